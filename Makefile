@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Thin fronts over CMake; everything here can be typed by hand (docs/development.md).
+# The release preset is what the demo, the tests and the image use.
+PRESET ?= release
+JOBS   ?= $(shell nproc)
+BUILD  := build/$(PRESET)
+
+.DEFAULT_GOAL := help
+.PHONY: help setup configure build demo test format format-check tidy image clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
+	  || sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' $(MAKEFILE_LIST)
+
+setup: ## install the Debian packages that are missing (root or sudo)
+	@docker/install-packages.sh docker/packages-build.txt
+
+configure: setup
+	@cmake --preset $(PRESET) --log-level=WARNING
+
+build: configure ## build everything, tests included, into build/release
+	cmake --build --preset $(PRESET) -j $(JOBS)
+
+demo: configure ## build the binaries and run the whole job on the default case, into demo/
+	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift
+	cmake/scripts/demo.sh $(BUILD)/bin
+
+test: build ## build and run all tests
+	ctest --preset $(PRESET) -j 2
+
+format: ## rewrite the C++ sources in the house format
+	@cmake/scripts/clang-format.sh write
+
+format-check: ## fail where a C++ source is not in the house format
+	@cmake/scripts/clang-format.sh check
+
+tidy: configure ## run clang-tidy over common/, server/ and client/
+	@cmake/scripts/clang-tidy.sh $(BUILD)
+
+image: ## build the container image and start it once, without a container engine (root)
+	docker/build-image-without-engine.sh
+
+clean: ## remove what the targets above have made
+	rm -rf build demo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/cli/command.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+namespace brainshift::client {
+
+int exit_status(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidArgument:
+    case ErrorCode::kNotFound:
+    case ErrorCode::kUnreadable:
+    case ErrorCode::kDegenerateMesh:
+    case ErrorCode::kEmptySet:
+    case ErrorCode::kFloatingBody:
+    case ErrorCode::kNotFinite: return 2;
+    case ErrorCode::kWriteFailed:
+    case ErrorCode::kSingularMatrix:
+    case ErrorCode::kNotConverged:
+    case ErrorCode::kModelNotReady:
+    case ErrorCode::kProtocol:
+    case ErrorCode::kUnavailable:
+    case ErrorCode::kInternal: return 1;
+  }
+  return 1;
+}
+
+void print_error(std::string_view sentence) {
+  std::string line(sentence);
+  for (char& c : line) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  std::fprintf(stderr, "brainshift: %s\n", line.c_str());
+}
+
+Progress terminal_progress() {
+  if (::isatty(STDERR_FILENO) == 0) return {};
+  // The stage on the line now; empty when the line is free.
+  auto shown = std::make_shared<std::string>();
+  return [shown](std::string_view stage, double fraction) {
+    if (!shown->empty() && *shown != stage) std::fputc('\n', stderr);
+    *shown = stage;
+    std::fprintf(stderr, "\r\033[K%-32.*s %3.0f %%", static_cast<int>(stage.size()), stage.data(),
+                 100.0 * fraction);
+    if (fraction >= 1.0) {
+      std::fputc('\n', stderr);
+      shown->clear();
+    }
+    std::fflush(stderr);
+  };
+}
+
+}  // namespace brainshift::client

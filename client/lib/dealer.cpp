@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/lib/dealer.hpp"
+
+#include <zmq.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <utility>
+
+#include "common/wire/frame.hpp"
+
+namespace brainshift::client {
+namespace {
+
+constexpr const char* kMonitorAddress = "inproc://connection";  // per context, and so per Dealer
+// Updates waiting in the socket: 64 of 2 MiB. The daemon decides what a slow reader misses.
+constexpr int kReceiveHighWaterMark = 64;
+constexpr int kSendHighWaterMark = 16;
+constexpr int kReconnectMs = 50;
+constexpr int kReconnectMaxMs = 1000;
+constexpr int kHandshakeMs = 5000;
+constexpr int kMissedHeartbeats = 3;
+
+long remaining_ms(Deadline deadline) {
+  const auto left =
+      std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+  return std::max<long>(0, static_cast<long>(left.count()));
+}
+
+bool set_option(void* socket, int option, int value) {
+  return zmq_setsockopt(socket, option, &value, sizeof value) == 0;
+}
+
+bool set_options(void* socket, int heartbeat_ms) {
+  const std::array<std::pair<int, int>, 10> options = {{
+      {ZMQ_LINGER, 0},
+      {ZMQ_IMMEDIATE, 1},
+      {ZMQ_HEARTBEAT_IVL, heartbeat_ms},
+      {ZMQ_HEARTBEAT_TIMEOUT, kMissedHeartbeats * heartbeat_ms},
+      {ZMQ_HANDSHAKE_IVL, kHandshakeMs},
+      {ZMQ_RECONNECT_IVL, kReconnectMs},
+      {ZMQ_RECONNECT_IVL_MAX, kReconnectMaxMs},
+      {ZMQ_RCVHWM, kReceiveHighWaterMark},
+      {ZMQ_SNDHWM, kSendHighWaterMark},
+      {ZMQ_RCVTIMEO, 0},
+  }};
+  const bool set = std::all_of(options.begin(), options.end(), [&](const auto& option) {
+    return set_option(socket, option.first, option.second);
+  });
+  const auto max_bytes = static_cast<std::int64_t>(wire::kHeaderBytes + wire::kMaxPayloadBytes);
+  return set && zmq_setsockopt(socket, ZMQ_MAXMSGSIZE, &max_bytes, sizeof max_bytes) == 0;
+}
+
+// A zmq_msg_t that closes itself.
+class Message {
+ public:
+  Message() { zmq_msg_init(&message_); }
+  Message(const Message&) = delete;
+  Message& operator=(const Message&) = delete;
+  ~Message() { zmq_msg_close(&message_); }
+
+  bool receive(void* socket) { return zmq_msg_recv(&message_, socket, ZMQ_DONTWAIT) >= 0; }
+  bool more() const { return zmq_msg_more(&message_) != 0; }
+  std::string bytes() {
+    return {static_cast<const char*>(zmq_msg_data(&message_)), zmq_msg_size(&message_)};
+  }
+
+ private:
+  zmq_msg_t message_;
+};
+
+// Discards what follows a message's first part.
+void drain_parts(void* socket) {
+  Message part;
+  while (part.receive(socket) && part.more()) {
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Dealer>> Dealer::connect(const std::string& endpoint,
+                                                std::chrono::milliseconds heartbeat_interval) {
+  std::unique_ptr<Dealer> dealer(new Dealer());
+  if (Status status = dealer->open(endpoint, heartbeat_interval); !status) {
+    return tl::unexpected(status.error());
+  }
+  return dealer;
+}
+
+Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval) {
+  endpoint_ = endpoint;
+  context_ = zmq_ctx_new();
+  if (context_ != nullptr) socket_ = zmq_socket(context_, ZMQ_DEALER);
+  if (socket_ == nullptr || !set_options(socket_, static_cast<int>(heartbeat_interval.count()))) {
+    return fail(ErrorCode::kInternal, endpoint + ": cannot open a socket: " + zmq_strerror(errno));
+  }
+  if (Status status = open_monitor(); !status) return status;
+  if (zmq_connect(socket_, endpoint.c_str()) != 0) {
+    return fail(ErrorCode::kInvalidArgument, "endpoint " + endpoint + ": " + zmq_strerror(errno) +
+                                                 " (e.g. tcp://127.0.0.1:5555)");
+  }
+  return {};
+}
+
+Status Dealer::open_monitor() {
+  monitor_ = zmq_socket(context_, ZMQ_PAIR);
+  if (monitor_ == nullptr || !set_option(monitor_, ZMQ_LINGER, 0) ||
+      zmq_socket_monitor(socket_, kMonitorAddress, ZMQ_EVENT_DISCONNECTED) != 0 ||
+      zmq_connect(monitor_, kMonitorAddress) != 0) {
+    return fail(ErrorCode::kInternal,
+                endpoint_ + ": cannot watch the connection: " + zmq_strerror(errno));
+  }
+  return {};
+}
+
+Dealer::~Dealer() {
+  if (socket_ != nullptr) zmq_close(socket_);
+  if (monitor_ != nullptr) zmq_close(monitor_);
+  if (context_ != nullptr) zmq_ctx_term(context_);
+}
+
+void Dealer::drain_monitor() {
+  Message event;
+  while (event.receive(monitor_)) {
+  }
+}
+
+Status Dealer::send(std::string_view message, Deadline deadline) {
+  do {
+    zmq_pollitem_t item{socket_, 0, ZMQ_POLLOUT, 0};
+    zmq_poll(&item, 1, remaining_ms(deadline));
+    // A connection that accepts messages was made after every loss that the monitor has told of so far.
+    drain_monitor();
+    if (zmq_send(socket_, message.data(), message.size(), ZMQ_DONTWAIT) >= 0) return {};
+    if (errno != EAGAIN && errno != EINTR) {
+      return fail(ErrorCode::kUnavailable, endpoint_ + ": cannot send: " + zmq_strerror(errno));
+    }
+  } while (remaining_ms(deadline) > 0);
+  return fail(ErrorCode::kUnavailable, "no daemon at " + endpoint_);
+}
+
+Result<std::string> Dealer::receive(Deadline deadline) {
+  while (true) {
+    std::array<zmq_pollitem_t, 2> items = {
+        {{socket_, 0, ZMQ_POLLIN, 0}, {monitor_, 0, ZMQ_POLLIN, 0}}};
+    zmq_poll(items.data(), static_cast<int>(items.size()), remaining_ms(deadline));
+    // What arrived before the connection was lost is still good.
+    if ((items[0].revents & ZMQ_POLLIN) != 0) return receive_waiting();
+    if ((items[1].revents & ZMQ_POLLIN) != 0) {
+      drain_monitor();
+      return fail(ErrorCode::kUnavailable, "lost the connection to " + endpoint_);
+    }
+    if (remaining_ms(deadline) == 0) {
+      return fail(ErrorCode::kUnavailable, "no answer in time from " + endpoint_);
+    }
+  }
+}
+
+Result<std::string> Dealer::receive_waiting() {
+  Message message;
+  if (!message.receive(socket_)) {
+    return fail(ErrorCode::kUnavailable, endpoint_ + ": cannot receive: " + zmq_strerror(errno));
+  }
+  if (message.more()) {
+    drain_parts(socket_);
+    return fail(ErrorCode::kProtocol, endpoint_ + " sent a multipart message");
+  }
+  return message.bytes();
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// A ZeroMQ DEALER socket that sends and receives single-part messages before a deadline.
+// Private to client/lib; knows nothing of what the bytes mean.
+//
+// Messages are handed only to completed connections, so that a request to nobody fails instead of waiting
+// in a queue. Heartbeats notice a peer that vanished without closing; a lost connection is reported
+// while waiting, because the peer's answer is then lost with it. The socket reconnects by itself.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/core/error.hpp"
+
+namespace brainshift::client {
+
+using Deadline = std::chrono::steady_clock::time_point;
+
+class Dealer {
+ public:
+  // kInvalidArgument for an endpoint that ZeroMQ does not understand. Does not wait for the peer.
+  static Result<std::unique_ptr<Dealer>> connect(const std::string& endpoint,
+                                                 std::chrono::milliseconds heartbeat_interval);
+  Dealer(const Dealer&) = delete;
+  Dealer& operator=(const Dealer&) = delete;
+  ~Dealer();
+
+  // kUnavailable when no connection accepts the message before the deadline.
+  Status send(std::string_view message, Deadline deadline);
+  // kUnavailable at the deadline or when the connection is lost; kProtocol for a multipart message.
+  Result<std::string> receive(Deadline deadline);
+
+  const std::string& endpoint() const { return endpoint_; }
+
+ private:
+  Dealer() = default;
+  Status open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval);
+  Status open_monitor();
+  // Forgets connections lost in the past.
+  void drain_monitor();
+  Result<std::string> receive_waiting();
+
+  std::string endpoint_;
+  void* context_ = nullptr;
+  void* socket_ = nullptr;
+  void* monitor_ = nullptr;
+};
+
+}  // namespace brainshift::client

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/lib/update_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace brainshift::client {
+
+void UpdateQueue::push(Result<wire::UpdateMessage> update) {
+  updates_.push_back(std::move(update));
+  if (updates_.size() <= capacity_) return;
+  const auto iterate = std::find_if(updates_.begin(), updates_.end(), [](const auto& entry) {
+    return entry && !entry->error && !entry->update.final;
+  });
+  if (iterate != updates_.end()) updates_.erase(iterate);
+}
+
+std::optional<Result<wire::UpdateMessage>> UpdateQueue::pop() {
+  if (updates_.empty()) return std::nullopt;
+  std::optional<Result<wire::UpdateMessage>> front(std::move(updates_.front()));
+  updates_.pop_front();
+  return front;
+}
+
+}  // namespace brainshift::client

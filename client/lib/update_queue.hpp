@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Updates that arrived while a call waited for something else, in order of arrival.
+// Private to client/lib.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+
+#include "common/core/error.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+
+// Holds `capacity` entries. When full, the oldest iterate gives way: a newer one says more. Final updates
+// and errors are never dropped, so that the queue grows past its capacity if it holds nothing else.
+class UpdateQueue {
+ public:
+  explicit UpdateQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  void push(Result<wire::UpdateMessage> update);
+  std::optional<Result<wire::UpdateMessage>> pop();
+  std::size_t size() const { return updates_.size(); }
+
+ private:
+  std::size_t capacity_;
+  std::deque<Result<wire::UpdateMessage>> updates_;
+};
+
+}  // namespace brainshift::client

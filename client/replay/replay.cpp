@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/replay/replay.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <span>
+
+#include "client/lib/client.hpp"
+#include "client/replay/score.hpp"
+#include "common/io/mesh_file.hpp"
+#include "common/io/surgery_file.hpp"
+
+namespace brainshift::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Surgery {
+  io::SurgeryFile file;
+  std::string case_id;
+  std::string model_id;
+  std::string case_file;
+  std::string scenario;
+  std::optional<std::uint64_t> seed;
+  std::vector<RecordedObservation> observations;
+};
+
+Result<std::string> meta_value(const io::SurgeryFile& file, const fs::path& path, const char* key) {
+  const auto found = file.meta().find(key);
+  if (found == file.meta().end() || found->second.empty()) {
+    return fail(ErrorCode::kUnreadable, path.string() + ": meta." + key + " is missing");
+  }
+  return found->second;
+}
+
+std::string optional_meta(const io::SurgeryFile& file, const char* key) {
+  const auto found = file.meta().find(key);
+  return found == file.meta().end() ? std::string() : found->second;
+}
+
+std::optional<std::uint64_t> parse_seed(const std::string& text) {
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return seed;
+}
+
+Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
+                                                           const fs::path& path) {
+  const auto records = file.records("observation");
+  if (!records) return tl::unexpected<Error>(records.error());
+  std::vector<RecordedObservation> observations;
+  for (const io::SurgeryRecord& record : *records) {
+    auto observation = wire::decode_observation(record.payload);
+    if (!observation) {
+      return fail(ErrorCode::kUnreadable, path.string() + ": observation " +
+                                              std::to_string(record.sequence) + ": " +
+                                              observation.error().message);
+    }
+    observations.push_back({record.recorded_ns, std::move(*observation)});
+  }
+  if (observations.empty()) {
+    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation");
+  }
+  return observations;
+}
+
+Result<Surgery> open_surgery(const fs::path& path) {
+  auto file = io::SurgeryFile::open(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  auto case_id = meta_value(*file, path, "case_id");
+  if (!case_id) return tl::unexpected<Error>(case_id.error());
+  auto model_id = meta_value(*file, path, "model_id");
+  if (!model_id) return tl::unexpected<Error>(model_id.error());
+  auto observations = read_observations(*file, path);
+  if (!observations) return tl::unexpected<Error>(observations.error());
+
+  Surgery surgery{std::move(*file), *case_id, *model_id, {}, {}, {}, {}};
+  surgery.case_file = optional_meta(surgery.file, "case_file");
+  surgery.scenario = optional_meta(surgery.file, "scenario");
+  if (surgery.scenario.empty()) surgery.scenario = path.stem().string();
+  surgery.seed = parse_seed(optional_meta(surgery.file, "seed"));
+  surgery.observations = std::move(*observations);
+  return surgery;
+}
+
+Status check_daemon(Client& client, const Surgery& surgery, const ReplayOptions& options) {
+  const auto status = client.status();
+  if (!status) return tl::unexpected<Error>(status.error());
+  if (!status->model_ready) {
+    return fail(ErrorCode::kModelNotReady, options.endpoint + ": the daemon has no model loaded");
+  }
+  const auto differs = [&](const char* key, const std::string& recorded,
+                           const std::string& served) {
+    return fail(ErrorCode::kInvalidArgument, options.surgery.string() + ": meta." + key + " is \"" +
+                                                 recorded + "\", but the daemon at " +
+                                                 options.endpoint + " serves \"" + served + "\"");
+  };
+  if (status->case_id != surgery.case_id)
+    return differs("case_id", surgery.case_id, status->case_id);
+  if (status->model_id != surgery.model_id) {
+    return differs("model_id", surgery.model_id, status->model_id);
+  }
+  return {};
+}
+
+struct Session {
+  Client client;
+  wire::SessionInfo info;
+  BrainModel model;
+};
+
+// A client of its own per boundary: nothing of an earlier session can still be queued in it.
+Result<Session> start_session(const Surgery& surgery, const ReplayOptions& options,
+                              Boundary boundary) {
+  auto client = Client::connect(options.endpoint);
+  if (!client) return tl::unexpected<Error>(client.error());
+  if (Status ok = check_daemon(*client, surgery, options); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  auto info = client->start_session({.case_id = surgery.case_id,
+                                     .method = options.method,
+                                     .boundary = boundary,
+                                     .publish_iterates = true});
+  if (!info) return tl::unexpected<Error>(info.error());
+  auto model = client->model();
+  if (!model) return tl::unexpected<Error>(model.error());
+  if (Status ok = client->subscribe(); !ok) return tl::unexpected<Error>(ok.error());
+  return Session{std::move(*client), std::move(*info), std::move(*model)};
+}
+
+Status write_fields(const fs::path& path, const BrainModel& model, const Points& estimated,
+                    const std::optional<io::SurgeryTruth>& truth) {
+  std::vector<io::NodeField> fields;
+  fields.push_back({"displacement_estimated", estimated});
+  if (truth) {
+    fields.push_back({"displacement_true", truth->displacement});
+    fields.push_back({"error_mm", (estimated - truth->displacement).colwise().norm()});
+  }
+  return io::write_vtu(path, model.mesh, fields);
+}
+
+RunReport describe_run(const Surgery& surgery, const Session& session, const ReplayOptions& options,
+                       Boundary boundary) {
+  RunReport run;
+  run.case_id = surgery.case_id;
+  run.scenario = surgery.scenario;
+  run.method = to_string(options.method);
+  run.boundary = to_string(boundary);
+  run.seed = surgery.seed;
+  run.model_id = surgery.model_id;
+  run.case_file = surgery.case_file;
+  run.surgery_file = options.surgery.string();
+  run.mesh = {session.info.nodes, session.info.tets, session.info.slaves};
+  run.prepare_s = session.info.prepare_s;
+  run.factor_s = session.info.factor_s;
+  run.model_bytes = session.info.model_bytes;
+  run.full_solve_ms = session.info.full_solve_ms;
+  return run;
+}
+
+// Everything that the last update says, with truth where the surgery carries it.
+Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSession& played,
+                const fs::path& field_file, RunReport& run) {
+  const Update& update = *played.last;
+  if (update.estimate.displacement.cols() != model.mesh.num_nodes()) {
+    return fail(ErrorCode::kProtocol,
+                "update " + std::to_string(update.sequence) + ": displacement of " +
+                    std::to_string(update.estimate.displacement.cols()) + " nodes, the model has " +
+                    std::to_string(model.mesh.num_nodes()));
+  }
+  const auto truth = read_truth(surgery.file, update.observation_sequence, model);
+  if (!truth) return tl::unexpected<Error>(truth.error());
+  describe(model, update.estimate, run);
+  run.left_out = update.left_out;
+  if (*truth) {
+    if (Status ok = score(model, **truth, update.estimate, run); !ok) return ok;
+  }
+  run.trace = trace_of(played, [&](const Points& displacement) {
+    return *truth ? cross_error(**truth, displacement) : std::nullopt;
+  });
+  run.field_file = field_file.filename().string();
+  return write_fields(field_file, model, update.estimate.displacement, *truth);
+}
+
+Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& options,
+                               Boundary boundary, const Progress& progress) {
+  report(progress, "prepare " + std::string(to_string(boundary)), 0.0);
+  auto session = start_session(surgery, options, boundary);
+  if (!session) return tl::unexpected<Error>(session.error());
+  report(progress, "prepare " + std::string(to_string(boundary)), 1.0);
+
+  const DaemonLink link{
+      [&](const Observation& observation) { return session->client.submit(observation); },
+      [&](std::chrono::milliseconds timeout) { return session->client.next_update(timeout); }};
+  const PlayOptions play_options{session->info.session_id, options.speed, options.timeout};
+  const std::string stage = "replay " + std::string(to_string(boundary));
+  const PlayedSession played =
+      play(link, surgery.observations, play_options,
+           [&](std::string_view, double fraction) { report(progress, stage, fraction); });
+
+  RunReport run = describe_run(surgery, *session, options, boundary);
+  summarise(played, run);
+  if (played.last) {
+    const fs::path field_file =
+        options.report.parent_path() /
+        (options.report.stem().string() + "-" + run.scenario + "-" + run.boundary + ".vtu");
+    if (Status ok = evaluate(surgery, session->model, played, field_file, run); !ok) {
+      return tl::unexpected<Error>(ok.error());
+    }
+  }
+  return run;
+}
+
+}  // namespace
+
+Status replay(const ReplayOptions& options, const Progress& progress) {
+  const auto surgery = open_surgery(options.surgery);
+  if (!surgery) return tl::unexpected<Error>(surgery.error());
+  std::vector<RunReport> runs;
+  for (const Boundary boundary : options.boundaries) {
+    auto run = run_boundary(*surgery, options, boundary, progress);
+    if (!run) return tl::unexpected<Error>(run.error());
+    runs.push_back(std::move(*run));
+  }
+  if (Status ok = write_reports(options.report, runs); !ok) return ok;
+  for (const RunReport& run : runs) {
+    if (run.updates > 0) continue;
+    const std::string cause = run.failures.empty() ? "" : ": " + run.failures.front().message;
+    return fail(ErrorCode::kNotConverged, options.surgery.string() +
+                                              ": no observation was answered with an "
+                                              "estimate under the " +
+                                              run.boundary + " boundary" + cause);
+  }
+  return {};
+}
+
+void summarise(const PlayedSession& session, RunReport& run) {
+  std::vector<double> latency;
+  std::vector<double> first_iterate;
+  std::vector<StageTimings> timings;
+  for (const PlayedObservation& observation : session.observations) {
+    if (observation.error) {
+      run.failures.push_back({observation.sequence, std::string(to_string(observation.error->code)),
+                              observation.error->message});
+    }
+    run.superseded += observation.superseded ? 1 : 0;
+    if (!observation.latency_ms) continue;
+    latency.push_back(*observation.latency_ms);
+    timings.push_back(observation.timings);
+    if (observation.first_iterate_ms) first_iterate.push_back(*observation.first_iterate_ms);
+  }
+  run.updates = static_cast<int>(latency.size());
+  if (latency.empty()) return;
+
+  run.latency_ms = LatencyPercentiles{percentile(latency, 50), percentile(latency, 95),
+                                      percentile(latency, 99), percentile(latency, 100)};
+  run.cold_ms = latency.front();
+  if (!first_iterate.empty()) run.first_iterate_ms = percentile(first_iterate, 50);
+  const auto median = [&timings](double StageTimings::*stage) {
+    std::vector<double> values;
+    for (const StageTimings& t : timings) values.push_back(t.*stage);
+    return percentile(values, 50);
+  };
+  run.stages_ms = StageMedians{median(&StageTimings::register_ms), median(&StageTimings::invert_ms),
+                               median(&StageTimings::rebuild_ms), median(&StageTimings::encode_ms),
+                               median(&StageTimings::journal_ms)};
+}
+
+std::vector<TracePoint> trace_of(
+    const PlayedSession& session,
+    const std::function<std::optional<MeanStd>(const Points&)>& cross_of) {
+  std::vector<TracePoint> trace;
+  if (!session.last) return trace;
+  for (const IterationRecord& record : session.last->estimate.history) {
+    TracePoint point{record.iteration,   record.misfit_mm,          std::nullopt,
+                     record.penetrating, record.max_penetration_mm, record.elapsed_ms};
+    const auto iterate =
+        std::find_if(session.iterates.begin(), session.iterates.end(),
+                     [&](const Iterate& it) { return it.iteration == record.iteration; });
+    if (iterate != session.iterates.end()) point.cross = cross_of(iterate->displacement);
+    trace.push_back(point);
+  }
+  return trace;
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// RunReport: what one run (scenario x method x boundary) of a replay showed; one object of report.json.
+//
+// The keys are the contract of docs/DESIGN section 6. A value that does not apply (no truth recorded, no
+// uncertainty computed, no update) is nullopt here and null there; so is a number that is not finite.
+// Unknown keys are ignored on reading, because newer writers may add some.
+// Lengths mm, times ms or s as the name says, angles degrees, shares percent.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/estimate.hpp"
+
+namespace brainshift::client {
+
+struct MeshSize {
+  int nodes = 0;
+  int tets = 0;
+  int slaves = 0;
+};
+
+// Over the final updates of a run, linear interpolation between order statistics.
+struct LatencyPercentiles {
+  double p50 = 0.0;
+  double p95 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+
+// Median per stage over the final updates, ms.
+struct StageMedians {
+  double register_ms = 0.0;
+  double invert_ms = 0.0;
+  double rebuild_ms = 0.0;
+  double encode_ms = 0.0;
+  double journal_ms = 0.0;
+};
+
+// mm; see score.hpp for the definition of each.
+struct RunErrors {
+  std::optional<MeanStd> initial;
+  std::optional<MeanStd> sparse_initial;
+  std::optional<MeanStd> sparse;
+  std::optional<MeanStd> cross;
+  std::optional<MeanStd> craniotomy_initial;
+  std::optional<MeanStd> craniotomy;
+  std::optional<MeanStd> craniotomy_displacement_initial;
+  std::optional<MeanStd> craniotomy_displacement;
+};
+
+// |u_est - u_true| over all nodes, percent of the largest |u_true|.
+struct FieldError {
+  double p50 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+
+// One iteration: the paper's Fig. 3. `cross` is null when that iterate was not received or truth is absent.
+struct TracePoint {
+  int iteration = 0;
+  MeanStd sparse;
+  std::optional<MeanStd> cross;
+  int penetrating = 0;
+  double max_penetration_mm = 0.0;
+  double elapsed_ms = 0.0;
+};
+
+struct RunFailure {
+  std::uint64_t observation_sequence = 0;
+  std::string code;
+  std::string message;
+};
+
+struct RunReport {
+  std::string case_id;
+  std::string scenario;
+  std::string method;
+  std::string boundary;
+  std::optional<std::uint64_t> seed;
+  std::string model_id;
+  std::string case_file;
+  std::string surgery_file;
+  std::string field_file;  // relative to the report; empty when no update came
+
+  MeshSize mesh;
+  std::optional<double> prepare_s;
+  std::optional<double> factor_s;
+  std::optional<std::uint64_t> model_bytes;
+  std::optional<double> full_solve_ms;
+
+  int updates = 0;     // final updates received
+  int superseded = 0;  // observations dropped by the daemon in favour of newer ones
+  std::string status;  // of the last final update
+  std::string reason;
+  std::optional<LatencyPercentiles> latency_ms;  // message sent -> final update received
+  std::optional<double> cold_ms;                 // the first of them
+  std::optional<double> first_iterate_ms;        // median; message sent -> first iterate received
+  std::optional<StageMedians> stages_ms;
+
+  RunErrors error_mm;
+  std::optional<double> recovery_pct;
+  std::optional<double> craniotomy_recovery_pct;               // by closest-point distance
+  std::optional<double> craniotomy_displacement_recovery_pct;  // by displacement, sliding included
+  std::optional<FieldError> field_error_pct;
+  std::optional<double> share_below_5_pct;
+  std::optional<double> largest_true_displacement_mm;
+  std::optional<double> coverage_90;
+  std::optional<ContactSummary> contact;
+  std::optional<double> principal_direction_deg;
+  std::optional<double> principal_direction_true_deg;
+
+  std::map<std::string, double> truth_scalars;
+  std::vector<Omission> left_out;
+  std::vector<RunFailure> failures;
+  std::vector<TracePoint> trace;
+};
+
+// JSON text, an array with one object per run; two-space indentation.
+std::string to_json(const std::vector<RunReport>& runs);
+
+// `origin` (a file name) opens every message. kUnreadable: not JSON, not an array of objects, a required key
+// (case, scenario, method, boundary) missing, or a value of the wrong type; the sentence names the key as
+// "R.json: [0].error_mm.cross.mean ...".
+Result<std::vector<RunReport>> from_json(const std::string& text, const std::string& origin);
+
+// kWriteFailed; an existing file is replaced.
+Status write_reports(const std::filesystem::path& path, const std::vector<RunReport>& runs);
+// kNotFound, kUnreadable.
+Result<std::vector<RunReport>> read_reports(const std::filesystem::path& path);
+
+}  // namespace brainshift::client

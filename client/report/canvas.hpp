@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drawing primitives of the report's pictures. Private to client/report: pulls in OpenCV.
+//
+// Pictures are drawn at kPixelRatio times the size at which the page shows them, so that the stroke font
+// stays legible. All lengths here are device pixels; colours are BGR.
+// Hershey fonts know ASCII only: write "deg" and "+/-".
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace brainshift::client {
+
+inline constexpr int kPixelRatio = 2;
+
+// Okabe and Ito's palette: distinguishable under the common colour-vision deficiencies.
+namespace palette {
+inline const cv::Scalar kBlack(0, 0, 0);
+inline const cv::Scalar kWhite(255, 255, 255);
+inline const cv::Scalar kOrange(0, 159, 230);
+inline const cv::Scalar kSkyBlue(233, 180, 86);
+inline const cv::Scalar kGreen(115, 158, 0);
+inline const cv::Scalar kYellow(66, 228, 240);
+inline const cv::Scalar kBlue(178, 114, 0);
+inline const cv::Scalar kVermillion(0, 94, 213);
+inline const cv::Scalar kPurple(167, 121, 204);
+inline const cv::Scalar kInk(40, 40, 40);
+inline const cv::Scalar kGrey(120, 120, 120);
+inline const cv::Scalar kPale(225, 225, 225);
+}  // namespace palette
+
+enum class Align { kLeft, kCentre, kRight };
+
+struct TextStyle {
+  double cap_px = 20.0;  // height of a capital letter
+  cv::Scalar colour = palette::kInk;
+  Align align = Align::kLeft;
+  bool bold = false;
+  bool halo = false;  // black rim, for text on images
+};
+
+// Width in pixels; `at` is the baseline's left end, middle or right end.
+int text_width(const std::string& text, const TextStyle& style);
+void draw_text(cv::Mat& image, cv::Point at, const std::string& text, const TextStyle& style = {});
+// Reads from bottom to top, centred on `centre`.
+void draw_vertical_text(cv::Mat& image, cv::Point centre, const std::string& text,
+                        const TextStyle& style = {});
+
+struct Stroke {
+  cv::Scalar colour = palette::kInk;
+  int thickness = 2;
+  double dash_px = 0.0;  // 0: solid; else equal dashes and gaps
+};
+
+// Sub-pixel, anti-aliased. Parts outside the image are clipped.
+void draw_polyline(cv::Mat& image, const std::vector<cv::Point2d>& points, const Stroke& stroke);
+// `head_px`: length of the barbs, shortened for short arrows. `rim` > 0 draws a black rim of that width.
+void draw_arrow(cv::Mat& image, cv::Point2d from, cv::Point2d to, const Stroke& stroke,
+                double head_px = 16.0, int rim = 0);
+
+enum class Marker { kNone, kCircle, kSquare, kTriangle };
+void draw_marker(cv::Mat& image, cv::Point2d at, Marker marker, const cv::Scalar& colour,
+                 int radius = 8);
+
+// Viridis without its darkest quarter, which would vanish on an MRI; t is clamped to [0, 1].
+cv::Scalar magnitude_colour(double t);
+
+// Vertical bar from 0 (bottom) to max (top) with ticks on its right and a vertical label beyond them.
+void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std::string& label,
+                     const cv::Scalar& ink);
+
+// Round tick positions (1, 2 or 5 times a power of ten apart) within [min, max]; about `target` of them.
+// Precondition: min < max.
+std::vector<double> nice_ticks(double min, double max, int target = 6);
+
+// As many decimals as the step between ticks needs.
+std::string tick_label(double value, double step);
+std::string fixed_decimals(double value, int decimals);
+
+}  // namespace brainshift::client

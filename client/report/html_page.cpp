@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/report/html_page.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+
+namespace brainshift::client {
+namespace {
+
+// Colours by role, given twice: light and dark. Pictures keep their own white ground in both.
+constexpr const char* kStyle = R"(
+:root { color-scheme: light dark; --ground: #ffffff; --ink: #1c1c1c; --soft: #5a5a5a; --rule: #d4d4d4;
+        --head: #f1f3f5; --paper: #eef4fa; --warn: #b34700; }
+@media (prefers-color-scheme: dark) {
+  :root { --ground: #16181b; --ink: #e8e8e8; --soft: #a8a8a8; --rule: #3a3e44; --head: #22262b;
+          --paper: #1b2733; --warn: #ffb066; } }
+body { background: var(--ground); color: var(--ink); font: 16px/1.5 system-ui, sans-serif;
+       max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.7rem; margin-bottom: 0.2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
+p.note { border-left: 4px solid var(--warn); padding-left: 0.8rem; }
+.soft, figcaption { color: var(--soft); }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid var(--rule); padding: 0.3rem 0.7rem; text-align: right; white-space: nowrap; }
+thead th { background: var(--head); vertical-align: bottom; }
+tbody th { text-align: left; font-weight: normal; white-space: normal; min-width: 15rem; }
+.paper { background: var(--paper); }
+figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; border: 1px solid var(--rule); border-radius: 6px; background: #ffffff; }
+figcaption { font-size: 0.9rem; }
+.failures { color: var(--warn); }
+)";
+
+constexpr const char* kCitation =
+    "S. Ji, D. W. Roberts, A. Hartov, K. D. Paulsen: <cite>Brain&ndash;skull contact boundary "
+    "conditions in an inverse "
+    "computational deformation model</cite>, Medical Image Analysis, 2009; simulated case (patient "
+    "2), section 3.1, "
+    "and section 4 for ICP. The value in brackets is not printed there but follows from its "
+    "errors.";
+
+std::string scalar_list(const RunReport& run) {
+  std::string text;
+  for (const auto& [name, value] : run.truth_scalars) {
+    char buffer[64];
+    std::snprintf(buffer, sizeof buffer, "%.4g", value);
+    text += (text.empty() ? "" : ", ") + escape_html(name) + " = " + buffer;
+  }
+  return text;
+}
+
+std::string scenario_list(const std::vector<ReportedRun>& runs,
+                          const std::vector<RunGroup>& groups) {
+  std::string html = "<ul>\n";
+  for (const RunGroup& group : groups) {
+    const RunReport& run = runs[group.contact ? *group.contact : *group.fixed].report;
+    html += "<li><strong>" + escape_html(run.scenario) + "</strong>: case " +
+            escape_html(run.case_id) + ", method " + escape_html(run.method);
+    if (run.seed) html += ", seed " + std::to_string(*run.seed);
+    if (!run.model_id.empty()) html += ", model " + escape_html(run.model_id);
+    const std::string scalars = scalar_list(run);
+    if (!scalars.empty()) html += "; truth: " + scalars;
+    html += "</li>\n";
+  }
+  return html + "</ul>\n";
+}
+
+std::string section(const std::string& title, const std::string& body) {
+  return body.empty() ? "" : "<h2>" + title + "</h2>\n" + body;
+}
+
+std::string picture(const PagePicture& picture) {
+  return "<figure><img alt=\"" + escape_html(picture.caption) + "\" width=\"" +
+         std::to_string(picture.width) + "\" height=\"" + std::to_string(picture.height) +
+         "\" src=\"data:image/png;base64," + base64(picture.png) + "\"><figcaption>" +
+         escape_html(picture.caption) + "</figcaption></figure>\n";
+}
+
+}  // namespace
+
+std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
+                      const std::vector<PagePicture>& pictures) {
+  std::string html =
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>brainshift report</title>\n<style>" +
+      std::string(kStyle) + "</style></head>\n<body>\n";
+  html +=
+      "<h1>Brain shift: what the replays showed</h1>\n"
+      "<p class=\"note\">Research software for simulation, replay and laboratory use. It is no "
+      "medical device and "
+      "must not guide the treatment of patients.</p>\n";
+  html += scenario_list(runs, groups);
+  html += section("Failures", failure_list(runs));
+  html +=
+      section("Errors, beside the published ones",
+              error_table(runs) +
+                  "<p class=\"soft\">Mean &plusmn; standard deviation. Blue columns: " + kCitation +
+                  "</p>\n");
+  html += section(
+      "Timings",
+      timing_table(runs) +
+          "<p class=\"soft\">Latency: from sending an observation to having received its final "
+          "update, on the client's clock. Stages: medians reported by the daemon.</p>\n");
+  std::string figures;
+  for (const PagePicture& p : pictures) figures += picture(p);
+  html += section("Pictures", figures);
+  html += section("Left out of the model", left_out_list(runs));
+  return html + "</body></html>\n";
+}
+
+std::string escape_html(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&': escaped += "&amp;"; break;
+      case '<': escaped += "&lt;"; break;
+      case '>': escaped += "&gt;"; break;
+      case '"': escaped += "&quot;"; break;
+      case '\'': escaped += "&#39;"; break;
+      default: escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string base64(std::string_view bytes) {
+  static constexpr char kAlphabet[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      group = (group << 8) | (k < count ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += k <= count ? kAlphabet[(group >> (18 - 6 * k)) & 63u] : '=';
+    }
+  }
+  return text;
+}
+
+}  // namespace brainshift::client

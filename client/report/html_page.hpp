@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The report as one self-contained page: no script, no external link, images embedded.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/report/head.hpp"
+
+namespace brainshift::client {
+
+struct PagePicture {
+  std::string png;      // file content
+  std::string caption;  // plain text
+  int width = 0;        // CSS pixels
+  int height = 0;
+};
+
+std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
+                      const std::vector<PagePicture>& pictures);
+
+// The page's tables: errors beside the paper's, timings, what was left out, failures (empty string if none).
+std::string error_table(const std::vector<ReportedRun>& runs);
+std::string timing_table(const std::vector<ReportedRun>& runs);
+std::string left_out_list(const std::vector<ReportedRun>& runs);
+std::string failure_list(const std::vector<ReportedRun>& runs);
+
+// &, <, >, " and ' replaced by their entities.
+std::string escape_html(std::string_view text);
+std::string base64(std::string_view bytes);
+
+}  // namespace brainshift::client

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One slice: MRI, field arrows, magnitude map, outlines. Private to client/report: pulls in OpenCV.
+//
+// Radiological view: the patient's right is on the left of the picture; anterior (axial slice) or superior
+// (coronal slice) is up. Arrows and maps are
+// sampled on the undeformed slice; an arrow is the projection of the displacement on the slice plane, drawn
+// from the undeformed point, its colour the full length of the displacement.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "client/report/canvas.hpp"
+#include "common/core/mesh.hpp"
+#include "common/core/types.hpp"
+#include "common/geometry/tet_locator.hpp"
+
+namespace brainshift::client {
+
+enum class Plane {
+  kAxial,    // S constant, A up
+  kCoronal,  // A constant, S up
+};
+
+// Rectangle of a slice plane, mm RAS: x runs along R, "up" along A or S.
+struct SliceWindow {
+  Plane plane = Plane::kAxial;
+  double offset_mm = 0.0;  // the constant coordinate
+  double x_min = 0.0, x_max = 0.0, up_min = 0.0, up_max = 0.0;
+  double px_per_mm = 5.0;
+
+  int up_axis() const { return plane == Plane::kAxial ? 1 : 2; }
+  int normal_axis() const { return plane == Plane::kAxial ? 2 : 1; }
+  cv::Size size() const;
+  cv::Point2d pixel(const Vec3& x_ras) const;
+  Vec3 position(cv::Point2d pixel) const;  // in the plane
+};
+
+// Points of a square grid on the slice that lie inside the mesh, with their sampling weights.
+struct SliceSamples {
+  double spacing_mm = 0.0;
+  std::vector<Vec3> positions;
+  std::vector<geometry::TetLocation> locations;
+};
+SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow& window,
+                          double spacing_mm);
+
+// sum of weights times nodal values.
+Vec3 interpolate(const geometry::TetLocation& location, const Points& nodal);
+
+// Vertices moved by the field at their undeformed places.
+TriangleSurface deformed_surface(const TriangleSurface& surface,
+                                 const geometry::TetLocator& locator, const Points& displacement);
+
+// Segments of plane_section joined end to end into polylines (closed ones repeat their first point).
+std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface, const Vec3& normal,
+                                                 double offset);
+
+class SlicePanel {
+ public:
+  explicit SlicePanel(const SliceWindow& window);  // black
+
+  // Grey values between the 1st and 99.5th percentile of the slice's non-zero ones, at `brightness` of white.
+  void draw_mri(const VoxelImage& mri, double brightness);
+  // Colour over the samples' cells; max_mm is the colour scale's end.
+  void draw_magnitude_map(const SliceSamples& samples, const Points& field, double max_mm,
+                          double opacity);
+  // Arrow = magnification x displacement. `thin` draws hairlines in white instead of colours.
+  void draw_arrows(const SliceSamples& samples, const Points& displacement, double magnification,
+                   double max_mm, bool thin);
+  void draw_section(const TriangleSurface& surface, const Stroke& stroke);
+  // The letters of the four sides (R, L, A or S, P or I), and a scale bar of `bar_mm`.
+  void draw_orientation(double bar_mm);
+  // An arrow named "gravity" in the upper left corner (its projection on the slice).
+  void draw_gravity(const Vec3& direction);
+
+  const cv::Mat& image() const { return image_; }
+
+ private:
+  SliceWindow window_;
+  cv::Mat image_;
+};
+
+}  // namespace brainshift::client

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reports of replays to one folder: report.json (all runs), report.html (self-contained) and pictures.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+
+namespace brainshift::client {
+
+struct ReportOptions {
+  std::vector<std::filesystem::path> reports;  // report.json files
+  std::filesystem::path out;                   // folder, made if missing
+};
+
+// Slices are drawn for runs that name a field file and a case file; a file that is named must be there.
+// kNotFound / kUnreadable name the file and key; kInvalidArgument: a case file that has changed since the run; kEmptySet when the reports hold no run at all; kWriteFailed.
+// Each file is complete or absent.
+Status write_report(const ReportOptions& options, const Progress& progress = {});
+
+}  // namespace brainshift::client

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Twin: simulated surgeries with known truth (paper section 2.6), recorded as surgery files.
+//
+// The truth is a forward solution of the case's own model with contact: gravity and drainage down to the
+// scenario's fluid level. It is written to the truth tables of the surgery file, which only scoring reads;
+// the observations carry what an operating room would measure.
+// Inverse crime, as in the paper: truth and estimate use the same mesh and material. What the estimate does
+// not know is the load (fluid level), the contact state, and the noise.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+
+namespace brainshift::twin {
+
+struct ScenarioInfo {
+  std::string name;
+  std::string description;  // one line
+};
+std::vector<ScenarioInfo> scenarios();
+
+struct SimulateOptions {
+  std::filesystem::path case_file;
+  std::string scenario;
+  std::uint64_t seed = 1;
+  std::filesystem::path out;  // must not exist; nothing is left behind on failure
+};
+
+// kNotFound for an unknown scenario (the sentence lists the known ones); else as io, scene and fem.
+Status simulate(const SimulateOptions& options, const Progress& progress = {});
+
+}  // namespace brainshift::twin

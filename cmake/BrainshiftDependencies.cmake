@@ -1,0 +1,47 @@
+# Every third-party library, found once. The Debian packages are listed in docker/packages-build.txt.
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(tl-expected REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(Protobuf REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(HDF5 REQUIRED COMPONENTS C)
+find_package(pugixml REQUIRED)
+find_package(nanoflann REQUIRED)
+find_package(CGAL REQUIRED)
+pkg_check_modules(ZMQ REQUIRED IMPORTED_TARGET libzmq)
+
+# SuiteSparse ships no CMake package in Debian 12.
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(brainshift_cholmod INTERFACE)
+target_include_directories(brainshift_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
+target_link_libraries(brainshift_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+
+# OpenCV's CMake package lives in the meta-package only; the split packages hold headers and libraries.
+find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+add_library(brainshift_opencv INTERFACE)
+target_include_directories(brainshift_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE_DIR})
+foreach(module core imgproc imgcodecs)
+  find_library(OPENCV_${module}_LIBRARY opencv_${module} REQUIRED)
+  target_link_libraries(brainshift_opencv INTERFACE ${OPENCV_${module}_LIBRARY})
+endforeach()
+
+# libnifti's own CMake package names targets that Debian does not install. libnifti2 reads NIfTI-1 and -2;
+# libniftiio has the same symbols for NIfTI-1 alone, so only one is linked.
+find_path(NIFTI_INCLUDE_DIR nifti2_io.h PATH_SUFFIXES nifti REQUIRED)
+find_library(NIFTI_LIBRARY nifti2 REQUIRED)
+find_library(ZNZ_LIBRARY znz REQUIRED)
+add_library(brainshift_nifti INTERFACE)
+target_include_directories(brainshift_nifti SYSTEM INTERFACE ${NIFTI_INCLUDE_DIR})
+target_link_libraries(brainshift_nifti INTERFACE ${NIFTI_LIBRARY} ${ZNZ_LIBRARY} ZLIB::ZLIB)
+
+if(BRAINSHIFT_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+  find_package(benchmark REQUIRED)
+endif()

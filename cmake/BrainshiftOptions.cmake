@@ -1,0 +1,22 @@
+# Language level, warnings, sanitizers.
+option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
+set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+add_library(brainshift_warnings INTERFACE)
+target_compile_options(brainshift_warnings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Werror)
+
+if(BRAINSHIFT_SANITIZE)
+  add_compile_options(-fsanitize=${BRAINSHIFT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${BRAINSHIFT_SANITIZE})
+endif()

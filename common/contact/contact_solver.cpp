@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/contact/contact_solver.hpp"
+
+namespace brainshift::contact {
+
+Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
+                                           const fem::SparseCholesky& factor,
+                                           const fem::DofMap& dofs, const PenaltyContact& contact,
+                                           const Points& load,
+                                           const ContactSolverOptions& options) {
+  ContactSolution solution;
+  solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
+  fem::SparseCholesky penalised = factor.clone_analysis();
+  while (solution.iterations < options.max_iterations && !solution.converged) {
+    VecX unknowns;
+    if (count(solution.active) == 0) {
+      unknowns = factor.solve(dofs.restrict_to(load));
+    } else {
+      fem::SymmetricMatrix k_p = stiffness;
+      contact.add_stiffness(k_p, dofs, solution.active);
+      Points b_p = load;
+      contact.add_load(b_p, solution.active);
+      if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
+      unknowns = penalised.solve(dofs.restrict_to(b_p));
+    }
+    dofs.expand(unknowns, solution.displacement);
+    ++solution.iterations;
+    ActiveSet next = contact.penetrating(solution.displacement);
+    solution.converged = next == solution.active;
+    solution.active = std::move(next);
+  }
+  return solution;
+}
+
+}  // namespace brainshift::contact

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/contact/forward_model.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "common/geometry/surface.hpp"
+
+namespace brainshift::contact {
+namespace {
+
+// Average nodal normals of the boundary, 3 x n; zero at interior nodes.
+Points boundary_normals(const BrainModel& model) {
+  return geometry::vertex_normals({model.mesh.nodes, model.boundary_triangles});
+}
+
+fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
+  const Points normals = boundary_normals(model);
+  fem::DofMap dofs(model.mesh.num_nodes());
+  for (NodeIndex node : model.fixed) dofs.fix_normal(node, normals.col(node));
+  if (boundary == Boundary::kFixed) {
+    for (NodeIndex node : model.slaves) dofs.fix_normal(node, normals.col(node));
+  }
+  dofs.finalise();
+  return dofs;
+}
+
+}  // namespace
+
+ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
+                           fem::SparseCholesky factor, PenaltyContact contact, double assemble_s)
+    : boundary_(boundary),
+      dofs_(std::move(dofs)),
+      stiffness_(std::move(stiffness)),
+      factor_(std::move(factor)),
+      contact_(std::move(contact)),
+      assemble_s_(assemble_s) {}
+
+Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConfig& config,
+                                         Boundary boundary, const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  report(progress, "assemble", 0.0);
+  fem::DofMap dofs = constrain(model, boundary);
+  fem::SymmetricMatrix stiffness =
+      fem::assemble_stiffness(model.mesh, fem::elasticity_from(config.material), dofs);
+  const double assemble_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  std::vector<ContactPair> pairs;
+  if (boundary == Boundary::kContact) {
+    report(progress, "contact search", 0.0);
+    auto found = search_contact(model.mesh.nodes, model.slaves, model.skull);
+    if (!found) return tl::unexpected(found.error());
+    pairs = std::move(*found);
+  }
+  report(progress, "factorise", 0.0);
+  auto factor = fem::SparseCholesky::factorise(stiffness);
+  if (!factor) return tl::unexpected(factor.error());
+  report(progress, "factorise", 1.0);
+  return ForwardModel(boundary, std::move(dofs), std::move(stiffness), std::move(*factor),
+                      PenaltyContact(std::move(pairs), config.contact.penalty_n_per_mm),
+                      assemble_s);
+}
+
+std::uint64_t ForwardModel::bytes() const {
+  return factor_.bytes() +
+         static_cast<std::uint64_t>(stiffness_.nonZeros()) * (sizeof(double) + sizeof(long));
+}
+
+Points ForwardModel::solve(const Points& load) const {
+  return dofs_.expand(factor_.solve(dofs_.restrict_to(load)));
+}
+
+Result<ContactSolution> ForwardModel::solve_with_contact(const Points& load) const {
+  return contact::solve_with_contact(stiffness_, factor_, dofs_, contact_, load);
+}
+
+}  // namespace brainshift::contact

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// ForwardModel: K u = b of one patient under one boundary condition (paper section 2.6), factorised once.
+//
+//   craniotomy, brainstem   stress-free
+//   slaves                  kContact: free, with penalty contact against the skull; kFixed: normal-fixed
+//   fixed                   normal-fixed, tangentially free, exactly (rotated frames, eliminated)
+//
+// Normals of fixed nodes are the average nodal normals of the brain's boundary.
+#pragma once
+
+#include "common/contact/contact_solver.hpp"
+#include "common/contact/penalty.hpp"
+#include "common/core/brain_model.hpp"
+#include "common/core/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/core/estimate.hpp"
+#include "common/core/progress.hpp"
+#include "common/fem/cholesky.hpp"
+#include "common/fem/dof_map.hpp"
+
+namespace brainshift::contact {
+
+class ForwardModel {
+ public:
+  // kFloatingBody, kSingularMatrix, kNotFinite, kEmptySet: see SparseCholesky and search_contact.
+  static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
+                                    Boundary boundary, const Progress& progress = {});
+
+  Boundary boundary() const { return boundary_; }
+  const fem::DofMap& dofs() const { return dofs_; }
+  const fem::SymmetricMatrix& stiffness() const { return stiffness_; }
+  const fem::SparseCholesky& factor() const { return factor_; }
+  // No pairs under the fixed boundary condition.
+  const PenaltyContact& contact() const { return contact_; }
+  double assemble_seconds() const { return assemble_s_; }
+  std::uint64_t bytes() const;
+
+  // u = K^-1 b without contact; b, u: 3 x n.
+  Points solve(const Points& load) const;
+  // u with contact iterated to a stable active set; without slaves the same as solve().
+  Result<ContactSolution> solve_with_contact(const Points& load) const;
+
+ private:
+  ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
+               fem::SparseCholesky factor, PenaltyContact contact, double assemble_s);
+  Boundary boundary_;
+  fem::DofMap dofs_;
+  fem::SymmetricMatrix stiffness_;
+  fem::SparseCholesky factor_;
+  PenaltyContact contact_;
+  double assemble_s_;
+};
+
+}  // namespace brainshift::contact

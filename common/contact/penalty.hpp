@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Penalty contact against a rigid master surface (paper section 2.3, eq. 9-16).
+//
+//   penetration         P_i = 0p_i - N_i . u_i                                     (eq. 11; > 0 penetrates)
+//   energy              1/2 sum_active beta P_i^2                                   (eq. 14)
+//   modified system     K_p = K + sum_active beta N_i N_i^T,   b_p = b + sum_active beta 0p_i N_i   (eq. 16)
+//   contact force       beta P_i N_i, pushing the brain inwards when P_i > 0
+//
+// In the paper's matrices Q_i = -N_i^T. Slaves carry the identity frame, so only their diagonal blocks change
+// and the symbolic analysis of K serves K_p.
+#pragma once
+
+#include <vector>
+
+#include "common/contact/contact_search.hpp"
+#include "common/fem/dof_map.hpp"
+#include "common/fem/elasticity.hpp"
+
+namespace brainshift::contact {
+
+// One flag per slave, in the order of the pairs.
+using ActiveSet = std::vector<char>;
+
+class PenaltyContact {
+ public:
+  // beta in N/mm, > 0.
+  PenaltyContact(std::vector<ContactPair> pairs, double beta);
+
+  const std::vector<ContactPair>& pairs() const { return pairs_; }
+  int num_slaves() const { return static_cast<int>(pairs_.size()); }
+  double beta() const { return beta_; }
+
+  // P, one per slave, mm. u: 3 x n.
+  VecX penetration(const Points& u) const;
+  // Slaves with P > 0.
+  ActiveSet penetrating(const Points& u) const;
+
+  // K_p from K.
+  void add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+                     const ActiveSet& active) const;
+  // b_p from b (3 x n, N).
+  void add_load(Points& b, const ActiveSet& active) const;
+
+ private:
+  std::vector<ContactPair> pairs_;
+  double beta_;
+};
+
+int count(const ActiveSet& active);
+
+}  // namespace brainshift::contact

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// CaseConfig: what a case file says, as plain values in the units of its keys.
+//
+// Read from YAML by io::read_case_config, which resolves relative paths against the case file and
+// rejects unknown keys. validate() checks ranges and names the key, the value and the constraint.
+// Defaults: Table 1 and sections 2.2-2.6 of Ji, Roberts, Hartov, Paulsen (2009), unless said otherwise.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/types.hpp"
+
+namespace brainshift {
+
+// Mesh made from the brain mask. Edge lengths are target sizes of tetrahedra.
+struct MeshGeneration {
+  double edge_mm = 5.75;
+  double tumour_edge_mm = 5.75;      // within tumour_margin_mm of the tumour
+  double craniotomy_edge_mm = 5.75;  // within craniotomy_margin_mm of the craniotomy's rim
+  double tumour_margin_mm = 10.0;
+  double craniotomy_margin_mm = 10.0;
+  // Width of the Gaussian that smooths the mask before its half-level is meshed; closes sulci.
+  double smoothing_mm = 2.0;
+};
+struct MeshFile {
+  std::filesystem::path path;  // Gmsh .msh or VTK .vtu, mm RAS
+};
+
+struct TumourEllipsoid {
+  Vec3 centre_mm = Vec3::Zero();
+  Vec3 semi_axes_mm = Vec3::Ones();
+};
+struct TumourLabel {
+  std::filesystem::path path;  // NIfTI label volume
+  int label = 1;
+};
+struct TumourSurface {
+  std::filesystem::path path;  // .stl, .ply, .obj or .vtp, mm RAS, closed
+};
+
+// An opening on the brain surface: boundary nodes within an ellipse around `centre_mm`, in the plane
+// tangential to the surface, with the given full axes (the paper's "45 x 24 mm").
+struct Craniotomy {
+  Vec3 centre_mm = Vec3::Zero();  // projected to the nearest boundary point
+  double long_axis_mm = 45.0;
+  double short_axis_mm = 24.0;
+  Vec3 long_axis_direction = Vec3(0, 1, 0);  // projected to the tangent plane
+};
+
+// Boundary nodes within a sphere: where brainstem leaves the skull.
+struct Brainstem {
+  Vec3 centre_mm = Vec3::Zero();
+  double radius_mm = 12.0;
+};
+
+struct Material {  // Table 1
+  double shear_modulus_pa = 2100.0;
+  double poisson_ratio = 0.46;
+  double tissue_density_kg_m3 = 1000.0;
+  double fluid_density_saturated_kg_m3 = 1000.0;
+  double fluid_density_unsaturated_kg_m3 = 1.0;
+};
+
+struct ContactConfig {
+  double gap_mm = 1.0;                              // brain to skull (section 2.6)
+  std::optional<std::filesystem::path> skull_file;  // patient's own inner skull surface instead
+  double slave_depth_mm = 20.0;                     // second plane below the fluid plane
+  double penalty_n_per_mm = 5.0;                    // beta (section 2.3)
+};
+
+// Prior on forces: zero mean, force density with standard deviation and correlation length, plus
+// buoyancy modes for what pose and drainage leave open (docs/DESIGN section 3.3).
+struct PriorConfig {
+  double correlation_length_mm = 5.0;
+  double force_density_sd_n_m3 = 1000.0;
+  double gravity_mode_sd = 1.0;  // in units of the full buoyancy load; 0 switches the modes off
+  std::vector<double> gravity_levels_mm = {0.0, 20.0,
+                                           40.0};  // fluid planes below the reference plane
+};
+
+struct InversionConfig {
+  double sigma_mm = 0.2;    // sd of the data misfit (section 2.2)
+  int sparse_points = 200;  // boundary points used for guidance (section 2.6)
+  int max_iterations = 40;  // the paper needed 10 to 19 with contact (Table 5); twice that
+  double relative_misfit_change = 0.001;  // eq. 17
+};
+
+struct CaseConfig {
+  std::string case_id;
+  std::filesystem::path file;  // where it was read from; empty for a case made in memory
+
+  std::filesystem::path mri;    // T1 MRI (NIfTI); pictures are drawn on it
+  std::filesystem::path brain;  // mask or skull-stripped MRI: voxels > 0 are brain
+
+  std::variant<MeshGeneration, MeshFile> mesh = MeshGeneration{};
+  std::variant<TumourEllipsoid, TumourLabel, TumourSurface> tumour = TumourEllipsoid{};
+  Craniotomy craniotomy;
+  Brainstem brainstem;
+  Vec3 gravity_direction = Vec3(0, -1, 0);  // normalised on reading
+  Material material;
+  ContactConfig contact;
+  PriorConfig prior;
+  InversionConfig inversion;
+};
+
+// Ok, or kInvalidArgument naming key, value and constraint ("material.poisson_ratio = 0.6: must be ...").
+Status validate(const CaseConfig& config);
+
+}  // namespace brainshift

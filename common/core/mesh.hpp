@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plain geometry values: tetrahedral mesh, triangle surface, voxel image. Algorithms on them live in
+// common/geometry.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "common/core/types.hpp"
+
+namespace brainshift {
+
+// Linear tetrahedra. nodes: 3 x n, mm RAS. tets: 4 x m node indices; positively oriented, i.e.
+// det[x1-x0, x2-x0, x3-x0] > 0. labels: m region labels (0 = brain) or empty.
+struct TetMesh {
+  Points nodes;
+  Eigen::Matrix<int, 4, Eigen::Dynamic> tets;
+  std::vector<int> labels;
+
+  int num_nodes() const { return static_cast<int>(nodes.cols()); }
+  int num_tets() const { return static_cast<int>(tets.cols()); }
+};
+
+// Triangles: 3 x t vertex indices, counter-clockwise seen from outside (outward normals).
+struct TriangleSurface {
+  Points vertices;  // 3 x v, mm RAS
+  Eigen::Matrix<int, 3, Eigen::Dynamic> triangles;
+
+  int num_vertices() const { return static_cast<int>(vertices.cols()); }
+  int num_triangles() const { return static_cast<int>(triangles.cols()); }
+};
+
+// Scalar voxel image; voxel (i,j,k) is values[i + dims[0]*(j + dims[1]*k)] and its centre lies at
+// T_ras_voxel * (i,j,k), mm RAS. The affine may be oblique or left-handed.
+struct VoxelImage {
+  std::array<int, 3> dims{0, 0, 0};
+  AffineTransform T_ras_voxel = AffineTransform::Identity();
+  std::vector<float> values;
+
+  float at(int i, int j, int k) const {
+    return values[static_cast<std::size_t>(i) +
+                  static_cast<std::size_t>(dims[0]) *
+                      (static_cast<std::size_t>(j) +
+                       static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k))];
+  }
+  std::size_t num_voxels() const {
+    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+           static_cast<std::size_t>(dims[2]);
+  }
+};
+
+}  // namespace brainshift

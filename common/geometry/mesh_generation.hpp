@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tetrahedra from a smooth brain mask, by CGAL Mesh_3 (Delaunay refinement, then perturbation/exudation).
+//
+// The domain is {x : mask(x) >= level} with trilinear interpolation. Deterministic: the same input gives
+// the same mesh bit for bit on one machine (fixed seeds, and optimisation that stops at a quality bound,
+// never at a time limit). The surface is a closed manifold.
+//
+// Reference: Jamin, Alliez, Yvinec, Boissonnat, CGALmesh: a generic framework for Delaunay mesh
+// generation, ACM Trans. Math. Softw. 41 (2015).
+#pragma once
+
+#include <functional>
+
+#include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
+#include "common/core/progress.hpp"
+
+namespace brainshift::geometry {
+
+// Target mean edge length (mm) at a point; finite and > 0 everywhere.
+using SizingField = std::function<double(const Vec3&)>;
+
+struct MeshingOptions {
+  float level = 0.5f;
+  double facet_angle_deg = 25.0;           // CGAL's guarantee needs <= 30
+  double facet_distance_over_edge = 0.15;  // surface approximation error / edge
+  double cell_radius_edge_ratio = 2.2;
+  // Optimisation stops when no dihedral angle is smaller; 0 leaves it out, when only the surface matters.
+  double sliver_bound_deg = 12.0;
+};
+
+// Nodes are numbered along a Morton (Z-order) curve and tetrahedra by their lowest node, so that
+// neighbours in space are neighbours in memory. Only the largest part that hangs together by faces is
+// kept, without unused nodes.
+// kEmptySet when the domain is empty; kDegenerateMesh when the result fails check_mesh (largest component
+// is kept first).
+Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
+                          const MeshingOptions& options = {}, const Progress& progress = {});
+
+}  // namespace brainshift::geometry

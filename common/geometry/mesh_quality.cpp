@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/geometry/mesh_quality.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "common/geometry/mesh_components.hpp"
+
+namespace brainshift::geometry {
+namespace {
+
+constexpr std::array<std::array<int, 2>, 6> kEdges = {
+    {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
+
+double tet_volume(const TetMesh& mesh, int tet) {
+  const auto nodes = mesh.tets.col(tet);
+  const Vec3 x0 = mesh.nodes.col(nodes[0]);
+  const Vec3 a = mesh.nodes.col(nodes[1]) - x0;
+  const Vec3 b = mesh.nodes.col(nodes[2]) - x0;
+  const Vec3 c = mesh.nodes.col(nodes[3]) - x0;
+  return a.cross(b).dot(c) / 6.0;
+}
+
+double longest_edge(const TetMesh& mesh, int tet) {
+  double longest = 0.0;
+  for (const auto& [a, b] : kEdges)
+    longest = std::max(
+        longest, (mesh.nodes.col(mesh.tets(a, tet)) - mesh.nodes.col(mesh.tets(b, tet))).norm());
+  return longest;
+}
+
+// Angle between the two faces that meet in edge (a, b): seen along the edge, the angle between the
+// directions to the two other nodes.
+double dihedral_deg(const TetMesh& mesh, int tet, int edge) {
+  const auto [a, b] = kEdges[static_cast<std::size_t>(edge)];
+  const auto [c, d] = kEdges[static_cast<std::size_t>(5 - edge)];  // the opposite edge
+  const Vec3 xa = mesh.nodes.col(mesh.tets(a, tet));
+  const Vec3 e = (mesh.nodes.col(mesh.tets(b, tet)) - xa).normalized();
+  const Vec3 to_c = mesh.nodes.col(mesh.tets(c, tet)) - xa;
+  const Vec3 to_d = mesh.nodes.col(mesh.tets(d, tet)) - xa;
+  const Vec3 u = to_c - e * e.dot(to_c);
+  const Vec3 v = to_d - e * e.dot(to_d);
+  return std::atan2(u.cross(v).norm(), u.dot(v)) * 180.0 / std::numbers::pi;
+}
+
+std::vector<std::pair<int, int>> unique_edges(const TetMesh& mesh) {
+  std::vector<std::pair<int, int>> edges;
+  edges.reserve(6 * static_cast<std::size_t>(mesh.num_tets()));
+  for (int t = 0; t < mesh.num_tets(); ++t)
+    for (const auto& [a, b] : kEdges)
+      edges.emplace_back(std::minmax(mesh.tets(a, t), mesh.tets(b, t)));
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+Status check_nodes(const TetMesh& mesh) {
+  for (int n = 0; n < mesh.num_nodes(); ++n)
+    if (!mesh.nodes.col(n).allFinite())
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("mesh node {}: position ({}, {}, {}) is not finite", n,
+                              mesh.nodes(0, n), mesh.nodes(1, n), mesh.nodes(2, n)));
+  return {};
+}
+
+Status check_indices(const TetMesh& mesh) {
+  for (int t = 0; t < mesh.num_tets(); ++t)
+    for (int a = 0; a < 4; ++a)
+      if (mesh.tets(a, t) < 0 || mesh.tets(a, t) >= mesh.num_nodes())
+        return fail(ErrorCode::kInvalidArgument,
+                    fmt::format("mesh tetrahedron {}: node index {} must be between 0 and {}", t,
+                                mesh.tets(a, t), mesh.num_nodes() - 1));
+  if (!mesh.labels.empty() && mesh.labels.size() != static_cast<std::size_t>(mesh.num_tets()))
+    return fail(ErrorCode::kInvalidArgument, fmt::format("mesh labels: {} labels for {} tetrahedra",
+                                                         mesh.labels.size(), mesh.num_tets()));
+  return {};
+}
+
+Status check_volumes(const TetMesh& mesh) {
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    const double volume = tet_volume(mesh, t);
+    const double edge = longest_edge(mesh, t);
+    const double least = 1e-9 * edge * edge * edge;
+    if (volume < -least)
+      return fail(ErrorCode::kDegenerateMesh,
+                  fmt::format("mesh tetrahedron {} is inverted: volume {:.6g} mm^3", t, volume));
+    if (!(volume >= least && volume > 0.0))
+      return fail(
+          ErrorCode::kDegenerateMesh,
+          fmt::format("mesh tetrahedron {} is flat: volume {:.6g} mm^3, longest edge {:.6g} mm", t,
+                      volume, edge));
+  }
+  return {};
+}
+
+Status check_connected(const TetMesh& mesh) {
+  std::vector<char> used(static_cast<std::size_t>(mesh.num_nodes()), 0);
+  for (int t = 0; t < mesh.num_tets(); ++t)
+    for (int a = 0; a < 4; ++a) used[static_cast<std::size_t>(mesh.tets(a, t))] = 1;
+  const auto unused = std::count(used.begin(), used.end(), 0);
+  if (unused > 0)
+    return fail(ErrorCode::kDegenerateMesh,
+                fmt::format("mesh has {} unused nodes, the first is node {}", unused,
+                            std::find(used.begin(), used.end(), 0) - used.begin()));
+  const TetComponents components = tet_components(mesh.tets);
+  if (components.sizes.size() > 1)
+    return fail(ErrorCode::kDegenerateMesh,
+                fmt::format("mesh has {} components not joined by faces, the smallest has {} of {} "
+                            "tetrahedra",
+                            components.sizes.size(),
+                            *std::min_element(components.sizes.begin(), components.sizes.end()),
+                            mesh.num_tets()));
+  return {};
+}
+
+}  // namespace
+
+MeshQuality mesh_quality(const TetMesh& mesh) {
+  MeshQuality quality;
+  if (mesh.num_tets() == 0) return quality;
+  quality.min_dihedral_deg = 180.0;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    quality.volume_mm3 += tet_volume(mesh, t);
+    for (int edge = 0; edge < 6; ++edge) {
+      const double angle = dihedral_deg(mesh, t, edge);
+      quality.min_dihedral_deg = std::min(quality.min_dihedral_deg, angle);
+      quality.max_dihedral_deg = std::max(quality.max_dihedral_deg, angle);
+    }
+  }
+  const auto edges = unique_edges(mesh);
+  double sum = 0.0;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const auto& [a, b] : edges) {
+    const double length = (mesh.nodes.col(a) - mesh.nodes.col(b)).norm();
+    sum += length;
+    shortest = std::min(shortest, length);
+    quality.max_edge_mm = std::max(quality.max_edge_mm, length);
+  }
+  quality.min_edge_mm = shortest;
+  quality.mean_edge_mm = sum / static_cast<double>(edges.size());
+  return quality;
+}
+
+Status check_mesh(const TetMesh& mesh) {
+  if (mesh.num_tets() == 0) return fail(ErrorCode::kEmptySet, "mesh has no tetrahedron");
+  for (const auto check : {check_nodes, check_indices, check_volumes, check_connected})
+    if (Status status = check(mesh); !status) return status;
+  return {};
+}
+
+}  // namespace brainshift::geometry

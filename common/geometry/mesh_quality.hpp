@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Is this mesh fit for a finite-element model?
+#pragma once
+
+#include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
+
+namespace brainshift::geometry {
+
+struct MeshQuality {
+  double volume_mm3 = 0.0;
+  double min_dihedral_deg = 0.0;
+  double max_dihedral_deg = 0.0;
+  double min_edge_mm = 0.0;
+  double mean_edge_mm = 0.0;
+  double max_edge_mm = 0.0;
+};
+MeshQuality mesh_quality(const TetMesh& mesh);
+
+// Ok, or one sentence that names the first offender: kNotFinite (node), kInvalidArgument (index out of
+// range), kDegenerateMesh (inverted or flat tetrahedron with its volume; several components; unused
+// nodes), kEmptySet (no tetrahedron). Flat means volume < 1e-9 x (longest edge)^3.
+Status check_mesh(const TetMesh& mesh);
+
+}  // namespace brainshift::geometry

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Is this SparseData fit to be inverted?
+#pragma once
+
+#include "common/core/error.hpp"
+#include "common/core/sparse_data.hpp"
+
+namespace brainshift::inversion {
+
+// Positions whose second principal spread is below this fraction of the first count as collinear: rotation
+// about their line would be left to the prior alone.
+inline constexpr double kCollinearRatio = 1e-6;
+// Boundary points may lie outside a mesh that cuts corners; farther out they are no brain.
+inline constexpr double kOutsideTolerance_mm = 5.0;
+
+// Ok, or the first of: kInvalidArgument (sizes differ, fewer than 3 data, sd <= 0, collinear positions),
+// kNotFinite. The sentence names the datum.
+Status check_data(const SparseData& data);
+
+}  // namespace brainshift::inversion

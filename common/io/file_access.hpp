@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whole files in and out; every write is checked, and a reader never sees half a file.
+//
+// A file is written under a temporary name in its own folder, synced, renamed over the final name, and
+// the folder is synced: after a crash there is the old file or the new one. Messages begin with the path.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "common/core/error.hpp"
+
+namespace brainshift::io {
+
+// Ok if `path` is a regular file; else kNotFound or kUnreadable.
+Status check_regular_file(const std::filesystem::path& path);
+
+// The bytes of a regular file. kNotFound, or kUnreadable.
+Result<std::string> read_file(const std::filesystem::path& path);
+
+// Replaces `path` by `content`, or leaves it as it was. kWriteFailed.
+Status write_file(const std::filesystem::path& path, std::string_view content);
+
+// For libraries that write the file themselves: they write to temporary_path(), and commit() puts the
+// complete file in place. Without commit() the temporary file is removed.
+class PendingFile {
+ public:
+  // The temporary file exists and is empty. kWriteFailed.
+  static Result<PendingFile> create(const std::filesystem::path& path);
+  PendingFile(PendingFile&& other) noexcept;
+  PendingFile& operator=(PendingFile&&) = delete;
+  ~PendingFile();
+
+  const std::filesystem::path& temporary_path() const { return temporary_; }
+  // Sync, rename, sync the folder. kWriteFailed.
+  Status commit();
+
+ private:
+  PendingFile(std::filesystem::path path, std::filesystem::path temporary);
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;  // empty once committed or moved from
+};
+
+// "PATH: MESSAGE" as an Error.
+tl::unexpected<Error> file_error(ErrorCode code, const std::filesystem::path& path,
+                                 const std::string& message);
+
+}  // namespace brainshift::io

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/mesh_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+#include "common/io/file_access.hpp"
+#include "common/io/mesh_formats.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+// Indices inside the node list and finite coordinates: what every later stage takes for granted.
+template <typename Cells>
+Status check_indices(const Points& points, const Cells& cells, const std::string& cell_name) {
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (!points.col(i).allFinite()) {
+      return fail(ErrorCode::kUnreadable,
+                  "node " + std::to_string(i) + " has a coordinate that is not finite");
+    }
+  }
+  for (Eigen::Index c = 0; c < cells.cols(); ++c) {
+    for (Eigen::Index k = 0; k < cells.rows(); ++k) {
+      if (cells(k, c) >= 0 && cells(k, c) < points.cols()) continue;
+      return fail(ErrorCode::kUnreadable, cell_name + " " + std::to_string(c) + " has node index " +
+                                              std::to_string(cells(k, c)) +
+                                              ": must be between 0 and " +
+                                              std::to_string(points.cols() - 1));
+    }
+  }
+  return {};
+}
+
+TetMesh without_unreferenced_nodes(const TetMesh& mesh) {
+  std::vector<int> new_index(static_cast<std::size_t>(mesh.num_nodes()), -1);
+  for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
+    new_index[static_cast<std::size_t>(mesh.tets.data()[i])] = 0;
+  }
+  TetMesh kept = mesh;
+  int next = 0;
+  for (int node = 0; node < mesh.num_nodes(); ++node) {
+    int& index = new_index[static_cast<std::size_t>(node)];
+    if (index < 0) continue;
+    index = next++;
+    kept.nodes.col(index) = mesh.nodes.col(node);
+  }
+  kept.nodes.conservativeResize(Eigen::NoChange, next);
+  for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
+    kept.tets.data()[i] = new_index[static_cast<std::size_t>(mesh.tets.data()[i])];
+  }
+  return kept;
+}
+
+Result<MeshWithFields> load_vtu(const fs::path& path, bool with_fields) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Result<MeshWithFields> read = parse_vtu(std::move(*content), with_fields);
+  if (!read) return file_error(read.error().code, path, read.error().message);
+  if (Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return read;
+}
+
+Result<TetMesh> load_gmsh(const fs::path& path) {
+  const Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Result<TetMesh> mesh = parse_gmsh(*content);
+  if (!mesh) return file_error(mesh.error().code, path, mesh.error().message);
+  if (Status ok = check_indices(mesh->nodes, mesh->tets, "tetrahedron"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Result<TetMesh> read_tet_mesh(const fs::path& path) {
+  if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
+  const std::string extension = lower_extension(path);
+  Result<TetMesh> mesh;
+  if (extension == ".msh") {
+    mesh = load_gmsh(path);
+  } else if (extension == ".vtu") {
+    mesh = load_vtu(path, false).map([](MeshWithFields&& read) { return std::move(read.mesh); });
+  } else {
+    return file_error(ErrorCode::kUnreadable, path,
+                      "unknown mesh format '" + extension + "': must be .msh or .vtu");
+  }
+  if (!mesh) return mesh;
+  return without_unreferenced_nodes(*mesh);
+}
+
+Result<MeshWithFields> read_vtu(const fs::path& path) { return load_vtu(path, true); }
+
+Result<TriangleSurface> read_surface(const fs::path& path) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const std::string extension = lower_extension(path);
+  Result<TriangleSurface> surface;
+  if (extension == ".stl") {
+    surface = parse_stl(*content);
+  } else if (extension == ".ply") {
+    surface = parse_ply(*content);
+  } else if (extension == ".obj") {
+    surface = parse_obj(*content);
+  } else if (extension == ".vtp") {
+    surface = parse_vtp(std::move(*content));
+  } else {
+    surface = fail(ErrorCode::kUnreadable,
+                   "unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
+  }
+  if (!surface) return file_error(surface.error().code, path, surface.error().message);
+  if (surface->num_triangles() == 0) {
+    return file_error(ErrorCode::kUnreadable, path, "has no triangle");
+  }
+  if (Status ok = check_indices(surface->vertices, surface->triangles, "triangle"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return surface;
+}
+
+}  // namespace brainshift::io

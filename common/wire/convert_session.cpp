@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "brainshift/v1/brainshift.pb.h"
+#include "common/wire/checked_values.hpp"
+#include "common/wire/convert.hpp"
+#include "common/wire/names.hpp"
+#include "common/wire/payload_scan.hpp"
+#include "common/wire/text.hpp"
+
+namespace brainshift::wire {
+
+std::string encode(const DaemonStatus& status) {
+  pb::StatusReply message;
+  message.set_version(to_utf8(status.version));
+  message.set_model_ready(status.model_ready);
+  message.set_case_id(to_utf8(status.case_id));
+  message.set_model_id(to_utf8(status.model_id));
+  message.set_busy(status.busy);
+  message.set_updates(status.updates);
+  message.set_uptime_ms(status.uptime_ms);
+  return message.SerializeAsString();
+}
+
+Result<DaemonStatus> decode_status(std::string_view payload) {
+  pb::StatusReply message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  return DaemonStatus{message.version(),  message.model_ready(), message.case_id(),
+                      message.model_id(), message.busy(),        message.updates(),
+                      message.uptime_ms()};
+}
+
+std::string encode(const SessionRequest& request) {
+  pb::StartSessionRequest message;
+  message.set_case_id(to_utf8(request.case_id));
+  message.set_method(std::string(to_string(request.method)));
+  message.set_boundary(std::string(to_string(request.boundary)));
+  message.set_publish_iterates(request.publish_iterates);
+  return message.SerializeAsString();
+}
+
+Result<SessionRequest> decode_session_request(std::string_view payload) {
+  pb::StartSessionRequest message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  const auto method = method_from(message.method());
+  if (!method) {
+    return fail(ErrorCode::kInvalidArgument,
+                "start_session.method = " + quoted(message.method()) + ": must be \"paper\"");
+  }
+  const auto boundary = boundary_from(message.boundary());
+  if (!boundary) {
+    return fail(ErrorCode::kInvalidArgument,
+                "start_session.boundary = " + quoted(message.boundary()) +
+                    ": must be \"contact\" or \"fixed\"");
+  }
+  return SessionRequest{message.case_id(), *method, *boundary, message.publish_iterates()};
+}
+
+std::string encode(const SessionInfo& info) {
+  pb::StartSessionReply message;
+  message.set_session_id(info.session_id);
+  message.set_model_id(to_utf8(info.model_id));
+  message.set_nodes(static_cast<std::uint32_t>(info.nodes));
+  message.set_tets(static_cast<std::uint32_t>(info.tets));
+  message.set_slaves(static_cast<std::uint32_t>(info.slaves));
+  message.set_prepare_s(info.prepare_s);
+  message.set_model_bytes(info.model_bytes);
+  message.set_full_solve_ms(info.full_solve_ms);
+  message.set_factor_s(info.factor_s);
+  return message.SerializeAsString();
+}
+
+Result<SessionInfo> decode_session_info(std::string_view payload) {
+  pb::StartSessionReply message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  Checked checked;
+  SessionInfo info;
+  info.session_id = message.session_id();
+  info.model_id = message.model_id();
+  info.nodes = checked.count(message.nodes(), "session.nodes");
+  info.tets = checked.count(message.tets(), "session.tets");
+  info.slaves = checked.count(message.slaves(), "session.slaves");
+  info.prepare_s = checked.non_negative(message.prepare_s(), "session.prepare_s");
+  info.model_bytes = message.model_bytes();
+  info.full_solve_ms = checked.non_negative(message.full_solve_ms(), "session.full_solve_ms");
+  info.factor_s = checked.non_negative(message.factor_s(), "session.factor_s");
+  if (!checked.ok()) return tl::unexpected(checked.status().error());
+  return info;
+}
+
+std::string encode(const ObservationReceipt& receipt) {
+  pb::ObservationReply message;
+  message.set_observation_sequence(receipt.observation_sequence);
+  message.set_replaced_pending(receipt.replaced_pending);
+  return message.SerializeAsString();
+}
+
+Result<ObservationReceipt> decode_observation_receipt(std::string_view payload) {
+  pb::ObservationReply message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  return ObservationReceipt{message.observation_sequence(), message.replaced_pending()};
+}
+
+std::string encode_subscribe_reply(std::uint64_t session_id) {
+  pb::SubscribeReply message;
+  message.set_session_id(session_id);
+  return message.SerializeAsString();
+}
+
+Result<std::uint64_t> decode_subscribe_reply(std::string_view payload) {
+  pb::SubscribeReply message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  return message.session_id();
+}
+
+std::string encode(const Error& error) {
+  pb::ErrorReply message;
+  message.set_code(std::string(to_string(error.code)));
+  message.set_message(to_utf8(error.message));
+  return message.SerializeAsString();
+}
+
+Error decode_error(std::string_view payload) {
+  pb::ErrorReply message;
+  if (Status status = parse(payload, message); !status) return status.error();
+  return make_error(message.code(), message.message());
+}
+
+Error make_error(std::string_view code, std::string_view message) {
+  if (const auto known = error_code_from(code)) return {*known, one_line(message)};
+  return {ErrorCode::kInternal, one_line(code) + ": " + one_line(message)};
+}
+
+}  // namespace brainshift::wire

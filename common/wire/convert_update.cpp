@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "brainshift/v1/brainshift.pb.h"
+#include "common/wire/checked_values.hpp"
+#include "common/wire/convert.hpp"
+#include "common/wire/names.hpp"
+#include "common/wire/payload_scan.hpp"
+#include "common/wire/text.hpp"
+
+namespace brainshift::wire {
+namespace {
+
+constexpr std::string_view kFailed = "failed";
+
+std::uint32_t unsigned_count(int count) { return static_cast<std::uint32_t>(std::max(count, 0)); }
+
+void set_contact(const Estimate& estimate, pb::Contact* out) {
+  out->set_active(unsigned_count(estimate.contact.active));
+  out->set_penetrating(unsigned_count(estimate.contact.penetrating));
+  out->set_max_penetration_mm(estimate.contact.max_penetration_mm);
+  out->set_iterations(unsigned_count(estimate.contact.iterations));
+  set(estimate.active_slaves, out->mutable_active_slaves());
+  set(estimate.contact_force_n, out->mutable_force_n());
+}
+
+void set_iteration(const IterationRecord& record, pb::Iteration* out) {
+  out->set_iteration(unsigned_count(record.iteration));
+  set(record.misfit_mm, out->mutable_misfit());
+  out->set_penetrating(unsigned_count(record.penetrating));
+  out->set_max_penetration_mm(record.max_penetration_mm);
+  out->set_elapsed_ms(record.elapsed_ms);
+}
+
+void set_timings(const StageTimings& timings, pb::StageTimings* out) {
+  out->set_register_ms(timings.register_ms);
+  out->set_invert_ms(timings.invert_ms);
+  out->set_rebuild_ms(timings.rebuild_ms);
+  out->set_encode_ms(timings.encode_ms);
+  out->set_journal_ms(timings.journal_ms);
+}
+
+void set_estimate(const Estimate& estimate, pb::Update& out) {
+  out.set_status(std::string(to_string(estimate.status)));
+  out.set_reason(to_utf8(estimate.reason));
+  set(estimate.displacement, out.mutable_displacement()->mutable_xyz_mm());
+  set(estimate.sd_mm, out.mutable_sd_mm());
+  set_contact(estimate, out.mutable_contact());
+  set(estimate.initial_misfit_mm, out.mutable_initial_misfit());
+  set(estimate.misfit_mm, out.mutable_misfit());
+  for (const auto& record : estimate.history) set_iteration(record, out.add_history());
+}
+
+StageTimings get_timings(const pb::StageTimings& message, Checked& checked) {
+  return {checked.non_negative(message.register_ms(), "update.timings.register_ms"),
+          checked.non_negative(message.invert_ms(), "update.timings.invert_ms"),
+          checked.non_negative(message.rebuild_ms(), "update.timings.rebuild_ms"),
+          checked.non_negative(message.encode_ms(), "update.timings.encode_ms"),
+          checked.non_negative(message.journal_ms(), "update.timings.journal_ms")};
+}
+
+IterationRecord get_iteration(const pb::Iteration& message, Checked& checked) {
+  IterationRecord record;
+  record.iteration = checked.count(message.iteration(), "update.history.iteration");
+  record.misfit_mm = checked.mean_std(message.misfit(), "update.history.misfit");
+  record.penetrating = checked.count(message.penetrating(), "update.history.penetrating");
+  record.max_penetration_mm =
+      checked.number(message.max_penetration_mm(), "update.history.max_penetration_mm");
+  record.elapsed_ms = checked.non_negative(message.elapsed_ms(), "update.history.elapsed_ms");
+  return record;
+}
+
+void get_contact(const pb::Contact& message, int nodes, Estimate& estimate, Checked& checked) {
+  estimate.contact.active = checked.count(message.active(), "update.contact.active");
+  estimate.contact.penetrating = checked.count(message.penetrating(), "update.contact.penetrating");
+  estimate.contact.max_penetration_mm =
+      checked.number(message.max_penetration_mm(), "update.contact.max_penetration_mm");
+  estimate.contact.iterations = checked.count(message.iterations(), "update.contact.iterations");
+  estimate.active_slaves =
+      checked.indices(message.active_slaves(), nodes, "update.contact.active_slaves");
+  estimate.contact_force_n = checked.numbers(message.force_n(), "update.contact.force_n");
+  checked.require(message.active_slaves_size() == message.force_n_size(), "update.contact.force_n",
+                  std::to_string(message.force_n_size()) + " forces for " +
+                      std::to_string(message.active_slaves_size()) + " active slaves");
+}
+
+Estimate get_estimate(const pb::Update& message, Checked& checked) {
+  Estimate estimate;
+  const auto status = estimate_status_from(message.status());
+  checked.require(status.has_value(), "update.status", quoted(message.status()) + " is unknown");
+  estimate.status = status.value_or(EstimateStatus::kNotRun);
+  estimate.reason = message.reason();
+  estimate.displacement =
+      checked.points(message.displacement().xyz_mm(), "update.displacement.xyz_mm");
+  const int nodes = static_cast<int>(estimate.displacement.cols());
+  estimate.sd_mm = checked.numbers(message.sd_mm(), "update.sd_mm");
+  checked.require(message.sd_mm_size() == 0 || message.sd_mm_size() == nodes, "update.sd_mm",
+                  std::to_string(message.sd_mm_size()) + " values, must be 0 or one per node (" +
+                      std::to_string(nodes) + ")");
+  get_contact(message.contact(), nodes, estimate, checked);
+  estimate.initial_misfit_mm = checked.mean_std(message.initial_misfit(), "update.initial_misfit");
+  estimate.misfit_mm = checked.mean_std(message.misfit(), "update.misfit");
+  estimate.history.reserve(static_cast<std::size_t>(message.history_size()));
+  for (const auto& record : message.history()) {
+    estimate.history.push_back(get_iteration(record, checked));
+  }
+  return estimate;
+}
+
+// What is common to an estimate and to the reason why there is none.
+Update get_envelope(const pb::Update& message, Checked& checked) {
+  Update update;
+  update.case_id = message.case_id();
+  update.model_id = message.model_id();
+  update.sequence = message.sequence();
+  update.observation_sequence = message.observation_sequence();
+  const auto method = method_from(message.method());
+  checked.require(method.has_value(), "update.method", quoted(message.method()) + " is unknown");
+  update.method = method.value_or(Method::kPaper);
+  const auto boundary = boundary_from(message.boundary());
+  checked.require(boundary.has_value(), "update.boundary",
+                  quoted(message.boundary()) + " is unknown");
+  update.boundary = boundary.value_or(Boundary::kContact);
+  update.final = message.final();
+  update.timings = get_timings(message.timings(), checked);
+  if (message.has_t_undeformed_deformed()) {
+    update.T_undeformed_deformed =
+        checked.rigid(message.t_undeformed_deformed(), "update.t_undeformed_deformed");
+  }
+  for (const auto& omission : message.left_out()) {
+    update.left_out.push_back({omission.part(), omission.reason(), omission.estimated_error()});
+  }
+  return update;
+}
+
+}  // namespace
+
+std::string encode(const UpdateMessage& message) {
+  const Update& update = message.update;
+  pb::Update out;
+  out.set_case_id(to_utf8(update.case_id));
+  out.set_model_id(to_utf8(update.model_id));
+  out.set_session_id(message.session_id);
+  out.set_sequence(update.sequence);
+  out.set_observation_sequence(update.observation_sequence);
+  out.set_method(std::string(to_string(update.method)));
+  out.set_boundary(std::string(to_string(update.boundary)));
+  out.set_final(update.final);
+  if (message.error) {
+    out.set_status(std::string(kFailed));
+    out.set_error_code(std::string(to_string(message.error->code)));
+    out.set_reason(to_utf8(message.error->message));
+  } else {
+    set_estimate(update.estimate, out);
+  }
+  set_timings(update.timings, out.mutable_timings());
+  if (update.T_undeformed_deformed.matrix() != RigidTransform::Identity().matrix()) {
+    set(update.T_undeformed_deformed, out.mutable_t_undeformed_deformed());
+  }
+  for (const auto& omission : update.left_out) {
+    auto* entry = out.add_left_out();
+    entry->set_part(to_utf8(omission.part));
+    entry->set_reason(to_utf8(omission.reason));
+    entry->set_estimated_error(to_utf8(omission.estimated_error));
+  }
+  return out.SerializeAsString();
+}
+
+Result<UpdateMessage> decode_update(std::string_view payload) {
+  pb::Update message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  Checked checked;
+  UpdateMessage decoded;
+  decoded.session_id = message.session_id();
+  decoded.update = get_envelope(message, checked);
+  if (message.status() == kFailed) {
+    checked.require(!message.error_code().empty(), "update.error_code",
+                    "is absent although status is \"failed\"");
+    checked.require(message.displacement().xyz_mm().empty(), "update.displacement",
+                    "is present although status is \"failed\"");
+    decoded.error = make_error(message.error_code(), message.reason());
+  } else {
+    checked.require(message.error_code().empty(), "update.error_code",
+                    "is present although status is not \"failed\"");
+    decoded.update.estimate = get_estimate(message, checked);
+  }
+  if (!checked.ok()) return tl::unexpected(checked.status().error());
+  return decoded;
+}
+
+}  // namespace brainshift::wire

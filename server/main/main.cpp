@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// brainshiftd: prepares patient models before surgery and serves estimates during it.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "common/fem/blas_threads.hpp"
+#include "server/main/exit_status.hpp"
+#include "server/main/prepare_command.hpp"
+#include "server/main/serve_command.hpp"
+
+namespace {
+
+using namespace brainshift::server;
+
+int parse_and_run(int argc, char** argv) {
+  CLI::App app(
+      "Estimates brain shift during surgery from sparse measurements. Research software, no "
+      "medical device.",
+      "brainshiftd");
+  app.set_version_flag("--version", "brainshiftd " BRAINSHIFT_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
+      "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
+      "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
+
+  PrepareArguments prepare;
+  auto* prepare_command = app.add_subcommand("prepare", "Build a patient's model from a case file");
+  prepare_command->add_option("--case", prepare.case_file, "Case file (YAML)")->required();
+  prepare_command->add_option("--out", prepare.out, "Model file to write (HDF5)")->required();
+  prepare_command->add_flag("--json", prepare.json, "Print one JSON object instead of a table");
+  prepare_command->footer(
+      "Reads the images that the case names, meshes the brain, finds the node sets, factorises "
+      "the\n"
+      "model under both boundaries to check and time it, and writes the model file.\n"
+      "Examples:\n"
+      "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
+      "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq "
+      ".prepare.contact.full_solve_ms");
+
+  ServeArguments serve;
+  auto* serve_command = app.add_subcommand("serve", "Answer clients until SIGINT or SIGTERM");
+  serve_command->add_option("--config", serve.config_file, "Daemon file (YAML)")->required();
+  serve_command->add_option("--model", serve.model, "Model file, instead of the daemon file's");
+  serve_command->add_option(
+      "--endpoint", serve.endpoint,
+      "Where to listen, instead of the daemon file's; port * picks a free one");
+  serve_command->footer(
+      "Prints \"listening on ENDPOINT\" to stdout when clients can connect; logs to stderr. "
+      "Without a\n"
+      "model it runs and answers model_not_ready.\n"
+      "Examples:\n"
+      "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
+      "  brainshiftd serve --config config/daemon.yaml --endpoint 'tcp://127.0.0.1:*'");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    // A word that is no subcommand is a better reason than the subcommand that is then missing.
+    const auto unknown = app.remaining(true);
+    const std::string reason =
+        unknown.empty() ? std::string(error.what()) : "unknown argument " + unknown.front();
+    return print_error(
+        {brainshift::ErrorCode::kInvalidArgument, reason + " (see brainshiftd --help)"});
+  }
+  if (prepare_command->parsed()) return run_prepare(prepare);
+  return run_serve(serve);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  brainshift::fem::use_single_threaded_blas();
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const std::exception& exception) {
+    std::fprintf(stderr, "brainshiftd: unexpected failure: %s\n", exception.what());
+    return kExitFailure;
+  }
+}

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/main/serve_command.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "common/inversion/invert.hpp"
+#include "common/inversion/prepared_model.hpp"
+#include "common/io/config_file.hpp"
+#include "common/io/model_file.hpp"
+#include "server/main/exit_status.hpp"
+#include "server/main/logging.hpp"
+#include "server/main/stop_signals.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "server/transport/outbox.hpp"
+#include "server/transport/router.hpp"
+#include "server/transport/service.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using inversion::PreparedModel;
+
+wire::SessionInfo session_info(const PreparedModel& prepared) {
+  const BrainModel& model = prepared.model();
+  const inversion::PrepareTimings& timings = prepared.timings();
+  wire::SessionInfo info;
+  info.model_id = model.model_id;
+  info.nodes = model.mesh.num_nodes();
+  info.tets = model.mesh.num_tets();
+  info.slaves = static_cast<int>(model.slaves.size());
+  info.prepare_s = timings.total_s;
+  info.model_bytes = timings.bytes;
+  info.full_solve_ms = timings.full_solve_ms;
+  info.factor_s = timings.factor_s;
+  return info;
+}
+
+// Factorises, and ties the result to the pipeline.
+Result<Prepared> prepare_boundary(const std::shared_ptr<const BrainModel>& model,
+                                  const CaseConfig& config, Boundary boundary) {
+  spdlog::info("preparing boundary={}", to_string(boundary));
+  auto made = PreparedModel::prepare(model, config, boundary);
+  if (!made) return tl::unexpected(made.error());
+  auto prepared = std::make_shared<const PreparedModel>(std::move(*made));
+  auto pipeline = Pipeline::build(
+      model, config, boundary,
+      [prepared](const SparseData& data, const inversion::InversionOptions& options) {
+        return inversion::invert(*prepared, data, options);
+      });
+  if (!pipeline) return tl::unexpected(pipeline.error());
+  auto shared = std::make_shared<const Pipeline>(std::move(*pipeline));
+  Prepared result;
+  result.info = session_info(*prepared);
+  result.run = [shared](const Observation& observation, const RunOptions& options) {
+    return shared->run(observation, options);
+  };
+  return result;
+}
+
+Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
+  auto config = io::read_daemon_config(arguments.config_file);
+  if (!config) return config;
+  if (arguments.model) config->model = *arguments.model;
+  if (arguments.endpoint) config->endpoint = *arguments.endpoint;
+  std::error_code ignored;
+  if (!config->journal_dir.empty() &&
+      !std::filesystem::is_directory(config->journal_dir, ignored)) {
+    return fail(ErrorCode::kNotFound,
+                fmt::format("{}: journal_dir: the folder {} does not exist",
+                            arguments.config_file.string(), config->journal_dir.string()));
+  }
+  return config;
+}
+
+Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
+  ServiceOptions options;
+  options.version = BRAINSHIFT_VERSION;
+  options.journal_dir = config.journal_dir;
+  if (config.model.empty()) return options;
+  auto file = io::read_model(config.model);
+  if (!file) return tl::unexpected(file.error());
+  auto model = std::make_shared<const BrainModel>(std::move(file->model));
+  options.model = model;
+  options.case_file = file->config.file;
+  options.prepare = [model, case_config = std::move(file->config)](Boundary boundary) {
+    return prepare_boundary(model, case_config, boundary);
+  };
+  return options;
+}
+
+Status serve(const ServeArguments& arguments) {
+  auto signals = StopSignals::block();  // first: every later thread inherits the mask
+  if (!signals) return tl::unexpected(signals.error());
+  const auto config = configuration(arguments);
+  if (!config) return tl::unexpected(config.error());
+  start_logging(config->log_level);
+  auto options = service_options(*config);
+  if (!options) return tl::unexpected(options.error());
+
+  RouterOptions router_options;
+  router_options.endpoint = config->endpoint;
+  router_options.max_clients = config->max_clients;
+  router_options.max_message_mib = config->max_message_mib;
+  auto router = Router::bind(router_options);
+  if (!router) return tl::unexpected(router.error());
+
+  if (options->model) {
+    spdlog::info("model loaded case={} model={} nodes={}", options->model->case_id,
+                 options->model->model_id, options->model->mesh.num_nodes());
+  } else {
+    spdlog::warn("no model is loaded: clients get model_not_ready");
+  }
+  Outbox outbox;
+  Service service(std::move(*options), outbox);
+  fmt::print("listening on {}\n", router->endpoint());
+  std::fflush(stdout);
+  auto status = router->run(service, outbox, signals->fd());
+  spdlog::info("stopping");
+  service.stop();
+  return status;
+}
+
+}  // namespace
+
+int run_serve(const ServeArguments& arguments) {
+  const auto status = serve(arguments);
+  return status ? kExitSuccess : print_error(status.error());
+}
+
+}  // namespace brainshift::server

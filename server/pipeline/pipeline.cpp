@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/pipeline/pipeline.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "server/pipeline/left_out.hpp"
+#include "server/pipeline/registration_stage.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                   Boundary boundary, InvertFunction invert, geometry::ClosestPointIndex tumour)
+    : model_(std::move(model)),
+      config_(config),
+      boundary_(boundary),
+      invert_(std::move(invert)),
+      tumour_(std::move(tumour)) {}
+
+Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                                 Boundary boundary, InvertFunction invert) {
+  auto tumour = geometry::ClosestPointIndex::build(model->tumour);
+  if (!tumour) return tl::unexpected(tumour.error());
+  return Pipeline(std::move(model), config, boundary, std::move(invert), std::move(*tumour));
+}
+
+Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) const {
+  const auto register_start = Clock::now();
+  const auto registered = register_observation(observation, tumour_, config_.inversion);
+  if (!registered) return tl::unexpected(registered.error());
+
+  Update update;
+  update.case_id = model_->case_id;
+  update.model_id = model_->model_id;
+  update.observation_sequence = observation.sequence;
+  update.method = options.method;
+  update.boundary = boundary_;
+  update.left_out = model_omissions(*model_, config_, options.method, boundary_);
+  if (registered->icp) {
+    update.T_undeformed_deformed = registered->icp->T_surface_points;
+    for (auto& omission :
+         registration_omissions(*registered->icp, registration::IcpOptions{}.rotation_sd_deg)) {
+      update.left_out.push_back(std::move(omission));
+    }
+  }
+  update.timings.register_ms = milliseconds_since(register_start);
+
+  const auto invert_start = Clock::now();
+  inversion::InversionOptions inversion_options;
+  inversion_options.method = options.method;
+  inversion_options.stop = options.stop;
+  if (options.on_iterate) {
+    inversion_options.on_iterate = [&](const Estimate& iterate) {
+      update.final = false;
+      update.estimate = iterate;
+      update.timings.invert_ms = milliseconds_since(invert_start);
+      options.on_iterate(update);
+    };
+  }
+  auto estimate = invert_(registered->data, inversion_options);
+  if (!estimate) return tl::unexpected(estimate.error());
+  update.final = true;
+  update.estimate = std::move(*estimate);
+  update.timings.invert_ms = milliseconds_since(invert_start);
+  return update;
+}
+
+}  // namespace brainshift::server

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pipeline: Observation -> register -> SparseData -> invert -> Estimate -> Update.
+//
+// Values in, values out; it knows no socket, no log and no wire format, and it keeps nothing between
+// observations. The inversion is given as a function, so that rules can be tested without a factorisation.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "common/core/brain_model.hpp"
+#include "common/core/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/core/estimate.hpp"
+#include "common/core/observation.hpp"
+#include "common/core/sparse_data.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/inversion/invert.hpp"
+
+namespace brainshift::server {
+
+using InvertFunction =
+    std::function<Result<Estimate>(const SparseData&, const inversion::InversionOptions&)>;
+
+struct RunOptions {
+  Method method = Method::kPaper;
+  // Called on the running thread with each iterate (final == false); may be empty.
+  std::function<void(const Update&)> on_iterate;
+  std::stop_token stop;
+};
+
+class Pipeline {
+ public:
+  // Indexes the tumour surface; kEmptySet / kNotFinite when the model has no usable one.
+  static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                                Boundary boundary, InvertFunction invert);
+
+  // Fills everything of an Update except its sequence number and the encode and journal times, which
+  // belong to later stages. Errors of registration and inversion pass through unchanged.
+  Result<Update> run(const Observation& observation, const RunOptions& options) const;
+
+ private:
+  Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Boundary boundary,
+           InvertFunction invert, geometry::ClosestPointIndex tumour);
+
+  std::shared_ptr<const BrainModel> model_;
+  CaseConfig config_;
+  Boundary boundary_;
+  InvertFunction invert_;
+  geometry::ClosestPointIndex tumour_;
+};
+
+}  // namespace brainshift::server

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which observations a session accepts. Pure.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "common/core/error.hpp"
+#include "common/core/observation.hpp"
+
+namespace brainshift::server {
+
+// Ok, or: kInvalidArgument for another case, a frame other than "ras", an empty or overlong source, a
+// sequence number that is not above `last_sequence`, a negative standard deviation; kNotFinite for a
+// coordinate. The sentence names the field and its value.
+Status check_observation(const Observation& observation, std::string_view case_id,
+                         std::uint64_t last_sequence);
+
+// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a one-line
+// message whatever a peer sent.
+std::string in_quotes(std::string_view text);
+
+}  // namespace brainshift::server

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/session/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "server/session/observation_rules.hpp"
+
+namespace brainshift::server {
+namespace {
+
+// A throwing library must cost one observation, not the daemon.
+template <typename Function>
+auto guarded(Function&& function) -> decltype(function()) {
+  try {
+    return function();
+  } catch (const std::exception& exception) {
+    return fail(ErrorCode::kInternal, fmt::format("unexpected failure: {}", exception.what()));
+  }
+}
+
+}  // namespace
+
+Session::Session(std::string case_id, SessionHooks hooks)
+    : case_id_(std::move(case_id)),
+      hooks_(std::move(hooks)),
+      worker_([this](const std::stop_token& stop) { work(stop); }) {}
+
+Session::~Session() { stop(); }
+
+void Session::start(const wire::SessionRequest& request, StartDone done) {
+  if (request.case_id != case_id_) {
+    done(fail(ErrorCode::kInvalidArgument,
+              fmt::format("start_session.case_id = {}: the loaded model is for {}",
+                          in_quotes(request.case_id), in_quotes(case_id_))));
+    return;
+  }
+  std::optional<PendingStart> superseded;
+  bool refused = false;
+  {
+    const std::lock_guard lock(mutex_);
+    refused = stopped_;
+    if (!refused) {
+      superseded = std::exchange(pending_start_, PendingStart{request, done});
+      running_.reset();
+      boxes_.clear();
+      run_stop_.request_stop();
+    }
+  }
+  if (refused) {
+    done(fail(ErrorCode::kUnavailable, "the daemon is stopping"));
+    return;
+  }
+  wake_.notify_all();
+  if (superseded) {
+    superseded->done(fail(ErrorCode::kUnavailable, "another session was started before this one"));
+  }
+}
+
+Result<wire::ObservationReceipt> Session::submit(Observation observation,
+                                                 const std::function<void()>& on_accepted) {
+  wire::ObservationReceipt receipt;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!running_) {
+      return fail(ErrorCode::kModelNotReady, busy_ || pending_start_
+                                                 ? "the session is still being prepared"
+                                                 : "no session is running: start one first");
+    }
+    auto status = check_observation(observation, case_id_, running_->last_sequence);
+    if (!status) return tl::unexpected(status.error());
+    const auto box = boxes_.find(observation.source);
+    if (box == boxes_.end() && boxes_.size() >= kMaxSources) {
+      return fail(ErrorCode::kUnavailable,
+                  fmt::format("observation.source = {}: {} other sources are waiting already",
+                              in_quotes(observation.source), boxes_.size()));
+    }
+    receipt.observation_sequence = observation.sequence;
+    receipt.replaced_pending = box != boxes_.end();
+    running_->last_sequence = observation.sequence;
+    if (on_accepted) on_accepted();
+    boxes_.insert_or_assign(observation.source, std::move(observation));
+  }
+  wake_.notify_all();
+  return receipt;
+}
+
+Session::State Session::state() const {
+  const std::lock_guard lock(mutex_);
+  State state;
+  state.session_id = running_ ? running_->session_id : 0;
+  state.busy = busy_ || pending_start_.has_value() || !boxes_.empty();
+  state.updates = updates_;
+  return state;
+}
+
+void Session::stop() {
+  std::optional<PendingStart> abandoned;
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    abandoned = std::exchange(pending_start_, std::nullopt);
+    running_.reset();
+    boxes_.clear();
+    run_stop_.request_stop();
+  }
+  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, "the daemon is stopping"));
+  if (worker_.joinable()) {
+    worker_.request_stop();
+    wake_.notify_all();
+    worker_.join();
+  }
+}
+
+void Session::work(const std::stop_token& stop) {
+  while (true) {
+    std::optional<PendingStart> start;
+    std::optional<Observation> observation;
+    {
+      std::unique_lock lock(mutex_);
+      busy_ = false;
+      wake_.wait(lock, stop, [&] { return pending_start_ || !boxes_.empty(); });
+      if (stop.stop_requested()) return;
+      busy_ = true;
+      run_stop_ = std::stop_source();
+      if (pending_start_) {
+        start = std::exchange(pending_start_, std::nullopt);
+      } else {
+        const auto oldest = std::min_element(
+            boxes_.begin(), boxes_.end(),
+            [](const auto& a, const auto& b) { return a.second.sequence < b.second.sequence; });
+        observation = std::move(oldest->second);
+        boxes_.erase(oldest);
+      }
+    }
+    if (start) begin(std::move(*start));
+    if (observation) process(*observation);
+  }
+}
+
+Result<std::shared_ptr<const Prepared>> Session::prepared_for(Boundary boundary) {
+  if (const auto found = cache_.find(boundary); found != cache_.end()) return found->second;
+  auto prepared = guarded([&] { return hooks_.prepare(boundary); });
+  if (!prepared) return tl::unexpected(prepared.error());
+  auto shared = std::make_shared<const Prepared>(std::move(*prepared));
+  cache_.emplace(boundary, shared);
+  return shared;
+}
+
+void Session::begin(PendingStart start) {
+  const auto prepared = prepared_for(start.request.boundary);
+  if (!prepared) {
+    start.done(tl::unexpected(prepared.error()));
+    return;
+  }
+  wire::SessionInfo info = (*prepared)->info;
+  {
+    const std::lock_guard lock(mutex_);
+    info.session_id = ++last_session_id_;
+  }
+  if (hooks_.on_ready) hooks_.on_ready(start.request, info);
+  bool superseded = false;
+  {
+    const std::lock_guard lock(mutex_);
+    superseded = stopped_ || pending_start_.has_value();
+    if (!superseded) running_ = Running{info.session_id, start.request, *prepared, 0, 0};
+  }
+  if (superseded) {
+    start.done(fail(ErrorCode::kUnavailable, "another session was started before this one"));
+  } else {
+    start.done(info);
+  }
+}
+
+void Session::process(const Observation& observation) {
+  Running session;
+  RunOptions options;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!running_) return;  // replaced between taking the observation and here
+    ++running_->published;
+    session = *running_;
+    options.stop = run_stop_.get_token();
+  }
+  options.method = session.request.method;
+  if (session.request.publish_iterates) {
+    options.on_iterate = [&](const Update& iterate) {
+      wire::UpdateMessage message{session.session_id, iterate, std::nullopt};
+      message.update.sequence = session.published;
+      hooks_.publish(std::move(message));
+    };
+  }
+  auto result = guarded([&] { return session.prepared->run(observation, options); });
+  if (options.stop.stop_requested()) return;
+
+  wire::UpdateMessage message;
+  message.session_id = session.session_id;
+  if (result) {
+    message.update = std::move(*result);
+  } else {
+    message.error = result.error();
+    message.update.case_id = case_id_;
+    message.update.model_id = session.prepared->info.model_id;
+    message.update.observation_sequence = observation.sequence;
+    message.update.method = session.request.method;
+    message.update.boundary = session.request.boundary;
+    message.update.final = true;
+  }
+  message.update.sequence = session.published;
+  {
+    const std::lock_guard lock(mutex_);
+    if (result) ++updates_;
+  }
+  hooks_.publish(std::move(message));
+}
+
+}  // namespace brainshift::server

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/transport/router.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cerrno>
+#include <charconv>
+#include <exception>
+#include <system_error>
+#include <utility>
+#include <zmq.hpp>
+
+#include "common/wire/convert.hpp"
+#include "server/transport/connection_monitor.hpp"
+#include "server/transport/peers.hpp"
+
+namespace brainshift::server {
+namespace {
+
+// Requests handled before pushes get their turn.
+constexpr int kRequestsPerTurn = 64;
+// How often a full peer is tried again while it is owed a final update.
+constexpr std::chrono::milliseconds kRetryInterval{20};
+// Messages of one peer that may wait unread; large ones are bounded by their size.
+constexpr int kReceiveQueue = 8;
+
+enum class Sent { kYes, kQueueFull, kPeerGone };
+
+struct Incoming {
+  std::string peer;
+  int connection_fd = -1;
+  zmq::message_t payload;
+  int parts = 0;  // after the routing id
+};
+
+// Shares the bytes with the socket, which drops its reference after sending.
+zmq::message_t share(const Bytes& bytes) {
+  auto* reference = new Bytes(bytes);
+  auto release = [](void*, void* hint) { delete static_cast<Bytes*>(hint); };
+  return {const_cast<char*>(bytes->data()), bytes->size(), release, reference};
+}
+
+Sent send(zmq::socket_t& socket, const std::string& peer, const Bytes& bytes) {
+  constexpr auto kNow = zmq::send_flags::dontwait;
+  try {
+    if (!socket.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore)) return Sent::kQueueFull;
+    return socket.send(share(bytes), kNow) ? Sent::kYes : Sent::kQueueFull;
+  } catch (const zmq::error_t& error) {
+    if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
+    throw;
+  }
+}
+
+std::optional<Incoming> receive(zmq::socket_t& socket) {
+  zmq::message_t routing_id;
+  if (!socket.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
+  Incoming incoming;
+  incoming.peer = routing_id.to_string();
+  bool more = routing_id.more();
+  while (more) {
+    zmq::message_t part;
+    static_cast<void>(socket.recv(part));  // the rest of a message is always there
+    more = part.more();
+    if (incoming.parts++ == 0) {
+      incoming.connection_fd = zmq_msg_get(part.handle(), ZMQ_SRCFD);
+      incoming.payload = std::move(part);
+    }
+  }
+  return incoming;
+}
+
+Bytes error_frame(std::uint64_t request_id, const Error& error) {
+  return std::make_shared<const std::string>(
+      wire::encode_frame(wire::MessageType::kErrorReply, request_id, wire::encode(error)));
+}
+
+// libzmq takes the remainder of a port number above 65535 and listens there.
+bool has_valid_port(const std::string& endpoint) {
+  if (endpoint.rfind("tcp://", 0) != 0) return true;  // libzmq judges the rest
+  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
+  if (port == "*") return true;
+  unsigned number = 0;
+  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
+  return error == std::errc() && end == port.data() + port.size() && number <= 65535;
+}
+
+int milliseconds(std::chrono::milliseconds duration) { return static_cast<int>(duration.count()); }
+
+void configure(zmq::socket_t& socket, const RouterOptions& options) {
+  socket.set(zmq::sockopt::router_mandatory, true);
+  socket.set(zmq::sockopt::linger, 0);
+  socket.set(zmq::sockopt::maxmsgsize, (std::int64_t{options.max_message_mib} << 20) +
+                                           static_cast<std::int64_t>(wire::kHeaderBytes));
+  socket.set(zmq::sockopt::rcvhwm, kReceiveQueue);
+  socket.set(zmq::sockopt::sndhwm, options.send_queue);
+  socket.set(zmq::sockopt::handshake_ivl, milliseconds(options.handshake_limit));
+  socket.set(zmq::sockopt::heartbeat_ivl, milliseconds(options.heartbeat_interval));
+  socket.set(zmq::sockopt::heartbeat_timeout, milliseconds(options.heartbeat_timeout));
+  socket.set(zmq::sockopt::heartbeat_ttl, milliseconds(options.heartbeat_timeout));
+}
+
+}  // namespace
+
+struct Router::Impl {
+  explicit Impl(const RouterOptions& given)
+      : options(given),
+        socket(context, zmq::socket_type::router),
+        monitor(context, socket),
+        peers(static_cast<std::size_t>(given.max_clients)) {
+    configure(socket, options);
+    socket.bind(options.endpoint);
+    endpoint = socket.get(zmq::sockopt::last_endpoint);
+  }
+
+  void serve_requests(RequestHandler& handler);
+  void answer(RequestHandler& handler, const Incoming& incoming);
+  void reply(const std::string& peer, const Bytes& bytes);
+  void deliver(const Outgoing& message);
+  void push(const std::string& routing_id, Peer& peer, const Bytes& bytes, bool may_be_lost);
+  void pay_owed();
+  void pay(const std::string& routing_id, Peer& peer);
+  void forget_closed();
+
+  RouterOptions options;
+  zmq::context_t context;
+  zmq::socket_t socket;
+  ConnectionMonitor monitor;
+  Peers peers;
+  std::string endpoint;
+  Bytes last_final;
+};
+
+Router::Router(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Router::Router(Router&&) noexcept = default;
+Router& Router::operator=(Router&&) noexcept = default;
+Router::~Router() = default;
+
+const std::string& Router::endpoint() const { return impl_->endpoint; }
+
+Result<Router> Router::bind(const RouterOptions& options) {
+  if (!has_valid_port(options.endpoint)) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("endpoint {}: the port must be * or 0 to 65535", options.endpoint));
+  }
+  try {
+    return Router(std::make_unique<Impl>(options));
+  } catch (const zmq::error_t& error) {
+    const bool malformed = error.num() == EINVAL || error.num() == EPROTONOSUPPORT;
+    return fail(malformed ? ErrorCode::kInvalidArgument : ErrorCode::kUnavailable,
+                fmt::format("endpoint {}: {}", options.endpoint, error.what()));
+  }
+}
+
+Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
+  Impl& self = *impl_;
+  zmq::pollitem_t items[] = {{self.socket.handle(), 0, ZMQ_POLLIN, 0},
+                             {self.monitor.socket().handle(), 0, ZMQ_POLLIN, 0},
+                             {nullptr, outbox.fd(), ZMQ_POLLIN, 0},
+                             {nullptr, stop_fd, ZMQ_POLLIN, 0}};
+  constexpr std::chrono::milliseconds kForever{-1};
+  try {
+    while (true) {
+      const auto timeout = self.peers.anything_owed() ? kRetryInterval : kForever;
+      if (zmq_poll(items, 4, timeout.count()) < 0) {
+        if (zmq_errno() == EINTR) continue;
+        throw zmq::error_t();
+      }
+      if (items[3].revents != 0) return {};
+      self.forget_closed();
+      if (items[0].revents != 0) self.serve_requests(handler);
+      for (const Outgoing& message : outbox.take()) self.deliver(message);
+      self.pay_owed();
+    }
+  } catch (const zmq::error_t& error) {
+    return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", self.endpoint, error.what()));
+  }
+}
+
+void Router::Impl::serve_requests(RequestHandler& handler) {
+  for (int served = 0; served < kRequestsPerTurn; ++served) {
+    const auto incoming = receive(socket);
+    if (!incoming) return;
+    forget_closed();  // before the peer is looked up, see ConnectionMonitor
+    answer(handler, *incoming);
+  }
+}
+
+void Router::Impl::answer(RequestHandler& handler, const Incoming& incoming) {
+  Peer* peer = peers.admit(incoming.peer, incoming.connection_fd);
+  if (peer == nullptr) {
+    const Error full{ErrorCode::kUnavailable,
+                     fmt::format("{} clients are connected already", options.max_clients)};
+    return reply(incoming.peer, error_frame(0, full));
+  }
+  if (incoming.parts != 1) {
+    const Error error{ErrorCode::kProtocol,
+                      fmt::format("a message has 1 part, this one has {}", incoming.parts)};
+    return reply(incoming.peer, error_frame(0, error));
+  }
+  const auto frame = wire::decode_frame(incoming.payload.to_string_view());
+  if (!frame) {
+    spdlog::debug("malformed frame: {}", frame.error().message);
+    return reply(incoming.peer, error_frame(0, frame.error()));
+  }
+  std::optional<Reply> answer;
+  try {
+    answer = handler.handle(incoming.peer, *frame);
+  } catch (const std::exception& exception) {
+    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
+                  exception.what());
+    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
+    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error), false};
+  }
+  if (!answer) return;
+  reply(incoming.peer, std::make_shared<const std::string>(
+                           wire::encode_frame(answer->type, frame->request_id, answer->payload)));
+  peer = peers.find(incoming.peer);  // gone when the reply found no route
+  if (!answer->subscribe || peer == nullptr) return;
+  peer->subscribed = true;
+  if (last_final) push(incoming.peer, *peer, last_final, false);
+}
+
+void Router::Impl::reply(const std::string& peer, const Bytes& bytes) {
+  const Sent sent = send(socket, peer, bytes);
+  if (sent == Sent::kYes) return;
+  spdlog::debug("reply lost: {}",
+                sent == Sent::kPeerGone ? "the peer is gone" : "the peer does not read");
+  if (sent == Sent::kPeerGone) peers.remove(peer);
+}
+
+void Router::Impl::deliver(const Outgoing& message) {
+  if (message.delivery == Delivery::kReply) return reply(message.peer, message.bytes);
+  if (message.delivery == Delivery::kFinal) last_final = message.bytes;
+  const bool may_be_lost = message.delivery == Delivery::kIterate;
+  for (auto next = peers.all().begin(); next != peers.all().end();) {
+    const auto peer = next++;  // push may remove it
+    if (peer->second.subscribed) push(peer->first, peer->second, message.bytes, may_be_lost);
+  }
+}
+
+void Router::Impl::push(const std::string& routing_id, Peer& peer, const Bytes& bytes,
+                        bool may_be_lost) {
+  if (may_be_lost) {
+    // What is owed goes first: nothing may overtake it.
+    if (!peer.owed.empty()) return;
+    if (send(socket, routing_id, bytes) == Sent::kPeerGone) peers.remove(std::string(routing_id));
+    return;
+  }
+  peer.owed.push_back(bytes);
+  if (peer.owed.size() > Peer::kMaxOwed) peer.owed.pop_front();
+  pay(routing_id, peer);
+}
+
+void Router::Impl::pay(const std::string& routing_id, Peer& peer) {
+  while (!peer.owed.empty()) {
+    const Sent sent = send(socket, routing_id, peer.owed.front());
+    if (sent == Sent::kQueueFull) return;
+    if (sent == Sent::kPeerGone) return peers.remove(std::string(routing_id));
+    peer.owed.pop_front();
+  }
+}
+
+void Router::Impl::pay_owed() {
+  for (auto next = peers.all().begin(); next != peers.all().end();) {
+    const auto peer = next++;  // pay may remove it
+    pay(peer->first, peer->second);
+  }
+}
+
+void Router::Impl::forget_closed() {
+  for (const int descriptor : monitor.closed()) {
+    if (peers.remove_connection(descriptor) > 0) spdlog::debug("peer left");
+  }
+}
+
+}  // namespace brainshift::server

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Router: the daemon's socket. One thread polls a ZeroMQ ROUTER socket, the outbox and a stop descriptor;
+// it decodes frames, asks the handler, sends replies and pushes updates. It never waits for a peer.
+//
+// Peers may be hostile or broken: message size, number of parts and number of peers are capped; a frame
+// that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and unfinished
+// handshakes to a short limit. A subscriber that does not read loses iterates; it is owed the newest
+// few final updates, nothing older. ZeroMQ bounds the size of each part, not their number within one message: expose
+// the daemon to trusted networks only.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/core/error.hpp"
+#include "common/wire/frame.hpp"
+#include "server/transport/outbox.hpp"
+
+namespace brainshift::server {
+
+struct RouterOptions {
+  std::string endpoint = "tcp://127.0.0.1:*";
+  int max_clients = 32;
+  int max_message_mib = 64;
+  int send_queue = 16;  // messages that may wait per peer
+  std::chrono::milliseconds heartbeat_interval{1000};
+  std::chrono::milliseconds heartbeat_timeout{5000};
+  std::chrono::milliseconds handshake_limit{2000};
+};
+
+struct Reply {
+  wire::MessageType type = wire::MessageType::kErrorReply;
+  std::string payload;
+  bool subscribe = false;  // the peer receives updates from now on, the last final one first
+};
+
+// Answers requests; called on the router's thread and must not block.
+class RequestHandler {
+ public:
+  virtual ~RequestHandler() = default;
+  // No value: the reply follows through the outbox.
+  virtual std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) = 0;
+};
+
+class Router {
+ public:
+  // kInvalidArgument for an endpoint that is none, kUnavailable when it cannot be bound (in use, no such
+  // interface, no permission). The sentence names the endpoint.
+  static Result<Router> bind(const RouterOptions& options);
+  Router(Router&&) noexcept;
+  Router& operator=(Router&&) noexcept;
+  ~Router();
+
+  // Where it listens; the actual port when the options asked for any.
+  const std::string& endpoint() const;
+
+  // Serves until `stop_fd` is readable.
+  Status run(RequestHandler& handler, Outbox& outbox, int stop_fd);
+
+ private:
+  struct Impl;
+  explicit Router(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace brainshift::server

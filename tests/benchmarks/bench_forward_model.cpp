@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Speed of the forward model on the default head: assembly, analysis and factorisation, single solve, solves
+// in blocks of 64, prior. One BLAS thread. The case file may be given in BRAINSHIFT_CASE.
+#include <benchmark/benchmark.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "common/contact/forward_model.hpp"
+#include "common/fem/blas_threads.hpp"
+#include "common/inversion/prepared_model.hpp"
+#include "common/io/config_file.hpp"
+#include "common/scene/brain_model_builder.hpp"
+
+namespace brainshift {
+namespace {
+
+struct Head {
+  CaseConfig config;
+  BrainModel model;
+};
+
+const Head& head() {
+  static const Head loaded = [] {
+    const char* name = std::getenv("BRAINSHIFT_CASE");
+    auto config = io::read_case_config(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE);
+    const auto stop = [](const Error& error) {
+      std::fprintf(stderr, "%s\n", error.message.c_str());
+      std::exit(2);
+    };
+    if (!config) stop(config.error());
+    auto inputs = io::load_case_inputs(*config);
+    if (!inputs) stop(inputs.error());
+    auto model = scene::build_brain_model(*inputs);
+    if (!model) stop(model.error());
+    return Head{std::move(*config), std::move(*model)};
+  }();
+  return loaded;
+}
+
+const contact::ForwardModel& forward() {
+  static const auto model =
+      contact::ForwardModel::build(head().model, head().config, Boundary::kContact);
+  return *model;
+}
+
+void Assembly(benchmark::State& state) {
+  const contact::ForwardModel& model = forward();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(fem::assemble_stiffness(
+        head().model.mesh, fem::elasticity_from(head().config.material), model.dofs()));
+  }
+  state.counters["nodes"] = head().model.mesh.num_nodes();
+  state.counters["tets"] = head().model.mesh.num_tets();
+}
+BENCHMARK(Assembly)->Unit(benchmark::kMillisecond);
+
+void AnalyseAndFactorise(benchmark::State& state) {
+  double factor_s = 0.0, analyse_s = 0.0;
+  for (auto _ : state) {
+    auto factor = fem::SparseCholesky::factorise(forward().stiffness());
+    factor_s += factor->factor_seconds();
+    analyse_s += factor->analyse_seconds();
+    benchmark::DoNotOptimize(factor);
+  }
+  const auto runs = static_cast<double>(state.iterations());
+  state.counters["factor_s"] = factor_s / runs;
+  state.counters["analyse_s"] = analyse_s / runs;
+  state.counters["nnz_L"] = static_cast<double>(forward().factor().nonzeros());
+}
+BENCHMARK(AnalyseAndFactorise)->Unit(benchmark::kMillisecond)->Iterations(3);
+
+void SingleSolve(benchmark::State& state) {
+  const VecX b = VecX::LinSpaced(forward().dofs().num_unknowns(), -1.0, 1.0);
+  VecX x;
+  for (auto _ : state) {
+    forward().factor().solve(b, x);
+    benchmark::DoNotOptimize(x.data());
+  }
+}
+BENCHMARK(SingleSolve)->Unit(benchmark::kMillisecond);
+
+void SolveInBlocksOf64(benchmark::State& state) {
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(forward().dofs().num_unknowns(), 64);
+  for (auto _ : state) benchmark::DoNotOptimize(forward().factor().solve_many(b));
+  state.counters["per_column"] = benchmark::Counter(
+      64.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(SolveInBlocksOf64)->Unit(benchmark::kMillisecond);
+
+void ApplyPrior(benchmark::State& state) {
+  const prior::ForcePrior prior(head().model.mesh.nodes, fem::nodal_volumes(head().model.mesh),
+                                head().config.prior.correlation_length_mm, 1e-6,
+                                inversion::gravity_modes(head().model, head().config));
+  const Points w = Points::Random(3, head().model.mesh.num_nodes());
+  Points f;
+  for (auto _ : state) {
+    prior.apply(w, f);
+    benchmark::DoNotOptimize(f.data());
+  }
+}
+BENCHMARK(ApplyPrior)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  brainshift::fem::use_single_threaded_blas();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the golden frames of protocol version 1: NAME.bin and its description NAME.json.
+
+A second implementation of the protocol, by hand from proto/brainshift/v1/brainshift.proto and
+common/wire/frame.hpp with the Python standard library alone; it shares no code with common/wire. The
+values are made up here (MESSAGES); they are chosen to exercise signs, large integers, non-ASCII text,
+absent fields and numbers without a short decimal form. 32-bit floats hold values that are exact in them.
+Run it only when the protocol changes:  python3 tests/data/wire/make_golden.py
+"""
+import json
+import pathlib
+import struct
+import zlib
+
+# message: field name -> (number, kind). "*kind" is repeated (numbers packed); "?kind" is sent even if zero.
+SCHEMA = {
+    "PointSet": {"xyz_mm": (1, "*double")},
+    "Displacements": {"xyz_mm": (1, "*float")},
+    "Surface": {"vertices": (1, "PointSet"), "triangle_indices": (2, "*int")},
+    "Rigid": {"rotation_row_major": (1, "*double"), "translation_mm": (2, "*double")},
+    "TumourBoundary": {"points": (1, "PointSet"), "sd_mm": (2, "double")},
+    "CorticalSurface": {"surface": (1, "Surface"), "sd_mm": (2, "double")},
+    "LandmarkPairs": {"undeformed": (1, "PointSet"), "deformed": (2, "PointSet"), "sd_mm": (3, "double")},
+    "PatientPose": {"gravity_direction": (1, "*double"), "fluid_level_mm": (2, "?double")},
+    "Observation": {
+        "case_id": (1, "text"), "frame": (2, "text"), "source": (3, "text"), "sequence": (4, "int"),
+        "acquired_ns": (5, "int"), "acquired_wall_ns": (6, "int"),
+        "tumour_boundary": (10, "TumourBoundary"), "cortical_surface": (11, "CorticalSurface"),
+        "landmark_pairs": (12, "LandmarkPairs"), "patient_pose": (13, "PatientPose")},
+    "Empty": {},
+    "StatusReply": {
+        "version": (1, "text"), "model_ready": (2, "int"), "case_id": (3, "text"), "model_id": (4, "text"),
+        "busy": (5, "int"), "updates": (6, "int"), "uptime_ms": (7, "int")},
+    "StartSessionRequest": {
+        "case_id": (1, "text"), "method": (2, "text"), "boundary": (3, "text"),
+        "publish_iterates": (4, "int")},
+    "StartSessionReply": {
+        "session_id": (1, "int"), "model_id": (2, "text"), "nodes": (3, "int"), "tets": (4, "int"),
+        "slaves": (5, "int"), "prepare_s": (6, "double"), "model_bytes": (7, "int"),
+        "full_solve_ms": (8, "double"), "factor_s": (9, "double")},
+    "ModelReply": {
+        "case_id": (1, "text"), "model_id": (2, "text"), "nodes": (3, "PointSet"),
+        "tet_indices": (4, "*int"), "boundary_indices": (5, "*int"), "skull": (6, "Surface"),
+        "tumour": (7, "Surface"), "craniotomy": (8, "*int"), "brainstem": (9, "*int"),
+        "slaves": (10, "*int"), "fixed": (11, "*int"), "gravity_direction": (12, "*double"),
+        "fluid_plane_depth_mm": (13, "double"), "slave_plane_depth_mm": (14, "double"),
+        "tet_labels": (15, "*int")},
+    "SubscribeReply": {"session_id": (1, "int")},
+    "ObservationReply": {"observation_sequence": (1, "int"), "replaced_pending": (2, "int")},
+    "ErrorReply": {"code": (1, "text"), "message": (2, "text")},
+    "MeanStd": {"mean_mm": (1, "double"), "std_mm": (2, "double")},
+    "Iteration": {
+        "iteration": (1, "int"), "misfit": (2, "MeanStd"), "penetrating": (3, "int"),
+        "max_penetration_mm": (4, "double"), "elapsed_ms": (5, "double")},
+    "Contact": {
+        "active": (1, "int"), "penetrating": (2, "int"), "max_penetration_mm": (3, "double"),
+        "iterations": (4, "int"), "active_slaves": (5, "*int"), "force_n": (6, "*float")},
+    "StageTimings": {
+        "register_ms": (1, "double"), "invert_ms": (2, "double"), "rebuild_ms": (3, "double"),
+        "encode_ms": (4, "double"), "journal_ms": (5, "double")},
+    "Omission": {"part": (1, "text"), "reason": (2, "text"), "estimated_error": (3, "text")},
+    "Update": {
+        "case_id": (1, "text"), "model_id": (2, "text"), "session_id": (3, "int"), "sequence": (4, "int"),
+        "observation_sequence": (5, "int"), "method": (6, "text"), "boundary": (7, "text"),
+        "final": (8, "int"), "status": (9, "text"), "reason": (10, "text"),
+        "displacement": (11, "Displacements"), "sd_mm": (12, "*float"), "contact": (13, "Contact"),
+        "initial_misfit": (14, "MeanStd"), "misfit": (15, "MeanStd"), "history": (16, "*Iteration"),
+        "timings": (17, "StageTimings"), "t_undeformed_deformed": (18, "Rigid"),
+        "left_out": (19, "*Omission"), "error_code": (20, "text")},
+}
+
+OBSERVATION = {
+    "case_id": "colin27", "frame": "ras", "source": "ius", "sequence": 1,
+    "acquired_ns": 123456789012345, "acquired_wall_ns": 1257850000000000000}
+TETRAHEDRON = {
+    "vertices": {"xyz_mm": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]},
+    "triangle_indices": [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]}
+UPDATE = {
+    "case_id": "colin27", "model_id": "00ff00ff00ff00ff", "session_id": 3, "sequence": 8,
+    "observation_sequence": 2, "method": "paper", "boundary": "fixed", "final": 1}
+TIMINGS = {
+    "register_ms": 3.5, "invert_ms": 1234.5, "rebuild_ms": 0.0, "encode_ms": 0.7, "journal_ms": 0.1}
+
+# name: (frame type, request id, message, value)
+MESSAGES = {
+    "status_request": (1, 1, "Empty", {}),
+    "status_reply": (2, 1, "StatusReply", {
+        "version": "0.1.0", "model_ready": 1, "case_id": "Fall Köln", "model_id": "0123456789abcdef",
+        "busy": 1, "updates": 300, "uptime_ms": 86400000}),
+    "start_session_request": (3, 2, "StartSessionRequest", {
+        "case_id": "colin27", "method": "paper", "boundary": "fixed", "publish_iterates": 1}),
+    "start_session_reply": (4, 2, "StartSessionReply", {
+        "session_id": 3, "model_id": "0123456789abcdef", "nodes": 18475, "tets": 101083, "slaves": 906,
+        "prepare_s": 12.3, "model_bytes": 5000000000, "full_solve_ms": 33.1, "factor_s": 2.3}),
+    "model_request": (5, 3, "Empty", {}),
+    "model_reply": (6, 3, "ModelReply", {
+        "case_id": "one-tetrahedron", "model_id": "fedcba9876543210", "nodes": TETRAHEDRON["vertices"],
+        "tet_indices": [0, 1, 2, 3], "boundary_indices": TETRAHEDRON["triangle_indices"],
+        "skull": {"vertices": {"xyz_mm": [v * 1.1 for v in TETRAHEDRON["vertices"]["xyz_mm"]]},
+                  "triangle_indices": TETRAHEDRON["triangle_indices"]},
+        "tumour": {"vertices": {"xyz_mm": [0.1, 0.1, 0.1, 0.2, 0.1, 0.1, 0.1, 0.2, 0.1]},
+                   "triangle_indices": [0, 1, 2]},
+        "craniotomy": [3], "brainstem": [], "slaves": [1, 2], "fixed": [0],
+        "gravity_direction": [0.6, -0.8, 0.0], "fluid_plane_depth_mm": -1.5,
+        "slave_plane_depth_mm": 18.5, "tet_labels": [2]}),
+    "subscribe_request": (7, 4, "Empty", {}),
+    "subscribe_reply": (8, 4, "SubscribeReply", {"session_id": 3}),
+    "observation_tumour": (9, 2**63 + 5, "Observation", OBSERVATION | {
+        "tumour_boundary": {"points": {"xyz_mm": [12.5, -40.1, 1 / 3, -0.1, 1e-300, 55.0]},
+                            "sd_mm": 0.51}}),
+    "observation_cortex": (9, 6, "Observation", OBSERVATION | {
+        "source": "stereopsis", "sequence": 2**64 - 1, "acquired_ns": -5, "acquired_wall_ns": 0,
+        "cortical_surface": {"surface": TETRAHEDRON, "sd_mm": 0.1}}),
+    "observation_landmarks": (9, 7, "Observation", OBSERVATION | {
+        "source": "pointer",
+        "landmark_pairs": {"undeformed": {"xyz_mm": [1.0, 2.0, 3.0]},
+                           "deformed": {"xyz_mm": [1.5, -2.0, 2.7]}, "sd_mm": 0.3}}),
+    "observation_pose": (9, 8, "Observation", OBSERVATION | {
+        "source": "tracker",
+        "patient_pose": {"gravity_direction": [0.0, -0.6, -0.8], "fluid_level_mm": 0.0}}),
+    "observation_reply": (10, 8, "ObservationReply", {"observation_sequence": 2, "replaced_pending": 1}),
+    "error_reply": (11, 9, "ErrorReply", {
+        "code": "model_not_ready", "message": "no model is loaded: start a session first"}),
+    "update": (12, 0, "Update", UPDATE | {
+        "status": "converged", "reason": "misfit changed by less than 0.1 %",
+        "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]}, "sd_mm": [0.125, 2.0],
+        "contact": {"active": 1, "penetrating": 0, "max_penetration_mm": 0.0, "iterations": 4,
+                    "active_slaves": [1], "force_n": [0.03125]},
+        "initial_misfit": {"mean_mm": 3.1, "std_mm": 0.9}, "misfit": {"mean_mm": 0.09, "std_mm": 0.04},
+        "history": [
+            {"iteration": 1, "misfit": {"mean_mm": 1.2, "std_mm": 0.3}, "penetrating": 12,
+             "max_penetration_mm": 0.4, "elapsed_ms": 101.5},
+            {"iteration": 2, "misfit": {"mean_mm": 0.09, "std_mm": 0.04}, "penetrating": 0,
+             "max_penetration_mm": 0.0, "elapsed_ms": 202.25}],
+        "timings": TIMINGS,
+        "t_undeformed_deformed": {
+            "rotation_row_major": [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            "translation_mm": [0.5, -1.25, 3.3]},
+        "left_out": [{"part": "pore pressure", "reason": "updates are at least 10 s apart",
+                      "estimated_error": "0.02 % in energy"}]}),
+    "update_failed": (12, 0, "Update", UPDATE | {
+        "status": "failed", "reason": "observation 2: no point is inside the brain",
+        "timings": TIMINGS, "error_code": "empty_set"}),
+}
+
+
+def varint(value):
+    value &= 2**64 - 1  # negative numbers travel as 64-bit two's complement
+    out = bytearray()
+    while value >= 0x80:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def tag(number, wire_type):
+    return varint(number << 3 | wire_type)
+
+
+def block(number, data):
+    return tag(number, 2) + varint(len(data)) + data
+
+
+def scalar(kind, value):
+    if kind == "int":
+        return varint(value)
+    return struct.pack("<d" if kind == "double" else "<f", value)
+
+
+WIRE_TYPE = {"int": 0, "double": 1, "float": 5}
+
+
+def encode_field(number, kind, value):
+    if kind.startswith("*"):
+        kind = kind[1:]
+        if kind not in WIRE_TYPE:
+            return b"".join(block(number, encode(kind, entry)) for entry in value)
+        packed = b"".join(scalar(kind, entry) for entry in value)
+        return block(number, packed) if packed else b""
+    present = kind.startswith("?")
+    kind = kind.lstrip("?")
+    if kind == "text":
+        return block(number, value.encode()) if value else b""
+    if kind in WIRE_TYPE:
+        return tag(number, WIRE_TYPE[kind]) + scalar(kind, value) if value or present else b""
+    return block(number, encode(kind, value))
+
+
+def encode(message, value):
+    schema = SCHEMA[message]
+    fields = sorted((schema[name], entry) for name, entry in value.items())
+    return b"".join(encode_field(number, kind, entry) for (number, kind), entry in fields)
+
+
+def main():
+    folder = pathlib.Path(__file__).parent
+    for name, (frame_type, request_id, message, value) in MESSAGES.items():
+        payload = encode(message, value)
+        header = b"BSFT" + struct.pack("<HHIIQ", 1, frame_type, len(payload), zlib.crc32(payload), request_id)
+        (folder / f"{name}.bin").write_bytes(header + payload)
+        description = {"type": frame_type, "request_id": request_id, "message": message, "value": value}
+        (folder / f"{name}.json").write_text(json.dumps(description, indent=1, ensure_ascii=False) + "\n")
+
+
+if __name__ == "__main__":
+    main()

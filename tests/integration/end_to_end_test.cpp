@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// MRI -> model -> simulated surgery -> daemon -> client -> report, with the programs a user runs.
+// The bounds are loose ones for the coarse mesh; the paper's figures are checked on the full one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/lib/client.hpp"
+#include "common/io/surgery_file.hpp"
+#include "tests/integration/process.hpp"
+#include "tests/integration/workspace.hpp"
+
+namespace brainshift::integration {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kListening = "listening on ";
+
+json read_json(const std::string& path) {
+  std::ifstream stream(path);
+  return json::parse(stream);
+}
+
+const json& run_with_boundary(const json& report, const std::string& boundary) {
+  for (const json& run : report) {
+    if (run.at("boundary") == boundary) return run;
+  }
+  throw std::runtime_error("no run with boundary " + boundary);
+}
+
+void expect_contract(const json& run) {
+  for (const char* key : {"case", "scenario", "method", "boundary", "mesh", "prepare_s",
+                          "model_bytes", "full_solve_ms", "updates", "latency_ms", "cold_ms",
+                          "stages_ms", "error_mm", "recovery_pct", "field_error_pct", "coverage_90",
+                          "contact", "principal_direction_deg", "left_out"}) {
+    EXPECT_TRUE(run.contains(key)) << key;
+  }
+  for (const char* key : {"initial", "sparse", "cross", "craniotomy_initial", "craniotomy"}) {
+    ASSERT_TRUE(run.at("error_mm").contains(key)) << key;
+    EXPECT_TRUE(run.at("error_mm").at(key).at("mean").is_number()) << key;
+  }
+  for (const char* key : {"register", "invert", "rebuild", "encode", "journal"}) {
+    EXPECT_TRUE(run.at("stages_ms").contains(key)) << key;
+  }
+  EXPECT_EQ(run.at("method"), "paper");
+  EXPECT_GT(run.at("mesh").at("nodes").get<int>(), 500);
+  EXPECT_GE(run.at("updates").get<int>(), 1);
+  EXPECT_GT(run.at("full_solve_ms").get<double>(), 0.0);
+  EXPECT_GT(run.at("stages_ms").at("invert").get<double>(), 0.0);
+  EXPECT_FALSE(run.at("left_out").empty());
+}
+
+class EndToEnd : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(head_is_installed()) << "Debian's mricron-data is not installed";
+    prepared_ =
+        run({brainshiftd(), "prepare", "--case", coarse_case(), "--out", model(), "--json"});
+    ASSERT_EQ(prepared_.exit_status, 0) << prepared_.err;
+  }
+
+  std::string model() const { return files_.path("model.h5"); }
+
+  // A daemon on a free port that keeps a journal.
+  std::unique_ptr<Background> serve() {
+    std::filesystem::create_directory(files_.path("journal"));
+    const auto config =
+        files_.write("daemon.yaml",
+                     "endpoint: tcp://127.0.0.1:*\njournal_dir: " + files_.path("journal") + "\n");
+    auto daemon = std::make_unique<Background>(
+        std::vector<std::string>{brainshiftd(), "serve", "--config", config, "--model", model()},
+        files_.path("daemon.log"));
+    EXPECT_THAT(daemon->first_line(), StartsWith(kListening));
+    return daemon;
+  }
+
+  static std::string endpoint(const Background& daemon) {
+    return daemon.first_line().substr(std::string(kListening).size());
+  }
+
+  std::string simulate(const std::string& scenario) {
+    const auto surgery = files_.path(scenario + ".surgery");
+    const auto simulated = run({brainshift(), "simulate", "--case", coarse_case(), "--scenario",
+                                scenario, "--seed", "1", "--out", surgery});
+    EXPECT_EQ(simulated.exit_status, 0) << simulated.err;
+    return surgery;
+  }
+
+  json replay(const std::string& surgery, const Background& daemon) {
+    const auto report = files_.path("report.json");
+    const auto replayed =
+        run({brainshift(), "replay", surgery, "--endpoint", endpoint(daemon), "--report", report});
+    EXPECT_EQ(replayed.exit_status, 0) << replayed.err;
+    return read_json(report);
+  }
+
+  std::vector<std::string> journals() const {
+    std::vector<std::string> paths;
+    for (const auto& entry : std::filesystem::directory_iterator(files_.path("journal"))) {
+      paths.push_back(entry.path().string());
+    }
+    return paths;
+  }
+
+  Workspace files_;
+  Finished prepared_;
+};
+
+TEST_F(EndToEnd, PrepareTellsWhatItBuilt) {
+  const json told = json::parse(prepared_.out);
+  EXPECT_EQ(told.at("case"), "colin27-coarse");
+  EXPECT_GT(told.at("mesh").at("nodes").get<int>(), 500);
+  for (const char* set : {"craniotomy", "brainstem", "slaves", "fixed"}) {
+    EXPECT_GT(told.at("sets").at(set).get<int>(), 0) << set;
+  }
+  for (const char* boundary : {"contact", "fixed"}) {
+    const json& timings = told.at("prepare").at(boundary);
+    EXPECT_GT(timings.at("factor_s").get<double>(), 0.0);
+    EXPECT_GT(timings.at("full_solve_ms").get<double>(), 0.0);
+    EXPECT_GT(timings.at("factor_nonzeros").get<std::uint64_t>(), 0u);
+  }
+  EXPECT_EQ(prepared_.err, "");
+}
+
+TEST_F(EndToEnd, TheSimulatedSurgeryOfThePaperIsRecovered) {
+  const auto surgery = simulate("paper");
+  const auto daemon = serve();
+  const json report = replay(surgery, *daemon);
+  ASSERT_EQ(report.size(), 2u);
+  for (const json& run : report) {
+    expect_contract(run);
+    EXPECT_EQ(run.at("scenario"), "paper");
+  }
+  const json& contact = run_with_boundary(report, "contact");
+  const json& fixed = run_with_boundary(report, "fixed");
+  const double cross = contact.at("error_mm").at("cross").at("mean").get<double>();
+  EXPECT_LT(cross, 0.2);
+  EXPECT_LT(cross, 0.15 * contact.at("error_mm").at("initial").at("mean").get<double>());
+  EXPECT_GT(contact.at("recovery_pct").get<double>(), 85.0);
+  EXPECT_LT(contact.at("contact").at("max_penetration_mm").get<double>(), 0.2);
+  EXPECT_LT(contact.at("error_mm").at("craniotomy").at("mean").get<double>(),
+            fixed.at("error_mm").at("craniotomy").at("mean").get<double>());
+  EXPECT_EQ(daemon->end(SIGTERM), 0);
+}
+
+TEST_F(EndToEnd, TumourBoundaryPointsThatMustBeRegisteredFirstAreRecovered) {
+  const auto surgery = simulate("paper-icp");
+  const auto daemon = serve();
+  const json report = replay(surgery, *daemon);
+  const json& contact = run_with_boundary(report, "contact");
+  expect_contract(contact);
+  EXPECT_GT(contact.at("recovery_pct").get<double>(), 75.0);
+  EXPECT_GT(contact.at("stages_ms").at("register").get<double>(), 0.0);
+  EXPECT_EQ(daemon->end(SIGINT), 0);
+}
+
+TEST_F(EndToEnd, TheJournalHoldsWhatWasAskedAndAnswered) {
+  const auto surgery = simulate("paper");
+  const auto daemon = serve();
+  const json report = replay(surgery, *daemon);
+  ASSERT_EQ(daemon->end(SIGTERM), 0);
+  const auto paths = journals();
+  ASSERT_EQ(paths.size(), 2u) << "one per session, and no leftovers of the write-ahead log";
+  const auto recorded = io::SurgeryFile::open(surgery)->records("observation");
+  ASSERT_TRUE(recorded.has_value());
+  for (const std::string& path : paths) {
+    const auto journal = io::SurgeryFile::open(path);
+    ASSERT_TRUE(journal.has_value()) << journal.error().message;
+    EXPECT_EQ(journal->meta().at("case_id"), "colin27-coarse");
+    const auto observations = journal->records("observation");
+    ASSERT_TRUE(observations.has_value());
+    ASSERT_EQ(observations->size(), recorded->size());
+    EXPECT_EQ(observations->front().payload, recorded->front().payload);
+    const auto updates = journal->records("update");
+    ASSERT_TRUE(updates.has_value());
+    ASSERT_EQ(updates->size(), recorded->size());
+    const auto update = wire::decode_update(updates->front().payload);
+    ASSERT_TRUE(update.has_value());
+    EXPECT_EQ(update->update.observation_sequence, recorded->front().sequence);
+  }
+}
+
+// ---------- without a model ----------
+
+TEST(WithoutAModel, TheDaemonRunsAndTellsClientsThatNoModelIsLoaded) {
+  const Workspace files;
+  const auto config = files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n");
+  Background daemon({brainshiftd(), "serve", "--config", config}, files.path("daemon.log"));
+  ASSERT_THAT(daemon.first_line(), StartsWith(kListening));
+  auto client = client::Client::connect(daemon.first_line().substr(std::string(kListening).size()));
+  ASSERT_TRUE(client.has_value());
+  const auto status = client->status();
+  ASSERT_TRUE(status.has_value()) << status.error().message;
+  EXPECT_FALSE(status->model_ready);
+  const auto session =
+      client->start_session({"colin27-coarse", Method::kPaper, Boundary::kContact, false});
+  ASSERT_FALSE(session.has_value());
+  EXPECT_EQ(session.error().code, ErrorCode::kModelNotReady);
+  EXPECT_THAT(session.error().message, HasSubstr("no model is loaded"));
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+}
+
+}  // namespace
+}  // namespace brainshift::integration

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A folder of its own for each test, the programs under test, and the coarse case.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace brainshift::integration {
+
+class Workspace {
+ public:
+  Workspace();
+  ~Workspace();
+  Workspace(const Workspace&) = delete;
+  Workspace& operator=(const Workspace&) = delete;
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  const std::filesystem::path& folder() const { return folder_; }
+  std::string write(const std::string& name, const std::string& content) const;  // returns its path
+
+ private:
+  std::filesystem::path folder_;
+};
+
+std::string brainshiftd();
+std::string brainshift();
+std::string coarse_case();       // path
+std::string coarse_case_text();  // content
+bool head_is_installed();        // Debian's mricron-data
+
+// The YAML text with the first line below the top-level `section:` whose key is `key` replaced, indentation
+// kept; throws when there is none.
+std::string with_line(const std::string& text, const std::string& section, const std::string& key,
+                      const std::string& line);
+
+}  // namespace brainshift::integration

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "client/lib/update_queue.hpp"
+
+namespace brainshift::client {
+namespace {
+
+wire::UpdateMessage update(std::uint64_t sequence, bool final) {
+  wire::UpdateMessage message;
+  message.update.sequence = sequence;
+  message.update.final = final;
+  return message;
+}
+
+std::vector<std::uint64_t> drain(UpdateQueue& queue) {
+  std::vector<std::uint64_t> sequences;
+  while (auto entry = queue.pop()) sequences.push_back(*entry ? (*entry)->update.sequence : 0);
+  return sequences;
+}
+
+TEST(UpdateQueue, KeepsTheOrderOfArrival) {
+  UpdateQueue queue(10);
+  for (std::uint64_t i = 1; i <= 5; ++i) queue.push(update(i, i % 2 == 0));
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 2, 3, 4, 5}));
+}
+
+TEST(UpdateQueue, WhenFullTheOldestIterateGivesWay) {
+  UpdateQueue queue(3);
+  queue.push(update(1, true));
+  queue.push(update(2, false));
+  queue.push(update(3, false));
+  queue.push(update(4, false));
+  EXPECT_EQ(queue.size(), 3u);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 3, 4}));
+}
+
+TEST(UpdateQueue, FinalUpdatesAndErrorsAreNeverDropped) {
+  UpdateQueue queue(2);
+  queue.push(update(1, true));
+  queue.push(fail(ErrorCode::kProtocol, "bad"));
+  auto failed = update(3, false);
+  failed.error = Error{ErrorCode::kEmptySet, "no point"};
+  queue.push(failed);
+  queue.push(update(4, true));
+  queue.push(update(5, false));  // the only one that may go
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 0, 3, 4}));
+}
+
+TEST(UpdateQueue, IteratesAloneNeverExceedTheCapacity) {
+  UpdateQueue queue(4);
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    queue.push(update(i, false));
+    EXPECT_LE(queue.size(), 4u);
+  }
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{997, 998, 999, 1000}));
+}
+
+}  // namespace
+}  // namespace brainshift::client

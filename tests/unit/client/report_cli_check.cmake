@@ -1,0 +1,18 @@
+# Runs BINARY with ARGUMENTS; expects exit status STATUS and, on failure, exactly one line on stderr that
+# contains EXPECTED; on success, an empty stderr and something on stdout.
+execute_process(COMMAND ${BINARY} ${ARGUMENTS} RESULT_VARIABLE status OUTPUT_VARIABLE out ERROR_VARIABLE err)
+if(NOT status EQUAL STATUS)
+  message(FATAL_ERROR "exit status ${status}, expected ${STATUS}: ${err}")
+endif()
+if(STATUS EQUAL 0)
+  if(NOT err STREQUAL "" OR out STREQUAL "")
+    message(FATAL_ERROR "expected an answer on stdout only, stderr: ${err}")
+  endif()
+else()
+  string(REGEX MATCHALL "\n" newlines "${err}")
+  list(LENGTH newlines lines)
+  string(FIND "${err}" "${EXPECTED}" found)
+  if(NOT lines EQUAL 1 OR found EQUAL -1)
+    message(FATAL_ERROR "expected one line with '${EXPECTED}', got ${lines}: ${err}")
+  endif()
+endif()

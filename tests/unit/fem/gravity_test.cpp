@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/fem/gravity.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/core/random.hpp"
+#include "common/core/units.hpp"
+#include "tests/support/box_mesh.hpp"
+
+namespace brainshift::fem {
+namespace {
+
+using test_support::box_mesh;
+
+const double kWeight = units::weight_density_from_kg_m3(999.0);  // N/mm^3, Table 1 above the plane
+
+double sum_along(const Points& load, const Vec3& direction) {
+  return direction.dot(Vec3(load.rowwise().sum()));
+}
+
+TEST(Buoyancy, TotalForceIsTheWeightOfTheDrainedPartWhereverThePlaneCuts) {
+  const Vec3 size(30, 20, 40);
+  const TetMesh mesh = box_mesh(3, 2, 4, size);
+  const Vec3 down(0, 0, -1);
+  for (double height_above : {0.0, 3.3, 10.0, 17.1, 40.0, 55.0}) {
+    // Depth of a point is -z; the plane lies height_above below the top.
+    const Points load = buoyancy_load(mesh, Material{}, down, -size[2] + height_above, down);
+    const double drained = 30.0 * 20.0 * std::min(height_above, 40.0);
+    EXPECT_NEAR(sum_along(load, down), kWeight * drained, 1e-12);
+    EXPECT_NEAR(load.topRows<2>().norm(), 0.0, 1e-15);
+  }
+}
+
+TEST(Buoyancy, ObliquePlaneThroughTheCentreDrainsHalf) {
+  const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  const Vec3 g = Vec3(-0.5, 0.3, -0.8).normalized();
+  const Points load = buoyancy_load(mesh, Material{}, g, g.dot(Vec3(15, 15, 15)), Vec3::UnitX());
+  EXPECT_NEAR(sum_along(load, Vec3::UnitX()), kWeight * 13500.0, 1e-12);
+}
+
+TEST(Buoyancy, DenserFluidBelowThePlaneLifts) {
+  Material material;
+  material.fluid_density_saturated_kg_m3 = 1100.0;
+  const TetMesh mesh = box_mesh(1, 1, 1, Vec3(10, 10, 10));
+  const Points load = buoyancy_load(mesh, material, -Vec3::UnitZ(), -20.0, -Vec3::UnitZ());
+  EXPECT_NEAR(load.row(2).sum(), units::weight_density_from_kg_m3(100.0) * 1000.0, 1e-15);
+}
+
+TEST(NegativeVolumeFraction, KnowsTheClosedForms) {
+  EXPECT_EQ(negative_volume_fraction({1, 2, 3, 4}), 0.0);
+  EXPECT_EQ(negative_volume_fraction({-1, -2, -3, -4}), 1.0);
+  EXPECT_DOUBLE_EQ(negative_volume_fraction({-1, 1, 1, 1}), 0.125);
+  EXPECT_DOUBLE_EQ(negative_volume_fraction({-1, 1, -1, 1}), 0.5);
+  EXPECT_DOUBLE_EQ(negative_volume_fraction({0, 0, 0, 0}), 0.0);
+  EXPECT_DOUBLE_EQ(negative_volume_fraction({-1, 0, 0, 0}), 1.0);
+}
+
+// Independent reference: counting random points. 2e5 points give a standard error below 0.0012.
+TEST(NegativeVolumeFraction, AgreesWithCountingPoints) {
+  Random random(42);
+  for (int trial = 0; trial < 8; ++trial) {
+    Eigen::Vector4d values;
+    for (int k = 0; k < 4; ++k) values[k] = 2.0 * random.uniform() - 1.0;
+    int below = 0;
+    constexpr int kPoints = 200000;
+    for (int i = 0; i < kPoints; ++i) {
+      Eigen::Vector4d weights;  // uniform in the simplex: normalised exponentials
+      for (int k = 0; k < 4; ++k) weights[k] = -std::log(1.0 - random.uniform());
+      below += values.dot(weights) < 0.0;
+    }
+    EXPECT_NEAR(negative_volume_fraction(values), below / static_cast<double>(kPoints), 0.006);
+    EXPECT_NEAR(negative_volume_fraction(values) + negative_volume_fraction(-values), 1.0, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace brainshift::fem

@@ -1,0 +1,10 @@
+# Tests of surfaces, closest points and point location; included by this folder's CMakeLists.txt.
+brainshift_test(geometry_surface_test
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/surface_test.cpp
+  LINKS brainshift::geometry)
+brainshift_test(geometry_closest_point_test
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/closest_point_test.cpp
+  LINKS brainshift::geometry Threads::Threads)
+brainshift_test(geometry_tet_locator_test
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/tet_locator_test.cpp
+  LINKS brainshift::geometry)

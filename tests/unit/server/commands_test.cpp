@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <poll.h>
+#include <csignal>
+
+#include "server/main/exit_status.hpp"
+#include "server/main/progress_bar.hpp"
+#include "server/main/stop_signals.hpp"
+
+namespace brainshift::server {
+namespace {
+
+bool readable(int fd) {
+  pollfd item{fd, POLLIN, 0};
+  return poll(&item, 1, 0) == 1;
+}
+
+TEST(ExitStatus, IsTwoForWhatTheUserCanMendAndOneOtherwise) {
+  EXPECT_EQ(exit_status(ErrorCode::kInvalidArgument), 2);
+  EXPECT_EQ(exit_status(ErrorCode::kNotFound), 2);
+  EXPECT_EQ(exit_status(ErrorCode::kDegenerateMesh), 2);
+  EXPECT_EQ(exit_status(ErrorCode::kFloatingBody), 2);
+  EXPECT_EQ(exit_status(ErrorCode::kWriteFailed), 1);
+  EXPECT_EQ(exit_status(ErrorCode::kInternal), 1);
+}
+
+TEST(PrintError, IsOneLine) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(print_error({ErrorCode::kNotFound, "a\nb"}), 2);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "brainshiftd: a b\n");
+}
+
+std::string progress_lines(ProgressBar::Style style) {
+  testing::internal::CaptureStdout();
+  {
+    ProgressBar bar(style);
+    const Progress progress = bar.progress("contact");
+    report(progress, "assemble", 0.0);
+    report(progress, "assemble", 0.5);
+    report(progress, "factor", 0.6);
+  }
+  return testing::internal::GetCapturedStdout();
+}
+
+TEST(ProgressBar, PrintsEachStageOnceWithoutATerminalAndNothingWhenSilent) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(progress_lines(ProgressBar::Style::kLines), "contact: assemble\ncontact: factor\n");
+  EXPECT_EQ(progress_lines(ProgressBar::Style::kSilent), "");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(ProgressBar, LeavesACleanLineOnATerminal) {
+  testing::internal::CaptureStderr();
+  {
+    ProgressBar bar(ProgressBar::Style::kBar);
+    bar.show("", "mesh", 0.5);
+  }
+  const std::string drawn = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(drawn, testing::HasSubstr("[###############...............]  50 %  mesh"));
+  EXPECT_THAT(drawn, testing::EndsWith("\r\033[K"));
+  EXPECT_THAT(drawn, testing::Not(testing::HasSubstr("\n")));
+}
+
+TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
+  const auto signals = StopSignals::block();
+  ASSERT_TRUE(signals.has_value());
+  EXPECT_FALSE(readable(signals->fd()));
+  std::raise(SIGTERM);
+  EXPECT_TRUE(readable(signals->fd()));
+}
+
+}  // namespace
+}  // namespace brainshift::server

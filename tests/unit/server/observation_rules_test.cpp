@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/session/observation_rules.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <ostream>
+#include <string>
+
+#include "tests/unit/server/sample_values.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::HasSubstr;
+
+struct BadObservation {
+  const char* name;
+  void (*spoil)(Observation&);
+  ErrorCode code;
+  const char* says;
+};
+
+void PrintTo(const BadObservation& bad, std::ostream* stream) { *stream << bad.name; }
+
+class ObservationRules : public testing::TestWithParam<BadObservation> {};
+
+TEST_P(ObservationRules, AreNamedWhenBroken) {
+  Observation observation = landmarks(2);
+  ASSERT_TRUE(check_observation(observation, kCase, 1).has_value());
+  GetParam().spoil(observation);
+  const auto status = check_observation(observation, kCase, 1);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().code, GetParam().code);
+  EXPECT_THAT(status.error().message, HasSubstr(GetParam().says));
+  EXPECT_THAT(status.error().message, testing::Not(HasSubstr("\n")));
+}
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, ObservationRules,
+    testing::Values(
+        BadObservation{"OtherCase", [](Observation& o) { o.case_id = "x\ny"; },
+                       ErrorCode::kInvalidArgument, "case_id = \"x?y\""},
+        BadObservation{"OtherFrame", [](Observation& o) { o.frame = "lps"; },
+                       ErrorCode::kInvalidArgument, "frame = \"lps\""},
+        BadObservation{"NoSource", [](Observation& o) { o.source.clear(); },
+                       ErrorCode::kInvalidArgument, "source"},
+        BadObservation{"EndlessSource", [](Observation& o) { o.source.assign(1000, 'a'); },
+                       ErrorCode::kInvalidArgument, "1 to 64 characters"},
+        BadObservation{"OldSequence", [](Observation& o) { o.sequence = 1; },
+                       ErrorCode::kInvalidArgument, "sequence = 1"},
+        BadObservation{
+            "LandmarkNaN",
+            [](Observation& o) { std::get<LandmarkPairs>(o.body).deformed(2, 3) = kNaN; },
+            ErrorCode::kNotFinite, "landmark_pairs.deformed: point 3"},
+        BadObservation{
+            "LandmarkInfinite",
+            [](Observation& o) { std::get<LandmarkPairs>(o.body).undeformed(0, 0) = kInf; },
+            ErrorCode::kNotFinite, "landmark_pairs.undeformed: point 0"},
+        BadObservation{"NegativeSd",
+                       [](Observation& o) { std::get<LandmarkPairs>(o.body).sd_mm = -1; },
+                       ErrorCode::kInvalidArgument, "landmark_pairs.sd_mm = -1"},
+        BadObservation{"BoundaryNaN",
+                       [](Observation& o) {
+                         o.body = TumourBoundary{Points::Constant(3, 4, kNaN), 0.5};
+                       },
+                       ErrorCode::kNotFinite, "tumour_boundary.points"},
+        BadObservation{"BoundarySdNaN",
+                       [](Observation& o) {
+                         o.body = TumourBoundary{Points::Zero(3, 4), kNaN};
+                       },
+                       ErrorCode::kInvalidArgument, "tumour_boundary.sd_mm"},
+        BadObservation{"SurfaceNaN",
+                       [](Observation& o) {
+                         CorticalSurface surface;
+                         surface.surface.vertices = Points::Constant(3, 1, kNaN);
+                         o.body = surface;
+                       },
+                       ErrorCode::kNotFinite, "cortical_surface"},
+        BadObservation{"GravityNaN",
+                       [](Observation& o) {
+                         o.body = PatientPose{Vec3(0, kNaN, 0), {}};
+                       },
+                       ErrorCode::kNotFinite, "gravity_direction"},
+        BadObservation{"FluidLevelInfinite",
+                       [](Observation& o) {
+                         o.body = PatientPose{Vec3(0, -1, 0), kInf};
+                       },
+                       ErrorCode::kNotFinite, "fluid_level_mm"}),
+    [](const auto& row) { return row.param.name; });
+
+TEST(InQuotes, IsOneShortLineWhateverItHolds) {
+  EXPECT_EQ(in_quotes("plain"), "\"plain\"");
+  EXPECT_EQ(in_quotes("a\nb\x1b"), "\"a?b?\"");
+  EXPECT_EQ(in_quotes(std::string(200, 'x')), "\"" + std::string(64, 'x') + "...\"");
+}
+
+}  // namespace
+}  // namespace brainshift::server

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/pipeline/pipeline.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "server/pipeline/left_out.hpp"
+#include "tests/unit/server/sample_values.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::HasSubstr;
+
+// Ellipsoid about the origin, latitude and longitude triangles; closed up to its two small polar caps.
+TriangleSurface ellipsoid(const Vec3& axes) {
+  constexpr int kRings = 24;
+  constexpr int kSectors = 48;
+  TriangleSurface surface;
+  surface.vertices.resize(3, (kRings + 1) * kSectors);
+  for (int r = 0; r <= kRings; ++r) {
+    for (int s = 0; s < kSectors; ++s) {
+      const double theta = std::numbers::pi * (r + 0.001) / (kRings + 0.002);
+      const double phi = 2.0 * std::numbers::pi * s / kSectors;
+      surface.vertices.col(r * kSectors + s) = axes.cwiseProduct(
+          Vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
+    }
+  }
+  surface.triangles.resize(3, 2 * kRings * kSectors);
+  int t = 0;
+  for (int r = 0; r < kRings; ++r) {
+    for (int s = 0; s < kSectors; ++s) {
+      const int a = r * kSectors + s;
+      const int b = r * kSectors + (s + 1) % kSectors;
+      surface.triangles.col(t++) << a, a + kSectors, b;
+      surface.triangles.col(t++) << b, a + kSectors, b + kSectors;
+    }
+  }
+  return surface;
+}
+
+// A cube of the given edge as five tetrahedra.
+TetMesh cube(double edge) {
+  TetMesh mesh;
+  mesh.nodes.resize(3, 8);
+  for (int i = 0; i < 8; ++i) mesh.nodes.col(i) = edge * Vec3(i & 1, (i >> 1) & 1, (i >> 2) & 1);
+  mesh.tets.resize(4, 5);
+  mesh.tets.col(0) << 0, 1, 2, 4;
+  mesh.tets.col(1) << 1, 3, 2, 7;
+  mesh.tets.col(2) << 1, 5, 7, 4;
+  mesh.tets.col(3) << 2, 7, 6, 4;
+  mesh.tets.col(4) << 1, 2, 4, 7;
+  for (int t = 0; t < 5; ++t) {
+    const Vec3 o = mesh.nodes.col(mesh.tets(0, t));
+    const Vec3 a = mesh.nodes.col(mesh.tets(1, t)) - o;
+    const Vec3 b = mesh.nodes.col(mesh.tets(2, t)) - o;
+    const Vec3 c = mesh.nodes.col(mesh.tets(3, t)) - o;
+    if (a.dot(b.cross(c)) < 0) std::swap(mesh.tets(2, t), mesh.tets(3, t));
+  }
+  return mesh;
+}
+
+std::shared_ptr<const BrainModel> model() {
+  auto model = std::make_shared<BrainModel>();
+  model->case_id = kCase;
+  model->model_id = "0123456789abcdef";
+  model->mesh = cube(100.0);
+  model->tumour = ellipsoid({16, 11, 8});
+  return model;
+}
+
+// An inversion that remembers what it was given.
+struct FakeInversion {
+  std::shared_ptr<std::optional<SparseData>> seen = std::make_shared<std::optional<SparseData>>();
+  Result<Estimate> operator()(const SparseData& data, const inversion::InversionOptions&) const {
+    *seen = data;
+    Estimate estimate;
+    estimate.status = EstimateStatus::kConverged;
+    estimate.displacement = Points::Zero(3, 8);
+    return estimate;
+  }
+};
+
+Pipeline pipeline(InvertFunction invert, Boundary boundary = Boundary::kContact,
+                  const CaseConfig& config = {}) {
+  auto built = Pipeline::build(model(), config, boundary, std::move(invert));
+  EXPECT_TRUE(built.has_value());
+  return std::move(*built);
+}
+
+Observation boundary_moved_by(const Vec3& shift) {
+  TumourBoundary boundary;
+  boundary.points = ellipsoid({16, 11, 8}).vertices.colwise() + shift;
+  boundary.sd_mm = 0.5;
+  Observation observation = landmarks(7, "ius");
+  observation.body = boundary;
+  return observation;
+}
+
+bool leaves_out(const Update& update, const std::string& part) {
+  for (const Omission& omission : update.left_out) {
+    if (omission.part == part) return true;
+  }
+  return false;
+}
+
+TEST(Pipeline, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
+  const FakeInversion inversion;
+  CaseConfig config;
+  config.inversion.sigma_mm = 0.25;
+  const auto update = pipeline(inversion, Boundary::kContact, config).run(landmarks(3), {});
+  ASSERT_TRUE(update.has_value());
+  const SparseData& data = inversion.seen->value();
+  ASSERT_EQ(data.size(), 4);
+  EXPECT_EQ(data.displacements, Points(Vec3(1, 0, 0).replicate(1, 4)));
+  EXPECT_EQ(data.positions, std::get<LandmarkPairs>(landmarks(3).body).undeformed);
+  EXPECT_EQ(data.sd_mm, VecX(VecX::Constant(4, 0.25)));
+  EXPECT_TRUE(update->T_undeformed_deformed.isApprox(RigidTransform::Identity()));
+  EXPECT_EQ(update->observation_sequence, 3u);
+  EXPECT_EQ(update->case_id, kCase);
+  EXPECT_TRUE(update->final);
+}
+
+TEST(Pipeline, AShiftedTumourBoundaryGivesBackItsShift) {
+  const FakeInversion inversion;
+  const Vec3 shift(1.5, -2.0, 1.0);
+  const auto update = pipeline(inversion).run(boundary_moved_by(shift), {});
+  ASSERT_TRUE(update.has_value());
+  EXPECT_LT((update->T_undeformed_deformed.translation() + shift).norm(), 0.05);
+  const SparseData& data = inversion.seen->value();
+  ASSERT_EQ(data.size(), CaseConfig{}.inversion.sparse_points);
+  EXPECT_LT((data.displacements.colwise() - shift).colwise().norm().maxCoeff(), 0.1);
+}
+
+TEST(Pipeline, GuidingPointsAreDistinctAndTheSameInEveryRun) {
+  const FakeInversion inversion;
+  const Pipeline once = pipeline(inversion);
+  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0}), {}).has_value());
+  const SparseData first = inversion.seen->value();
+  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0}), {}).has_value());
+  const SparseData second = inversion.seen->value();
+  EXPECT_EQ(first.positions, second.positions);
+  std::set<std::pair<double, std::pair<double, double>>> distinct;
+  for (int i = 0; i < first.size(); ++i) {
+    distinct.insert({first.positions(0, i), {first.positions(1, i), first.positions(2, i)}});
+  }
+  EXPECT_EQ(static_cast<int>(distinct.size()), first.size());
+}
+
+TEST(Pipeline, FewerBoundaryPointsThanWantedAreAllUsed) {
+  const FakeInversion inversion;
+  CaseConfig config;
+  config.inversion.sparse_points = 1'000'000;
+  const Observation observation = boundary_moved_by({1, 0, 0});
+  ASSERT_TRUE(pipeline(inversion, Boundary::kContact, config).run(observation, {}).has_value());
+  EXPECT_EQ(inversion.seen->value().size(),
+            std::get<TumourBoundary>(observation.body).points.cols());
+}
+
+TEST(Pipeline, RefusesWhatMethodPaperDoesNotAssimilate) {
+  const FakeInversion inversion;
+  Observation observation = landmarks(1);
+  observation.body = CorticalSurface{};
+  const auto surface = pipeline(inversion).run(observation, {});
+  ASSERT_FALSE(surface.has_value());
+  EXPECT_EQ(surface.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(surface.error().message, HasSubstr("cortical_surface is not assimilated"));
+  observation.body = PatientPose{};
+  const auto pose = pipeline(inversion).run(observation, {});
+  ASSERT_FALSE(pose.has_value());
+  EXPECT_THAT(pose.error().message, HasSubstr("patient_pose is not assimilated"));
+  EXPECT_FALSE(inversion.seen->has_value());
+}
+
+TEST(Pipeline, RefusesLandmarksThatDoNotPairUpOrAreTooFewOrNotFinite) {
+  const FakeInversion inversion;
+  Observation observation = landmarks(1);
+  auto& pairs = std::get<LandmarkPairs>(observation.body);
+  pairs.deformed.conservativeResize(3, 3);
+  const auto unpaired = pipeline(inversion).run(observation, {});
+  ASSERT_FALSE(unpaired.has_value());
+  EXPECT_THAT(unpaired.error().message, HasSubstr("4 undeformed but 3 deformed"));
+
+  pairs.undeformed.conservativeResize(3, 2);
+  pairs.deformed.conservativeResize(3, 2);
+  const auto few = pipeline(inversion).run(observation, {});
+  ASSERT_FALSE(few.has_value());
+  EXPECT_EQ(few.error().code, ErrorCode::kInvalidArgument);
+
+  observation = landmarks(1);
+  std::get<LandmarkPairs>(observation.body).deformed(1, 2) =
+      std::numeric_limits<double>::quiet_NaN();
+  const auto not_finite = pipeline(inversion).run(observation, {});
+  ASSERT_FALSE(not_finite.has_value());
+  EXPECT_EQ(not_finite.error().code, ErrorCode::kNotFinite);
+  EXPECT_FALSE(inversion.seen->has_value());
+}
+
+TEST(Pipeline, AnErrorOfTheInversionPassesThroughUnchanged) {
+  const auto update = pipeline([](const SparseData&, const inversion::InversionOptions&) {
+                        return Result<Estimate>(fail(ErrorCode::kNotConverged, "the reason"));
+                      }).run(landmarks(1), {});
+  ASSERT_FALSE(update.has_value());
+  EXPECT_EQ(update.error().code, ErrorCode::kNotConverged);
+  EXPECT_EQ(update.error().message, "the reason");
+}
+
+TEST(Pipeline, IteratesAreMarkedAndTheStopTokenReachesTheInversion) {
+  std::stop_source stop;
+  bool stoppable = false;
+  const auto inversion = [&](const SparseData&, const inversion::InversionOptions& options) {
+    stoppable = options.stop.stop_possible();
+    Estimate iterate;
+    iterate.status = EstimateStatus::kIterating;
+    options.on_iterate(iterate);
+    iterate.status = EstimateStatus::kConverged;
+    return Result<Estimate>(iterate);
+  };
+  std::vector<bool> final;
+  RunOptions options;
+  options.stop = stop.get_token();
+  options.on_iterate = [&](const Update& update) { final.push_back(update.final); };
+  const auto update = pipeline(inversion).run(landmarks(1), options);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_THAT(final, testing::ElementsAre(false));
+  EXPECT_TRUE(update->final);
+  EXPECT_EQ(update->estimate.status, EstimateStatus::kConverged);
+  EXPECT_TRUE(stoppable);
+}
+
+TEST(Pipeline, SaysWhatItLeavesOut) {
+  const auto contact = pipeline(FakeInversion{}, Boundary::kContact).run(landmarks(1), {});
+  ASSERT_TRUE(contact.has_value());
+  EXPECT_TRUE(leaves_out(*contact, "pressure"));
+  EXPECT_TRUE(leaves_out(*contact, "uncertainty"));
+  EXPECT_FALSE(leaves_out(*contact, "contact"));
+  const auto fixed = pipeline(FakeInversion{}, Boundary::kFixed).run(landmarks(1), {});
+  ASSERT_TRUE(fixed.has_value());
+  EXPECT_TRUE(leaves_out(*fixed, "contact"));
+  for (const Omission& omission : fixed->left_out) {
+    EXPECT_FALSE(omission.reason.empty()) << omission.part;
+    EXPECT_FALSE(omission.estimated_error.empty()) << omission.part;
+  }
+}
+
+TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
+  auto sphere = std::make_shared<BrainModel>(*model());
+  sphere->tumour = ellipsoid({10, 10, 10});
+  const auto built = Pipeline::build(sphere, {}, Boundary::kContact, FakeInversion{});
+  ASSERT_TRUE(built.has_value());
+  Observation observation = landmarks(1);
+  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
+  const auto update = built->run(observation, {});
+  ASSERT_TRUE(update.has_value());
+  EXPECT_TRUE(leaves_out(*update, "rotation"));
+}
+
+TEST(Pipeline, NeedsATumourSurface) {
+  auto without = std::make_shared<BrainModel>(*model());
+  without->tumour = {};
+  const auto built = Pipeline::build(without, {}, Boundary::kContact, FakeInversion{});
+  ASSERT_FALSE(built.has_value());
+  EXPECT_EQ(built.error().code, ErrorCode::kEmptySet);
+}
+
+// R^2 / c_v by hand: a cube of 100 mm has the volume of a ball of 62.035 mm; Table 1 gives
+// lambda = 24150 Pa, c_v = 1e-7 * 28350 = 2.835e-3 m^2/s.
+TEST(ConsolidationTime, AgreesWithHandCalculation) {
+  EXPECT_NEAR(consolidation_time_s(cube(100.0), Material{}), 0.062035 * 0.062035 / 2.835e-3, 1e-4);
+}
+
+TEST(ConsolidationTime, GrowsWithTheSquareOfTheSize) {
+  const double small = consolidation_time_s(cube(50.0), Material{});
+  ASSERT_GT(small, 0.0);
+  EXPECT_NEAR(consolidation_time_s(cube(100.0), Material{}) / small, 4.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace brainshift::server

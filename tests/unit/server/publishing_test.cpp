@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who receives which update, and when.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+
+#include "tests/unit/server/transport_fixture.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::HasSubstr;
+
+TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {
+  serve(with_model());
+  RawPeer sender(endpoint_);
+  RawPeer watcher(endpoint_);
+  start_session(sender);
+  subscribe(sender);
+  subscribe(watcher);
+  for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
+    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    for (RawPeer* peer : {&sender, &watcher}) {
+      const auto message = next_update(*peer);
+      EXPECT_EQ(message.update.observation_sequence, sequence);
+      EXPECT_FALSE(message.error.has_value());
+      EXPECT_EQ(message.update.estimate.displacement(0, 0), static_cast<double>(sequence));
+    }
+  }
+}
+
+TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
+  serve(with_model());
+  RawPeer sender(endpoint_);
+  start_session(sender);
+  subscribe(sender);
+  sender.request(MessageType::kObservation, wire::encode(landmarks(42)));
+  ASSERT_EQ(next_update(sender).update.observation_sequence, 42u);
+  RawPeer late(endpoint_);
+  subscribe(late);
+  EXPECT_EQ(next_update(late).update.observation_sequence, 42u);
+}
+
+TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
+  ServiceOptions options = with_model();
+  options.prepare = [](Boundary) -> Result<Prepared> {
+    Prepared prepared;
+    prepared.run = [](const Observation& observation, const RunOptions&) {
+      if (observation.sequence == 2) {
+        return Result<Update>(fail(ErrorCode::kNotConverged, "no luck"));
+      }
+      return Result<Update>(answer(observation));
+    };
+    return prepared;
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  subscribe(peer);
+  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  EXPECT_FALSE(next_update(peer).error.has_value());
+  peer.request(MessageType::kObservation, wire::encode(landmarks(2)));
+  const auto failed = next_update(peer);
+  ASSERT_TRUE(failed.error.has_value());
+  EXPECT_EQ(failed.error->code, ErrorCode::kNotConverged);
+  EXPECT_EQ(failed.update.observation_sequence, 2u);
+  RawPeer late(endpoint_);
+  subscribe(late);
+  EXPECT_EQ(next_update(late).update.observation_sequence, 1u);
+}
+
+TEST_F(TransportTest, ASubscriberThatDoesNotReadDelaysNobodyAndIsOwedTheNewestUpdate) {
+  constexpr int kNodes = 40'000;  // 0.5 MB per update
+  constexpr std::uint64_t kUpdates = 60;
+  RouterOptions options;
+  options.send_queue = 2;
+  serve(with_model(kNodes), options);
+  RawPeer sender(endpoint_);
+  RawPeer slow(endpoint_, 1);
+  start_session(sender);
+  subscribe(sender);
+  subscribe(slow);
+  for (std::uint64_t sequence = 1; sequence <= kUpdates; ++sequence) {
+    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    ASSERT_EQ(next_update(sender).update.observation_sequence, sequence);
+  }
+  std::uint64_t received = 0;
+  std::uint64_t last = 0;
+  while (last < kUpdates) {
+    const std::uint64_t sequence = next_update(slow).update.observation_sequence;
+    EXPECT_GT(sequence, last);
+    last = sequence;
+    ++received;
+  }
+  EXPECT_LT(received, kUpdates)
+      << "nothing was lost: the queues never filled, the test shows nothing";
+}
+
+TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
+  RouterOptions options;
+  options.max_clients = 2;
+  serve(with_model(), options);
+  RawPeer first(endpoint_);
+  auto second = std::make_unique<RawPeer>(endpoint_);
+  subscribe(first);
+  subscribe(*second);
+  RawPeer third(endpoint_);
+  const Error refused = error_of(third.ask(MessageType::kStatusRequest));
+  EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
+  EXPECT_THAT(refused.message, HasSubstr("2 clients"));
+  second.reset();
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  MessageType answered = MessageType::kErrorReply;
+  while (answered == MessageType::kErrorReply && std::chrono::steady_clock::now() < deadline) {
+    answered = third.ask(MessageType::kStatusRequest).type;
+  }
+  EXPECT_EQ(answered, MessageType::kStatusReply);
+}
+
+TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
+  ServiceOptions options = with_model();
+  options.journal_dir = testing::TempDir();
+  options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
+    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  subscribe(peer);
+  // The journal fails on its own thread: the first updates may come before it has.
+  std::string told;
+  for (std::uint64_t sequence = 1; told.empty() && sequence <= 1000; ++sequence) {
+    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    for (const Omission& omission : next_update(peer).update.left_out) {
+      if (omission.part == "journal") told = omission.reason;
+    }
+  }
+  EXPECT_EQ(told, "j.surgery: disk full");
+}
+
+TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
+  ServiceOptions options = with_model();
+  auto entered = std::make_shared<std::promise<void>>();
+  options.prepare = [entered](Boundary) -> Result<Prepared> {
+    Prepared prepared;
+    prepared.run = [entered](const Observation&, const RunOptions& run) {
+      std::promise<void> stopped;
+      const std::stop_callback wake(run.stop, [&] { stopped.set_value(); });
+      entered->set_value();
+      stopped.get_future().wait();
+      return Result<Update>(fail(ErrorCode::kNotConverged, "stopped"));
+    };
+    return prepared;
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  entered->get_future().wait();
+  expect_alive();  // the transport answers while the worker is busy
+  stop();
+}
+
+}  // namespace
+}  // namespace brainshift::server

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/session/session.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "tests/unit/server/sample_values.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using namespace std::chrono_literals;
+
+// Messages as they are published, to wait for.
+class Published {
+ public:
+  void push(wire::UpdateMessage message) {
+    const std::lock_guard lock(mutex_);
+    messages_.push_back(std::move(message));
+    changed_.notify_all();
+  }
+  // The first `count` messages; fewer when they do not come in time.
+  std::vector<wire::UpdateMessage> wait_for(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, 10s, [&] { return messages_.size() >= count; });
+    return messages_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<wire::UpdateMessage> messages_;
+};
+
+// A gate that a fake run waits at.
+struct Gate {
+  std::promise<void> entered;
+  std::promise<void> leave;
+};
+
+class SessionTest : public testing::Test {
+ protected:
+  using Run = std::function<Result<Update>(const Observation&, const RunOptions&)>;
+
+  SessionHooks hooks(Run run) {
+    SessionHooks hooks;
+    hooks.prepare = [this, run = std::move(run)](Boundary boundary) -> Result<Prepared> {
+      prepared_boundaries_.push_back(boundary);
+      Prepared prepared;
+      prepared.info.model_id = "0123456789abcdef";
+      prepared.run = run;
+      return prepared;
+    };
+    hooks.publish = [this](wire::UpdateMessage message) { published_.push(std::move(message)); };
+    return hooks;
+  }
+
+  static Result<Update> echo(const Observation& observation, const RunOptions&) {
+    return answer(observation);
+  }
+
+  static Result<wire::SessionInfo> start(Session& session, Boundary boundary = Boundary::kContact,
+                                         const std::string& case_id = kCase,
+                                         bool publish_iterates = false) {
+    auto promise = std::make_shared<std::promise<Result<wire::SessionInfo>>>();
+    auto future = promise->get_future();
+    session.start(
+        {case_id, Method::kPaper, boundary, publish_iterates},
+        [promise](Result<wire::SessionInfo> info) { promise->set_value(std::move(info)); });
+    if (future.wait_for(10s) != std::future_status::ready) {
+      return fail(ErrorCode::kInternal, "start was not answered");
+    }
+    return future.get();
+  }
+
+  std::vector<Boundary> prepared_boundaries_;  // written by the worker, read after its answers
+  Published published_;
+};
+
+TEST_F(SessionTest, RefusesObservationsBeforeASessionRuns) {
+  Session session(kCase, hooks(echo));
+  const auto receipt = session.submit(landmarks(1));
+  ASSERT_FALSE(receipt.has_value());
+  EXPECT_EQ(receipt.error().code, ErrorCode::kModelNotReady);
+  EXPECT_EQ(session.state().session_id, 0u);
+}
+
+TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
+  Session session(kCase, hooks(echo));
+  const auto info = start(session);
+  ASSERT_TRUE(info.has_value());
+  EXPECT_EQ(info->session_id, 1u);
+  EXPECT_EQ(info->model_id, "0123456789abcdef");
+  const auto receipt = session.submit(landmarks(5));
+  ASSERT_TRUE(receipt.has_value());
+  EXPECT_EQ(receipt->observation_sequence, 5u);
+  EXPECT_FALSE(receipt->replaced_pending);
+  const auto messages = published_.wait_for(1);
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_FALSE(messages[0].error.has_value());
+  EXPECT_EQ(messages[0].session_id, 1u);
+  EXPECT_EQ(messages[0].update.sequence, 1u);
+  EXPECT_EQ(messages[0].update.observation_sequence, 5u);
+  EXPECT_EQ(session.state().updates, 1u);
+}
+
+TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  const auto other = start(session, Boundary::kContact, "someone-else");
+  ASSERT_FALSE(other.has_value());
+  EXPECT_EQ(other.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(other.error().message, HasSubstr("\"someone-else\""));
+  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+}
+
+TEST_F(SessionTest, SequenceNumbersMustGrow) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  EXPECT_FALSE(session.submit(landmarks(0)).has_value());
+  EXPECT_TRUE(session.submit(landmarks(4)).has_value());
+  const auto again = session.submit(landmarks(4, "another"));
+  ASSERT_FALSE(again.has_value());
+  EXPECT_THAT(again.error().message, HasSubstr("observation.sequence = 4: must be above 4"));
+  EXPECT_FALSE(session.submit(landmarks(3)).has_value());
+  EXPECT_TRUE(session.submit(landmarks(9)).has_value());
+}
+
+TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(4)).has_value());
+  published_.wait_for(1);
+  const auto second = start(session);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(second->session_id, 2u);
+  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+  const auto messages = published_.wait_for(2);
+  ASSERT_EQ(messages.size(), 2u);
+  EXPECT_EQ(messages[1].update.sequence, 1u);
+  EXPECT_EQ(messages[1].session_id, 2u);
+}
+
+TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
+  Gate gate;
+  Session session(kCase, hooks([&](const Observation& observation, const RunOptions&) {
+                    if (observation.sequence == 1) {
+                      gate.entered.set_value();
+                      gate.leave.get_future().wait();
+                    }
+                    return Result<Update>(answer(observation));
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
+  gate.entered.get_future().wait();
+  EXPECT_FALSE(session.submit(landmarks(2, "ius"))->replaced_pending);
+  EXPECT_TRUE(session.submit(landmarks(3, "ius"))->replaced_pending);
+  EXPECT_FALSE(session.submit(landmarks(4, "pointer"))->replaced_pending);
+  EXPECT_TRUE(session.submit(landmarks(5, "ius"))->replaced_pending);
+  EXPECT_TRUE(session.state().busy);
+  gate.leave.set_value();
+  const auto messages = published_.wait_for(3);
+  ASSERT_EQ(messages.size(), 3u);
+  std::vector<std::uint64_t> answered;
+  for (const auto& message : messages) answered.push_back(message.update.observation_sequence);
+  EXPECT_THAT(answered, ElementsAre(1, 4, 5));  // oldest first
+}
+
+TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
+  Gate gate;
+  Session session(kCase, hooks([&](const Observation& observation, const RunOptions&) {
+                    if (observation.sequence == 1) {
+                      gate.entered.set_value();
+                      gate.leave.get_future().wait();
+                    }
+                    return Result<Update>(answer(observation));
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  gate.entered.get_future().wait();
+  for (std::uint64_t i = 0; i < Session::kMaxSources; ++i) {
+    EXPECT_TRUE(session.submit(landmarks(2 + i, "source " + std::to_string(i))).has_value());
+  }
+  const auto refused = session.submit(landmarks(100, "one too many"));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+  gate.leave.set_value();
+}
+
+TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
+  Session session(kCase, hooks([](const Observation& observation, const RunOptions&) {
+                    if (observation.sequence == 1) {
+                      return Result<Update>(fail(ErrorCode::kNotConverged, "no luck"));
+                    }
+                    return Result<Update>(answer(observation));
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  const auto failed = published_.wait_for(1);
+  ASSERT_EQ(failed.size(), 1u);
+  ASSERT_TRUE(failed[0].error.has_value());
+  EXPECT_EQ(failed[0].error->message, "no luck");
+  EXPECT_EQ(failed[0].update.observation_sequence, 1u);
+  EXPECT_EQ(failed[0].update.case_id, kCase);
+  EXPECT_EQ(session.state().updates, 0u);
+  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
+  const auto messages = published_.wait_for(2);
+  ASSERT_EQ(messages.size(), 2u);
+  EXPECT_FALSE(messages[1].error.has_value());
+}
+
+TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
+  Session session(kCase,
+                  hooks([](const Observation& observation, const RunOptions&) -> Result<Update> {
+                    if (observation.sequence == 1) throw std::runtime_error("thrown");
+                    return answer(observation);
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  const auto failed = published_.wait_for(1);
+  ASSERT_EQ(failed.size(), 1u);
+  ASSERT_TRUE(failed[0].error.has_value());
+  EXPECT_EQ(failed[0].error->code, ErrorCode::kInternal);
+  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
+  EXPECT_EQ(published_.wait_for(2).size(), 2u);
+}
+
+TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished) {
+  std::promise<void> entered;
+  Session session(kCase, hooks([&](const Observation& observation, const RunOptions& options) {
+                    if (observation.sequence == 1) {
+                      std::promise<void> stopped;
+                      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+                      entered.set_value();
+                      stopped.get_future().wait();
+                    }
+                    return Result<Update>(answer(observation));
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  entered.get_future().wait();
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
+  const auto messages = published_.wait_for(1);
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_EQ(messages[0].update.observation_sequence, 2u);
+}
+
+TEST_F(SessionTest, StopEndsARunningInversion) {
+  std::promise<void> entered;
+  Session session(kCase, hooks([&](const Observation&, const RunOptions& options) {
+                    std::promise<void> stopped;
+                    const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+                    entered.set_value();
+                    stopped.get_future().wait();
+                    return Result<Update>(fail(ErrorCode::kNotConverged, "stopped"));
+                  }));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  entered.get_future().wait();
+  session.stop();
+  session.stop();
+  EXPECT_EQ(session.submit(landmarks(2)).error().code, ErrorCode::kModelNotReady);
+  EXPECT_EQ(start(session).error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session, Boundary::kContact).has_value());
+  ASSERT_TRUE(start(session, Boundary::kFixed).has_value());
+  ASSERT_TRUE(start(session, Boundary::kContact).has_value());
+  EXPECT_THAT(prepared_boundaries_, ElementsAre(Boundary::kContact, Boundary::kFixed));
+}
+
+TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
+  int attempts = 0;
+  SessionHooks failing = hooks(echo);
+  failing.prepare = [&, prepare = failing.prepare](Boundary boundary) -> Result<Prepared> {
+    if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
+    return prepare(boundary);
+  };
+  Session session(kCase, std::move(failing));
+  const auto first = start(session);
+  ASSERT_FALSE(first.has_value());
+  EXPECT_EQ(first.error().code, ErrorCode::kFloatingBody);
+  EXPECT_EQ(session.submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
+  EXPECT_TRUE(start(session).has_value());
+}
+
+TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
+  std::promise<void> entered;
+  std::promise<void> leave;
+  SessionHooks slow = hooks(echo);
+  bool first = true;
+  slow.prepare = [&, prepare = slow.prepare](Boundary boundary) {
+    if (std::exchange(first, false)) {
+      entered.set_value();
+      leave.get_future().wait();
+    }
+    return prepare(boundary);
+  };
+  Session session(kCase, std::move(slow));
+  std::promise<Result<wire::SessionInfo>> preparing;
+  session.start({kCase, Method::kPaper, Boundary::kContact, false},
+                [&](Result<wire::SessionInfo> info) { preparing.set_value(std::move(info)); });
+  entered.get_future().wait();
+  EXPECT_TRUE(session.state().busy);
+  std::promise<Result<wire::SessionInfo>> later;
+  session.start({kCase, Method::kPaper, Boundary::kFixed, false},
+                [&](Result<wire::SessionInfo> info) { later.set_value(std::move(info)); });
+  leave.set_value();
+  const auto superseded = preparing.get_future().get();
+  ASSERT_FALSE(superseded.has_value());
+  EXPECT_EQ(superseded.error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(later.get_future().get().has_value());
+}
+
+TEST_F(SessionTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
+  const auto iterating = [](const Observation& observation, const RunOptions& options) {
+    Update update = answer(observation);
+    update.final = false;
+    if (options.on_iterate) options.on_iterate(update);
+    update.final = true;
+    return Result<Update>(update);
+  };
+  Session session(kCase, hooks(iterating));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  ASSERT_EQ(published_.wait_for(1).size(), 1u);
+  ASSERT_TRUE(start(session, Boundary::kContact, kCase, true).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  const auto messages = published_.wait_for(3);
+  ASSERT_EQ(messages.size(), 3u);
+  EXPECT_TRUE(messages[0].update.final);
+  EXPECT_FALSE(messages[1].update.final);
+  EXPECT_TRUE(messages[2].update.final);
+  EXPECT_EQ(messages[1].update.sequence, messages[2].update.sequence);
+}
+
+}  // namespace
+}  // namespace brainshift::server

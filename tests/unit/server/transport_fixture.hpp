@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A daemon on a free loopback port, with a fake inversion, and raw sockets that may say anything to it.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <zmq.hpp>
+
+#include "common/wire/convert.hpp"
+#include "common/wire/frame.hpp"
+#include "server/transport/outbox.hpp"
+#include "server/transport/router.hpp"
+#include "server/transport/service.hpp"
+#include "tests/unit/server/sample_values.hpp"
+
+namespace brainshift::server {
+
+using wire::MessageType;
+
+inline std::shared_ptr<const BrainModel> small_model() {
+  auto model = std::make_shared<BrainModel>();
+  model->case_id = kCase;
+  model->model_id = "0123456789abcdef";
+  model->mesh.nodes.resize(3, 4);
+  model->mesh.nodes << 0, 1, 0, 0,  //
+      0, 0, 1, 0,                   //
+      0, 0, 0, 1;
+  model->mesh.tets.resize(4, 1);
+  model->mesh.tets << 0, 1, 2, 3;
+  return model;
+}
+
+struct Received {
+  MessageType type = MessageType::kErrorReply;
+  std::uint64_t request_id = 0;
+  std::string payload;
+};
+
+// A peer that sends whatever bytes it is given.
+class RawPeer {
+ public:
+  explicit RawPeer(const std::string& endpoint, int receive_queue = 1000)
+      : socket_(context_, zmq::socket_type::dealer) {
+    socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::rcvhwm, receive_queue);
+    socket_.set(zmq::sockopt::rcvtimeo, 10000);
+    socket_.connect(endpoint);
+  }
+
+  void send(const std::string& bytes) { socket_.send(zmq::buffer(bytes)); }
+  void send_parts(int parts) {
+    for (int i = 0; i < parts; ++i) {
+      socket_.send(zmq::str_buffer("part"),
+                   i + 1 < parts ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+  }
+  void request(MessageType type, const std::string& payload = {}, std::uint64_t id = 1) {
+    send(wire::encode_frame(type, id, payload));
+  }
+  Received receive() {
+    zmq::message_t message;
+    if (!socket_.recv(message)) throw std::runtime_error("nothing came within 10 s");
+    const auto frame = wire::decode_frame(message.to_string_view());
+    if (!frame) throw std::runtime_error("undecodable: " + frame.error().message);
+    return {frame->type, frame->request_id, std::string(frame->payload)};
+  }
+  Received ask(MessageType type, const std::string& payload = {}, std::uint64_t id = 1) {
+    request(type, payload, id);
+    return receive();
+  }
+  // Asks again every 100 ms; false after 10 s.
+  bool keeps_asking_until_answered() {
+    for (int attempt = 0; attempt < 100; ++attempt) {
+      request(MessageType::kStatusRequest);
+      zmq::pollitem_t item{socket_.handle(), 0, ZMQ_POLLIN, 0};
+      if (zmq_poll(&item, 1, 100) == 1) return receive().type == MessageType::kStatusReply;
+    }
+    return false;
+  }
+
+ private:
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+};
+
+inline Error error_of(const Received& received) {
+  EXPECT_EQ(received.type, MessageType::kErrorReply);
+  return wire::decode_error(received.payload);
+}
+
+class TransportTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { spdlog::set_level(spdlog::level::off); }
+  ~TransportTest() override { stop(); }
+
+  void serve(ServiceOptions service_options, RouterOptions router_options = {}) {
+    router_options.endpoint = "tcp://127.0.0.1:*";
+    auto router = Router::bind(router_options);
+    ASSERT_TRUE(router.has_value()) << router.error().message;
+    endpoint_ = router->endpoint();
+    service_ = std::make_unique<Service>(std::move(service_options), outbox_);
+    thread_ = std::thread([this, router = std::make_shared<Router>(std::move(*router))] {
+      run_status_ = router->run(*service_, outbox_, stop_fd_);
+    });
+  }
+
+  void stop() {
+    if (!thread_.joinable()) return;
+    const std::uint64_t one = 1;
+    ASSERT_EQ(write(stop_fd_, &one, sizeof one), static_cast<ssize_t>(sizeof one));
+    thread_.join();
+    service_->stop();
+    EXPECT_TRUE(run_status_.has_value()) << run_status_.error().message;
+    close(stop_fd_);
+  }
+
+  static ServiceOptions with_model(int nodes = 5) {
+    ServiceOptions options;
+    options.version = "1.2.3";
+    options.model = small_model();
+    options.prepare = [nodes](Boundary) -> Result<Prepared> {
+      Prepared prepared;
+      prepared.info.model_id = "0123456789abcdef";
+      prepared.info.nodes = nodes;
+      prepared.run = [nodes](const Observation& observation, const RunOptions&) {
+        return Result<Update>(answer(observation, nodes));
+      };
+      return prepared;
+    };
+    return options;
+  }
+
+  static ServiceOptions without_model() {
+    ServiceOptions options;
+    options.version = "1.2.3";
+    return options;
+  }
+
+  static void start_session(RawPeer& peer) {
+    const auto reply = peer.ask(
+        MessageType::kStartSessionRequest,
+        wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
+    ASSERT_EQ(reply.type, MessageType::kStartSessionReply);
+  }
+
+  static void subscribe(RawPeer& peer) {
+    ASSERT_EQ(peer.ask(MessageType::kSubscribeRequest).type, MessageType::kSubscribeReply);
+  }
+
+  static wire::UpdateMessage next_update(RawPeer& peer) {
+    Received received = peer.receive();
+    while (received.type != MessageType::kUpdate) received = peer.receive();
+    auto message = wire::decode_update(received.payload);
+    EXPECT_TRUE(message.has_value());
+    return message ? *message : wire::UpdateMessage{};
+  }
+
+  void expect_alive() {
+    RawPeer peer(endpoint_);
+    EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  }
+
+  std::string endpoint_;
+
+ private:
+  int stop_fd_ = eventfd(0, EFD_CLOEXEC);
+  Outbox outbox_;
+  std::unique_ptr<Service> service_;
+  std::thread thread_;
+  Status run_status_;
+};
+
+}  // namespace brainshift::server

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Requests, good, bad and malformed, and the parts of the transport.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "server/transport/peers.hpp"
+#include "tests/unit/server/transport_fixture.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::HasSubstr;
+
+// ---------- requests ----------
+
+TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
+  serve(without_model());
+  RawPeer peer(endpoint_);
+  const auto status = wire::decode_status(peer.ask(MessageType::kStatusRequest).payload);
+  ASSERT_TRUE(status.has_value());
+  EXPECT_FALSE(status->model_ready);
+  EXPECT_EQ(status->version, "1.2.3");
+  EXPECT_EQ(error_of(peer.ask(MessageType::kModelRequest)).code, ErrorCode::kModelNotReady);
+  EXPECT_EQ(error_of(peer.ask(MessageType::kObservation, wire::encode(landmarks(1)))).code,
+            ErrorCode::kModelNotReady);
+  const auto start = peer.ask(
+      MessageType::kStartSessionRequest,
+      wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}), 77);
+  EXPECT_EQ(start.request_id, 77u);
+  EXPECT_EQ(error_of(start).code, ErrorCode::kModelNotReady);
+  EXPECT_EQ(error_of(start).message, "no model is loaded");
+}
+
+TEST_F(TransportTest, AnswersStatusModelAndSession) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  const auto model = wire::decode_model(peer.ask(MessageType::kModelRequest).payload);
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->mesh.nodes, small_model()->mesh.nodes);
+  start_session(peer);
+  const auto status = wire::decode_status(peer.ask(MessageType::kStatusRequest).payload);
+  ASSERT_TRUE(status.has_value());
+  EXPECT_TRUE(status->model_ready);
+  EXPECT_EQ(status->case_id, kCase);
+  const auto session =
+      wire::decode_subscribe_reply(peer.ask(MessageType::kSubscribeRequest).payload);
+  ASSERT_TRUE(session.has_value());
+  EXPECT_EQ(*session, 1u);
+}
+
+TEST_F(TransportTest, RefusesAnObservationOfAnotherCase) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  Observation observation = landmarks(1);
+  observation.case_id = "someone-else";
+  const Error error = error_of(peer.ask(MessageType::kObservation, wire::encode(observation)));
+  EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(error.message, HasSubstr("someone-else"));
+}
+
+TEST_F(TransportTest, RefusesAnObservationThatIsNotFinite) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  Observation observation = landmarks(1);
+  std::get<LandmarkPairs>(observation.body).deformed(0, 0) =
+      std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(error_of(peer.ask(MessageType::kObservation, wire::encode(observation))).code,
+            ErrorCode::kNotFinite);
+}
+
+TEST_F(TransportTest, RefusesASessionForAnotherCase) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  const wire::SessionRequest request{"someone-else", Method::kPaper, Boundary::kContact, false};
+  const auto reply = peer.ask(MessageType::kStartSessionRequest, wire::encode(request), 5);
+  EXPECT_EQ(reply.request_id, 5u);
+  EXPECT_EQ(error_of(reply).code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(TransportTest, AnObservationWithoutASessionIsRefused) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  const Error error = error_of(peer.ask(MessageType::kObservation, wire::encode(landmarks(1))));
+  EXPECT_EQ(error.code, ErrorCode::kModelNotReady);
+  EXPECT_THAT(error.message, HasSubstr("no session"));
+}
+
+// ---------- malformed messages ----------
+
+TEST_F(TransportTest, AnswersGarbageWithAProtocolError) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  for (const std::string& garbage :
+       {std::string(), std::string("x"), std::string(24, '\0'), std::string(10'000, '\xff'),
+        std::string("GET / HTTP/1.1\r\n\r\n")}) {
+    peer.send(garbage);
+    EXPECT_EQ(error_of(peer.receive()).code, ErrorCode::kProtocol);
+  }
+  EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+}
+
+TEST_F(TransportTest, AnyDamagedByteOfARequestIsNoticed) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  const wire::SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
+  const std::string good =
+      wire::encode_frame(MessageType::kStartSessionRequest, 3, wire::encode(request));
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    if (i == 6 || (i >= 16 && i < 24)) continue;  // another valid type; the request id is free
+    std::string damaged = good;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x55);
+    peer.send(damaged);
+    EXPECT_EQ(error_of(peer.receive()).code, ErrorCode::kProtocol) << "byte " << i;
+  }
+}
+
+TEST_F(TransportTest, WellFramedRubbishIsAProtocolErrorWithTheRequestsId) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  const auto observation = peer.ask(MessageType::kObservation, "\xff\xff\xff rubbish", 9);
+  EXPECT_EQ(observation.request_id, 9u);
+  EXPECT_EQ(error_of(observation).code, ErrorCode::kProtocol);
+  EXPECT_EQ(error_of(peer.ask(MessageType::kStartSessionRequest, "\xff\xff rubbish")).code,
+            ErrorCode::kProtocol);
+}
+
+TEST_F(TransportTest, ATypeThatIsNoRequestIsAProtocolError) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  for (const MessageType type : {MessageType::kStatusReply, MessageType::kUpdate,
+                                 MessageType::kErrorReply, MessageType::kModelReply}) {
+    const Error error = error_of(peer.ask(type));
+    EXPECT_EQ(error.code, ErrorCode::kProtocol);
+    EXPECT_THAT(error.message, HasSubstr("is not a request"));
+  }
+}
+
+TEST_F(TransportTest, AMessageOfSeveralPartsIsAProtocolError) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  peer.send_parts(500);
+  const Error error = error_of(peer.receive());
+  EXPECT_EQ(error.code, ErrorCode::kProtocol);
+  EXPECT_THAT(error.message, HasSubstr("500"));
+  EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+}
+
+TEST_F(TransportTest, AnOversizedMessageEndsItsConnectionOnly) {
+  RouterOptions options;
+  options.max_message_mib = 1;
+  serve(with_model(), options);
+  RawPeer other(endpoint_);
+  ASSERT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  RawPeer large(endpoint_);
+  large.send(std::string(2 << 20, 'x'));
+  // Its connection is closed, and what was under way on it is lost; it is served on the next one.
+  EXPECT_TRUE(large.keeps_asking_until_answered());
+  EXPECT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+}
+
+// ---------- binding ----------
+
+TEST(Router, RefusesAnEndpointThatIsNone) {
+  for (const char* endpoint : {"", "nonsense", "ftp://127.0.0.1:1", "tcp://127.0.0.1:99999",
+                               "tcp://127.0.0.1:-1", "tcp://127.0.0.1:80x", "tcp://127.0.0.1"}) {
+    RouterOptions options;
+    options.endpoint = endpoint;
+    const auto router = Router::bind(options);
+    ASSERT_FALSE(router.has_value()) << endpoint;
+    EXPECT_EQ(router.error().code, ErrorCode::kInvalidArgument) << endpoint;
+    EXPECT_THAT(router.error().message, HasSubstr(endpoint));
+  }
+}
+
+TEST(Router, APortInUseIsUnavailable) {
+  const auto first = Router::bind({});
+  ASSERT_TRUE(first.has_value());
+  RouterOptions options;
+  options.endpoint = first->endpoint();
+  const auto second = Router::bind(options);
+  ASSERT_FALSE(second.has_value());
+  EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
+}
+
+// ---------- parts ----------
+
+TEST(Outbox, KeepsTheNewestIteratesAndEverythingElse) {
+  Outbox outbox;
+  const auto bytes = [](const char* text) { return std::make_shared<const std::string>(text); };
+  outbox.post({Delivery::kFinal, {}, bytes("final")});
+  for (const char* text : {"1", "2", "3", "4", "5", "6"}) {
+    outbox.post({Delivery::kIterate, {}, bytes(text)});
+  }
+  outbox.post({Delivery::kReply, "peer", bytes("reply")});
+  std::vector<std::string> taken;
+  for (const Outgoing& message : outbox.take()) taken.push_back(*message.bytes);
+  EXPECT_THAT(taken, testing::ElementsAre("final", "3", "4", "5", "6", "reply"));
+  EXPECT_TRUE(outbox.take().empty());
+}
+
+TEST(Peers, AConnectionThatClosesTakesItsPeerAlong) {
+  Peers peers(2);
+  ASSERT_NE(peers.admit("a", 10), nullptr);
+  ASSERT_NE(peers.admit("b", 11), nullptr);
+  EXPECT_EQ(peers.admit("c", 12), nullptr);
+  EXPECT_NE(peers.admit("a", 10), nullptr);
+  EXPECT_EQ(peers.remove_connection(10), 1u);
+  EXPECT_EQ(peers.remove_connection(10), 0u);
+  EXPECT_NE(peers.admit("c", 12), nullptr);
+  EXPECT_EQ(peers.find("a"), nullptr);
+}
+
+}  // namespace
+}  // namespace brainshift::server

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames written by a second, independent implementation (tests/data/wire/make_golden.py): decoding gives
+// the described values, and encoding the described values gives the same bytes.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/wire/frame.hpp"
+#include "tests/unit/wire/same_values.hpp"
+
+namespace brainshift::wire {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file) << path;
+  std::ostringstream content;
+  content << file.rdbuf();
+  return content.str();
+}
+
+// ---------- core values from their description ----------
+
+Points points_from(const json& xyz) {
+  const auto values = xyz.get<std::vector<double>>();
+  return Eigen::Map<const Points>(values.data(), 3, static_cast<Eigen::Index>(values.size() / 3));
+}
+
+template <int Rows>
+Eigen::Matrix<int, Rows, Eigen::Dynamic> columns_from(const json& indices) {
+  const auto values = indices.get<std::vector<int>>();
+  return Eigen::Map<const Eigen::Matrix<int, Rows, Eigen::Dynamic>>(
+      values.data(), Rows, static_cast<Eigen::Index>(values.size()) / Rows);
+}
+
+VecX vector_from(const json& numbers) {
+  const auto values = numbers.get<std::vector<double>>();
+  return Eigen::Map<const VecX>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+TriangleSurface surface_from(const json& value) {
+  return {points_from(value["vertices"]["xyz_mm"]), columns_from<3>(value["triangle_indices"])};
+}
+
+MeanStd mean_std_from(const json& value) { return {value["mean_mm"], value["std_mm"]}; }
+
+Observation observation_from(const json& value) {
+  Observation observation;
+  observation.case_id = value["case_id"];
+  observation.frame = value["frame"];
+  observation.source = value["source"];
+  observation.sequence = value["sequence"];
+  observation.acquired_ns = value["acquired_ns"];
+  observation.acquired_wall_ns = value["acquired_wall_ns"];
+  if (value.contains("tumour_boundary")) {
+    const json& body = value["tumour_boundary"];
+    observation.body = TumourBoundary{points_from(body["points"]["xyz_mm"]), body["sd_mm"]};
+  } else if (value.contains("cortical_surface")) {
+    const json& body = value["cortical_surface"];
+    observation.body = CorticalSurface{surface_from(body["surface"]), body["sd_mm"]};
+  } else if (value.contains("landmark_pairs")) {
+    const json& body = value["landmark_pairs"];
+    observation.body = LandmarkPairs{points_from(body["undeformed"]["xyz_mm"]),
+                                     points_from(body["deformed"]["xyz_mm"]), body["sd_mm"]};
+  } else {
+    const json& body = value["patient_pose"];
+    observation.body =
+        PatientPose{vector_from(body["gravity_direction"]), body["fluid_level_mm"].get<double>()};
+  }
+  return observation;
+}
+
+BrainModel model_from(const json& value) {
+  BrainModel model;
+  model.case_id = value["case_id"];
+  model.model_id = value["model_id"];
+  model.mesh.nodes = points_from(value["nodes"]["xyz_mm"]);
+  model.mesh.tets = columns_from<4>(value["tet_indices"]);
+  model.mesh.labels = value["tet_labels"].get<std::vector<int>>();
+  model.boundary_triangles = columns_from<3>(value["boundary_indices"]);
+  model.skull = surface_from(value["skull"]);
+  model.tumour = surface_from(value["tumour"]);
+  model.craniotomy = value["craniotomy"].get<std::vector<int>>();
+  model.brainstem = value["brainstem"].get<std::vector<int>>();
+  model.slaves = value["slaves"].get<std::vector<int>>();
+  model.fixed = value["fixed"].get<std::vector<int>>();
+  model.gravity_direction = vector_from(value["gravity_direction"]);
+  model.fluid_plane_depth_mm = value["fluid_plane_depth_mm"];
+  model.slave_plane_depth_mm = value["slave_plane_depth_mm"];
+  return model;
+}
+
+Estimate estimate_from(const json& value) {
+  Estimate estimate;
+  EXPECT_EQ(value["status"], "converged");
+  estimate.status = EstimateStatus::kConverged;
+  estimate.reason = value["reason"];
+  estimate.displacement = points_from(value["displacement"]["xyz_mm"]);
+  estimate.sd_mm = vector_from(value["sd_mm"]);
+  const json& contact = value["contact"];
+  estimate.contact = {contact["active"], contact["penetrating"], contact["max_penetration_mm"],
+                      contact["iterations"]};
+  estimate.active_slaves = contact["active_slaves"].get<std::vector<int>>();
+  estimate.contact_force_n = vector_from(contact["force_n"]);
+  estimate.initial_misfit_mm = mean_std_from(value["initial_misfit"]);
+  estimate.misfit_mm = mean_std_from(value["misfit"]);
+  for (const json& entry : value["history"]) {
+    estimate.history.push_back({entry["iteration"], mean_std_from(entry["misfit"]),
+                                entry["penetrating"], entry["max_penetration_mm"],
+                                entry["elapsed_ms"]});
+  }
+  return estimate;
+}
+
+UpdateMessage update_from(const json& value) {
+  UpdateMessage message;
+  message.session_id = value["session_id"];
+  Update& update = message.update;
+  update.case_id = value["case_id"];
+  update.model_id = value["model_id"];
+  update.sequence = value["sequence"];
+  update.observation_sequence = value["observation_sequence"];
+  EXPECT_EQ(value["boundary"], "fixed");
+  update.boundary = Boundary::kFixed;
+  update.final = value["final"] == 1;
+  const json& timings = value["timings"];
+  update.timings = {timings["register_ms"], timings["invert_ms"], timings["rebuild_ms"],
+                    timings["encode_ms"], timings["journal_ms"]};
+  if (value["status"] == "failed") {
+    EXPECT_EQ(value["error_code"], "empty_set");
+    message.error = Error{ErrorCode::kEmptySet, value["reason"]};
+    return message;
+  }
+  update.estimate = estimate_from(value);
+  const json& T = value["t_undeformed_deformed"];
+  const auto rotation = T["rotation_row_major"].get<std::vector<double>>();
+  update.T_undeformed_deformed.linear() =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data());
+  update.T_undeformed_deformed.translation() = vector_from(T["translation_mm"]);
+  for (const json& entry : value["left_out"]) {
+    update.left_out.push_back({entry["part"], entry["reason"], entry["estimated_error"]});
+  }
+  return message;
+}
+
+DaemonStatus status_from(const json& value) {
+  return {value["version"],   value["model_ready"] == 1, value["case_id"],  value["model_id"],
+          value["busy"] == 1, value["updates"],          value["uptime_ms"]};
+}
+
+SessionRequest session_request_from(const json& value) {
+  EXPECT_EQ(value["method"], "paper");
+  EXPECT_EQ(value["boundary"], "fixed");
+  return {value["case_id"], Method::kPaper, Boundary::kFixed, value["publish_iterates"] == 1};
+}
+
+SessionInfo session_info_from(const json& value) {
+  return {value["session_id"],  value["model_id"],      value["nodes"],
+          value["tets"],        value["slaves"],        value["prepare_s"],
+          value["model_bytes"], value["full_solve_ms"], value["factor_s"]};
+}
+
+// ---------- the check ----------
+
+template <typename T>
+std::string check(const T& described, const Result<T>& decoded) {
+  EXPECT_TRUE(decoded) << decoded.error().message;
+  if (decoded) expect_same(described, *decoded);
+  return encode(described);
+}
+
+// Compares the decoded payload with its description and returns the description encoded by us.
+std::string check_message(const std::string& message, const json& value, std::string_view payload) {
+  if (message == "Empty") return {};
+  if (message == "StatusReply") return check(status_from(value), decode_status(payload));
+  if (message == "StartSessionRequest") {
+    return check(session_request_from(value), decode_session_request(payload));
+  }
+  if (message == "StartSessionReply") {
+    return check(session_info_from(value), decode_session_info(payload));
+  }
+  if (message == "ModelReply") return check(model_from(value), decode_model(payload));
+  if (message == "Observation") return check(observation_from(value), decode_observation(payload));
+  if (message == "ObservationReply") {
+    return check(ObservationReceipt{value["observation_sequence"], value["replaced_pending"] == 1},
+                 decode_observation_receipt(payload));
+  }
+  if (message == "Update") return check(update_from(value), decode_update(payload));
+  if (message == "SubscribeReply") {
+    const std::uint64_t session_id = value["session_id"];
+    EXPECT_EQ(decode_subscribe_reply(payload).value(), session_id);
+    return encode_subscribe_reply(session_id);
+  }
+  if (message == "ErrorReply") {
+    EXPECT_EQ(value["code"], "model_not_ready");
+    const Error described{ErrorCode::kModelNotReady, value["message"]};
+    expect_same(described, decode_error(payload));
+    return encode(described);
+  }
+  ADD_FAILURE() << "no reader for " << message;
+  return {};
+}
+
+class Golden : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(Golden, FrameHoldsTheDescribedValuesAndIsReproducedByteForByte) {
+  const fs::path stem = fs::path(GOLDEN_DIR) / GetParam();
+  const std::string bytes = read(fs::path(stem) += ".bin");
+  const json description = json::parse(read(fs::path(stem) += ".json"));
+  const auto frame = decode_frame(bytes);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(static_cast<int>(frame->type), description["type"]);
+  EXPECT_EQ(frame->request_id, description["request_id"].get<std::uint64_t>());
+  const std::string payload =
+      check_message(description["message"], description["value"], frame->payload);
+  EXPECT_EQ(encode_frame(frame->type, frame->request_id, payload), bytes);
+}
+
+INSTANTIATE_TEST_SUITE_P(Frames, Golden,
+                         ::testing::Values("status_request", "status_reply",
+                                           "start_session_request", "start_session_reply",
+                                           "model_request", "model_reply", "subscribe_request",
+                                           "subscribe_reply", "observation_tumour",
+                                           "observation_cortex", "observation_landmarks",
+                                           "observation_pose", "observation_reply", "error_reply",
+                                           "update", "update_failed"));
+
+}  // namespace
+}  // namespace brainshift::wire

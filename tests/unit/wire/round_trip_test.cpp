@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/unit/wire/same_values.hpp"
+#include "tests/unit/wire/sample_values.hpp"
+
+namespace brainshift::wire {
+namespace {
+
+template <typename T>
+void expect_round_trip(const T& value, Result<T> (*decode)(std::string_view)) {
+  const auto decoded = decode(encode(value));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  expect_same(value, *decoded);
+}
+
+TEST(RoundTrip, EveryObservationKindIsReproduced) {
+  for (int kind = 0; kind < 4; ++kind) {
+    SCOPED_TRACE(kind);
+    expect_round_trip(sample_observation(kind), decode_observation);
+  }
+}
+
+TEST(RoundTrip, NegativeZeroKeepsItsSign) {
+  const auto decoded = decode_observation(encode(sample_observation(3)));
+  ASSERT_TRUE(decoded);
+  const auto& pose = std::get<PatientPose>(decoded->body);
+  EXPECT_TRUE(std::signbit(pose.gravity_direction.y()));
+  ASSERT_TRUE(pose.fluid_level_mm.has_value());
+  EXPECT_TRUE(std::signbit(*pose.fluid_level_mm));
+}
+
+TEST(RoundTrip, AbsentFluidLevelStaysAbsentAndZeroStaysPresent) {
+  Observation observation = sample_observation(3);
+  std::get<PatientPose>(observation.body).fluid_level_mm.reset();
+  expect_round_trip(observation, decode_observation);
+  std::get<PatientPose>(observation.body).fluid_level_mm = 0.0;
+  expect_round_trip(observation, decode_observation);
+}
+
+TEST(RoundTrip, ObservationsWithoutPointsAreReproduced) {
+  for (int kind = 0; kind < 3; ++kind) {
+    Observation observation = sample_observation(kind);
+    if (kind == 0) observation.body = TumourBoundary{Points(3, 0), 0.5};
+    if (kind == 1) observation.body = CorticalSurface{{awkward_points(2), {}}, 0.5};
+    if (kind == 2) observation.body = LandmarkPairs{Points(3, 0), Points(3, 0), 0.5};
+    expect_round_trip(observation, decode_observation);
+  }
+}
+
+TEST(RoundTrip, ModelIsReproduced) { expect_round_trip(sample_model(), decode_model); }
+
+TEST(RoundTrip, ModelWithoutLabelsIsReproduced) {
+  BrainModel model = sample_model();
+  model.mesh.labels.clear();
+  model.tumour = {};
+  expect_round_trip(model, decode_model);
+}
+
+TEST(RoundTrip, UpdateIsReproduced) { expect_round_trip(sample_update(), decode_update); }
+
+TEST(RoundTrip, FailedUpdateCarriesItsErrorAndNoEstimate) {
+  expect_round_trip(sample_failure(), decode_update);
+}
+
+TEST(RoundTrip, EveryEstimateStatusIsReproduced) {
+  for (const auto status : {EstimateStatus::kNotRun, EstimateStatus::kIterating,
+                            EstimateStatus::kConverged, EstimateStatus::kIterationLimit}) {
+    UpdateMessage message = sample_update();
+    message.update.estimate.status = status;
+    expect_round_trip(message, decode_update);
+  }
+}
+
+TEST(RoundTrip, SessionMessagesAreReproduced) {
+  expect_round_trip(
+      DaemonStatus{"0.1.0", true, "Fall Köln", "0123456789abcdef", true, 1ull << 63, 1},
+      decode_status);
+  expect_round_trip(DaemonStatus{}, decode_status);
+  expect_round_trip(SessionRequest{"c", Method::kPaper, Boundary::kFixed, true},
+                    decode_session_request);
+  expect_round_trip(SessionRequest{"", Method::kPaper, Boundary::kContact, false},
+                    decode_session_request);
+  expect_round_trip(SessionInfo{7, "id", 18475, std::numeric_limits<int>::max(), 906, 0.1,
+                                1ull << 40, 1.0 / 3.0, 2.3},
+                    decode_session_info);
+  expect_round_trip(ObservationReceipt{std::numeric_limits<std::uint64_t>::max(), true},
+                    decode_observation_receipt);
+  EXPECT_EQ(decode_subscribe_reply(encode_subscribe_reply(1ull << 63)).value(), 1ull << 63);
+}
+
+TEST(RoundTrip, EveryErrorCodeIsReproduced) {
+  for (int code = 0; code <= static_cast<int>(ErrorCode::kInternal); ++code) {
+    const Error error{static_cast<ErrorCode>(code),
+                      "case.yaml: mesh.edge_mm = -1: must be positive"};
+    expect_same(error, decode_error(encode(error)));
+  }
+}
+
+TEST(RoundTrip, AFieldOfAHeadMeshIsReproducedAsFloats) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0.0, 4.0);
+  UpdateMessage message = sample_update();
+  message.update.estimate.displacement =
+      Points::NullaryExpr(3, 18475, [&] { return normal(random); });
+  message.update.estimate.sd_mm = VecX::NullaryExpr(18475, [&] { return normal(random); });
+  const std::string payload = encode(message);
+  const auto decoded = decode_update(payload);
+  ASSERT_TRUE(decoded);
+  expect_same_matrix(decoded->update.estimate.displacement.cast<float>(),
+                     message.update.estimate.displacement.cast<float>());
+  // Four bytes per number and next to nothing else.
+  EXPECT_LT(payload.size(), 4u * 4u * 18475u + 2000u);
+}
+
+TEST(Text, BytesThatAreNotUtf8AreReplacedSoThatThePeerCanRead) {
+  const Error error{ErrorCode::kNotFound,
+                    "caf\xe9.yaml, \xc3\xa9t\xc3\xa9, \xed\xa0\x80, \xf0\x9f\xa7\xa0, \xe2\x82"};
+  EXPECT_EQ(decode_error(encode(error)).message,
+            "caf?.yaml, \xc3\xa9t\xc3\xa9, ???, \xf0\x9f\xa7\xa0, ??");
+}
+
+TEST(Text, AnErrorStaysOnOneLine) {
+  EXPECT_EQ(decode_error(encode(Error{ErrorCode::kInternal, "a\nb\x1b[2Jc"})).message, "a b [2Jc");
+}
+
+}  // namespace
+}  // namespace brainshift::wire
