@@ -9,6 +9,7 @@
 
 #include "client/replay/replay.hpp"
 #include "common/io/surgery_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -262,11 +263,6 @@ TEST(Trace, PairsHistoryWithTheIteratesThatArrived) {
 
 class ReplayInput : public testing::Test {
  protected:
-  ReplayInput() : folder(std::filesystem::path(testing::TempDir()) / "replay_input") {
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directory(folder);
-  }
-  ~ReplayInput() override { std::filesystem::remove_all(folder); }
   Error refused() const {
     ReplayOptions options;
     options.surgery = folder / "s.surgery";
@@ -277,7 +273,7 @@ class ReplayInput : public testing::Test {
     EXPECT_FALSE(std::filesystem::exists(options.report));
     return status ? Error{} : status.error();
   }
-  std::filesystem::path folder;
+  const test_support::TemporaryFolder folder;
 };
 
 TEST_F(ReplayInput, MissingSurgeryIsNamed) {

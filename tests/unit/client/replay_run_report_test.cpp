@@ -10,6 +10,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace brainshift::client {
 namespace {
 
@@ -148,7 +150,8 @@ TEST(RunReport, TextThatIsNoArrayOfRunsIsRefused) {
 }
 
 TEST(ReportFile, MissingFolderAndUnwritablePlacesAreNamed) {
-  const std::filesystem::path folder = testing::TempDir();
+  const test_support::TemporaryFolder temporary;
+  const std::filesystem::path folder = temporary.path();
   const auto missing = read_reports(folder / "no-such-report.json");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
@@ -163,17 +166,14 @@ TEST(ReportFile, MissingFolderAndUnwritablePlacesAreNamed) {
 }
 
 TEST(ReportFile, ReplacesTheOldOneAndLeavesNoTemporaryFile) {
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / "replay_report_file";
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directory(folder);
+  const test_support::TemporaryFolder temporary;
+  const std::filesystem::path folder = temporary.path();
   std::ofstream(folder / "R.json") << "old";
   ASSERT_TRUE(write_reports(folder / "R.json", {full_run()}));
   const auto read = read_reports(folder / "R.json");
   ASSERT_TRUE(read);
   EXPECT_EQ(read->size(), 1u);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/replay_box.hpp"
 
 namespace brainshift::client {
@@ -168,23 +169,14 @@ TEST(Angle, MatchesKnownAnglesAlsoNearZero) {
 
 class TruthInFile : public SinkingBox {
  protected:
-  TruthInFile()
-      : path(std::filesystem::path(testing::TempDir()) /
-             (std::string("replay_score_") +
-              testing::UnitTest::GetInstance()->current_test_info()->name() + ".surgery")) {
-    remove();
-  }
-  ~TruthInFile() override { remove(); }
-  void remove() const {
-    for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(path.string() + end);
-  }
   Result<std::optional<io::SurgeryTruth>> stored_and_read() {
     auto file = io::SurgeryFile::create(path, {{"case_id", "box"}});
     EXPECT_TRUE(file);
     EXPECT_TRUE(file->write_truth(1, truth));
     return read_truth(*file, 1, model);
   }
-  std::filesystem::path path;
+  const test_support::TemporaryFolder folder;
+  const std::filesystem::path path = folder / "truth.surgery";
 };
 
 TEST_F(TruthInFile, ComesBackAsWritten) {

@@ -10,6 +10,7 @@
 #include "client/report/html_page.hpp"
 #include "client/report/write_report.hpp"
 #include "common/io/mesh_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/replay_box.hpp"
 
 namespace brainshift::client {
@@ -68,21 +69,13 @@ TEST(Html, PageSaysWhatItIsNotForAndCitesThePaper) {
 
 class ReportFolder : public testing::Test {
  protected:
-  ReportFolder()
-      : folder(fs::path(testing::TempDir()) /
-               (std::string("report_page_") +
-                testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::remove_all(folder);
-    fs::create_directories(folder);
-  }
-  ~ReportFolder() override { fs::remove_all(folder); }
   Error refused(const std::vector<fs::path>& reports) const {
     const Status status = write_report({reports, folder / "out"});
     EXPECT_FALSE(status);
     EXPECT_FALSE(fs::exists(folder / "out" / "report.html"));
     return status ? Error{} : status.error();
   }
-  fs::path folder;
+  const test_support::TemporaryFolder folder;
 };
 
 TEST_F(ReportFolder, HoldsMergedJsonPageAndPictures) {

@@ -4,10 +4,12 @@
 
 #include "common/io/config_file.hpp"
 #include "common/io/mesh_file.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::TemporaryFolder;
 
 using testing::HasSubstr;
 using testing::StartsWith;

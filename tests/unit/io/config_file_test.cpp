@@ -5,10 +5,13 @@
 
 #include <sstream>
 
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::content_of;
+using test_support::TemporaryFolder;
 
 namespace fs = std::filesystem;
 using testing::AllOf;

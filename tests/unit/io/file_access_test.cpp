@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::content_of;
+using test_support::TemporaryFolder;
 
 using testing::HasSubstr;
 

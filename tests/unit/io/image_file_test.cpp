@@ -11,10 +11,13 @@
 #include <cstring>
 #include <limits>
 
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::put;
+using test_support::TemporaryFolder;
 
 using testing::ElementsAre;
 using testing::HasSubstr;

@@ -9,10 +9,13 @@
 
 #include "common/core/model_id.hpp"
 #include "common/io/config_file.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::content_of;
+using test_support::TemporaryFolder;
 
 using testing::AnyOf;
 using testing::HasSubstr;

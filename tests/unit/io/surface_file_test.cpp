@@ -7,10 +7,13 @@
 #include <sstream>
 
 #include "common/io/mesh_file.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using test_support::put;
+using test_support::TemporaryFolder;
 
 using testing::HasSubstr;
 

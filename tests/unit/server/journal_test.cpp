@@ -9,9 +9,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -19,18 +22,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = testing::TempDir() + "journal-XXXXXX";
-    path_ = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+using test_support::TemporaryFolder;
 
 // What a fake sink was asked to do; the sink itself belongs to the journal.
 struct SinkLog {
@@ -223,15 +215,16 @@ void journal_on_a_full_disk(const std::filesystem::path& path) {
 
 TEST(JournalDeathTest, AFullDiskIsReportedAndLeavesAReadableFile) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
-  const std::filesystem::path path =
-      std::filesystem::path(testing::TempDir()) / "brainshift-full-disk-test.surgery";
-  for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(path.string() + suffix);
+  // The dying process runs this test from its start: it must find the folder of the one that watches.
+  constexpr const char* kVariable = "BRAINSHIFT_FULL_DISK_FOLDER";
+  std::optional<TemporaryFolder> folder;
+  if (getenv(kVariable) == nullptr) setenv(kVariable, folder.emplace().path().c_str(), 1);
+  const auto path = std::filesystem::path(getenv(kVariable)) / "j.surgery";
   EXPECT_EXIT(journal_on_a_full_disk(path), testing::ExitedWithCode(42), "");
   const auto file = io::SurgeryFile::open(path);
   ASSERT_TRUE(file.has_value()) << file.error().message;
   EXPECT_EQ(file->records("observation")->size(), 1u);
   EXPECT_EQ(file->records("update")->size(), 0u);
-  for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(path.string() + suffix);
 }
 
 TEST(JournalPath, KeepsTheCaseIdInsideTheFolder) {

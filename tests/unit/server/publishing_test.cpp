@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
 namespace brainshift::server {
@@ -123,7 +124,8 @@ TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
 
 TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
   ServiceOptions options = with_model();
-  options.journal_dir = testing::TempDir();
+  const test_support::TemporaryFolder folder;
+  options.journal_dir = folder.path();
   options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
     return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
   };

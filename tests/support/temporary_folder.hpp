@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A folder of its own for each test, removed afterwards, and the bytes tests put into files.
+// CTest runs every test as a process of its own, several at a time: a fixed name would be shared by two of them.
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <cerrno>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <system_error>
 
-namespace brainshift::io {
+namespace brainshift::test_support {
 
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string(test->test_suite_name()) + "." + test->name() + "." +
-                       std::to_string(::getpid());
-    for (char& c : name) {
-      if (c == '/') c = '_';
+    std::string name =
+        (std::filesystem::path(testing::TempDir()) / "brainshift-test-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::system_error(errno, std::generic_category(), name);
     }
-    path_ = std::filesystem::path(testing::TempDir()) / name;
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
+    path_ = name;
   }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
@@ -57,4 +60,4 @@ void put(std::string& out, T value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-}  // namespace brainshift::io
+}  // namespace brainshift::test_support
