@@ -113,7 +113,23 @@ Status validate(const CaseConfig& config) {
   check.between("inversion.max_iterations", config.inversion.max_iterations, 1, 100000);
   check.between("inversion.relative_misfit_change", config.inversion.relative_misfit_change, 1e-12,
                 1.0);
+  check.between("condensed.max_rank", config.condensed.max_rank, 1, 2000);
+  check.between("condensed.memory_limit_gib", config.condensed.memory_limit_gib, 0.1, 1e4);
+  check.between("condensed.deadline_ms", config.condensed.deadline_ms, 0.1, 1e6);
+  check.between("condensed.max_contact_iterations", config.condensed.max_contact_iterations, 1,
+                1000);
+  check.between("condensed.uncertainty_nodes", config.condensed.uncertainty_nodes, 8, 1e5);
+  check.between("scene.region_of_interest_mm", config.scene.region_of_interest_mm, 1.0, 300.0);
   return check.status();
+}
+
+std::string_view to_string(Carry carry) {
+  switch (carry) {
+    case Carry::kAuto: return "auto";
+    case Carry::kOn: return "on";
+    case Carry::kOff: return "off";
+  }
+  return "auto";
 }
 
 }  // namespace brainshift

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -91,6 +92,34 @@ struct InversionConfig {
   double relative_misfit_change = 0.001;  // eq. 17
 };
 
+// What is prepared before surgery for the condensed method.
+struct CondensedConfig {
+  // Largest number of prior modes kept. 200 leave out about a micrometre on the default head
+  // (docs/decisions).
+  int max_rank = 200;
+  // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
+  double memory_limit_gib = 8.0;
+  // An update returns its best iterate when this time has passed, ms.
+  double deadline_ms = 1000.0;
+  int max_contact_iterations = 30;
+  // Nodes at which the standard deviation is evaluated; interpolated between them.
+  int uncertainty_nodes = 600;
+};
+
+// Which parts of the work a scene carries. kAuto: decided from case and data; every omission is listed in the
+// Update with its reason and an estimate of the error.
+enum class Carry { kAuto, kOn, kOff };
+struct SceneConfig {
+  Carry pressure = Carry::kAuto;
+  Carry contact = Carry::kAuto;
+  Carry rotation = Carry::kAuto;  // in ICP
+  Carry surface = Carry::kAuto;   // cortical surface data
+  Carry uncertainty = Carry::kAuto;
+  Carry gravity_modes = Carry::kAuto;
+  Carry far_field = Carry::kAuto;       // off: only the region of interest is rebuilt
+  double region_of_interest_mm = 40.0;  // around the tumour, used with far_field off
+};
+
 struct CaseConfig {
   std::string case_id;
   std::filesystem::path file;  // where it was read from; empty for a case made in memory
@@ -107,7 +136,11 @@ struct CaseConfig {
   ContactConfig contact;
   PriorConfig prior;
   InversionConfig inversion;
+  CondensedConfig condensed;
+  SceneConfig scene;
 };
+
+std::string_view to_string(Carry carry);  // "auto", "on", "off"
 
 // Ok, or kInvalidArgument naming key, value and constraint ("material.poisson_ratio = 0.6: must be ...").
 Status validate(const CaseConfig& config);

@@ -9,9 +9,14 @@ std::string_view to_string(Boundary boundary) {
 
 std::string_view to_string(Method method) {
   switch (method) {
+    case Method::kCondensed: return "condensed";
+    case Method::kCondensedExact: return "condensed-exact";
     case Method::kPaper: return "paper";
+    case Method::kPaperWoodbury: return "paper-woodbury";
+    case Method::kConjugateGradients: return "cg";
+    case Method::kIterativeSolver: return "pcg";
   }
-  return "paper";
+  return "condensed";
 }
 
 std::string_view to_string(EstimateStatus status) {
@@ -20,6 +25,7 @@ std::string_view to_string(EstimateStatus status) {
     case EstimateStatus::kIterating: return "iterating";
     case EstimateStatus::kConverged: return "converged";
     case EstimateStatus::kIterationLimit: return "iteration_limit";
+    case EstimateStatus::kDeadline: return "deadline";
   }
   return "not_run";
 }

@@ -17,16 +17,26 @@ enum class Boundary {
   kFixed,    // slaves are fixed in the normal direction, free tangentially
 };
 enum class Method {
-  kPaper,  // adjoint steepest descent with refactorisation (paper section 2.4)
+  kCondensed,  // prepared before surgery, prior reduced to its leading modes: the everyday method
+  kCondensedExact,  // the same with the whole prior; for comparison
+  kPaper,           // adjoint steepest descent with refactorisation (paper section 2.4)
+  kPaperWoodbury,  // the same, contact as a low-rank correction of the factor instead of refactorisation
+  kConjugateGradients,  // the same minimiser by conjugate gradients in place of steepest descent
+  kIterativeSolver,  // conjugate gradients whose solves are preconditioned CG too (the paper's outlook)
 };
+inline constexpr Method kAllMethods[] = {
+    Method::kCondensed,     Method::kCondensedExact,     Method::kPaper,
+    Method::kPaperWoodbury, Method::kConjugateGradients, Method::kIterativeSolver};
 std::string_view to_string(Boundary boundary);  // "contact", "fixed"
-std::string_view to_string(Method method);      // "paper"
+// "condensed", "condensed-exact", "paper", "paper-woodbury", "cg", "pcg"
+std::string_view to_string(Method method);
 
 enum class EstimateStatus {
   kNotRun,
   kIterating,       // an intermediate iterate, published for progress
   kConverged,       // the stop rule held
   kIterationLimit,  // best iterate so far; the stop rule did not hold
+  kDeadline,        // best iterate when the time ran out
 };
 std::string_view to_string(EstimateStatus status);  // "not_run", "iterating", ...
 
@@ -50,7 +60,9 @@ struct Estimate {
   EstimateStatus status = EstimateStatus::kNotRun;
   std::string reason;   // one sentence: why it stopped
   Points displacement;  // 3 x n, mm; at every node, moves undeformed to deformed
-  VecX sd_mm;           // n, or empty when uncertainty was not computed
+  // n, mm, or empty when uncertainty was not computed: root mean square over the three components of the
+  // standard deviation of a node's displacement.
+  VecX sd_mm;
   ContactSummary contact;
   std::vector<NodeIndex> active_slaves;
   VecX contact_force_n;       // one per active slave, >= 0 pushes the brain inwards
@@ -79,7 +91,7 @@ struct Update {
   std::string model_id;
   std::uint64_t sequence = 0;              // counts up per session, from 1
   std::uint64_t observation_sequence = 0;  // the observation it answers
-  Method method = Method::kPaper;
+  Method method = Method::kCondensed;
   Boundary boundary = Boundary::kContact;
   bool final = true;  // false: an intermediate iterate
   Estimate estimate;

@@ -57,13 +57,45 @@ Status check_finite(const SymmetricMatrix& lower) {
 
 }  // namespace
 
+// Solution and workspace of solves, kept so that the hot path does not allocate.
+struct SparseCholesky::Workspace::Impl {
+  cholmod_common common{};
+  cholmod_dense* x = nullptr;
+  cholmod_dense* y = nullptr;
+  cholmod_dense* e = nullptr;
+
+  Impl() {
+    cholmod_l_start(&common);
+    common.print = 0;
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    cholmod_l_free_dense(&x, &common);
+    cholmod_l_free_dense(&y, &common);
+    cholmod_l_free_dense(&e, &common);
+    cholmod_l_finish(&common);
+  }
+  // The solution, valid until the next call.
+  const double* solve(cholmod_factor* factor, const Eigen::Ref<const Eigen::MatrixXd>& b) {
+    cholmod_dense rhs =
+        view_of(b.data(), static_cast<std::size_t>(b.rows()), static_cast<std::size_t>(b.cols()));
+    const int ok = cholmod_l_solve2(CHOLMOD_A, factor, &rhs, nullptr, &x, nullptr, &y, &e, &common);
+    assert(ok);
+    (void)ok;
+    return static_cast<const double*>(x->x);
+  }
+};
+
+SparseCholesky::Workspace::Workspace() : impl_(std::make_unique<Impl>()) {}
+SparseCholesky::Workspace::Workspace(Workspace&&) noexcept = default;
+SparseCholesky::Workspace& SparseCholesky::Workspace::operator=(Workspace&&) noexcept = default;
+SparseCholesky::Workspace::~Workspace() = default;
+
 struct SparseCholesky::Impl {
   mutable cholmod_common common{};
   cholmod_factor* factor = nullptr;
-  // Solution and workspace of single solves, kept so that the hot path does not allocate.
-  mutable cholmod_dense* x = nullptr;
-  mutable cholmod_dense* y = nullptr;
-  mutable cholmod_dense* e = nullptr;
+  mutable Workspace::Impl workspace;  // of solves that bring none
   std::uint64_t nonzeros = 0;
   double rcond = 0.0;
   double analyse_s = 0.0;
@@ -81,9 +113,6 @@ struct SparseCholesky::Impl {
   Impl& operator=(const Impl&) = delete;
   ~Impl() {
     cholmod_l_free_factor(&factor, &common);
-    cholmod_l_free_dense(&x, &common);
-    cholmod_l_free_dense(&y, &common);
-    cholmod_l_free_dense(&e, &common);
     cholmod_l_finish(&common);
   }
 };
@@ -155,12 +184,7 @@ SparseCholesky SparseCholesky::clone_analysis() const {
 
 void SparseCholesky::solve(const VecX& b, VecX& x) const {
   assert(b.size() == size());
-  cholmod_dense rhs = view_of(b.data(), static_cast<std::size_t>(b.size()), 1);
-  const int ok = cholmod_l_solve2(CHOLMOD_A, impl_->factor, &rhs, nullptr, &impl_->x, nullptr,
-                                  &impl_->y, &impl_->e, &impl_->common);
-  assert(ok);
-  (void)ok;
-  x = Eigen::Map<const VecX>(static_cast<const double*>(impl_->x->x), b.size());
+  x = Eigen::Map<const VecX>(impl_->workspace.solve(impl_->factor, b), b.size());
 }
 
 VecX SparseCholesky::solve(const VecX& b) const {
@@ -169,15 +193,17 @@ VecX SparseCholesky::solve(const VecX& b) const {
   return x;
 }
 
-Eigen::MatrixXd SparseCholesky::solve_many(const Eigen::MatrixXd& b) const {
+void SparseCholesky::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x,
+                                Workspace& workspace) const {
   assert(b.rows() == size());
-  cholmod_dense rhs =
-      view_of(b.data(), static_cast<std::size_t>(b.rows()), static_cast<std::size_t>(b.cols()));
-  cholmod_dense* solution = cholmod_l_solve(CHOLMOD_A, impl_->factor, &rhs, &impl_->common);
-  assert(solution != nullptr);
-  const Eigen::MatrixXd x = Eigen::Map<const Eigen::MatrixXd>(
-      static_cast<const double*>(solution->x), b.rows(), b.cols());
-  cholmod_l_free_dense(&solution, &impl_->common);
+  x = Eigen::Map<const Eigen::MatrixXd>(workspace.impl_->solve(impl_->factor, b), b.rows(),
+                                        b.cols());
+}
+
+Eigen::MatrixXd SparseCholesky::solve_many(const Eigen::MatrixXd& b) const {
+  Workspace workspace;
+  Eigen::MatrixXd x;
+  solve_many(b, x, workspace);
   return x;
 }
 

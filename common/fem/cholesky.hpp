@@ -38,6 +38,22 @@ class SparseCholesky {
   // Several right-hand sides at once, one per column; cheaper per column than single solves.
   Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const;
 
+  // What one thread needs to solve with a factor that several threads share.
+  class Workspace {
+   public:
+    Workspace();
+    Workspace(Workspace&&) noexcept;
+    Workspace& operator=(Workspace&&) noexcept;
+    ~Workspace();
+
+   private:
+    friend class SparseCholesky;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+  };
+  // X = K^-1 B, one right-hand side per column. Thread-safe as long as every thread has its own workspace.
+  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
+
   int size() const;
   double rcond() const;            // CHOLMOD's estimate: squared ratio of extreme pivots of L
   std::uint64_t nonzeros() const;  // of L

@@ -11,6 +11,11 @@ Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
   if (auto status = check_data(data); !status) return tl::unexpected(status.error());
   switch (options.method) {
     case Method::kPaper: return steepest_descent(model, data, options);
+    case Method::kPaperWoodbury:
+    case Method::kConjugateGradients:
+    case Method::kIterativeSolver:
+    case Method::kCondensed:
+    case Method::kCondensedExact: break;
   }
   return fail(ErrorCode::kInternal, "unknown inversion method");
 }

@@ -126,6 +126,24 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.integer("  sparse_points", config.inversion.sparse_points);
   out.integer("  max_iterations", config.inversion.max_iterations);
   out.number("  relative_misfit_change", config.inversion.relative_misfit_change);
+  out.section("condensed");
+  out.integer("  max_rank", config.condensed.max_rank);
+  out.number("  memory_limit_gib", config.condensed.memory_limit_gib);
+  out.number("  deadline_ms", config.condensed.deadline_ms);
+  out.integer("  max_contact_iterations", config.condensed.max_contact_iterations);
+  out.integer("  uncertainty_nodes", config.condensed.uncertainty_nodes);
+  out.section("scene");
+  const auto carry = [&out](const std::string& key, Carry value) {
+    out.text("  " + key, std::string(to_string(value)));
+  };
+  carry("pressure", config.scene.pressure);
+  carry("contact", config.scene.contact);
+  carry("rotation", config.scene.rotation);
+  carry("surface", config.scene.surface);
+  carry("uncertainty", config.scene.uncertainty);
+  carry("gravity_modes", config.scene.gravity_modes);
+  carry("far_field", config.scene.far_field);
+  out.number("  region_of_interest_mm", config.scene.region_of_interest_mm);
 }
 
 }  // namespace

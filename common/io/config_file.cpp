@@ -117,6 +117,32 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   inversion.integer("max_iterations", config.inversion.max_iterations);
   inversion.number("relative_misfit_change", config.inversion.relative_misfit_change);
   inversion.done();
+
+  YamlSection condensed = root.section("condensed");
+  condensed.integer("max_rank", config.condensed.max_rank);
+  condensed.number("memory_limit_gib", config.condensed.memory_limit_gib);
+  condensed.number("deadline_ms", config.condensed.deadline_ms);
+  condensed.integer("max_contact_iterations", config.condensed.max_contact_iterations);
+  condensed.integer("uncertainty_nodes", config.condensed.uncertainty_nodes);
+  condensed.done();
+}
+
+void read_scene(YamlSection& root, CaseConfig& config) {
+  YamlSection scene = root.section("scene");
+  const auto carry = [&scene](const std::string& key, Carry& value) {
+    std::string word(to_string(value));
+    scene.choice(key, word, {"auto", "on", "off"});
+    value = word == "on" ? Carry::kOn : word == "off" ? Carry::kOff : Carry::kAuto;
+  };
+  carry("pressure", config.scene.pressure);
+  carry("contact", config.scene.contact);
+  carry("rotation", config.scene.rotation);
+  carry("surface", config.scene.surface);
+  carry("uncertainty", config.scene.uncertainty);
+  carry("gravity_modes", config.scene.gravity_modes);
+  carry("far_field", config.scene.far_field);
+  scene.number("region_of_interest_mm", config.scene.region_of_interest_mm);
+  scene.done();
 }
 
 // Length 1; a direction that has it already keeps its bits, so that a stored case reads back unchanged.
@@ -166,6 +192,7 @@ Result<CaseConfig> parse_case_config(const std::string& text, const fs::path& fi
   read_anatomy(root, config);
   read_physics(root, config);
   read_estimation(root, config);
+  read_scene(root, config);
   root.done();
   if (Status status = document.status(); !status) return tl::unexpected(status.error());
   if (Status status = brainshift::validate(config); !status) {

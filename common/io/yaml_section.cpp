@@ -225,6 +225,20 @@ void YamlSection::text(const std::string& key, std::string& value, Presence pres
   value = node->yaml.Scalar();
 }
 
+void YamlSection::choice(const std::string& key, std::string& value,
+                         const std::vector<std::string>& words) {
+  std::string word = value;
+  text(key, word);
+  for (const std::string& known : words) {
+    if (word != known) continue;
+    value = word;
+    return;
+  }
+  std::string list;
+  for (const std::string& known : words) list += (list.empty() ? "" : ", ") + known;
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + word + ": must be one of " + list);
+}
+
 void YamlSection::path(const std::string& key, fs::path& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node) return;

@@ -57,6 +57,8 @@ class YamlSection {
   void number(const std::string& key, double& value, Presence presence = Presence::kOptional);
   void integer(const std::string& key, int& value, Presence presence = Presence::kOptional);
   void text(const std::string& key, std::string& value, Presence presence = Presence::kOptional);
+  // One of `words`.
+  void choice(const std::string& key, std::string& value, const std::vector<std::string>& words);
   // Relative paths are taken from the document's folder; the result is absolute. Empty text: empty path.
   void path(const std::string& key, std::filesystem::path& value,
             Presence presence = Presence::kOptional);

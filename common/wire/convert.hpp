@@ -39,7 +39,7 @@ struct DaemonStatus {
 
 struct SessionRequest {
   std::string case_id;
-  Method method = Method::kPaper;
+  Method method = Method::kCondensed;
   Boundary boundary = Boundary::kContact;
   bool publish_iterates = false;
 };

@@ -23,13 +23,13 @@ inline std::optional<ErrorCode> error_code_from(std::string_view name) {
   return from_name(name, ErrorCode::kInvalidArgument, ErrorCode::kInternal);
 }
 inline std::optional<Method> method_from(std::string_view name) {
-  return from_name(name, Method::kPaper, Method::kPaper);
+  return from_name(name, Method::kCondensed, Method::kIterativeSolver);
 }
 inline std::optional<Boundary> boundary_from(std::string_view name) {
   return from_name(name, Boundary::kContact, Boundary::kFixed);
 }
 inline std::optional<EstimateStatus> estimate_status_from(std::string_view name) {
-  return from_name(name, EstimateStatus::kNotRun, EstimateStatus::kIterationLimit);
+  return from_name(name, EstimateStatus::kNotRun, EstimateStatus::kDeadline);
 }
 
 // What a peer reported. A code of a newer version is kept in the sentence.

@@ -94,7 +94,7 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
 }
 
 Status serve(const ServeArguments& arguments) {
-  auto signals = StopSignals::block();  // first: every later thread inherits the mask
+  auto signals = StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
   const auto config = configuration(arguments);
   if (!config) return tl::unexpected(config.error());

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // SIGINT and SIGTERM as a file descriptor, so that the poll loop sees them like any other event.
+//
+// By handlers, not by a blocked mask and signalfd: a library may start threads before main() (OpenBLAS does),
+// which do not inherit a mask, and a signal to the process may be delivered to any of its threads.
 #pragma once
 
 #include "common/core/error.hpp"
@@ -8,10 +11,11 @@ namespace brainshift::server {
 
 class StopSignals {
  public:
-  // Blocks both signals in the calling thread; make it before any other thread, which inherits the mask.
-  static Result<StopSignals> block();
+  // From here on both signals only make fd() readable. One at a time in a process.
+  static Result<StopSignals> catch_all();
   StopSignals(StopSignals&& other) noexcept;
   StopSignals& operator=(StopSignals&&) = delete;
+  // Restores the default actions.
   ~StopSignals();
 
   int fd() const { return fd_; }  // readable once a signal has arrived

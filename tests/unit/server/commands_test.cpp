@@ -64,7 +64,7 @@ TEST(ProgressBar, LeavesACleanLineOnATerminal) {
 }
 
 TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
-  const auto signals = StopSignals::block();
+  const auto signals = StopSignals::catch_all();
   ASSERT_TRUE(signals.has_value());
   EXPECT_FALSE(readable(signals->fd()));
   std::raise(SIGTERM);

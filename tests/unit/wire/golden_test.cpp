@@ -127,6 +127,8 @@ UpdateMessage update_from(const json& value) {
   update.sequence = value["sequence"];
   update.observation_sequence = value["observation_sequence"];
   EXPECT_EQ(value["boundary"], "fixed");
+  EXPECT_EQ(value["method"], "paper");
+  update.method = Method::kPaper;
   update.boundary = Boundary::kFixed;
   update.final = value["final"] == 1;
   const json& timings = value["timings"];

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// ThreadTeam: a fixed number of threads that work on the same task, each on its own fixed part.
+//
+// Part i of a task always runs on the same member and always covers the same items, so results do not depend
+// on timing. The caller is member 0; the others sleep between tasks. run() neither allocates nor throws.
+#pragma once
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace brainshift {
+
+class ThreadTeam {
+ public:
+  // At least 1; 0 means as many as the machine has cores.
+  explicit ThreadTeam(int members = 0);
+  ~ThreadTeam();
+  ThreadTeam(const ThreadTeam&) = delete;
+  ThreadTeam& operator=(const ThreadTeam&) = delete;
+
+  int size() const { return static_cast<int>(threads_.size()) + 1; }
+
+  // Calls task(member) once for every member in [0, size()) and returns when all are done. One caller at a
+  // time; the task must not throw.
+  template <typename Task>
+  void run(Task& task) {
+    run([](void* context, int member) { (*static_cast<Task*>(context))(member); }, &task);
+  }
+  // Calls body(begin, end) with equal, contiguous parts of [0, count), one per member.
+  template <typename Body>
+  void split(long count, Body&& body) {
+    auto task = [&](int member) {
+      const long begin = count * member / size();
+      const long end = count * (member + 1) / size();
+      if (begin < end) body(begin, end);
+    };
+    run(task);
+  }
+
+ private:
+  using Function = void (*)(void*, int);
+  void run(Function function, void* context);
+  void work(int member);
+
+  Function function_ = nullptr;
+  void* context_ = nullptr;
+  std::atomic<unsigned> round_{0};
+  std::atomic<int> busy_{0};
+  std::atomic<bool> stopped_{false};
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace brainshift

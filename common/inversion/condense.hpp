@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// PreparedModel -> CondensedOperators: the long work before surgery, blocked multi-right-hand-side solves.
+//
+// Right-hand sides are solved in blocks of kBlock columns, blocks dealt to the cores in a fixed partition, one
+// BLAS thread each, so the result is bit-identical from run to run. Only G (float), the sketch (3n x q,
+// double) and two blocks per core are held at a time.
+//   1. G = K^-1 N block by block; Phi from the same blocks
+//   2. sketch F = K^-1 Sigma_k K^-1 Omega; Omega^T F = V Lambda V^T; U_k = F V Lambda^-1/2, leading columns
+//   3. gravity modes K^-1 M
+//   4. diag(C) at the control nodes: |Sigma_k^1/2 K^-1 e|^2 by one more solve per control dof
+#pragma once
+
+#include <filesystem>
+#include <stop_token>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+#include "common/inversion/condensed_operators.hpp"
+#include "common/inversion/prepared_model.hpp"
+
+namespace brainshift::inversion {
+
+struct CondenseOptions {
+  Progress progress;     // stage "contact columns" / "prior modes" / "uncertainty", fraction
+  std::stop_token stop;  // checked between blocks; ends with kInterrupted
+  // Where finished blocks are kept so that an interrupted preparation can go on; empty: nowhere.
+  std::filesystem::path checkpoint;
+};
+
+// kInvalidArgument when condensed.memory_limit_gib is below what condense_memory_bytes says (the sentence names
+// both); kNotConverged when stopped.
+Result<CondensedOperators> condense(const PreparedModel& model,
+                                    const CondenseOptions& options = {});
+
+// Peak memory of condense() beside the factor, bytes.
+std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config);
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// CondensedInverter: SparseData -> Estimate in milliseconds; holds what an update can reuse.
+//
+// For a set A of active slaves, with D = Phi_AA + I / beta (penalty contact, paper eq. 16):
+//   contact forces    D f = p_A - N_A^T U z         =>  f = f0 - T z,   [T f0] = D^-1 [N_A^T U  p_A]
+//   data              d = A u + e                   =>  A u = J z + A G_A f0,   J = A U - A G_A T
+//   posterior of z    (I + J^T R^-1 J) z = J^T R^-1 (d - A G_A f0)
+// which is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. Next set: active
+// slaves that press (f > 0) and open ones that penetrate; ends when a set repeats itself. A set visited
+// before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best
+// iterate, the one with the least violation, is kept; limits on iterations and time end with it.
+//
+// Not thread-safe. update() does not allocate as long as the data fit capacity().
+#pragma once
+
+#include <memory>
+#include <stop_token>
+
+#include "common/core/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/core/estimate.hpp"
+#include "common/core/sparse_data.hpp"
+#include "common/geometry/tet_locator.hpp"
+#include "common/inversion/condensed_operators.hpp"
+
+namespace brainshift::inversion {
+
+struct CondensedOptions {
+  // Parts a scene leaves out (server/pipeline decides).
+  bool contact = true;
+  bool uncertainty = true;
+  bool gravity_modes = true;
+  int rank = 0;  // use only so many modes; 0: all
+  bool warm_start = true;
+  int capacity = 1000;  // data per update reserved up front
+  int threads = 0;      // 0: as many as cores
+  std::stop_token stop;
+};
+
+class CondensedInverter {
+ public:
+  // Keeps references to nothing but what it shares. kInvalidArgument when operators and locator disagree.
+  static Result<CondensedInverter> build(std::shared_ptr<const CondensedOperators> operators,
+                                         std::shared_ptr<const geometry::TetLocator> locator,
+                                         const CaseConfig& config,
+                                         const CondensedOptions& options = {});
+  CondensedInverter(CondensedInverter&&) noexcept;
+  CondensedInverter& operator=(CondensedInverter&&) noexcept;
+  ~CondensedInverter();
+
+  // Writes `estimate` in place, reusing its memory; on an error it is left as it was.
+  // Errors as check_data; kInvalidArgument for data outside the brain (the sentence names the datum);
+  // kNotFinite when the result is not finite.
+  Status update(const SparseData& data, Estimate& estimate);
+  // Forgets the last active set.
+  void reset();
+
+ private:
+  struct Impl;
+  explicit CondensedInverter(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace brainshift::inversion
