@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/client_lib_fake_daemon.hpp"
 
 namespace brainshift::client {
@@ -229,8 +230,10 @@ TEST(Client, WorksAgainAfterTheDaemonRestarted) {
   const auto handler = [](const Frame& request) -> Answers {
     return {status_reply(request.request_id)};
   };
-  auto daemon = std::make_unique<FakeDaemon>(handler);
-  const std::string endpoint = daemon->endpoint();
+  // A local socket: a loopback port could be taken by another test while nobody holds it.
+  const test_support::TemporaryFolder folder;
+  const std::string endpoint = "ipc://" + (folder / "daemon").string();
+  auto daemon = std::make_unique<FakeDaemon>(handler, endpoint);
   Client client = connect(endpoint);
   ASSERT_TRUE(client.status());
   daemon.reset();
