@@ -23,6 +23,14 @@ add_library(brainshift_cholmod INTERFACE)
 target_include_directories(brainshift_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 target_link_libraries(brainshift_cholmod INTERFACE ${CHOLMOD_LIBRARY})
 
+# BLAS and LAPACK by their standard names, as CHOLMOD links them.
+find_path(CBLAS_INCLUDE_DIR cblas.h PATH_SUFFIXES openblas-pthread REQUIRED)
+find_library(BLAS_LIBRARY blas REQUIRED)
+find_library(LAPACK_LIBRARY lapack REQUIRED)
+add_library(brainshift_blas INTERFACE)
+target_include_directories(brainshift_blas SYSTEM INTERFACE ${CBLAS_INCLUDE_DIR})
+target_link_libraries(brainshift_blas INTERFACE ${LAPACK_LIBRARY} ${BLAS_LIBRARY})
+
 # OpenCV's CMake package lives in the meta-package only; the split packages hold headers and libraries.
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 add_library(brainshift_opencv INTERFACE)

@@ -94,9 +94,9 @@ struct InversionConfig {
 
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
-  // Largest number of prior modes kept. 200 leave out about a micrometre on the default head
-  // (docs/decisions).
-  int max_rank = 200;
+  // Largest number of prior modes kept, gravity modes among them. 128 move the estimate by at most a
+  // micrometre on the default head (docs/decisions/0008).
+  int max_rank = 128;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.

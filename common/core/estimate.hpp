@@ -69,6 +69,8 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
+  double rebuild_ms =
+      0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };
 
 // Something that the scene did not need, with the reason and an estimate of the error it causes.

@@ -10,29 +10,39 @@
 //   4. diag(C) at the control nodes: |Sigma_k^1/2 K^-1 e|^2 by one more solve per control dof
 #pragma once
 
-#include <filesystem>
+#include <cstdint>
+#include <functional>
 #include <stop_token>
 
+#include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
-#include "common/inversion/condensed_operators.hpp"
 #include "common/inversion/prepared_model.hpp"
 
 namespace brainshift::inversion {
 
-struct CondenseOptions {
-  Progress progress;     // stage "contact columns" / "prior modes" / "uncertainty", fraction
-  std::stop_token stop;  // checked between blocks; ends with kInterrupted
-  // Where finished blocks are kept so that an interrupted preparation can go on; empty: nowhere.
-  std::filesystem::path checkpoint;
+// Keeps finished blocks of contact columns, so that an interrupted preparation can go on. Called by one thread
+// at a time.
+struct BlockStore {
+  // False when block `index` is not kept.
+  std::function<bool(int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance)> load;
+  std::function<void(int index, const Eigen::MatrixXf& columns, const Eigen::MatrixXd& compliance)>
+      save;
 };
 
-// kInvalidArgument when condensed.memory_limit_gib is below what condense_memory_bytes says (the sentence names
-// both); kNotConverged when stopped.
+struct CondenseOptions {
+  Progress progress;     // stages "contact columns", "prior modes", "gravity modes", "uncertainty"
+  std::stop_token stop;  // checked between blocks
+  BlockStore store;      // both empty: nothing is kept
+  int threads = 0;       // 0: as many as cores
+};
+
+// kInvalidArgument when condensed.memory_limit_gib is below the factor and condense_memory_bytes (the sentence
+// names both); kUnavailable when stopped; kNotFinite.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
 
-// Peak memory of condense() beside the factor, bytes.
-std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config);
+// Peak memory of the arrays of condense(), bytes.
+std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config, int threads);
 
 }  // namespace brainshift::inversion

@@ -6,7 +6,7 @@
 //   data              d = A u + e                   =>  A u = J z + A G_A f0,   J = A U - A G_A T
 //   posterior of z    (I + J^T R^-1 J) z = J^T R^-1 (d - A G_A f0)
 // which is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. Next set: active
-// slaves that press (f > 0) and open ones that penetrate; ends when a set repeats itself. A set visited
+// slaves that press (f > 0) and open ones that penetrate, until contact holds (set_search.hpp). A set visited
 // before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best
 // iterate, the one with the least violation, is kept; limits on iterations and time end with it.
 //
@@ -17,11 +17,11 @@
 #include <stop_token>
 
 #include "common/core/case_config.hpp"
+#include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/estimate.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/tet_locator.hpp"
-#include "common/inversion/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -54,6 +54,8 @@ class CondensedInverter {
   Status update(const SparseData& data, Estimate& estimate);
   // Forgets the last active set.
   void reset();
+  // Part of the last update() spent rebuilding field and standard deviation, ms.
+  double rebuild_ms() const;
 
  private:
   struct Impl;

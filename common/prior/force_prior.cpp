@@ -68,6 +68,27 @@ void ForcePrior::apply(const Points& w, Points& f) const {
   f_flat.noalias() += modes_ * (modes_.transpose() * w_flat);
 }
 
+void ForcePrior::apply_kernel(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
+  assert(w.rows() == 3 * kernel_.rows());
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Index n = kernel_.rows();
+  f.resize(w.rows(), w.cols());
+  // A few columns at a time, one row of three components per node and column: stays in cache.
+  constexpr Eigen::Index kColumns = 8;
+  RowMajor in, out;
+  for (Eigen::Index first = 0; first < w.cols(); first += kColumns) {
+    const Eigen::Index count = std::min(kColumns, w.cols() - first);
+    in.resize(n, 3 * count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      in.middleCols<3>(3 * j) = Eigen::Map<const Points>(w.col(first + j).data(), 3, n).transpose();
+    }
+    out.noalias() = kernel_ * in;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      Eigen::Map<Points>(f.col(first + j).data(), 3, n) = out.middleCols<3>(3 * j).transpose();
+    }
+  }
+}
+
 Points ForcePrior::apply(const Points& w) const {
   Points f;
   apply(w, f);

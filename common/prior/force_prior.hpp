@@ -33,6 +33,9 @@ class ForcePrior {
   void apply(const Points& w, Points& f) const;
   Points apply(const Points& w) const;
 
+  // The kernel part alone, for several nodal columns at once (3n rows, node-major). Thread-safe.
+  void apply_kernel(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
+
   int num_modes() const { return static_cast<int>(modes_.cols()); }
   const Eigen::MatrixXd& modes() const { return modes_; }
   // sigma_f^2 V R V, n x n, both triangles.

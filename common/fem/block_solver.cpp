@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/fem/block_solver.hpp"
+
+namespace brainshift::fem {
+
+BlockSolver::BlockSolver(const SparseCholesky& factor, const DofMap& dofs)
+    : factor_(factor), dofs_(dofs), nodal_(3, dofs.num_nodes()) {}
+
+void BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements) {
+  rhs_.resize(dofs_.num_unknowns(), loads.cols());
+  for (Eigen::Index j = 0; j < loads.cols(); ++j) {
+    nodal_ = Eigen::Map<const Points>(loads.col(j).data(), 3, dofs_.num_nodes());
+    dofs_.restrict_to(nodal_, column_);
+    rhs_.col(j) = column_;
+  }
+  factor_.solve_many(rhs_, unknowns_, workspace_);
+  displacements.resize(loads.rows(), loads.cols());
+  for (Eigen::Index j = 0; j < loads.cols(); ++j) {
+    column_ = unknowns_.col(j);
+    dofs_.expand(column_, nodal_);
+    displacements.col(j) = Eigen::Map<const VecX>(nodal_.data(), nodal_.size());
+  }
+}
+
+}  // namespace brainshift::fem

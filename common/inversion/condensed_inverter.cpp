@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed_inverter.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "common/core/thread_team.hpp"
+#include "common/fem/blas.hpp"
+#include "common/inversion/contact_reduction.hpp"
+#include "common/inversion/data_check.hpp"
+#include "common/inversion/field_rebuild.hpp"
+#include "common/inversion/invert.hpp"
+#include "common/inversion/sampled_operators.hpp"
+#include "common/inversion/set_search.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+namespace blas = fem::blas;
+using Eigen::MatrixXd;
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+std::string reason_of(EstimateStatus outcome, const SetSearch& search,
+                      const CondensedConfig& config) {
+  std::ostringstream text;
+  switch (outcome) {
+    case EstimateStatus::kConverged:
+      text << "contact holds to " << kContactTolerance_mm << " mm at iteration "
+           << search.iteration();
+      break;
+    case EstimateStatus::kDeadline:
+      text << "deadline of " << config.deadline_ms << " ms reached after " << search.iteration()
+           << " contact sets; best iterate returned";
+      break;
+    default:
+      text << "contact did not settle in " << search.iteration()
+           << " iterations; best iterate returned";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+struct CondensedInverter::Impl {
+  Impl(std::shared_ptr<const CondensedOperators> given,
+       std::shared_ptr<const geometry::TetLocator> given_locator, const CaseConfig& config,
+       const CondensedOptions& given_options)
+      : operators(std::move(given)),
+        options(given_options),
+        window(mode_window(*operators, options)),
+        condensed(config.condensed),
+        team(options.threads),
+        sampled(operators, std::move(given_locator), window),
+        reduction(*operators, window, config.contact.penalty_n_per_mm),
+        rebuild(*operators, window),
+        search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
+    const Eigen::Index r = window.count;
+    normal.resize(r, r);
+    z.setZero(r);
+    reserve(options.capacity);
+  }
+
+  // Grows what depends on the number of data; nothing happens while they fit.
+  void reserve(int data) {
+    if (3 * data <= jacobian.rows()) return;
+    jacobian.resize(3 * data, window.count + 1);
+    residual.resize(3 * data);
+    sampled.reserve(data);
+  }
+
+  static ModeWindow mode_window(const CondensedOperators& operators,
+                                const CondensedOptions& options) {
+    ModeWindow window;
+    window.first = options.gravity_modes ? 0 : operators.gravity_modes;
+    const int last =
+        options.rank > 0 ? std::min(options.rank, operators.num_modes()) : operators.num_modes();
+    window.count = std::max(0, last - window.first);
+    return window;
+  }
+
+  // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
+  Status estimate_for_set(const SparseData& data);
+  void record(const SparseData& data, Clock::time_point start, int iteration);
+  void finish(const SparseData& data, Estimate& estimate);
+
+  std::shared_ptr<const CondensedOperators> operators;
+  CondensedOptions options;
+  ModeWindow window;
+  CondensedConfig condensed;
+  ThreadTeam team;
+  SampledOperators sampled;
+  ContactReduction reduction;
+  FieldRebuild rebuild;
+  SetSearch search;
+
+  MatrixXd jacobian;  // whitened [J | d - A G f0], 3m x (r + 1)
+  VecX residual;      // whitened d - A u, 3m
+  MatrixXd normal;    // I + J^T J, then its Cholesky factor (lower)
+  VecX z;
+  std::vector<IterationRecord> history;
+  double rebuild_ms = 0.0;
+};
+
+Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
+  const Eigen::Index rows = 3 * data.size(), r = window.count;
+  auto j = jacobian.topRows(rows);
+  j = sampled.free_body();
+  if (reduction.size() > 0) {
+    blas::multiply(-1.0, sampled.contact(reduction.active()), reduction.response(), 1.0, j);
+  }
+  normal.setIdentity();
+  blas::gram(j.leftCols(r), 1.0, normal);
+  if (!blas::cholesky(normal)) {
+    return fail(ErrorCode::kNotFinite, "inversion: the normal equations are not positive definite");
+  }
+  z.noalias() = j.leftCols(r).transpose() * j.col(r);
+  blas::solve_lower(normal, z);
+  blas::solve_lower_transposed(normal, z);
+  residual.head(rows) = j.col(r);
+  residual.head(rows).noalias() -= j.leftCols(r) * z;
+  reduction.update_forces(z);
+  return {};
+}
+
+void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point start,
+                                     int iteration) {
+  const int m = data.size();
+  double sum = 0.0, squares = 0.0;
+  for (int i = 0; i < m; ++i) {
+    const double norm = residual.segment<3>(3 * i).norm() * sampled.sd(i);
+    sum += norm;
+    squares += norm * norm;
+  }
+  IterationRecord entry;
+  entry.iteration = iteration;
+  entry.misfit_mm.mean = sum / m;
+  entry.misfit_mm.std = m > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / m) / (m - 1))) : 0.0;
+  const VecX& penetration = reduction.penetration();
+  for (Eigen::Index i = 0; i < penetration.size(); ++i) {
+    if (penetration[i] > kPenetrationTolerance_mm) ++entry.penetrating;
+    entry.max_penetration_mm = std::max(entry.max_penetration_mm, penetration[i]);
+  }
+  entry.elapsed_ms = milliseconds_since(start);
+  history.push_back(entry);
+}
+
+void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
+  const auto start = Clock::now();
+  if (options.uncertainty) {
+    rebuild.standard_deviation(team, reduction, normal, estimate.sd_mm);
+  } else {
+    estimate.sd_mm.resize(0);
+  }
+  rebuild.displacement(team, z, reduction, estimate.displacement);
+  rebuild_ms = milliseconds_since(start);
+  estimate.rebuild_ms = rebuild_ms;
+
+  const IterationRecord& last = history.back();
+  estimate.misfit_mm = last.misfit_mm;
+  estimate.initial_misfit_mm = mean_std_of_norms(data.displacements);
+  estimate.contact = {reduction.size(), last.penetrating, last.max_penetration_mm,
+                      static_cast<int>(history.size())};
+  estimate.active_slaves.clear();
+  estimate.contact_force_n = reduction.forces();
+  for (const int slave : reduction.active()) {
+    estimate.active_slaves.push_back(operators->slaves[static_cast<std::size_t>(slave)]);
+  }
+  estimate.history = history;
+}
+
+CondensedInverter::CondensedInverter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+CondensedInverter::CondensedInverter(CondensedInverter&&) noexcept = default;
+CondensedInverter& CondensedInverter::operator=(CondensedInverter&&) noexcept = default;
+CondensedInverter::~CondensedInverter() = default;
+
+Result<CondensedInverter> CondensedInverter::build(
+    std::shared_ptr<const CondensedOperators> operators,
+    std::shared_ptr<const geometry::TetLocator> locator, const CaseConfig& config,
+    const CondensedOptions& options) {
+  if (operators->modes.rows() != 3 * operators->control_neighbours.cols() ||
+      operators->slave_modes.cols() != operators->modes.cols()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "condensed operators: the arrays do not belong to one mesh");
+  }
+  auto impl = std::make_unique<Impl>(std::move(operators), std::move(locator), config, options);
+  impl->history.reserve(static_cast<std::size_t>(config.condensed.max_contact_iterations) + 1);
+  return CondensedInverter(std::move(impl));
+}
+
+void CondensedInverter::reset() { impl_->search.forget(); }
+double CondensedInverter::rebuild_ms() const { return impl_->rebuild_ms; }
+
+Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
+  const auto start = Clock::now();
+  Impl& impl = *impl_;
+  if (auto status = check_data(data); !status) return status;
+  impl.reserve(data.size());
+  if (auto status = impl.sampled.sample(data); !status) return status;
+
+  SetSearch& search = impl.search;
+  if (!impl.options.warm_start) search.forget();
+  search.begin();
+  impl.history.clear();
+  EstimateStatus outcome = EstimateStatus::kIterating;
+  while (outcome == EstimateStatus::kIterating) {
+    if (auto status = impl.reduction.activate(search.current()); !status) return status;
+    if (auto status = impl.estimate_for_set(data); !status) return status;
+    impl.record(data, start, search.iteration() + 1);
+    switch (search.next(impl.reduction.all_forces(), impl.reduction.penetration(),
+                        impl.reduction.compliance_diagonal())) {
+      case SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
+      case SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
+      case SetSearch::Step::kContinue: break;
+    }
+    if (outcome == EstimateStatus::kIterating &&
+        (impl.options.stop.stop_requested() ||
+         milliseconds_since(start) > impl.condensed.deadline_ms)) {
+      outcome = EstimateStatus::kDeadline;
+    }
+  }
+  if (outcome != EstimateStatus::kConverged) {  // the best set seen, evaluated once more
+    if (auto status = impl.reduction.activate(search.best()); !status) return status;
+    if (auto status = impl.estimate_for_set(data); !status) return status;
+    impl.record(data, start, search.iteration() + 1);
+    search.adopt_best();
+  }
+  if (!impl.z.allFinite() || !impl.reduction.forces().allFinite()) {
+    search.forget();
+    return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
+  }
+  impl.finish(data, estimate);
+  estimate.status = outcome;
+  estimate.reason = reason_of(outcome, search, impl.condensed);
+  return {};
+}
+
+}  // namespace brainshift::inversion

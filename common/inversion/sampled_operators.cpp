@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/sampled_operators.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <sstream>
+
+#include "common/inversion/data_check.hpp"
+#include "common/inversion/gather_rows.hpp"
+
+namespace brainshift::inversion {
+SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,
+                                   std::shared_ptr<const geometry::TetLocator> locator,
+                                   ModeWindow window)
+    : operators_(std::move(operators)),
+      locator_(std::move(locator)),
+      window_(window),
+      region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
+      region_modes_(gather_rows(operators_->modes, operators_->region)),
+      region_contact_(gather_rows(operators_->contact_columns, operators_->region)) {
+  for (std::size_t i = 0; i < operators_->region.size(); ++i) {
+    region_row_[static_cast<std::size_t>(operators_->region[i])] = static_cast<int>(i);
+  }
+}
+
+void SampledOperators::reserve(int data) {
+  if (data <= capacity_) return;
+  capacity_ = data;
+  rows_.resize(4, data);
+  weights_.resize(4, data);
+  sd_.resize(data);
+  free_body_.resize(3 * data, window_.count + 1);
+  contact_storage_.reset(new double[3 * static_cast<std::size_t>(data) *
+                                    static_cast<std::size_t>(operators_->num_slaves())]);
+}
+
+Status SampledOperators::sample(const SparseData& data) {
+  assert(data.size() <= capacity_);
+  size_ = data.size();
+  outside_region_ = 0;
+  for (int i = 0; i < size_; ++i) {
+    const geometry::TetLocation location = locator_->locate(data.positions.col(i));
+    if (!(location.distance_mm <= kOutsideTolerance_mm)) {
+      std::ostringstream text;
+      text << "sparse data: point " << i << " at (" << data.positions.col(i).transpose()
+           << ") mm lies " << location.distance_mm << " mm outside the brain";
+      size_ = 0;
+      return fail(ErrorCode::kInvalidArgument, text.str());
+    }
+    rows_.col(i) = location.nodes;
+    weights_.col(i) = location.weights;
+    bool in_region = true;
+    double left_out = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const int node = location.nodes[k];
+      if (region_row_[static_cast<std::size_t>(node)] >= 0) continue;
+      in_region = false;
+      for (int c = 0; c < 4; ++c) {
+        left_out += location.weights[k] * operators_->control_weights(c, node) *
+                    operators_->truncated_variance_mm2[operators_->control_neighbours(c, node)];
+      }
+    }
+    if (!in_region) ++outside_region_;
+    sd_[i] = std::sqrt(data.sd_mm[i] * data.sd_mm[i] + std::max(0.0, left_out));
+    weights_.col(i) /= sd_[i];
+  }
+  const bool region_only = outside_region_ == 0;
+  if (region_only) {
+    for (int i = 0; i < size_; ++i) {
+      for (int k = 0; k < 4; ++k) rows_(k, i) = region_row_[static_cast<std::size_t>(rows_(k, i))];
+    }
+  }
+  const Eigen::MatrixXf& modes = region_only ? region_modes_ : operators_->modes;
+  for (int j = 0; j < window_.count; ++j) {
+    sample_column(modes.col(window_.first + j).data(), free_body_.col(j).data());
+  }
+  for (int i = 0; i < size_; ++i) {
+    free_body_.col(window_.count).segment<3>(3 * i) = data.displacements.col(i) / sd_[i];
+  }
+  return {};
+}
+
+void SampledOperators::sample_column(const float* array, double* out) const {
+  for (int i = 0; i < size_; ++i) {
+    double x = 0.0, y = 0.0, z = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const double weight = weights_(k, i);
+      const float* node = array + 3 * static_cast<std::ptrdiff_t>(rows_(k, i));
+      x += weight * static_cast<double>(node[0]);
+      y += weight * static_cast<double>(node[1]);
+      z += weight * static_cast<double>(node[2]);
+    }
+    out[3 * i] = x;
+    out[3 * i + 1] = y;
+    out[3 * i + 2] = z;
+  }
+}
+
+Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+  const Eigen::MatrixXf& columns =
+      outside_region_ == 0 ? region_contact_ : operators_->contact_columns;
+  double* out = contact_storage_.get();
+  for (const int slave : active) {
+    sample_column(columns.col(slave).data(), out);
+    out += 3 * size_;
+  }
+  return {contact_storage_.get(), 3 * size_, static_cast<Eigen::Index>(active.size())};
+}
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// SampledOperators: the operators at the data of one update, whitened by their standard deviation.
+//
+//   free_body   R^-1/2 [A U | d]     3m x (r + 1)
+//   contact     R^-1/2 A G_A         3m x k
+// Rows of U and G near the data region are kept in arrays of their own, small enough for the cache. A datum that
+// touches another node is sampled from the full arrays, and what the modes leave out of the prior there is
+// added to its variance (CondensedOperators::truncated_variance_mm2), so that it is not believed too much.
+// Does not allocate after reserve().
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/core/condensed_operators.hpp"
+#include "common/core/error.hpp"
+#include "common/core/sparse_data.hpp"
+#include "common/fem/blas.hpp"
+#include "common/geometry/tet_locator.hpp"
+#include "common/inversion/mode_window.hpp"
+
+namespace brainshift::inversion {
+
+class SampledOperators {
+ public:
+  SampledOperators(std::shared_ptr<const CondensedOperators> operators,
+                   std::shared_ptr<const geometry::TetLocator> locator, ModeWindow window);
+
+  void reserve(int data);
+  // Locates the data and fills free_body. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside
+  // the brain (named). Preconditions: check_data; reserve(data.size()).
+  Status sample(const SparseData& data);
+  int size() const { return size_; }
+  int outside_region() const { return outside_region_; }  // data sampled from the full arrays
+  double sd(int datum) const { return sd_[datum]; }       // mm, with what the modes leave out
+  auto free_body() const { return free_body_.topRows(3 * size_); }
+  // Valid until the next call.
+  Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
+
+ private:
+  // out = R^-1/2 A (array column); `array` has 3n rows when any datum lies outside the region, else 3e rows.
+  void sample_column(const float* array, double* out) const;
+
+  std::shared_ptr<const CondensedOperators> operators_;
+  std::shared_ptr<const geometry::TetLocator> locator_;
+  ModeWindow window_;
+  std::vector<int> region_row_;  // per node, -1 outside the region
+  Eigen::MatrixXf region_modes_, region_contact_;
+  int size_ = 0, capacity_ = 0, outside_region_ = 0;
+  Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
+  Eigen::Matrix<double, 4, Eigen::Dynamic> weights_;  // 4 x m, barycentric / sd
+  VecX sd_;
+  Eigen::MatrixXd free_body_;
+  std::unique_ptr<double[]> contact_storage_;
+};
+
+}  // namespace brainshift::inversion
