@@ -22,8 +22,12 @@ MeanStd mean_std(std::span<const double> values) {
 }
 
 MeanStd mean_std_of_norms(const Points& vectors) {
-  const VecX norms = vectors.colwise().norm().transpose();
-  return mean_std({norms.data(), static_cast<std::size_t>(norms.size())});
+  const double n = static_cast<double>(vectors.cols());
+  if (vectors.cols() == 0) return {};
+  const auto norms = vectors.colwise().norm();  // an expression: nothing is stored
+  const double mean = norms.sum() / n;
+  if (vectors.cols() < 2) return {mean, 0.0};
+  return {mean, std::sqrt((norms.array() - mean).square().sum() / (n - 1.0))};
 }
 
 double percentile(std::span<const double> values, double q) {

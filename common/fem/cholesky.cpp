@@ -8,6 +8,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "common/fem/blas_threads.hpp"
+
 namespace brainshift::fem {
 namespace {
 
@@ -127,6 +129,7 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
     return fail(ErrorCode::kEmptySet, "stiffness matrix: no unknown is left to solve for");
   }
   if (auto finite = check_finite(lower); !finite) return tl::unexpected(finite.error());
+  use_single_threaded_blas();
   SparseCholesky cholesky(std::make_unique<Impl>());
   Impl& impl = *cholesky.impl_;
   const auto start = std::chrono::steady_clock::now();

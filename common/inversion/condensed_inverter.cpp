@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <sstream>
+#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "common/core/thread_team.hpp"
 #include "common/fem/blas.hpp"
+#include "common/fem/blas_threads.hpp"
 #include "common/inversion/contact_reduction.hpp"
 #include "common/inversion/data_check.hpp"
 #include "common/inversion/field_rebuild.hpp"
@@ -28,23 +29,26 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-std::string reason_of(EstimateStatus outcome, const SetSearch& search,
-                      const CondensedConfig& config) {
-  std::ostringstream text;
+// Into memory that `reason` has already.
+void set_reason(EstimateStatus outcome, const SetSearch& search, const CondensedConfig& config,
+                std::string& reason) {
+  char text[160];
   switch (outcome) {
     case EstimateStatus::kConverged:
-      text << "contact holds to " << kContactTolerance_mm << " mm at iteration "
-           << search.iteration();
+      std::snprintf(text, sizeof text, "contact holds to %g mm at iteration %d",
+                    kContactTolerance_mm, search.iteration());
       break;
     case EstimateStatus::kDeadline:
-      text << "deadline of " << config.deadline_ms << " ms reached after " << search.iteration()
-           << " contact sets; best iterate returned";
+      std::snprintf(text, sizeof text,
+                    "deadline of %g ms reached after %d contact sets; best iterate returned",
+                    config.deadline_ms, search.iteration());
       break;
     default:
-      text << "contact did not settle in " << search.iteration()
-           << " iterations; best iterate returned";
+      std::snprintf(text, sizeof text,
+                    "contact did not settle in %d iterations; best iterate returned",
+                    search.iteration());
   }
-  return text.str();
+  reason.assign(text);
 }
 
 }  // namespace
@@ -190,6 +194,7 @@ Result<CondensedInverter> CondensedInverter::build(
     return fail(ErrorCode::kInvalidArgument,
                 "condensed operators: the arrays do not belong to one mesh");
   }
+  fem::use_single_threaded_blas();
   auto impl = std::make_unique<Impl>(std::move(operators), std::move(locator), config, options);
   impl->history.reserve(static_cast<std::size_t>(config.condensed.max_contact_iterations) + 1);
   return CondensedInverter(std::move(impl));
@@ -238,7 +243,7 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
   }
   impl.finish(data, estimate);
   estimate.status = outcome;
-  estimate.reason = reason_of(outcome, search, impl.condensed);
+  set_reason(outcome, search, impl.condensed, estimate.reason);
   return {};
 }
 

@@ -10,7 +10,8 @@
 // before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best
 // iterate, the one with the least violation, is kept; limits on iterations and time end with it.
 //
-// Not thread-safe. update() does not allocate as long as the data fit capacity().
+// Not thread-safe. update() allocates nothing as long as the data fit the capacity, but for members of the
+// estimate whose size changes.
 #pragma once
 
 #include <memory>

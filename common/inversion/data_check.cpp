@@ -7,6 +7,44 @@
 #include <string>
 
 namespace brainshift::inversion {
+namespace {
+
+// Not on one line, not in one plane.
+Status check_spread(const Points& positions) {
+  const Vec3 centre = positions.rowwise().mean();
+  Mat3 scatter = Mat3::Zero();
+  for (Eigen::Index i = 0; i < positions.cols(); ++i) {
+    const Vec3 arm = positions.col(i) - centre;
+    scatter += arm * arm.transpose();
+  }
+  const Vec3 variances = Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvalues();  // ascending
+  const double limit = kCollinearRatio * kCollinearRatio * variances[2];
+  if (variances[1] > limit && variances[0] > limit) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              "sparse data: the " + std::to_string(positions.cols()) + " positions lie " +
+                  (variances[1] > limit ? "in one plane" : "on one line or in one point"));
+}
+
+// Neighbours that would have to tear apart. Thinned beyond some thousand data: all pairs are looked at.
+Status check_agreement(const SparseData& data) {
+  constexpr int kMostPairs = 2000;
+  const int step = 1 + (data.size() - 1) / kMostPairs;
+  for (int i = 0; i < data.size(); i += step) {
+    for (int j = i + step; j < data.size(); j += step) {
+      const double apart = (data.positions.col(i) - data.positions.col(j)).norm();
+      const double differ = (data.displacements.col(i) - data.displacements.col(j)).norm();
+      const double noise = kContradictionSds * (data.sd_mm[i] + data.sd_mm[j]);
+      if (!(differ > kContradiction_mm + kContradictionStretch * apart + noise)) continue;
+      std::ostringstream text;
+      text << "sparse data: points " << i << " and " << j << " contradict each other: " << apart
+           << " mm apart, their displacements differ by " << differ << " mm";
+      return fail(ErrorCode::kInvalidArgument, text.str());
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 Status check_data(const SparseData& data) {
   const int m = data.size();
@@ -34,14 +72,8 @@ Status check_data(const SparseData& data) {
       return fail(ErrorCode::kInvalidArgument, text.str());
     }
   }
-  const Points centred = data.positions.colwise() - data.positions.rowwise().mean();
-  const Eigen::SelfAdjointEigenSolver<Mat3> spread(centred * centred.transpose());
-  const Vec3 variances = spread.eigenvalues();  // ascending
-  if (!(variances[1] > kCollinearRatio * kCollinearRatio * variances[2])) {
-    return fail(ErrorCode::kInvalidArgument, "sparse data: the " + std::to_string(m) +
-                                                 " positions lie on one line or in one point");
-  }
-  return {};
+  if (auto status = check_spread(data.positions); !status) return status;
+  return check_agreement(data);
 }
 
 }  // namespace brainshift::inversion

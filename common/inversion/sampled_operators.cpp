@@ -54,7 +54,7 @@ Status SampledOperators::sample(const SparseData& data) {
     double left_out = 0.0;
     for (int k = 0; k < 4; ++k) {
       const int node = location.nodes[k];
-      if (region_row_[static_cast<std::size_t>(node)] >= 0) continue;
+      if (region_row_[static_cast<std::size_t>(node)] >= 0 || location.weights[k] == 0.0) continue;
       in_region = false;
       for (int c = 0; c < 4; ++c) {
         left_out += location.weights[k] * operators_->control_weights(c, node) *
@@ -68,7 +68,9 @@ Status SampledOperators::sample(const SparseData& data) {
   const bool region_only = outside_region_ == 0;
   if (region_only) {
     for (int i = 0; i < size_; ++i) {
-      for (int k = 0; k < 4; ++k) rows_(k, i) = region_row_[static_cast<std::size_t>(rows_(k, i))];
+      for (int k = 0; k < 4; ++k) {  // a node outside has weight 0 here: any row will do
+        rows_(k, i) = std::max(0, region_row_[static_cast<std::size_t>(rows_(k, i))]);
+      }
     }
   }
   const Eigen::MatrixXf& modes = region_only ? region_modes_ : operators_->modes;

@@ -42,6 +42,7 @@ struct SessionRequest {
   Method method = Method::kCondensed;
   Boundary boundary = Boundary::kContact;
   bool publish_iterates = false;
+  bool measure_full_solve = false;
 };
 
 struct SessionInfo {

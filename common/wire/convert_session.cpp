@@ -34,6 +34,7 @@ std::string encode(const SessionRequest& request) {
   message.set_method(std::string(to_string(request.method)));
   message.set_boundary(std::string(to_string(request.boundary)));
   message.set_publish_iterates(request.publish_iterates);
+  message.set_measure_full_solve(request.measure_full_solve);
   return message.SerializeAsString();
 }
 
@@ -42,8 +43,10 @@ Result<SessionRequest> decode_session_request(std::string_view payload) {
   if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
   const auto method = method_from(message.method());
   if (!method) {
+    std::string names;
+    for (const Method known : kAllMethods) names += ' ' + std::string(to_string(known));
     return fail(ErrorCode::kInvalidArgument,
-                "start_session.method = " + quoted(message.method()) + ": must be \"paper\"");
+                "start_session.method = " + quoted(message.method()) + ": must be one of" + names);
   }
   const auto boundary = boundary_from(message.boundary());
   if (!boundary) {
@@ -51,7 +54,8 @@ Result<SessionRequest> decode_session_request(std::string_view payload) {
                 "start_session.boundary = " + quoted(message.boundary()) +
                     ": must be \"contact\" or \"fixed\"");
   }
-  return SessionRequest{message.case_id(), *method, *boundary, message.publish_iterates()};
+  return SessionRequest{message.case_id(), *method, *boundary, message.publish_iterates(),
+                        message.measure_full_solve()};
 }
 
 std::string encode(const SessionInfo& info) {

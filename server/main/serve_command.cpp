@@ -8,59 +8,18 @@
 #include <memory>
 #include <utility>
 
-#include "common/inversion/invert.hpp"
-#include "common/inversion/prepared_model.hpp"
 #include "common/io/config_file.hpp"
 #include "common/io/model_file.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/logging.hpp"
+#include "server/main/model_store.hpp"
 #include "server/main/stop_signals.hpp"
-#include "server/pipeline/pipeline.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
 #include "server/transport/service.hpp"
 
 namespace brainshift::server {
 namespace {
-
-using inversion::PreparedModel;
-
-wire::SessionInfo session_info(const PreparedModel& prepared) {
-  const BrainModel& model = prepared.model();
-  const inversion::PrepareTimings& timings = prepared.timings();
-  wire::SessionInfo info;
-  info.model_id = model.model_id;
-  info.nodes = model.mesh.num_nodes();
-  info.tets = model.mesh.num_tets();
-  info.slaves = static_cast<int>(model.slaves.size());
-  info.prepare_s = timings.total_s;
-  info.model_bytes = timings.bytes;
-  info.full_solve_ms = timings.full_solve_ms;
-  info.factor_s = timings.factor_s;
-  return info;
-}
-
-// Factorises, and ties the result to the pipeline.
-Result<Prepared> prepare_boundary(const std::shared_ptr<const BrainModel>& model,
-                                  const CaseConfig& config, Boundary boundary) {
-  spdlog::info("preparing boundary={}", to_string(boundary));
-  auto made = PreparedModel::prepare(model, config, boundary);
-  if (!made) return tl::unexpected(made.error());
-  auto prepared = std::make_shared<const PreparedModel>(std::move(*made));
-  auto pipeline = Pipeline::build(
-      model, config, boundary,
-      [prepared](const SparseData& data, const inversion::InversionOptions& options) {
-        return inversion::invert(*prepared, data, options);
-      });
-  if (!pipeline) return tl::unexpected(pipeline.error());
-  auto shared = std::make_shared<const Pipeline>(std::move(*pipeline));
-  Prepared result;
-  result.info = session_info(*prepared);
-  result.run = [shared](const Observation& observation, const RunOptions& options) {
-    return shared->run(observation, options);
-  };
-  return result;
-}
 
 Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
@@ -87,8 +46,10 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   auto model = std::make_shared<const BrainModel>(std::move(file->model));
   options.model = model;
   options.case_file = file->config.file;
-  options.prepare = [model, case_config = std::move(file->config)](Boundary boundary) {
-    return prepare_boundary(model, case_config, boundary);
+  auto store = std::make_shared<ModelStore>(model, std::move(file->config),
+                                            std::vector<CondensedOperators>());
+  options.prepare = [store](const wire::SessionRequest& request) {
+    return store->prepare(request);
   };
   return options;
 }

@@ -70,7 +70,8 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   if (!estimate) return tl::unexpected(estimate.error());
   update.final = true;
   update.estimate = std::move(*estimate);
-  update.timings.invert_ms = milliseconds_since(invert_start);
+  update.timings.rebuild_ms = update.estimate.rebuild_ms;
+  update.timings.invert_ms = milliseconds_since(invert_start) - update.timings.rebuild_ms;
   return update;
 }
 

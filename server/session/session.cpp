@@ -141,21 +141,23 @@ void Session::work(const std::stop_token& stop) {
   }
 }
 
-Result<std::shared_ptr<const Prepared>> Session::prepared_for(Boundary boundary) {
-  if (const auto found = cache_.find(boundary); found != cache_.end()) return found->second;
-  auto prepared = guarded([&] { return hooks_.prepare(boundary); });
+Result<std::shared_ptr<const Prepared>> Session::prepared_for(const wire::SessionRequest& request) {
+  const std::tuple key{request.boundary, request.method, request.measure_full_solve};
+  if (const auto found = cache_.find(key); found != cache_.end()) return found->second;
+  auto prepared = guarded([&] { return hooks_.prepare(request); });
   if (!prepared) return tl::unexpected(prepared.error());
   auto shared = std::make_shared<const Prepared>(std::move(*prepared));
-  cache_.emplace(boundary, shared);
+  cache_.emplace(key, shared);
   return shared;
 }
 
 void Session::begin(PendingStart start) {
-  const auto prepared = prepared_for(start.request.boundary);
+  const auto prepared = prepared_for(start.request);
   if (!prepared) {
     start.done(tl::unexpected(prepared.error()));
     return;
   }
+  if ((*prepared)->begin) (*prepared)->begin();
   wire::SessionInfo info = (*prepared)->info;
   {
     const std::lock_guard lock(mutex_);

@@ -21,6 +21,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <tuple>
 
 #include "common/core/error.hpp"
 #include "common/core/observation.hpp"
@@ -32,12 +33,14 @@ namespace brainshift::server {
 // A boundary condition made ready: what clients are told, and the pipeline as a function.
 struct Prepared {
   wire::SessionInfo info;  // session_id is filled in by the session
+  // A session begins: nothing of an earlier one may be remembered. May be empty.
+  std::function<void()> begin;
   std::function<Result<Update>(const Observation&, const RunOptions&)> run;
 };
 
 // Called on the worker thread, one at a time.
 struct SessionHooks {
-  std::function<Result<Prepared>(Boundary)> prepare;
+  std::function<Result<Prepared>(const wire::SessionRequest&)> prepare;
   // A session is ready; called before its start is answered. May be empty.
   std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
   // An iterate, a final update, or the error that an observation ended in.
@@ -91,12 +94,13 @@ class Session {
 
   void work(const std::stop_token& stop);
   void begin(PendingStart start);
-  Result<std::shared_ptr<const Prepared>> prepared_for(Boundary boundary);
+  Result<std::shared_ptr<const Prepared>> prepared_for(const wire::SessionRequest& request);
   void process(const Observation& observation);
 
   const std::string case_id_;
   const SessionHooks hooks_;
-  std::map<Boundary, std::shared_ptr<const Prepared>> cache_;  // worker only
+  // By boundary, method and whether a full solve was measured; worker only.
+  std::map<std::tuple<Boundary, Method, bool>, std::shared_ptr<const Prepared>> cache_;
 
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;

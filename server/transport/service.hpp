@@ -36,7 +36,7 @@ namespace brainshift::server {
 struct ServiceOptions {
   std::string version;
   std::shared_ptr<const BrainModel> model;  // null: no model is loaded
-  std::function<Result<Prepared>(Boundary)> prepare;
+  std::function<Result<Prepared>(const wire::SessionRequest&)> prepare;
   std::filesystem::path journal_dir;  // empty: no journal
   std::filesystem::path case_file;    // metadata of the journal
   OpenSink open_journal = open_surgery_file;

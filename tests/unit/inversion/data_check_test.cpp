@@ -29,10 +29,20 @@ void expect_refused(const SparseData& data, ErrorCode code, const std::string& w
 
 TEST(CheckData, AcceptsDataInGeneralPosition) { EXPECT_TRUE(check_data(good_data()).has_value()); }
 
-TEST(CheckData, AcceptsCoplanarPositions) {
+// A plane of data does not see what tissue does across it.
+TEST(CheckData, RefusesCoplanarPositions) {
   SparseData data = good_data();
   data.positions.row(2).setConstant(40);
+  expect_refused(data, ErrorCode::kInvalidArgument, "in one plane");
+}
+
+TEST(CheckData, RefusesNeighboursThatContradictEachOther) {
+  SparseData data = good_data();
+  data.positions.col(1) = data.positions.col(0) + Vec3(0.5, 0.7, 1.1);
+  data.displacements.col(1) = data.displacements.col(0) + Vec3(0, 12, 0);
   EXPECT_TRUE(check_data(data).has_value());
+  data.displacements.col(1) = data.displacements.col(0) + Vec3(0, 20, 0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "points 0 and 1 contradict each other");
 }
 
 TEST(CheckData, RefusesFewerThanThreePoints) {

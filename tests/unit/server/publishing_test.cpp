@@ -48,7 +48,7 @@ TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
 
 TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   ServiceOptions options = with_model();
-  options.prepare = [](Boundary) -> Result<Prepared> {
+  options.prepare = [](const wire::SessionRequest&) -> Result<Prepared> {
     Prepared prepared;
     prepared.run = [](const Observation& observation, const RunOptions&) {
       if (observation.sequence == 2) {
@@ -147,7 +147,7 @@ TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
   ServiceOptions options = with_model();
   auto entered = std::make_shared<std::promise<void>>();
-  options.prepare = [entered](Boundary) -> Result<Prepared> {
+  options.prepare = [entered](const wire::SessionRequest&) -> Result<Prepared> {
     Prepared prepared;
     prepared.run = [entered](const Observation&, const RunOptions& run) {
       std::promise<void> stopped;

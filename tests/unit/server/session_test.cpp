@@ -52,8 +52,9 @@ class SessionTest : public testing::Test {
 
   SessionHooks hooks(Run run) {
     SessionHooks hooks;
-    hooks.prepare = [this, run = std::move(run)](Boundary boundary) -> Result<Prepared> {
-      prepared_boundaries_.push_back(boundary);
+    hooks.prepare =
+        [this, run = std::move(run)](const wire::SessionRequest& request) -> Result<Prepared> {
+      prepared_boundaries_.push_back(request.boundary);
       Prepared prepared;
       prepared.info.model_id = "0123456789abcdef";
       prepared.run = run;
@@ -73,7 +74,7 @@ class SessionTest : public testing::Test {
     auto promise = std::make_shared<std::promise<Result<wire::SessionInfo>>>();
     auto future = promise->get_future();
     session.start(
-        {case_id, Method::kPaper, boundary, publish_iterates},
+        {case_id, Method::kPaper, boundary, publish_iterates, false},
         [promise](Result<wire::SessionInfo> info) { promise->set_value(std::move(info)); });
     if (future.wait_for(10s) != std::future_status::ready) {
       return fail(ErrorCode::kInternal, "start was not answered");
@@ -283,7 +284,8 @@ TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
 TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   int attempts = 0;
   SessionHooks failing = hooks(echo);
-  failing.prepare = [&, prepare = failing.prepare](Boundary boundary) -> Result<Prepared> {
+  failing.prepare =
+      [&, prepare = failing.prepare](const wire::SessionRequest& boundary) -> Result<Prepared> {
     if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
     return prepare(boundary);
   };
@@ -300,7 +302,7 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   std::promise<void> leave;
   SessionHooks slow = hooks(echo);
   bool first = true;
-  slow.prepare = [&, prepare = slow.prepare](Boundary boundary) {
+  slow.prepare = [&, prepare = slow.prepare](const wire::SessionRequest& boundary) {
     if (std::exchange(first, false)) {
       entered.set_value();
       leave.get_future().wait();
@@ -309,12 +311,12 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   };
   Session session(kCase, std::move(slow));
   std::promise<Result<wire::SessionInfo>> preparing;
-  session.start({kCase, Method::kPaper, Boundary::kContact, false},
+  session.start({kCase, Method::kPaper, Boundary::kContact},
                 [&](Result<wire::SessionInfo> info) { preparing.set_value(std::move(info)); });
   entered.get_future().wait();
   EXPECT_TRUE(session.state().busy);
   std::promise<Result<wire::SessionInfo>> later;
-  session.start({kCase, Method::kPaper, Boundary::kFixed, false},
+  session.start({kCase, Method::kPaper, Boundary::kFixed},
                 [&](Result<wire::SessionInfo> info) { later.set_value(std::move(info)); });
   leave.set_value();
   const auto superseded = preparing.get_future().get();

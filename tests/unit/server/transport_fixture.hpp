@@ -127,7 +127,7 @@ class TransportTest : public testing::Test {
     ServiceOptions options;
     options.version = "1.2.3";
     options.model = small_model();
-    options.prepare = [nodes](Boundary) -> Result<Prepared> {
+    options.prepare = [nodes](const wire::SessionRequest&) -> Result<Prepared> {
       Prepared prepared;
       prepared.info.model_id = "0123456789abcdef";
       prepared.info.nodes = nodes;

@@ -66,8 +66,9 @@ TEST(RoundTrip, FailedUpdateCarriesItsErrorAndNoEstimate) {
 }
 
 TEST(RoundTrip, EveryEstimateStatusIsReproduced) {
-  for (const auto status : {EstimateStatus::kNotRun, EstimateStatus::kIterating,
-                            EstimateStatus::kConverged, EstimateStatus::kIterationLimit}) {
+  for (const auto status :
+       {EstimateStatus::kNotRun, EstimateStatus::kIterating, EstimateStatus::kConverged,
+        EstimateStatus::kIterationLimit, EstimateStatus::kDeadline}) {
     UpdateMessage message = sample_update();
     message.update.estimate.status = status;
     expect_round_trip(message, decode_update);
@@ -79,8 +80,10 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
       DaemonStatus{"0.1.0", true, "Fall Köln", "0123456789abcdef", true, 1ull << 63, 1},
       decode_status);
   expect_round_trip(DaemonStatus{}, decode_status);
-  expect_round_trip(SessionRequest{"c", Method::kPaper, Boundary::kFixed, true},
-                    decode_session_request);
+  for (const Method method : kAllMethods) {
+    expect_round_trip(SessionRequest{"c", method, Boundary::kFixed, true, true},
+                      decode_session_request);
+  }
   expect_round_trip(SessionRequest{"", Method::kPaper, Boundary::kContact, false},
                     decode_session_request);
   expect_round_trip(SessionInfo{7, "id", 18475, std::numeric_limits<int>::max(), 906, 0.1,

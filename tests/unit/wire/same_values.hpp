@@ -87,6 +87,7 @@ inline void expect_same(const SessionRequest& a, const SessionRequest& b) {
   EXPECT_EQ(a.method, b.method);
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.publish_iterates, b.publish_iterates);
+  EXPECT_EQ(a.measure_full_solve, b.measure_full_solve);
 }
 
 inline void expect_same(const SessionInfo& a, const SessionInfo& b) {

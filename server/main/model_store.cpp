@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/main/model_store.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <utility>
+
+#include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/invert.hpp"
+#include "server/pipeline/pipeline.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using inversion::CondensedInverter;
+using inversion::PreparedModel;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// The pipeline as the function that a session calls.
+Result<Prepared> with_pipeline(const std::shared_ptr<const BrainModel>& model,
+                               const CaseConfig& config, Boundary boundary, InvertFunction invert) {
+  auto pipeline = Pipeline::build(model, config, boundary, std::move(invert));
+  if (!pipeline) return tl::unexpected(pipeline.error());
+  auto shared = std::make_shared<const Pipeline>(std::move(*pipeline));
+  Prepared prepared;
+  prepared.run = [shared](const Observation& observation, const RunOptions& options) {
+    return shared->run(observation, options);
+  };
+  return prepared;
+}
+
+}  // namespace
+
+ModelStore::ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
+                       std::vector<CondensedOperators> operators)
+    : model_(std::move(model)),
+      config_(std::move(config)),
+      locator_(std::make_shared<const geometry::TetLocator>(model_->mesh)) {
+  for (CondensedOperators& one : operators) {
+    const Boundary boundary = one.boundary;
+    condensed_.emplace(boundary, std::make_shared<const CondensedOperators>(std::move(one)));
+  }
+}
+
+wire::SessionInfo ModelStore::info() const {
+  wire::SessionInfo info;
+  info.model_id = model_->model_id;
+  info.nodes = model_->mesh.num_nodes();
+  info.tets = model_->mesh.num_tets();
+  info.slaves = static_cast<int>(model_->slaves.size());
+  return info;
+}
+
+Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary boundary) {
+  if (const auto found = factorised_.find(boundary); found != factorised_.end()) {
+    return found->second;
+  }
+  spdlog::info("factorising boundary={}", to_string(boundary));
+  auto made = PreparedModel::prepare(model_, config_, boundary);
+  if (!made) return tl::unexpected(made.error());
+  auto shared = std::make_shared<const PreparedModel>(std::move(*made));
+  factorised_.emplace(boundary, shared);
+  return shared;
+}
+
+Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(Boundary boundary) {
+  if (const auto found = condensed_.find(boundary); found != condensed_.end()) {
+    return found->second;
+  }
+  const auto factor = factorised(boundary);
+  if (!factor) return tl::unexpected(factor.error());
+  spdlog::info("condensing boundary={}: the model file holds no operators for it",
+               to_string(boundary));
+  auto made = inversion::condense(**factor);
+  if (!made) return tl::unexpected(made.error());
+  auto shared = std::make_shared<const CondensedOperators>(std::move(*made));
+  condensed_.emplace(boundary, shared);
+  return shared;
+}
+
+Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& request) {
+  const auto operators = condensed(request.boundary);
+  if (!operators) return tl::unexpected(operators.error());
+  auto made = CondensedInverter::build(*operators, locator_, config_);
+  if (!made) return tl::unexpected(made.error());
+  auto inverter = std::make_shared<CondensedInverter>(std::move(*made));
+  auto scratch = std::make_shared<Estimate>();  // its memory is reused from update to update
+  auto prepared =
+      with_pipeline(model_, config_, request.boundary,
+                    [inverter, scratch](const SparseData& data,
+                                        const inversion::InversionOptions&) -> Result<Estimate> {
+                      if (auto status = inverter->update(data, *scratch); !status) {
+                        return tl::unexpected(status.error());
+                      }
+                      return *scratch;
+                    });
+  if (!prepared) return prepared;
+  prepared->begin = [inverter] { inverter->reset(); };
+  prepared->info.model_bytes = (*operators)->bytes();
+  return prepared;
+}
+
+Result<Prepared> ModelStore::prepare_iterative(const wire::SessionRequest& request) {
+  const auto factor = factorised(request.boundary);
+  if (!factor) return tl::unexpected(factor.error());
+  auto prepared = with_pipeline(
+      model_, config_, request.boundary,
+      [factor = *factor](const SparseData& data, const inversion::InversionOptions& options) {
+        return inversion::invert(*factor, data, options);
+      });
+  if (!prepared) return prepared;
+  prepared->info.model_bytes = (*factor)->timings().bytes;
+  return prepared;
+}
+
+Result<Prepared> ModelStore::prepare(const wire::SessionRequest& request) {
+  const auto start = Clock::now();
+  const bool condensed_method = request.method == Method::kCondensed;
+  auto prepared = condensed_method ? prepare_condensed(request) : prepare_iterative(request);
+  if (!prepared) return prepared;
+  const wire::SessionInfo common = info();
+  const std::uint64_t bytes = prepared->info.model_bytes;
+  prepared->info = common;
+  prepared->info.model_bytes = bytes;
+  prepared->info.prepare_s = seconds_since(start);
+  if (!condensed_method || request.measure_full_solve) {
+    const auto factor = factorised(request.boundary);
+    if (!factor) return tl::unexpected(factor.error());
+    prepared->info.full_solve_ms = (*factor)->timings().full_solve_ms;
+    prepared->info.factor_s = (*factor)->timings().factor_s;
+  }
+  return prepared;
+}
+
+}  // namespace brainshift::server

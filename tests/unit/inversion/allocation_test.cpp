@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A program of its own, because it counts every allocation of the process.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+
+#include "tests/unit/inversion/condensed_fixture.hpp"
+
+namespace {
+std::atomic<bool> counting{false};
+std::atomic<long> allocations{0};
+}  // namespace
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* malloc(std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_malloc(size);
+}
+}
+#endif
+
+namespace brainshift::inversion {
+namespace {
+
+TEST_F(Condensed, UpdatesDoNotAllocate) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer has its own malloc";
+#endif
+  auto inverter = Condensed::inverter(Boundary::kContact);
+  std::vector<SparseData> data;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    data.push_back(sagging_data(Boundary::kContact, 0.3, seed));
+  }
+  Estimate estimate;
+  for (const SparseData& d : data) ASSERT_TRUE(inverter.update(d, estimate));
+  const int active = estimate.contact.active;
+  ASSERT_GT(active, 0);
+
+  counting = true;
+  std::free(std::malloc(1));
+  const long own = allocations;
+  for (int i = 0; i < 50; ++i) {
+    if (!inverter.update(data[3], estimate)) break;
+  }
+  const long same_data = allocations - own;
+  for (int i = 0; i < 50; ++i) {
+    if (!inverter.update(data[static_cast<std::size_t>(i % 4)], estimate)) break;
+  }
+  counting = false;
+  EXPECT_EQ(own, 1) << "the counter does not count";
+  EXPECT_EQ(same_data, 0);
+  // The contact forces of the estimate, whose number changes.
+  EXPECT_LE(allocations - own, 50);
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

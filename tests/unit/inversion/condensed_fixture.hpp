@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A toy patient, its condensed operators, and the posterior by dense linear algebra.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <memory>
+
+#include "common/core/random.hpp"
+#include "common/fem/gravity.hpp"
+#include "common/fem/sampling.hpp"
+#include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "tests/support/toy_patient.hpp"
+
+namespace brainshift::inversion {
+
+// Posterior mean and covariance of u for a given active set, from K_p^-1 column by column.
+struct DirectPosterior {
+  VecX mean;
+  Eigen::MatrixXd covariance;
+};
+
+class Condensed : public ::testing::TestWithParam<Boundary> {
+ protected:
+  static CaseConfig config() {
+    CaseConfig config = test_support::toy_config();
+    config.condensed.max_rank = 600;
+    config.condensed.uncertainty_nodes = 300;  // more than there are: all
+    return config;
+  }
+  static std::shared_ptr<const BrainModel> patient() {
+    static const auto model = std::make_shared<const BrainModel>(test_support::toy_patient());
+    return model;
+  }
+  static const PreparedModel& prepared(Boundary boundary) {
+    static const PreparedModel contact =
+        std::move(*PreparedModel::prepare(patient(), config(), Boundary::kContact));
+    static const PreparedModel fixed =
+        std::move(*PreparedModel::prepare(patient(), config(), Boundary::kFixed));
+    return boundary == Boundary::kContact ? contact : fixed;
+  }
+  static std::shared_ptr<const CondensedOperators> operators(Boundary boundary) {
+    static const auto contact = std::make_shared<const CondensedOperators>(
+        std::move(*condense(prepared(Boundary::kContact))));
+    static const auto fixed = std::make_shared<const CondensedOperators>(
+        std::move(*condense(prepared(Boundary::kFixed))));
+    return boundary == Boundary::kContact ? contact : fixed;
+  }
+  static CondensedInverter inverter(Boundary boundary, const CondensedOptions& options = {},
+                                    const CaseConfig& with = config()) {
+    static const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+    auto made = CondensedInverter::build(operators(boundary), locator, with, options);
+    EXPECT_TRUE(made.has_value());
+    return std::move(*made);
+  }
+  // Noisy displacements of the data region's nodes, from a sagging truth with contact.
+  static SparseData sagging_data(Boundary boundary, double noise_mm, std::uint64_t seed = 4) {
+    const PreparedModel& model = prepared(boundary);
+    const BrainModel& brain = *patient();
+    const Points load =
+        fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
+                           brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
+    const auto truth = model.forward().solve_with_contact(40.0 * load);
+    EXPECT_TRUE(truth.has_value());
+    Random random(seed);
+    const auto& region = operators(boundary)->region;
+    const auto m = static_cast<Eigen::Index>(region.size());
+    SparseData data{Points(3, m), Points(3, m), VecX::Constant(m, 0.2)};
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const NodeIndex node = region[static_cast<std::size_t>(i)];
+      data.positions.col(i) = brain.mesh.nodes.col(node);
+      data.displacements.col(i) =
+          truth->displacement.col(node) + noise_mm * random.normal() * random.direction();
+    }
+    return data;
+  }
+
+  static DirectPosterior direct_posterior(Boundary boundary, const SparseData& data,
+                                          const std::vector<NodeIndex>& active_nodes) {
+    const PreparedModel& model = prepared(boundary);
+    const contact::ForwardModel& forward = model.forward();
+    const Eigen::Index n3 = patient()->mesh.nodes.size();
+    contact::ActiveSet active(static_cast<std::size_t>(forward.contact().num_slaves()), 0);
+    for (std::size_t i = 0; i < active.size(); ++i) {
+      const NodeIndex slave = forward.contact().pairs()[i].slave;
+      active[i] = std::count(active_nodes.begin(), active_nodes.end(), slave) > 0;
+    }
+    fem::SymmetricMatrix k_p = forward.stiffness();
+    forward.contact().add_stiffness(k_p, forward.dofs(), active);
+    const auto factor = fem::SparseCholesky::factorise(k_p);
+    Eigen::MatrixXd inverse(n3, n3), loaded(n3, n3);
+    for (Eigen::Index j = 0; j < n3; ++j) {
+      Points unit = Points::Zero(3, n3 / 3);
+      unit(j % 3, j / 3) = 1.0;
+      const Points column = forward.dofs().expand(factor->solve(forward.dofs().restrict_to(unit)));
+      inverse.col(j) = Eigen::Map<const VecX>(column.data(), n3);
+      const Points force = model.prior().apply(column);
+      loaded.col(j) = Eigen::Map<const VecX>(force.data(), n3);
+    }
+    const Eigen::MatrixXd prior = inverse * loaded;
+    Points gaps = Points::Zero(3, n3 / 3);
+    forward.contact().add_load(gaps, active);
+    const VecX shift = inverse * Eigen::Map<const VecX>(gaps.data(), n3);
+    const auto weights =
+        fem::sampling_matrix(model.locator(), static_cast<int>(n3 / 3), data.positions, 1e-6);
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(3 * data.size(), n3);
+    VecX noise(3 * data.size());
+    for (int i = 0; i < data.size(); ++i) {
+      for (fem::SamplingMatrix::InnerIterator it(*weights, i); it; ++it) {
+        for (int axis = 0; axis < 3; ++axis) a(3 * i + axis, 3 * it.col() + axis) = it.value();
+      }
+      noise.segment<3>(3 * i).setConstant(data.sd_mm[i] * data.sd_mm[i]);
+    }
+    Eigen::MatrixXd innovation = a * prior * a.transpose();
+    innovation.diagonal() += noise;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
+    const VecX d = Eigen::Map<const VecX>(data.displacements.data(), noise.size());
+    DirectPosterior posterior;
+    posterior.mean = shift + prior * (a.transpose() * solver.solve(d - a * shift));
+    posterior.covariance = prior - prior * a.transpose() * solver.solve(a * prior);
+    return posterior;
+  }
+};
+
+}  // namespace brainshift::inversion

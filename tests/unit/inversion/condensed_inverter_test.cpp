@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed_inverter.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "common/inversion/set_search.hpp"
+
+#include "tests/unit/inversion/condensed_fixture.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using testing::HasSubstr;
+
+INSTANTIATE_TEST_SUITE_P(Boundaries, Condensed,
+                         ::testing::Values(Boundary::kContact, Boundary::kFixed),
+                         [](const auto& each) { return std::string(to_string(each.param)); });
+
+// Single precision of U and G: 6e-8 of each of some hundred terms, which partly cancel.
+constexpr double kFloatTolerance = 1e-5;
+
+TEST_P(Condensed, EstimateEqualsTheDirectPosteriorOfThePenalisedSystem) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  if (GetParam() == Boundary::kContact) {
+    ASSERT_GT(estimate.contact.active, 5) << "the test shows nothing without contact";
+  }
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  const double largest_mm = direct.mean.cwiseAbs().maxCoeff();
+  ASSERT_GT(largest_mm, 1.0);
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(), kFloatTolerance * largest_mm);
+}
+
+// Equal in the data region; elsewhere the modes leave variance out, which is added as that of the free body.
+TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const auto& region = operators(GetParam())->region;
+  for (int node = 0; node < patient()->mesh.num_nodes(); ++node) {
+    const double variance = direct.covariance.diagonal().segment<3>(3 * node).mean();
+    EXPECT_GT(estimate.sd_mm[node], 0.98 * std::sqrt(std::max(0.0, variance))) << node;
+    if (std::binary_search(region.begin(), region.end(), node)) {
+      EXPECT_NEAR(estimate.sd_mm[node], std::sqrt(variance), 0.05 * std::sqrt(variance)) << node;
+    }
+  }
+}
+
+TEST_P(Condensed, ContactHolds) {
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(sagging_data(GetParam(), 0.3), estimate));
+  const auto& contact = prepared(GetParam()).forward().contact();
+  const VecX penetration = contact.penetration(estimate.displacement);
+  Eigen::Index active = 0;
+  for (int i = 0; i < contact.num_slaves(); ++i) {
+    const NodeIndex slave = contact.pairs()[static_cast<std::size_t>(i)].slave;
+    if (active < estimate.contact_force_n.size() &&
+        estimate.active_slaves[static_cast<std::size_t>(active)] == slave) {
+      const double force = estimate.contact_force_n[active++];
+      EXPECT_GE(force, 0.0) << i;                                      // it presses,
+      EXPECT_NEAR(penetration[i], force / contact.beta(), 1e-4) << i;  // as the penalty says
+    } else {
+      EXPECT_LT(penetration[i], kContactTolerance_mm + 1e-4) << i;
+    }
+  }
+  EXPECT_EQ(active, estimate.contact_force_n.size());
+}
+
+TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
+  auto warm = Condensed::inverter(GetParam());
+  CondensedOptions from_nothing;
+  from_nothing.warm_start = false;
+  auto cold = Condensed::inverter(GetParam(), from_nothing);
+  Estimate a, b;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const SparseData data = sagging_data(GetParam(), 0.3, seed);
+    ASSERT_TRUE(warm.update(data, a));
+    ASSERT_TRUE(cold.update(data, b));
+    EXPECT_LT((a.displacement - b.displacement).cwiseAbs().maxCoeff(), 2e-3) << seed;
+  }
+}
+
+TEST_P(Condensed, ResetMakesRunsBitIdentical) {
+  auto inverter = Condensed::inverter(GetParam());
+  std::vector<Estimate> first(3), second(3);
+  for (auto* run : {&first, &second}) {
+    inverter.reset();
+    for (std::size_t i = 0; i < run->size(); ++i) {
+      ASSERT_TRUE(inverter.update(sagging_data(GetParam(), 0.3, i + 1), (*run)[i]));
+    }
+  }
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_TRUE(first[i].displacement == second[i].displacement);
+    EXPECT_TRUE(first[i].sd_mm == second[i].sd_mm);
+  }
+}
+
+TEST_P(Condensed, LeavingPartsOutChangesOnlyThem) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate full, without_sd, without_contact;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(data, full));
+  CondensedOptions options;
+  options.uncertainty = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), options).update(data, without_sd));
+  EXPECT_TRUE(full.displacement == without_sd.displacement);
+  EXPECT_EQ(without_sd.sd_mm.size(), 0);
+  options.contact = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), options).update(data, without_contact));
+  EXPECT_EQ(without_contact.contact.active, 0);
+  EXPECT_EQ(without_contact.displacement == full.displacement, GetParam() == Boundary::kFixed);
+}
+
+TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
+  CaseConfig hurried = config();
+  hurried.condensed.deadline_ms = 1e-9;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
+  ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kDeadline);
+  EXPECT_THAT(estimate.reason, HasSubstr("best iterate"));
+  EXPECT_TRUE(estimate.displacement.allFinite());
+}
+
+TEST_F(Condensed, IterationLimitReturnsTheBestIterateAndSaysSo) {
+  CaseConfig hurried = config();
+  hurried.condensed.max_contact_iterations = 1;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
+  ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kIterationLimit);
+}
+
+TEST_F(Condensed, DataFarFromTheRegionAreBelievedLess) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  CondensedOptions few;
+  few.rank = 12;
+  auto inverter = Condensed::inverter(Boundary::kContact, few);
+  Estimate estimate;
+  data.positions.col(0) = Vec3(5, 5, 5);  // far from tumour and craniotomy
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_TRUE(estimate.displacement.allFinite());
+}
+
+class RefusedData : public Condensed {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(inverter_.update(good_, estimate_));
+    before_ = estimate_.displacement;
+  }
+  void expect_refused(const SparseData& data, ErrorCode code, const std::string& words) {
+    const Status status = inverter_.update(data, estimate_);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, code);
+    EXPECT_THAT(status.error().message, HasSubstr(words));
+    EXPECT_TRUE(estimate_.displacement == before_) << "the estimate before must stay";
+    EXPECT_TRUE(inverter_.update(good_, estimate_)) << "and the next one must work";
+  }
+  SparseData good_ = sagging_data(Boundary::kContact, 0.3);
+  CondensedInverter inverter_ = Condensed::inverter(Boundary::kContact);
+  Estimate estimate_;
+  Points before_;
+};
+
+TEST_F(RefusedData, TwoPoints) {
+  SparseData data{good_.positions.leftCols(2), good_.displacements.leftCols(2),
+                  good_.sd_mm.head(2)};
+  expect_refused(data, ErrorCode::kInvalidArgument, "2 points");
+}
+TEST_F(RefusedData, NotANumber) {
+  SparseData data = good_;
+  data.displacements(1, 3) = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(data, ErrorCode::kNotFinite, "point 3");
+}
+TEST_F(RefusedData, Collinear) {
+  SparseData data = good_;
+  for (int i = 0; i < data.size(); ++i) data.positions.col(i) = Vec3(20.0 + 0.5 * i, 30, 40);
+  expect_refused(data, ErrorCode::kInvalidArgument, "line");
+}
+TEST_F(RefusedData, Coplanar) {
+  SparseData data = good_;
+  data.positions.row(2).setConstant(40.0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "plane");
+}
+TEST_F(RefusedData, OutsideTheBrain) {
+  SparseData data = good_;
+  data.positions.col(2) = Vec3(30, 30, 300);
+  expect_refused(data, ErrorCode::kInvalidArgument, "point 2");
+}
+TEST_F(RefusedData, Contradictory) {
+  SparseData data = good_;
+  data.positions.col(1) = data.positions.col(0);
+  data.displacements.col(1) = data.displacements.col(0) + Vec3(20, 0, 0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "contradict");
+}
+
+}  // namespace
+}  // namespace brainshift::inversion
