@@ -13,9 +13,9 @@
 #include <filesystem>
 #include <stop_token>
 
+#include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
-#include "common/inversion/condensed_operators.hpp"
 #include "common/inversion/prepared_model.hpp"
 
 namespace brainshift::inversion {

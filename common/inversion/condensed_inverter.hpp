@@ -17,11 +17,11 @@
 #include <stop_token>
 
 #include "common/core/case_config.hpp"
+#include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/estimate.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/tet_locator.hpp"
-#include "common/inversion/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // CondensedOperators: all that an update needs of one patient under one boundary condition, as plain arrays.
 //
 // A displacement is carried by few numbers, prior modes z and contact forces f (N, one per active slave):
@@ -20,7 +20,7 @@
 #include "common/core/estimate.hpp"
 #include "common/core/types.hpp"
 
-namespace brainshift::inversion {
+namespace brainshift {
 
 struct CondensedOperators {
   Boundary boundary = Boundary::kContact;
@@ -48,7 +48,17 @@ struct CondensedOperators {
   int num_nodes() const { return static_cast<int>(modes.rows() / 3); }
   int num_modes() const { return static_cast<int>(modes.cols()); }
   int num_slaves() const { return static_cast<int>(contact_columns.cols()); }
+  // Memory held by the arrays.
   std::uint64_t bytes() const;
 };
 
-}  // namespace brainshift::inversion
+inline std::uint64_t CondensedOperators::bytes() const {
+  const auto of = [](const auto& values) -> std::uint64_t {
+    return static_cast<std::uint64_t>(values.size()) * sizeof(*values.data());
+  };
+  return of(modes) + of(contact_columns) + of(compliance) + of(slave_modes) + of(slave_normals) +
+         of(initial_penetration_mm) + of(slaves) + of(region) + of(control) +
+         of(truncated_variance_mm2) + of(control_neighbours) + of(control_weights);
+}
+
+}  // namespace brainshift
