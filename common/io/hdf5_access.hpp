@@ -22,10 +22,13 @@ struct Hdf5Problem {
   std::string message;
 };
 
-// HDF5 prints every failed call to stderr unless told otherwise.
+// To be made before any other HDF5 call. HDF5 prints every failed call to stderr unless told otherwise. At the
+// exit of the process it would close a file again that could not be closed, because the disk was full, and crash;
+// everything is closed here explicitly, so it is told to do nothing then.
 class QuietHdf5 {
  public:
   QuietHdf5() {
+    H5dont_atexit();  // has an effect once, before the library starts
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
