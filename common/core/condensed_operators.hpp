@@ -48,15 +48,17 @@ struct CondensedOperators {
   int num_nodes() const { return static_cast<int>(modes.rows() / 3); }
   int num_modes() const { return static_cast<int>(modes.cols()); }
   int num_slaves() const { return static_cast<int>(contact_columns.cols()); }
-  // Memory of the arrays.
-  std::uint64_t bytes() const {
-    const auto of = [](const auto& array) {
-      return static_cast<std::uint64_t>(array.size()) * sizeof(array(0));
-    };
-    return of(modes) + of(contact_columns) + of(compliance) + of(slave_modes) + of(slave_normals) +
-           of(initial_penetration_mm) + of(truncated_variance_mm2) + of(control_neighbours) +
-           of(control_weights);
-  }
+  // Memory held by the arrays.
+  std::uint64_t bytes() const;
 };
+
+inline std::uint64_t CondensedOperators::bytes() const {
+  const auto of = [](const auto& values) -> std::uint64_t {
+    return static_cast<std::uint64_t>(values.size()) * sizeof(*values.data());
+  };
+  return of(modes) + of(contact_columns) + of(compliance) + of(slave_modes) + of(slave_normals) +
+         of(initial_penetration_mm) + of(slaves) + of(region) + of(control) +
+         of(truncated_variance_mm2) + of(control_neighbours) + of(control_weights);
+}
 
 }  // namespace brainshift

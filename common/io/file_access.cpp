@@ -11,6 +11,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "common/io/descriptor.hpp"
+
 namespace brainshift::io {
 namespace {
 
@@ -24,26 +26,6 @@ tl::unexpected<Error> write_error(const fs::path& path, const std::string& actio
   return file_error(ErrorCode::kWriteFailed, path,
                     "cannot " + action + ": " + system_message(error));
 }
-
-// Closes on scope exit; close() reports what a late write error says.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  bool close() {
-    const int fd = fd_;
-    fd_ = -1;
-    return ::close(fd) == 0;
-  }
-
- private:
-  int fd_;
-};
 
 Status sync_path(const fs::path& path, int flags) {
   Descriptor file(::open(path.c_str(), flags | O_CLOEXEC));

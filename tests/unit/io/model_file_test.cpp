@@ -2,67 +2,41 @@
 #include "common/io/model_file.hpp"
 
 #include <gmock/gmock.h>
-#include <zlib.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-#include <iomanip>
-#include <sstream>
+#include <csignal>
 
-#include "common/core/model_id.hpp"
-#include "common/io/config_file.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/io/model_file_example.hpp"
+
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+#endif
 
 namespace brainshift::io {
 namespace {
 
+// HDF5 does not free what belongs to a file that it could not close.
+#ifdef __SANITIZE_ADDRESS__
+using LeaksOfHdf5 = __lsan::ScopedDisabler;
+#else
+struct LeaksOfHdf5 {};
+#endif
+
+using test_example::condensed_file;
+using test_example::with_header;
 using test_support::content_of;
 using test_support::TemporaryFolder;
 
 using testing::AnyOf;
 using testing::HasSubstr;
 
-// Values without symmetry, so that a swapped or transposed array shows.
-ModelFile example() {
-  ModelFile file;
-  file.config = parse_case_config(R"(case_id: example
-images: {brain: mask.nii}
-tumour: {ellipsoid: {centre_mm: [1, 2, 3], semi_axes_mm: [4, 5, 6]}}
-craniotomy: {centre_mm: [7, 8, 9]}
-brainstem: {centre_mm: [0, 0, -60]}
-gravity: {direction: [1, -2, 3]}
-material: {poisson_ratio: 0.41}
-)",
-                                  "/cases/example.yaml")
-                    .value();
-  BrainModel& model = file.model;
-  model.case_id = "example";
-  model.mesh.nodes.resize(3, 5);
-  for (Eigen::Index i = 0; i < 15; ++i) model.mesh.nodes.data()[i] = 0.1 * static_cast<double>(i);
-  model.mesh.tets.resize(4, 2);
-  model.mesh.tets << 0, 1, 1, 2, 2, 3, 3, 4;
-  model.mesh.labels = {0, 3};
-  model.boundary_triangles.resize(3, 2);
-  model.boundary_triangles << 0, 1, 2, 3, 4, 0;
-  model.skull.vertices = 2.0 * model.mesh.nodes.leftCols(4);
-  model.skull.triangles.resize(3, 1);
-  model.skull.triangles << 3, 1, 2;
-  model.tumour.vertices = 0.3 * model.mesh.nodes.rightCols(3);
-  model.tumour.triangles.resize(3, 1);
-  model.tumour.triangles << 2, 1, 0;
-  model.craniotomy = {4};
-  model.brainstem = {0, 1};
-  model.slaves = {2};
-  model.fixed = {};
-  model.gravity_direction = Vec3(0.6, 0, -0.8);
-  model.fluid_plane_depth_mm = -12.25;
-  model.slave_plane_depth_mm = 7.75;
-  model.model_id = content_hash(model);
-  return file;
-}
-
 class ModelFileTest : public testing::Test {
  protected:
   std::filesystem::path written() {
-    const Status status = write_model(folder_ / "m.h5", example());
+    const Status status = write_model(folder_ / "m.h5", condensed_file());
     EXPECT_TRUE(status) << status.error().message;
     return folder_ / "m.h5";
   }
@@ -74,7 +48,7 @@ class ModelFileTest : public testing::Test {
 };
 
 TEST_F(ModelFileTest, ModelAndCaseAreReadBackBitForBit) {
-  const ModelFile original = example();
+  const ModelFile original = test_example::model_file();
   const auto read = read_model(written());
   ASSERT_TRUE(read) << read.error().message;
   const BrainModel& model = read->model;
@@ -100,7 +74,7 @@ TEST_F(ModelFileTest, ModelAndCaseAreReadBackBitForBit) {
 }
 
 TEST_F(ModelFileTest, ModelWithoutLabelsOrSkullIsReadBack) {
-  ModelFile file = example();
+  ModelFile file = test_example::model_file();
   file.model.mesh.labels.clear();
   file.model.skull = {};
   file.model.model_id = content_hash(file.model);
@@ -135,19 +109,6 @@ TEST_F(ModelFileTest, EveryFlippedBitIsRefused) {
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "HDF5 stays silent";
   EXPECT_TRUE(read_model(path)) << "every byte was put back";
-}
-
-// The first block as the header of model_file.hpp describes it, made independently.
-std::string with_header(const std::string& bytes) {
-  const std::string body = bytes.substr(512);
-  const auto crc =
-      crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
-  std::ostringstream header;
-  header << "brainshift model file\nformat 1\nbytes " << bytes.size() << "\ncrc32 " << std::hex
-         << std::setw(8) << std::setfill('0') << crc << "\n";
-  std::string block = header.str();
-  block.resize(512, '\0');
-  return block + body;
 }
 
 TEST_F(ModelFileTest, HeaderIsAsDocumented) {
@@ -194,12 +155,15 @@ TEST_F(ModelFileTest, HeaderWithoutHdf5IsRefused) {
   EXPECT_THAT(read.error().message, HasSubstr("HDF5 cannot open it"));
 }
 
-TEST_F(ModelFileTest, OtherFormatIsNamed) {
+TEST_F(ModelFileTest, OtherFormatIsNamedWithTheWayOut) {
   std::string bytes = content_of(written());
-  bytes.replace(bytes.find("format 1"), 8, "format 2");
+  bytes.replace(bytes.find("format 2"), 8, "format 1");
   const auto read = read_bytes(bytes);
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("is a model file of 'format 2': must be 'format 1'"));
+  EXPECT_THAT(
+      read.error().message,
+      HasSubstr("is a model file of 'format 1': must be 'format 2', run brainshiftd prepare "
+                "again"));
 }
 
 TEST_F(ModelFileTest, EveryTruncationIsRefused) {
@@ -209,8 +173,20 @@ TEST_F(ModelFileTest, EveryTruncationIsRefused) {
     ASSERT_FALSE(read) << size;
     EXPECT_THAT(read.error().message,
                 AnyOf(HasSubstr("not a model file"), HasSubstr("is a model file of"),
-                      HasSubstr("truncated")));
+                      HasSubstr("damaged in its first block"), HasSubstr("truncated")));
   }
+}
+
+TEST_F(ModelFileTest, TruncatedAlteredAndLengthenedAreToldApart) {
+  const std::string intact = content_of(written());
+  EXPECT_THAT(read_bytes(intact.substr(0, 1000)).error().message,
+              HasSubstr("is truncated or was added to: has 1000 bytes, was written with " +
+                        std::to_string(intact.size())));
+  EXPECT_THAT(read_bytes(intact + "x").error().message, HasSubstr("was added to"));
+  std::string altered = intact;
+  altered[intact.size() / 2] = static_cast<char>(altered[intact.size() / 2] ^ 1);
+  EXPECT_THAT(read_bytes(altered).error().message,
+              HasSubstr("is altered or damaged: its checksum"));
 }
 
 TEST_F(ModelFileTest, ForeignFileIsRefused) {
@@ -229,7 +205,7 @@ TEST_F(ModelFileTest, MissingFileIsNotFound) {
 }
 
 TEST_F(ModelFileTest, UnwritablePlaceIsNamedAndLeavesNothing) {
-  const Status status = write_model(folder_ / "no" / "m.h5", example());
+  const Status status = write_model(folder_ / "no" / "m.h5", test_example::model_file());
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
   EXPECT_THAT(status.error().message, HasSubstr("no/m.h5"));
@@ -237,7 +213,7 @@ TEST_F(ModelFileTest, UnwritablePlaceIsNamedAndLeavesNothing) {
 }
 
 TEST_F(ModelFileTest, ModelWithAForeignIdIsNotWritten) {
-  ModelFile file = example();
+  ModelFile file = test_example::model_file();
   file.model.mesh.nodes(0, 0) += 1.0;
   const Status status = write_model(folder_ / "m.h5", file);
   ASSERT_FALSE(status);
@@ -246,12 +222,58 @@ TEST_F(ModelFileTest, ModelWithAForeignIdIsNotWritten) {
 }
 
 TEST_F(ModelFileTest, InvalidCaseIsNotWritten) {
-  ModelFile file = example();
+  ModelFile file = test_example::model_file();
   file.config.material.poisson_ratio = 0.6;
   const Status status = write_model(folder_ / "m.h5", file);
   ASSERT_FALSE(status);
   EXPECT_THAT(status.error().message, HasSubstr("material.poisson_ratio = 0.6"));
   EXPECT_EQ(folder_.entries(), 0u);
+}
+
+// A file-size limit fails like a full disk: some write in the middle comes back short.
+TEST_F(ModelFileTest, FullDiskLeavesTheOldFileAlone) {
+  [[maybe_unused]] const LeaksOfHdf5 expected;
+  const std::string before = content_of(written());
+  ASSERT_GT(before.size(), 4000u);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old{};
+  getrlimit(RLIMIT_FSIZE, &old);
+  for (const rlim_t limit : {rlim_t{100}, rlim_t{1000}, rlim_t{3000}, rlim_t{before.size() - 1}}) {
+    const rlimit small{limit, old.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+    const Status status = write_model(folder_ / "m.h5", condensed_file());
+    setrlimit(RLIMIT_FSIZE, &old);
+    ASSERT_FALSE(status) << limit;
+    EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+    EXPECT_THAT(status.error().message, HasSubstr("m.h5: cannot write "));
+    EXPECT_EQ(folder_.entries(), 1u);
+    EXPECT_EQ(content_of(folder_ / "m.h5"), before);
+  }
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_TRUE(write_model(folder_ / "m.h5", condensed_file())) << "HDF5 is still usable";
+}
+
+// The other process replaces the file all the time; HDF5 itself allows one call at a time in a process.
+TEST_F(ModelFileTest, ReaderNeverSeesAHalfWrittenModel) {
+  const auto path = written();
+  const pid_t writer = fork();
+  ASSERT_GE(writer, 0);
+  if (writer == 0) {
+    bool good = true;
+    for (int i = 0; i < 30; ++i) {
+      good = good && write_model(path, i % 2 == 0 ? test_example::model_file() : condensed_file());
+    }
+    _exit(good ? 0 : 1);
+  }
+  int state = 0, reads = 0;
+  while (waitpid(writer, &state, WNOHANG) == 0) {
+    const auto read = read_model(path);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_TRUE(read->condensed.empty() || read->condensed.size() == 2u);
+    ++reads;
+  }
+  EXPECT_EQ(state, 0);
+  EXPECT_GT(reads, 0);
 }
 
 }  // namespace
