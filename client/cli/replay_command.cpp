@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "client/cli/command.hpp"
 #include "client/replay/replay.hpp"
@@ -13,14 +15,24 @@ struct Arguments {
   ReplayOptions options;
   std::string speed = "max";
   std::string boundary = "both";
+  std::string method;
   double timeout_s = 600.0;
 };
+
+std::vector<std::string> method_names() {
+  std::vector<std::string> names;
+  for (const Method method : kAllMethods) names.emplace_back(to_string(method));
+  return names;
+}
 
 Status run(Arguments arguments) {
   ReplayOptions& options = arguments.options;
   options.speed = arguments.speed == "max" ? Speed::kMax : Speed::kRecorded;
   if (arguments.boundary == "contact") options.boundaries = {Boundary::kContact};
   if (arguments.boundary == "fixed") options.boundaries = {Boundary::kFixed};
+  for (const Method method : kAllMethods) {
+    if (arguments.method == to_string(method)) options.method = method;
+  }
   if (!std::isfinite(arguments.timeout_s)) {  // CLI::Range lets NaN pass
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
@@ -51,6 +63,20 @@ void add_replay(CLI::App& app, Status& status) {
                    "brain-skull boundary condition to estimate with")
       ->check(CLI::IsMember({"contact", "fixed", "both"}))
       ->capture_default_str();
+  arguments->method = to_string(options.method);
+  command->add_option("--method", arguments->method, "how to invert")
+      ->check(CLI::IsMember(method_names()))
+      ->capture_default_str();
+  command
+      ->add_option("--repeat", options.repeat,
+                   "play the observations so many times in a cycle, to measure latency; needs "
+                   "--speed max")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command->add_option("--latency-csv", options.latency_csv,
+                      "also write latency, stage times and contact of every update, a row each; "
+                      "with --boundary both a file per boundary, \"-contact\" and \"-fixed\" added "
+                      "to its name");
   command
       ->add_option("--timeout-s", arguments->timeout_s,
                    "longest silence before an observation counts as lost, s")
@@ -59,7 +85,11 @@ void add_replay(CLI::App& app, Status& status) {
   command->footer(
       "The daemon must serve the case and model that the surgery was recorded with. Example:\n"
       "  brainshift replay paper.surgery --endpoint tcp://127.0.0.1:5555 --speed max --report "
-      "paper.json");
+      "paper.json\n"
+      "2,000 updates of a surgery with 20 observations, timed one by one:\n"
+      "  brainshift replay sag.surgery --boundary contact --repeat 100 --latency-csv "
+      "sag_latency.csv "
+      "--report sag.json");
   command->callback([arguments, &status] { status = run(*arguments); });
 }
 

@@ -25,17 +25,20 @@ class Player {
   Player(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
          const PlayOptions& options, const Progress& progress)
       : link_(link), recording_(recording), options_(options), progress_(progress) {
-    for (const auto& entry : recording) {
-      session_.observations.emplace_back().sequence = entry.observation.sequence;
+    const auto plays = static_cast<std::size_t>(options.repeat) * recording.size();
+    session_.observations.resize(plays);
+    for (std::size_t i = 0; i < plays; ++i) {
+      session_.observations[i].sequence = sequence_in_cycle(recording, i % recording.size(),
+                                                            static_cast<int>(i / recording.size()));
     }
-    sent_.resize(recording.size());
-    waiting_.resize(recording.size(), false);
+    sent_.resize(plays);
   }
 
   PlayedSession run() {
     const auto start = Clock::now();
-    for (std::size_t i = 0; i < recording_.size() && !lost_; ++i) {
-      report(progress_, "replay", static_cast<double>(i) / static_cast<double>(recording_.size()));
+    const std::size_t plays = session_.observations.size();
+    for (std::size_t i = 0; i < plays && !lost_; ++i) {
+      report(progress_, "replay", static_cast<double>(i) / static_cast<double>(plays));
       if (options_.speed == Speed::kRecorded) {
         receive_until([] { return false; }, start + due(i));
       }
@@ -52,17 +55,23 @@ class Player {
   }
 
  private:
+  const RecordedObservation& recorded(std::size_t i) const {
+    return recording_[i % recording_.size()];
+  }
+
   std::chrono::nanoseconds due(std::size_t i) const {
     return std::chrono::nanoseconds(
-        std::max<std::int64_t>(0, recording_[i].recorded_ns - recording_.front().recorded_ns));
+        std::max<std::int64_t>(0, recorded(i).recorded_ns - recording_.front().recorded_ns));
   }
 
   void submit(std::size_t i) {
+    Observation observation = recorded(i).observation;
+    observation.sequence = session_.observations[i].sequence;
     sent_[i] = Clock::now();
-    waiting_[i] = true;
-    const auto receipt = link_.submit(recording_[i].observation);
+    waiting_.push_back(i);
+    const auto receipt = link_.submit(observation);
     if (!receipt) {
-      waiting_[i] = false;
+      answered(i);
       session_.observations[i].error = receipt.error();
       if (receipt.error().code == ErrorCode::kUnavailable) lost_ = receipt.error();
       return;
@@ -72,22 +81,20 @@ class Player {
 
   // The daemon replaces the newest pending observation of the same source.
   void supersede_before(std::size_t i) {
-    for (std::size_t j = i; j-- > 0;) {
-      const bool same_source = recording_[j].observation.source == recording_[i].observation.source;
-      if (!waiting_[j] || !same_source) continue;
-      waiting_[j] = false;
+    for (std::size_t w = waiting_.size(); w-- > 0;) {
+      const std::size_t j = waiting_[w];
+      if (j == i || recorded(j).observation.source != recorded(i).observation.source) continue;
+      answered(j);
       session_.observations[j].superseded = true;
       return;
     }
   }
 
-  bool any_waiting() const {
-    return std::find(waiting_.begin(), waiting_.end(), true) != waiting_.end();
-  }
+  void answered(std::size_t i) { std::erase(waiting_, i); }
 
   // Every answer, iterates included, renews the deadline: a long inversion that shows progress is alive.
   void wait_for_all() {
-    while (any_waiting() && !lost_) {
+    while (!waiting_.empty() && !lost_) {
       const auto before = received_;
       receive_until([&] { return received_ != before; }, Clock::now() + options_.timeout);
       if (received_ == before && !lost_) {
@@ -98,14 +105,13 @@ class Player {
   }
 
   void time_out() {
-    for (std::size_t i = 0; i < waiting_.size(); ++i) {
-      if (!waiting_[i]) continue;
-      waiting_[i] = false;
+    for (const std::size_t i : waiting_) {
       session_.observations[i].error = malformed_.value_or(
           Error{ErrorCode::kUnavailable,
                 "observation " + std::to_string(session_.observations[i].sequence) +
                     ": no update within " + std::to_string(options_.timeout.count()) + " ms"});
     }
+    waiting_.clear();
   }
 
   template <typename Done>
@@ -130,20 +136,24 @@ class Player {
   void take(wire::UpdateMessage&& message, Clock::time_point now) {
     Update& update = message.update;
     if (message.session_id != options_.session_id) return;
-    const auto found = std::find_if(
-        session_.observations.begin(), session_.observations.end(),
-        [&](const PlayedObservation& o) { return o.sequence == update.observation_sequence; });
-    if (found == session_.observations.end()) return;
-    const auto i = static_cast<std::size_t>(found - session_.observations.begin());
-    if (!waiting_[i]) return;
+    const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](std::size_t i) {
+      return session_.observations[i].sequence == update.observation_sequence;
+    });
+    if (found == waiting_.end()) return;
+    const std::size_t i = *found;
+    PlayedObservation& observation = session_.observations[i];
     ++received_;
     if (message.error) {
-      waiting_[i] = false;
-      found->error = std::move(message.error);
+      answered(i);
+      observation.error = std::move(message.error);
     } else if (update.final) {
-      waiting_[i] = false;
-      found->latency_ms = ms_between(sent_[i], now);
-      found->timings = update.timings;
+      answered(i);
+      observation.latency_ms = ms_between(sent_[i], now);
+      observation.timings = update.timings;
+      observation.status = update.estimate.status;
+      observation.active = update.estimate.contact.active;
+      observation.contact_iterations = update.estimate.contact.iterations;
+      session_.last_recorded_sequence = recorded(i).observation.sequence;
       if (iterates_of_ != i) iterates_.clear();
       session_.iterates = std::move(iterates_);
       iterates_.clear();
@@ -169,7 +179,7 @@ class Player {
   const Progress& progress_;
   PlayedSession session_;
   std::vector<Clock::time_point> sent_;
-  std::vector<bool> waiting_;
+  std::vector<std::size_t> waiting_;  // sent, not answered yet; oldest first
   std::vector<Iterate> iterates_;
   std::size_t iterates_of_ = 0;
   std::size_t received_ = 0;
@@ -178,6 +188,14 @@ class Player {
 };
 
 }  // namespace
+
+std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
+                                std::size_t index, int cycle) {
+  const std::uint64_t first = recording.front().observation.sequence;
+  const std::uint64_t last = recording.back().observation.sequence;
+  return recording[index].observation.sequence +
+         static_cast<std::uint64_t>(cycle) * (last - first + 1);
+}
 
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/replay/replay.hpp"
 
-#include <algorithm>
 #include <charconv>
-#include <span>
+#include <limits>
 
 #include "client/lib/client.hpp"
 #include "client/replay/score.hpp"
+#include "client/replay/write_file.hpp"
 #include "common/io/mesh_file.hpp"
 #include "common/io/surgery_file.hpp"
 
@@ -121,7 +121,7 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
   auto info = client->start_session({.case_id = surgery.case_id,
                                      .method = options.method,
                                      .boundary = boundary,
-                                     .publish_iterates = true});
+                                     .publish_iterates = options.repeat == 1});
   if (!info) return tl::unexpected<Error>(info.error());
   auto model = client->model();
   if (!model) return tl::unexpected<Error>(model.error());
@@ -169,7 +169,7 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
                     std::to_string(update.estimate.displacement.cols()) + " nodes, the model has " +
                     std::to_string(model.mesh.num_nodes()));
   }
-  const auto truth = read_truth(surgery.file, update.observation_sequence, model);
+  const auto truth = read_truth(surgery.file, played.last_recorded_sequence, model);
   if (!truth) return tl::unexpected<Error>(truth.error());
   describe(model, update.estimate, run);
   run.left_out = update.left_out;
@@ -183,6 +183,14 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
   return write_fields(field_file, model, update.estimate.displacement, *truth);
 }
 
+fs::path csv_path(const ReplayOptions& options, Boundary boundary) {
+  if (options.boundaries.size() == 1) return options.latency_csv;
+  fs::path path = options.latency_csv;
+  path.replace_filename(path.stem().string() + "-" + std::string(to_string(boundary)) +
+                        path.extension().string());
+  return path;
+}
+
 Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& options,
                                Boundary boundary, const Progress& progress) {
   report(progress, "prepare " + std::string(to_string(boundary)), 0.0);
@@ -193,7 +201,8 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
   const DaemonLink link{
       [&](const Observation& observation) { return session->client.submit(observation); },
       [&](std::chrono::milliseconds timeout) { return session->client.next_update(timeout); }};
-  const PlayOptions play_options{session->info.session_id, options.speed, options.timeout};
+  const PlayOptions play_options{session->info.session_id, options.speed, options.timeout,
+                                 options.repeat};
   const std::string stage = "replay " + std::string(to_string(boundary));
   const PlayedSession played =
       play(link, surgery.observations, play_options,
@@ -201,6 +210,11 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 
   RunReport run = describe_run(surgery, *session, options, boundary);
   summarise(played, run);
+  if (!options.latency_csv.empty()) {
+    if (Status ok = write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
+      return tl::unexpected<Error>(ok.error());
+    }
+  }
   if (played.last) {
     const fs::path field_file =
         options.report.parent_path() /
@@ -212,11 +226,33 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
   return run;
 }
 
+Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
+  const std::string given = "repeat = " + std::to_string(options.repeat) + ": ";
+  if (options.repeat < 1) return fail(ErrorCode::kInvalidArgument, given + "must be at least 1");
+  if (options.repeat == 1) return {};
+  if (options.speed != Speed::kMax) {
+    return fail(ErrorCode::kInvalidArgument, given + "recorded times have no cycle; use speed max");
+  }
+  // Without this the cycles would overlap or leave the range of a surgery file's sequences.
+  const std::uint64_t first = surgery.observations.front().observation.sequence;
+  const std::uint64_t last = surgery.observations.back().observation.sequence;
+  const std::uint64_t limit = std::numeric_limits<std::int64_t>::max();
+  const auto more_cycles = static_cast<std::uint64_t>(options.repeat - 1);
+  if (last < first || last > limit || more_cycles > (limit - last) / (last - first + 1)) {
+    return fail(ErrorCode::kInvalidArgument,
+                given + "observation sequences " + std::to_string(first) + " to " +
+                    std::to_string(last) + " of " + options.surgery.string() +
+                    " cannot go on counting up");
+  }
+  return {};
+}
+
 }  // namespace
 
 Status replay(const ReplayOptions& options, const Progress& progress) {
   const auto surgery = open_surgery(options.surgery);
   if (!surgery) return tl::unexpected<Error>(surgery.error());
+  if (Status ok = check_repeat(options, *surgery); !ok) return ok;
   std::vector<RunReport> runs;
   for (const Boundary boundary : options.boundaries) {
     auto run = run_boundary(*surgery, options, boundary, progress);
@@ -233,55 +269,6 @@ Status replay(const ReplayOptions& options, const Progress& progress) {
                                               run.boundary + " boundary" + cause);
   }
   return {};
-}
-
-void summarise(const PlayedSession& session, RunReport& run) {
-  std::vector<double> latency;
-  std::vector<double> first_iterate;
-  std::vector<StageTimings> timings;
-  for (const PlayedObservation& observation : session.observations) {
-    if (observation.error) {
-      run.failures.push_back({observation.sequence, std::string(to_string(observation.error->code)),
-                              observation.error->message});
-    }
-    run.superseded += observation.superseded ? 1 : 0;
-    if (!observation.latency_ms) continue;
-    latency.push_back(*observation.latency_ms);
-    timings.push_back(observation.timings);
-    if (observation.first_iterate_ms) first_iterate.push_back(*observation.first_iterate_ms);
-  }
-  run.updates = static_cast<int>(latency.size());
-  if (latency.empty()) return;
-
-  run.latency_ms = LatencyPercentiles{percentile(latency, 50), percentile(latency, 95),
-                                      percentile(latency, 99), percentile(latency, 100)};
-  run.cold_ms = latency.front();
-  if (!first_iterate.empty()) run.first_iterate_ms = percentile(first_iterate, 50);
-  const auto median = [&timings](double StageTimings::*stage) {
-    std::vector<double> values;
-    for (const StageTimings& t : timings) values.push_back(t.*stage);
-    return percentile(values, 50);
-  };
-  run.stages_ms = StageMedians{median(&StageTimings::register_ms), median(&StageTimings::invert_ms),
-                               median(&StageTimings::rebuild_ms), median(&StageTimings::encode_ms),
-                               median(&StageTimings::journal_ms)};
-}
-
-std::vector<TracePoint> trace_of(
-    const PlayedSession& session,
-    const std::function<std::optional<MeanStd>(const Points&)>& cross_of) {
-  std::vector<TracePoint> trace;
-  if (!session.last) return trace;
-  for (const IterationRecord& record : session.last->estimate.history) {
-    TracePoint point{record.iteration,   record.misfit_mm,          std::nullopt,
-                     record.penetrating, record.max_penetration_mm, record.elapsed_ms};
-    const auto iterate =
-        std::find_if(session.iterates.begin(), session.iterates.end(),
-                     [&](const Iterate& it) { return it.iteration == record.iteration; });
-    if (iterate != session.iterates.end()) point.cross = cross_of(iterate->displacement);
-    trace.push_back(point);
-  }
-  return trace;
 }
 
 }  // namespace brainshift::client

@@ -25,7 +25,8 @@ struct MeshSize {
   int slaves = 0;
 };
 
-// Over the final updates of a run, linear interpolation between order statistics.
+// Over the final updates of a run but the first (that one too when it is the only one), linear interpolation
+// between order statistics.
 struct LatencyPercentiles {
   double p50 = 0.0;
   double p95 = 0.0;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Twin: simulated surgeries with known truth (paper section 2.6), recorded as surgery files.
 //
-// The truth is a forward solution of the case's own model with contact: gravity and drainage down to the
-// scenario's fluid level. It is written to the truth tables of the surgery file, which only scoring reads;
-// the observations carry what an operating room would measure.
+// The truth is a forward solution of the case's own model with contact: gravity, drainage down to the
+// scenario's fluid level, and swelling. Every observation has a truth of its own. It is written to the truth
+// tables of the surgery file, which only scoring reads; the observations carry what an operating room would
+// measure.
 // Inverse crime, as in the paper: truth and estimate use the same mesh and material. What the estimate does
-// not know is the load (fluid level), the contact state, and the noise.
+// not know is the load (fluid level, swelling), the contact state, and the noise.
 #pragma once
 
 #include <cstdint>

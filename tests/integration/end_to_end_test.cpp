@@ -4,11 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "client/lib/client.hpp"
 #include "common/io/surgery_file.hpp"
@@ -160,6 +162,40 @@ TEST_F(EndToEnd, TumourBoundaryPointsThatMustBeRegisteredFirstAreRecovered) {
   EXPECT_GT(contact.at("recovery_pct").get<double>(), 75.0);
   EXPECT_GT(contact.at("stages_ms").at("register").get<double>(), 0.0);
   EXPECT_EQ(daemon->end(SIGINT), 0);
+}
+
+// Sequences that count on, a row per update, and the truth of the observation that was sent last.
+TEST_F(EndToEnd, ARecordedSurgeryCanBeRepeatedToMeasureLatency) {
+  const auto surgery = simulate("paper");
+  const auto daemon = serve();
+  const auto report = files_.path("report.json"), csv = files_.path("latency.csv");
+  const auto replayed =
+      run({brainshift(), "replay", surgery, "--endpoint", endpoint(*daemon), "--report", report,
+           "--boundary", "contact", "--method", "paper", "--repeat", "3", "--latency-csv", csv});
+  ASSERT_EQ(replayed.exit_status, 0) << replayed.err;
+  const json runs = read_json(report);
+  ASSERT_EQ(runs.size(), 1u);
+  EXPECT_EQ(runs[0].at("updates"), 3);
+  EXPECT_TRUE(runs[0].at("failures").empty());
+  EXPECT_DOUBLE_EQ(runs[0].at("truth_scalars").at("fluid_level_mm").get<double>(), 55.0);
+  EXPECT_GT(runs[0].at("recovery_pct").get<double>(), 85.0);
+
+  std::ifstream stream(csv);
+  std::string line, last;
+  std::vector<double> latency;
+  ASSERT_TRUE(std::getline(stream, line));
+  EXPECT_THAT(line, StartsWith("update,observation_sequence,latency_ms,"));
+  while (std::getline(stream, line)) {
+    const auto rest = line.substr(line.find(',', line.find(',') + 1) + 1);
+    latency.push_back(std::stod(rest));
+    last = line;
+  }
+  ASSERT_EQ(latency.size(), 3u);
+  EXPECT_THAT(last, StartsWith("3,3,"));
+  EXPECT_NEAR(latency[0], runs[0].at("cold_ms").get<double>(), 1e-3);
+  EXPECT_NEAR(*std::max_element(latency.begin() + 1, latency.end()),
+              runs[0].at("latency_ms").at("max").get<double>(), 1e-3);
+  EXPECT_EQ(daemon->end(SIGTERM), 0);
 }
 
 TEST_F(EndToEnd, TheJournalHoldsWhatWasAskedAndAnswered) {

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <deque>
+#include <sstream>
 #include <thread>
 
 #include "client/replay/replay.hpp"
@@ -216,7 +218,109 @@ TEST(Play, ObservationReplacedByANewerOneIsSuperseded) {
   EXPECT_TRUE(played.observations[1].latency_ms);
 }
 
-TEST(Summary, PercentilesAndMediansOverFinalUpdates) {
+PlayOptions repeated(int repeat) {
+  PlayOptions options = kOptions;
+  options.repeat = repeat;
+  return options;
+}
+
+TEST(Repeat, CyclesThroughTheRecordingWithSequencesThatKeepCountingUp) {
+  ScriptedDaemon daemon;
+  std::vector<std::string> sources;
+  std::vector<std::size_t> pending_when_sent;
+  daemon.script = [&](const Observation& o) {
+    sources.push_back(o.source);
+    pending_when_sent.push_back(daemon.queue.size());
+    auto message = update(o.sequence, true, static_cast<int>(o.sequence));
+    message.update.estimate.status = EstimateStatus::kConverged;
+    message.update.estimate.contact = {static_cast<int>(10 * o.sequence), 0, 0.0, 3};
+    return std::vector{message};
+  };
+  auto observations = recording(3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    observations[i].observation.sequence = 5 + 2 * i;  // 5, 7, 9
+    observations[i].observation.source = std::string(1, static_cast<char>('a' + i));
+  }
+  const PlayedSession played = play(daemon.link(), observations, repeated(4));
+  EXPECT_THAT(daemon.submitted, testing::ElementsAre(5, 7, 9, 10, 12, 14, 15, 17, 19, 20, 22, 24));
+  EXPECT_THAT(sources,
+              testing::ElementsAre("a", "b", "c", "a", "b", "c", "a", "b", "c", "a", "b", "c"));
+  EXPECT_THAT(pending_when_sent, testing::Each(0u));
+  ASSERT_EQ(played.observations.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(played.observations[i].sequence, daemon.submitted[i]);
+    EXPECT_TRUE(played.observations[i].latency_ms);
+    EXPECT_EQ(played.observations[i].active, static_cast<int>(10 * daemon.submitted[i]));
+    EXPECT_EQ(played.observations[i].contact_iterations, 3);
+    EXPECT_EQ(played.observations[i].status, EstimateStatus::kConverged);
+  }
+  ASSERT_TRUE(played.last);
+  EXPECT_EQ(played.last->observation_sequence, 24u);
+  EXPECT_EQ(played.last_recorded_sequence, 9u);  // whose truth it is scored with
+}
+
+TEST(Repeat, TruthIsThatOfTheLastObservationAnswered) {
+  ScriptedDaemon daemon;
+  daemon.script = [](const Observation& o) {
+    auto message = update(o.sequence, true);
+    if (o.sequence == 6) message.error = Error{ErrorCode::kEmptySet, "too few points"};
+    return std::vector{message};
+  };
+  const PlayedSession played = play(daemon.link(), recording(3), repeated(2));
+  ASSERT_TRUE(played.last);
+  EXPECT_EQ(played.last->observation_sequence, 5u);
+  EXPECT_EQ(played.last_recorded_sequence, 2u);
+}
+
+TEST(Repeat, OnceSendsTheRecordedSequences) {
+  ScriptedDaemon daemon;
+  daemon.script = [](const Observation& o) { return std::vector{update(o.sequence, true)}; };
+  auto observations = recording(2);
+  observations[1].observation.sequence = 40;
+  play(daemon.link(), observations, repeated(1));
+  EXPECT_THAT(daemon.submitted, testing::ElementsAre(1, 40));
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(LatencyCsv, HasOneRowPerObservationSent) {
+  ScriptedDaemon daemon;
+  daemon.script = [](const Observation& o) { return std::vector{update(o.sequence, true)}; };
+  const auto lines = lines_of(latency_csv(play(daemon.link(), recording(2), repeated(1000))));
+  ASSERT_EQ(lines.size(), 2001u);
+  EXPECT_THAT(lines[1], testing::StartsWith("1,1,"));
+  EXPECT_THAT(lines[2000], testing::StartsWith("2000,2000,"));
+  for (const std::string& line : lines) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 9);
+}
+
+TEST(LatencyCsv, TellsTimesContactAndOutcome) {
+  PlayedSession session;
+  session.observations.resize(3);
+  PlayedObservation& good = session.observations[0];
+  good.sequence = 41;
+  good.latency_ms = 1234.5;
+  good.timings = {0.25, 20.0, 3.5, 0.125, 99.0};
+  good.active = 612;
+  good.contact_iterations = 7;
+  good.status = EstimateStatus::kDeadline;
+  session.observations[1].sequence = 42;
+  session.observations[1].error = Error{ErrorCode::kEmptySet, "too few, points"};
+  session.observations[2].sequence = 43;
+  session.observations[2].superseded = true;
+  EXPECT_THAT(lines_of(latency_csv(session)),
+              testing::ElementsAre(
+                  "update,observation_sequence,latency_ms,register_ms,invert_ms,rebuild_ms,"
+                  "encode_ms,active,contact_iterations,status",
+                  "1,41,1234.5000,0.2500,20.0000,3.5000,0.1250,612,7,deadline",
+                  "2,42,,,,,,,,empty_set", "3,43,,,,,,,,superseded"));
+}
+
+TEST(Summary, PercentilesLeaveOutTheFirstUpdateWhichIsTheColdOne) {
   PlayedSession session;
   for (int i = 1; i <= 5; ++i) {
     PlayedObservation observation;
@@ -229,13 +333,24 @@ TEST(Summary, PercentilesAndMediansOverFinalUpdates) {
   RunReport run;
   summarise(session, run);
   EXPECT_EQ(run.updates, 5);
-  EXPECT_DOUBLE_EQ(run.latency_ms->p50, 300.0);
-  EXPECT_DOUBLE_EQ(run.latency_ms->p95, 480.0);
-  EXPECT_DOUBLE_EQ(run.latency_ms->p99, 496.0);
-  EXPECT_DOUBLE_EQ(run.latency_ms->max, 500.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->p50, 250.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->p95, 385.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->p99, 397.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->max, 400.0);
   EXPECT_DOUBLE_EQ(*run.cold_ms, 500.0);
   EXPECT_DOUBLE_EQ(*run.first_iterate_ms, 30.0);
   EXPECT_DOUBLE_EQ(run.stages_ms->invert_ms, 3.0);
+}
+
+TEST(Summary, ASingleUpdateIsBothTheColdOneAndTheLatency) {
+  PlayedSession session;
+  session.observations.resize(1);
+  session.observations[0].latency_ms = 70.0;
+  RunReport run;
+  summarise(session, run);
+  EXPECT_DOUBLE_EQ(*run.cold_ms, 70.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->p50, 70.0);
+  EXPECT_DOUBLE_EQ(run.latency_ms->max, 70.0);
 }
 
 TEST(Summary, WithoutUpdatesTimesStayEmpty) {
@@ -263,8 +378,10 @@ TEST(Trace, PairsHistoryWithTheIteratesThatArrived) {
 
 class ReplayInput : public testing::Test {
  protected:
-  Error refused() const {
+  Error refused(int repeat = 1, Speed speed = Speed::kMax) const {
     ReplayOptions options;
+    options.repeat = repeat;
+    options.speed = speed;
     options.surgery = folder / "s.surgery";
     options.report = folder / "R.json";
     options.endpoint = "tcp://127.0.0.1:1";
@@ -275,6 +392,34 @@ class ReplayInput : public testing::Test {
   }
   const test_support::TemporaryFolder folder;
 };
+
+// A surgery whose observations have these sequence numbers.
+void record(const std::filesystem::path& path, const std::vector<std::uint64_t>& sequences) {
+  auto file = io::SurgeryFile::create(path, {{"case_id", "box"}, {"model_id", "m"}});
+  ASSERT_TRUE(file);
+  for (const std::uint64_t sequence : sequences) {
+    Observation observation;
+    observation.case_id = "box";
+    observation.source = "ius";
+    observation.sequence = sequence;
+    observation.body = LandmarkPairs{Points::Random(3, 4), Points::Random(3, 4), 0.3};
+    ASSERT_TRUE(file->append({"observation", sequence, 0, wire::encode(observation)}));
+  }
+  ASSERT_TRUE(file->close());
+}
+
+TEST_F(ReplayInput, RepeatThatDoesNotFitIsRefused) {
+  constexpr std::uint64_t kLargest = (std::uint64_t{1} << 63) - 1;
+  record(folder / "s.surgery", {kLargest - 4, kLargest - 3});
+  for (const int repeat : {0, -1, 3, 1000}) {
+    const Error error = refused(repeat);
+    EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(error.message, HasSubstr("repeat = " + std::to_string(repeat)));
+  }
+  const Error recorded_times = refused(2, Speed::kRecorded);
+  EXPECT_EQ(recorded_times.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(recorded_times.message, HasSubstr("speed max"));
+}
 
 TEST_F(ReplayInput, MissingSurgeryIsNamed) {
   const Error error = refused();

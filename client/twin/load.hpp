@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Swelling and shrinkage of tissue, as a load of the simulated surgeries.
+//
+// Tissue that takes up water (oedema) or gives it off (mannitol, a debulked tumour) wants to change its volume
+// by theta: the stress-free strain is e0 = theta / 3 I, and sigma = C (e - e0) = C e - kappa theta I with the
+// drained bulk modulus kappa = lambda + 2 G / 3. The initial stress moves to the right-hand side:
+//   f = int B^T kappa theta I dV,     per tetrahedron and node i:  f_i = V kappa theta g_i
+// (g_i gradient of the shape function, theta at the centroid). The forces balance by themselves: no net force,
+// no net moment. A body free to move would follow with u = theta / 3 x.
+#pragma once
+
+#include "common/core/brain_model.hpp"
+#include "common/core/case_config.hpp"
+
+namespace brainshift::twin {
+
+// theta(r) = volume_strain (1 - (r / radius)^2)^2 within radius of the centre, 0 outside: densest in the
+// middle, fading out without an edge.
+struct Swelling {
+  double volume_strain = 0.0;  // > 0 swells, < 0 shrinks, 0: none
+  double radius_mm = 0.0;
+  double depth_mm =
+      0.0;  // of the centre: beyond the tumour's centroid, as seen from the craniotomy
+};
+
+// Mean of the craniotomy's nodes, mm.
+Vec3 craniotomy_centre(const BrainModel& model);
+// Centre of the swelling in this patient, mm.
+Vec3 swelling_centre(const BrainModel& model, const Swelling& swelling);
+
+double volume_strain_at(const Swelling& swelling, double distance_mm);
+
+// Nodal forces f, 3 x n, N.
+Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
+                     const Swelling& swelling);
+
+}  // namespace brainshift::twin

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scenario played on one patient: what is measured at each moment, and the truth behind it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "client/twin/scenario.hpp"
+#include "common/core/brain_model.hpp"
+#include "common/core/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/core/observation.hpp"
+#include "common/core/progress.hpp"
+#include "common/io/surgery_file.hpp"
+
+namespace brainshift::twin {
+
+// One entry per moment of the scenario in both.
+struct SimulatedSurgery {
+  std::vector<Observation> observations;  // sequences from 1, acquired_ns from 0
+  std::vector<io::SurgeryTruth> truths;
+};
+
+// Truth scalars: fluid_level_mm, noise_sd_mm, max_displacement_mm, tumour_displacement_mm (mean over the tumour
+// surface), active_slaves, max_penetration_mm (negative: minus the least distance between slave and skull), and
+// swelling_volume_strain, swelling_radius_mm where the scenario has a swelling.
+//
+// Everything random comes from the seed. kInvalidArgument when the scenario promises that nothing touches the
+// skull and something does; kNotConverged when a contact search does not settle; else as contact::ForwardModel.
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress = {});
+
+}  // namespace brainshift::twin
