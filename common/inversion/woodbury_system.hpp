@@ -6,7 +6,7 @@
 // which is K^-1 f - X_A (Phi_AA + I / beta)^-1 X_A^T f with X_A = K^-1 N_A. A column of X is solved for when its
 // slave is active for the first time, in blocks, and only its entries in Phi are kept, for the life of the system:
 // multiplying by X_A would read as much memory as a second solve with the factor does, and X takes 3n numbers
-// per slave that was ever active (some 0.4 GB for the default head). The dense Phi_AA + I / beta is factorised when
+// per slave that was ever active (0.4 MB each for the default head). The dense Phi_AA + I / beta is factorised when
 // the set changes.
 #pragma once
 
