@@ -37,8 +37,8 @@ class Table {
       : runs_(runs), with_paper_(with_paper) {
     html_ = "<div class=\"scroll\"><table>\n<thead><tr><th></th>";
     for (const ReportedRun& run : runs) {
-      html_ += "<th>" + escape_html(run.report.scenario) + "<br>" +
-               escape_html(run.report.method) + "<br>" + escape_html(run.report.boundary) + "</th>";
+      html_ += "<th>" + escape_html(run.report.scenario) + "<br>" + escape_html(run.report.method) +
+               "<br>" + escape_html(run.report.boundary) + "</th>";
     }
     if (with_paper) {
       for (const char* name : {"contact", "fixed", "ICP, contact"}) {
