@@ -103,6 +103,7 @@ Status validate(const CaseConfig& config) {
   check.between("prior.correlation_length_mm", config.prior.correlation_length_mm, 0.1, 200.0);
   check.positive("prior.force_density_sd_n_m3", config.prior.force_density_sd_n_m3);
   check.not_negative("prior.gravity_mode_sd", config.prior.gravity_mode_sd);
+  check.between("prior.gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg, 0.0, 80.0);
   for (std::size_t i = 0; i < config.prior.gravity_levels_mm.size(); ++i) {
     check.between("prior.gravity_levels_mm[" + std::to_string(i) + "]",
                   config.prior.gravity_levels_mm[i], -300.0, 300.0);

@@ -81,6 +81,8 @@ struct PriorConfig {
   double correlation_length_mm = 5.0;
   double force_density_sd_n_m3 = 1000.0;
   double gravity_mode_sd = 1.0;  // in units of the full buoyancy load; 0 switches the modes off
+  // How well the direction of gravity is known: modes across it have gravity_mode_sd times its tangent.
+  double gravity_direction_sd_deg = 10.0;
   std::vector<double> gravity_levels_mm = {0.0, 20.0,
                                            40.0};  // fluid planes below the reference plane
 };

@@ -66,16 +66,17 @@ struct CondensedInverter::Impl {
         reduction(*operators, window, config.contact.penalty_n_per_mm),
         rebuild(*operators, window),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
-    const Eigen::Index r = window.count;
-    normal.resize(r, r);
-    z.setZero(r);
+    const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
+    normal_storage.resize(most * most);
+    solution.setZero(most);
+    z.setZero(window.count);
     reserve(options.capacity);
   }
 
   // Grows what depends on the number of data; nothing happens while they fit.
   void reserve(int data) {
     if (3 * data <= jacobian.rows()) return;
-    jacobian.resize(3 * data, window.count + 1);
+    jacobian.resize(3 * data, SparseData::kMaxCommonErrors + window.count + 1);
     residual.resize(3 * data);
     sampled.reserve(data);
   }
@@ -105,31 +106,40 @@ struct CondensedInverter::Impl {
   FieldRebuild rebuild;
   SetSearch search;
 
-  MatrixXd jacobian;  // whitened [J | d - A G f0], 3m x (r + 1)
+  // Lower Cholesky factor of the normal equations of (c, z), (q + r) x (q + r).
+  Eigen::Map<MatrixXd> normal() {
+    const Eigen::Index size = sampled.common() + window.count;
+    return {normal_storage.data(), size, size};
+  }
+
+  MatrixXd jacobian;  // whitened [common error | J | d - A G f0], 3m x (q + r + 1)
   VecX residual;      // whitened d - A u, 3m
-  MatrixXd normal;    // I + J^T J, then its Cholesky factor (lower)
-  VecX z;
+  VecX normal_storage, solution, z;
   std::vector<IterationRecord> history;
   double rebuild_ms = 0.0;
 };
 
 Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
-  const Eigen::Index rows = 3 * data.size(), r = window.count;
-  auto j = jacobian.topRows(rows);
+  const Eigen::Index rows = 3 * data.size(), r = window.count, unknowns = sampled.common() + r;
+  auto j = jacobian.topLeftCorner(rows, unknowns + 1);
   j = sampled.free_body();
-  if (reduction.size() > 0) {
-    blas::multiply(-1.0, sampled.contact(reduction.active()), reduction.response(), 1.0, j);
+  if (reduction.size() > 0) {  // contact does not touch the common error
+    blas::multiply(-1.0, sampled.contact(reduction.active()), reduction.response(), 1.0,
+                   j.rightCols(r + 1));
   }
-  normal.setIdentity();
-  blas::gram(j.leftCols(r), 1.0, normal);
-  if (!blas::cholesky(normal)) {
+  auto factor = normal();
+  factor.setIdentity();
+  blas::gram(j.leftCols(unknowns), 1.0, factor);
+  if (!blas::cholesky(factor)) {
     return fail(ErrorCode::kNotFinite, "inversion: the normal equations are not positive definite");
   }
-  z.noalias() = j.leftCols(r).transpose() * j.col(r);
-  blas::solve_lower(normal, z);
-  blas::solve_lower_transposed(normal, z);
-  residual.head(rows) = j.col(r);
-  residual.head(rows).noalias() -= j.leftCols(r) * z;
+  auto cz = solution.head(unknowns);
+  cz.noalias() = j.leftCols(unknowns).transpose() * j.col(unknowns);
+  blas::solve_lower(factor, cz);
+  blas::solve_lower_transposed(factor, cz);
+  z = cz.tail(r);
+  residual.head(rows) = j.col(unknowns);
+  residual.head(rows).noalias() -= j.middleCols(sampled.common(), r) * z;
   reduction.update_forces(z);
   return {};
 }
@@ -159,7 +169,9 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
 void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
   const auto start = Clock::now();
   if (options.uncertainty) {
-    rebuild.standard_deviation(team, reduction, normal, estimate.sd_mm);
+    // The common error comes first, so the last block is the factor of the Schur complement of z.
+    rebuild.standard_deviation(
+        team, reduction, normal().bottomRightCorner(window.count, window.count), estimate.sd_mm);
   } else {
     estimate.sd_mm.resize(0);
   }

@@ -5,6 +5,7 @@
 //   contact forces    D f = p_A - N_A^T U z         =>  f = f0 - T z,   [T f0] = D^-1 [N_A^T U  p_A]
 //   data              d = A u + e                   =>  A u = J z + A G_A f0,   J = A U - A G_A T
 //   posterior of z    (I + J^T R^-1 J) z = J^T R^-1 (d - A G_A f0)
+// With a common error of the data (SparseData), its amplitudes c ~ N(0, I) are estimated beside z, J = [common J].
 // which is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. Next set: active
 // slaves that press (f > 0) and open ones that penetrate, until contact holds (set_search.hpp). A set visited
 // before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best

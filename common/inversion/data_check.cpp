@@ -55,6 +55,19 @@ Status check_data(const SparseData& data) {
          << " standard deviations must be equal counts";
     return fail(ErrorCode::kInvalidArgument, text.str());
   }
+  const Eigen::MatrixXd& common = data.common_error;
+  if (common.rows() > 0 &&
+      (common.rows() != 3 * m || common.cols() > SparseData::kMaxCommonErrors)) {
+    std::ostringstream text;
+    text << "sparse data: common_error is " << common.rows() << " x " << common.cols()
+         << ": must have 3 rows for each of " << m << " data and at most "
+         << SparseData::kMaxCommonErrors << " columns";
+    return fail(ErrorCode::kInvalidArgument, text.str());
+  }
+  if (!common.allFinite()) {
+    return fail(ErrorCode::kNotFinite,
+                "sparse data: common_error holds a value that is not finite");
+  }
   if (m < 3) {
     return fail(ErrorCode::kInvalidArgument,
                 "sparse data: " + std::to_string(m) + " points, at least 3 are needed");

@@ -56,7 +56,7 @@ void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactRe
 }
 
 void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                                      const Eigen::MatrixXd& normal_factor, VecX& sd) {
+                                      const fem::blas::In<double>& normal_factor, VecX& sd) {
   const int r = window_.count, k = contact.size();
   sd.resize(operators_.num_nodes());
   // The diagonal blocks of a float factor are exact enough for a standard deviation.

@@ -12,6 +12,7 @@
 
 #include "common/core/condensed_operators.hpp"
 #include "common/core/thread_team.hpp"
+#include "common/fem/blas.hpp"
 #include "common/inversion/contact_reduction.hpp"
 #include "common/inversion/mode_window.hpp"
 
@@ -26,7 +27,7 @@ class FieldRebuild {
   void displacement(ThreadTeam& team, const VecX& z, const ContactReduction& contact, Points& u);
   // normal_factor: lower Cholesky factor of I + J^T J, r x r. sd: n, mm.
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                          const Eigen::MatrixXd& normal_factor, VecX& sd);
+                          const fem::blas::In<double>& normal_factor, VecX& sd);
 
  private:
   const CondensedOperators& operators_;

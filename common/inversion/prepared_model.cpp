@@ -2,6 +2,8 @@
 #include "common/inversion/prepared_model.hpp"
 
 #include <chrono>
+#include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -51,12 +53,14 @@ Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config)
   const auto& levels = config.prior.gravity_levels_mm;
   Eigen::MatrixXd modes(model.mesh.nodes.size(), 3 * static_cast<int>(levels.size()));
   int column = 0;
+  const double across_sd = config.prior.gravity_mode_sd *
+                           std::tan(config.prior.gravity_direction_sd_deg * std::numbers::pi / 180);
   for (double level : levels) {
     for (const Vec3& direction : directions) {
+      const double sd = &direction == &directions[0] ? config.prior.gravity_mode_sd : across_sd;
       const Points load = fem::buoyancy_load(model.mesh, config.material, g,
                                              model.fluid_plane_depth_mm + level, direction);
-      modes.col(column++) =
-          config.prior.gravity_mode_sd * Eigen::Map<const VecX>(load.data(), load.size());
+      modes.col(column++) = sd * Eigen::Map<const VecX>(load.data(), load.size());
     }
   }
   return modes;

@@ -57,7 +57,8 @@ class PreparedModel {
 };
 
 // Gravity modes of the prior, 3n x (3 levels): buoyancy of a fluid plane at each level of the case, along
-// gravity and along the two directions across it (what drainage and pose leave open), times the case's sd.
+// gravity (what drainage leaves open) and along the two directions across it (what pose leaves open), times the
+// case's standard deviations.
 Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config);
 
 }  // namespace brainshift::inversion

@@ -30,7 +30,7 @@ void SampledOperators::reserve(int data) {
   rows_.resize(4, data);
   weights_.resize(4, data);
   sd_.resize(data);
-  free_body_.resize(3 * data, window_.count + 1);
+  free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
   contact_storage_.reset(new double[3 * static_cast<std::size_t>(data) *
                                     static_cast<std::size_t>(operators_->num_slaves())]);
 }
@@ -39,6 +39,7 @@ Status SampledOperators::sample(const SparseData& data) {
   assert(data.size() <= capacity_);
   size_ = data.size();
   outside_region_ = 0;
+  common_ = data.common_error.rows() > 0 ? static_cast<int>(data.common_error.cols()) : 0;
   for (int i = 0; i < size_; ++i) {
     const geometry::TetLocation location = locator_->locate(data.positions.col(i));
     if (!(location.distance_mm <= kOutsideTolerance_mm)) {
@@ -75,10 +76,13 @@ Status SampledOperators::sample(const SparseData& data) {
   }
   const Eigen::MatrixXf& modes = region_only ? region_modes_ : operators_->modes;
   for (int j = 0; j < window_.count; ++j) {
-    sample_column(modes.col(window_.first + j).data(), free_body_.col(j).data());
+    sample_column(modes.col(window_.first + j).data(), free_body_.col(common_ + j).data());
   }
   for (int i = 0; i < size_; ++i) {
-    free_body_.col(window_.count).segment<3>(3 * i) = data.displacements.col(i) / sd_[i];
+    free_body_.col(common_ + window_.count).segment<3>(3 * i) = data.displacements.col(i) / sd_[i];
+    for (int q = 0; q < common_; ++q) {
+      free_body_.col(q).segment<3>(3 * i) = data.common_error.col(q).segment<3>(3 * i) / sd_[i];
+    }
   }
   return {};
 }

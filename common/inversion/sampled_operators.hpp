@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // SampledOperators: the operators at the data of one update, whitened by their standard deviation.
 //
-//   free_body   R^-1/2 [A U | d]     3m x (r + 1)
+//   free_body   R^-1/2 [common error | A U | d]     3m x (q + r + 1)
 //   contact     R^-1/2 A G_A         3m x k
 // Rows of U and G near the data region are kept in arrays of their own, small enough for the cache. A datum that
 // touches another node is sampled from the full arrays, and what the modes leave out of the prior there is
@@ -31,9 +31,12 @@ class SampledOperators {
   // the brain (named). Preconditions: check_data; reserve(data.size()).
   Status sample(const SparseData& data);
   int size() const { return size_; }
+  int common() const { return common_; }                  // q
   int outside_region() const { return outside_region_; }  // data sampled from the full arrays
   double sd(int datum) const { return sd_[datum]; }       // mm, with what the modes leave out
-  auto free_body() const { return free_body_.topRows(3 * size_); }
+  auto free_body() const {
+    return free_body_.topLeftCorner(3 * size_, common_ + window_.count + 1);
+  }
   // Valid until the next call.
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
 
@@ -46,7 +49,7 @@ class SampledOperators {
   ModeWindow window_;
   std::vector<int> region_row_;  // per node, -1 outside the region
   Eigen::MatrixXf region_modes_, region_contact_;
-  int size_ = 0, capacity_ = 0, outside_region_ = 0;
+  int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
   Eigen::Matrix<double, 4, Eigen::Dynamic> weights_;  // 4 x m, barycentric / sd
   VecX sd_;

@@ -120,6 +120,7 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.number("  correlation_length_mm", config.prior.correlation_length_mm);
   out.number("  force_density_sd_n_m3", config.prior.force_density_sd_n_m3);
   out.number("  gravity_mode_sd", config.prior.gravity_mode_sd);
+  out.number("  gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   out.list("  gravity_levels_mm", config.prior.gravity_levels_mm);
   out.section("inversion");
   out.number("  sigma_mm", config.inversion.sigma_mm);

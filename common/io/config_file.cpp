@@ -108,6 +108,7 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   prior.number("correlation_length_mm", config.prior.correlation_length_mm);
   prior.number("force_density_sd_n_m3", config.prior.force_density_sd_n_m3);
   prior.number("gravity_mode_sd", config.prior.gravity_mode_sd);
+  prior.number("gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   prior.numbers("gravity_levels_mm", config.prior.gravity_levels_mm);
   prior.done();
 

@@ -58,9 +58,16 @@ Result<IcpResult> align(const Points& points, const geometry::ClosestPointIndex&
                         const RigidTransform& T_surface_points_initial,
                         const IcpOptions& options = {});
 
+// What a rigid alignment of a deformed boundary leaves in common to all its points: a rotation that a smooth
+// boundary hardly shows (the prior's standard deviation, however sure the points seem to be of it), and the strain
+// that it takes for none. Brain shifts by millimetres over some 100 mm: a few per cent.
+inline constexpr double kAlignmentStrainSd = 0.1;
+
 // Paper 2.7: displacement of each boundary point = its tracked (deformed) place minus its place after the
-// transform (undeformed). positions = T p, displacements = p - T p, each with standard deviation sd_mm.
+// transform (undeformed). positions = T p, displacements = p - T p, each with standard deviation sd_mm;
+// common_error: three rotations of rotation_sd_deg (none if <= 0) and six strains about the points' centroid.
 SparseData sparse_data_from_alignment(const Points& points, const RigidTransform& T_surface_points,
-                                      double sd_mm);
+                                      double sd_mm,
+                                      double rotation_sd_deg = IcpOptions{}.rotation_sd_deg);
 
 }  // namespace brainshift::registration

@@ -27,11 +27,15 @@ SparseData select(const SparseData& data, const std::vector<int>& columns) {
   subset.positions.resize(3, size);
   subset.displacements.resize(3, size);
   subset.sd_mm.resize(size);
+  subset.common_error.resize(data.common_error.rows() > 0 ? 3 * size : 0, data.common_error.cols());
   for (Eigen::Index i = 0; i < size; ++i) {
     const int column = columns[static_cast<std::size_t>(i)];
     subset.positions.col(i) = data.positions.col(column);
     subset.displacements.col(i) = data.displacements.col(column);
     subset.sd_mm(i) = data.sd_mm(column);
+    if (subset.common_error.rows() > 0) {
+      subset.common_error.middleRows<3>(3 * i) = data.common_error.middleRows<3>(3 * column);
+    }
   }
   return subset;
 }

@@ -52,7 +52,7 @@ void expect_contract(const json& run) {
   for (const char* key : {"register", "invert", "rebuild", "encode", "journal"}) {
     EXPECT_TRUE(run.at("stages_ms").contains(key)) << key;
   }
-  EXPECT_EQ(run.at("method"), "paper");
+  EXPECT_EQ(run.at("method"), "condensed");
   EXPECT_GT(run.at("mesh").at("nodes").get<int>(), 500);
   EXPECT_GE(run.at("updates").get<int>(), 1);
   EXPECT_GT(run.at("full_solve_ms").get<double>(), 0.0);
