@@ -96,8 +96,8 @@ struct InversionConfig {
 
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
-  // Largest number of prior modes kept, gravity modes among them. 128 move the estimate by at most a
-  // micrometre on the default head (docs/decisions/0008).
+  // Largest number of prior modes kept, gravity modes among them. 128 move the estimate by less
+  // than 2 micrometres in the default scenario (docs/decisions/0008).
   int max_rank = 128;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/invert.hpp"
 
+#include "common/inversion/condensed_exact.hpp"
 #include "common/inversion/conjugate_gradients.hpp"
 #include "common/inversion/data_check.hpp"
 #include "common/inversion/iterative_system.hpp"
@@ -36,6 +37,20 @@ Result<Estimate> gradients_iterative(const PreparedModel& model, const SparseDat
   return conjugate_gradients(model, data, options, **system);
 }
 
+// Prepares for one inversion; repeated ones take the class.
+Result<Estimate> condensed_exact(const PreparedModel& model, const SparseData& data,
+                                 const InversionOptions& options) {
+  CondensedExactOptions exact;
+  exact.stop = options.stop;
+  auto inverter = CondensedExact::prepare(model, exact);
+  if (!inverter) return tl::unexpected(inverter.error());
+  Estimate estimate;
+  if (auto status = inverter->update(data, estimate, options.stop); !status) {
+    return tl::unexpected(status.error());
+  }
+  return estimate;
+}
+
 }  // namespace
 
 Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
@@ -46,8 +61,8 @@ Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
     case Method::kPaperWoodbury: return paper_woodbury(model, data, options);
     case Method::kConjugateGradients: return gradients_woodbury(model, data, options);
     case Method::kIterativeSolver: return gradients_iterative(model, data, options);
-    case Method::kCondensed:
-    case Method::kCondensedExact: break;
+    case Method::kCondensedExact: return condensed_exact(model, data, options);
+    case Method::kCondensed: break;
   }
   return fail(ErrorCode::kInternal, "unknown inversion method");
 }

@@ -18,7 +18,8 @@ inline constexpr double kPenetrationTolerance_mm = 0.01;
 
 struct InversionOptions {
   Method method = Method::kPaper;
-  // Called after every iteration with the iterate so far (status kIterating); may be empty.
+  // Called after every iteration with the iterate so far (status kIterating); may be empty. The condensed methods
+  // have no field before the last iteration and do not call it.
   std::function<void(const Estimate&)> on_iterate;
   // Checked once per iteration; a requested stop ends the inversion with kNotConverged.
   std::stop_token stop;

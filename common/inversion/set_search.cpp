@@ -51,7 +51,7 @@ SetSearch::Step SetSearch::next(const VecX& forces, const VecX& penetration,
     const double here = current_[i] ? -forces[row] * compliance_diagonal[row] : penetration[row];
     if (!(here > 0.0)) continue;
     violation = std::max(violation, here);
-    first = std::min(first, i);
+    if (here > tolerance_mm_) first = std::min(first, i);  // smaller ones do no harm
   }
   if (violation <= tolerance_mm_) return Step::kSolved;
   if (violation < best_violation_mm_) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_exact.hpp"
 #include "common/inversion/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
 #include "server/pipeline/pipeline.hpp"
@@ -14,6 +15,7 @@
 namespace brainshift::server {
 namespace {
 
+using inversion::CondensedExact;
 using inversion::CondensedInverter;
 using inversion::PreparedModel;
 using Clock = std::chrono::steady_clock;
@@ -109,6 +111,37 @@ Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& reque
   return prepared;
 }
 
+Result<Prepared> ModelStore::prepare_condensed_exact(const wire::SessionRequest& request) {
+  const auto factor = factorised(request.boundary);
+  if (!factor) return tl::unexpected(factor.error());
+  spdlog::info("condensing boundary={} with the whole prior", to_string(request.boundary));
+  auto made = CondensedExact::prepare(**factor);
+  if (!made) return tl::unexpected(made.error());
+  auto inverter = std::make_shared<CondensedExact>(std::move(*made));
+  // The inverter refers to the factor.
+  auto prepared = with_pipeline(
+      model_, config_, request.boundary,
+      [inverter, factor = *factor](const SparseData& data,
+                                   const inversion::InversionOptions& options) -> Result<Estimate> {
+        Estimate estimate;
+        auto status = inverter->update(data, estimate, options.stop);
+        if (!status) return tl::unexpected(status.error());
+        return estimate;
+      });
+  if (!prepared) return prepared;
+  prepared->begin = [inverter] { inverter->reset(); };
+  prepared->info.model_bytes = (*factor)->timings().bytes + inverter->bytes();
+  return prepared;
+}
+
+Result<Prepared> ModelStore::prepare_for_method(const wire::SessionRequest& request) {
+  switch (request.method) {
+    case Method::kCondensed: return prepare_condensed(request);
+    case Method::kCondensedExact: return prepare_condensed_exact(request);
+    default: return prepare_iterative(request);
+  }
+}
+
 Result<Prepared> ModelStore::prepare_iterative(const wire::SessionRequest& request) {
   const auto factor = factorised(request.boundary);
   if (!factor) return tl::unexpected(factor.error());
@@ -124,8 +157,7 @@ Result<Prepared> ModelStore::prepare_iterative(const wire::SessionRequest& reque
 
 Result<Prepared> ModelStore::prepare(const wire::SessionRequest& request) {
   const auto start = Clock::now();
-  const bool condensed_method = request.method == Method::kCondensed;
-  auto prepared = condensed_method ? prepare_condensed(request) : prepare_iterative(request);
+  auto prepared = prepare_for_method(request);
   if (!prepared) return prepared;
   const wire::SessionInfo common = info();
   const wire::SessionInfo own = prepared->info;
@@ -133,7 +165,7 @@ Result<Prepared> ModelStore::prepare(const wire::SessionRequest& request) {
   prepared->info.model_bytes = own.model_bytes;
   // What was done before surgery counts.
   prepared->info.prepare_s = own.prepare_s > 0.0 ? own.prepare_s : seconds_since(start);
-  if (!condensed_method || request.measure_full_solve) {
+  if (request.method != Method::kCondensed || request.measure_full_solve) {
     const auto factor = factorised(request.boundary);
     if (!factor) return tl::unexpected(factor.error());
     prepared->info.full_solve_ms = (*factor)->timings().full_solve_ms;

@@ -31,7 +31,9 @@ class ModelStore {
   Result<std::shared_ptr<const inversion::PreparedModel>> factorised(Boundary boundary);
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary);
   Result<Prepared> prepare_condensed(const wire::SessionRequest& request);
+  Result<Prepared> prepare_condensed_exact(const wire::SessionRequest& request);
   Result<Prepared> prepare_iterative(const wire::SessionRequest& request);
+  Result<Prepared> prepare_for_method(const wire::SessionRequest& request);
   wire::SessionInfo info() const;
 
   std::shared_ptr<const BrainModel> model_;

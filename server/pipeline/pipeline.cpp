@@ -35,7 +35,8 @@ Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const 
 
 Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) const {
   const auto register_start = Clock::now();
-  const auto registered = register_observation(observation, tumour_, config_.inversion);
+  const auto registered =
+      register_observation(observation, tumour_, config_.inversion, options.method);
   if (!registered) return tl::unexpected(registered.error());
 
   Update update;

@@ -40,16 +40,21 @@ SparseData select(const SparseData& data, const std::vector<int>& columns) {
   return subset;
 }
 
+double datum_sd_mm(double observed_mm, const InversionConfig& config, Method method) {
+  const bool condensed = method == Method::kCondensed || method == Method::kCondensedExact;
+  return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
+}
+
 Result<RegisteredObservation> from_tumour_boundary(const TumourBoundary& boundary,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config) {
+                                                   const InversionConfig& config, Method method) {
   registration::IcpOptions options;
   if (boundary.sd_mm > 0.0) options.sd_mm = boundary.sd_mm;
   // The points arrive tracked, in patient RAS, so the identity is the tracked pose.
   auto icp = registration::align(boundary.points, tumour, RigidTransform::Identity(), options);
   if (!icp) return tl::unexpected(icp.error());
   const SparseData all = registration::sparse_data_from_alignment(
-      boundary.points, icp->T_surface_points, config.sigma_mm);
+      boundary.points, icp->T_surface_points, datum_sd_mm(boundary.sd_mm, config, method));
   RegisteredObservation registered;
   registered.data = select(all, guiding_points(all.size(), config.sparse_points));
   registered.icp = *icp;
@@ -57,7 +62,7 @@ Result<RegisteredObservation> from_tumour_boundary(const TumourBoundary& boundar
 }
 
 Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
-                                             const InversionConfig& config) {
+                                             const InversionConfig& config, Method method) {
   if (pairs.undeformed.cols() != pairs.deformed.cols()) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("landmark_pairs: {} undeformed but {} deformed points",
@@ -74,7 +79,8 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
   RegisteredObservation registered;
   registered.data.positions = pairs.undeformed;
   registered.data.displacements = pairs.deformed - pairs.undeformed;
-  registered.data.sd_mm = VecX::Constant(pairs.undeformed.cols(), config.sigma_mm);
+  registered.data.sd_mm =
+      VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config, method));
   return registered;
 }
 
@@ -82,17 +88,17 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
 
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config) {
+                                                   const InversionConfig& config, Method method) {
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    return from_tumour_boundary(*boundary, tumour, config);
+    return from_tumour_boundary(*boundary, tumour, config, method);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
-    return from_landmarks(*pairs, config);
+    return from_landmarks(*pairs, config, method);
   }
   const char* kind = std::holds_alternative<CorticalSurface>(observation.body) ? "cortical_surface"
                                                                                : "patient_pose";
   return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation {}: a {} is not assimilated by method paper",
+              fmt::format("observation {}: a {} is not assimilated in this version",
                           observation.sequence, kind));
 }
 

@@ -7,14 +7,16 @@
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
 //   CorticalSurface, PatientPose   refused: method paper does not assimilate them
 //
-// Every datum gets the standard deviation inversion.sigma_mm, the sigma_eps of the paper's W_eps, whatever
-// the observation says of itself. Assumption: independent errors, see SparseData.
+// Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the observation's own
+// where that is larger; the paper's method and its variants take the former whatever the observation says.
+// Errors that aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once
 
 #include <optional>
 
 #include "common/core/case_config.hpp"
 #include "common/core/error.hpp"
+#include "common/core/estimate.hpp"
 #include "common/core/observation.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/closest_point.hpp"
@@ -31,6 +33,7 @@ struct RegisteredObservation {
 // kNotFinite: NaN or infinity. The sentence names the observation's source and the count.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config);
+                                                   const InversionConfig& config,
+                                                   Method method = Method::kCondensed);
 
 }  // namespace brainshift::server

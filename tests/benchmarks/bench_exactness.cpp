@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How far the condensed methods are from the posterior that they stand for, at every node of a real head.
+//
+// The reference takes another road. For the final active set of a method it factorises K_p = K + Q^T beta Q anew
+// (paper eq. 16), solves for the 3m columns V = K_p^-1 A^T, and
+//   u = u0 + K_p^-1 Sigma V mu,   (V^T Sigma V + R) mu = d - A u0,   K_p u0 = Q^T beta p
+// Exit status: 0 when the exact method is within kExactBound_mm and the reduced one, with all its modes, within
+// kReducedBound_mm; 1 when not, or on a failure; 2 for bad usage or bad input.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "client/twin/surgery.hpp"
+#include "common/fem/blas.hpp"
+#include "common/fem/blas_threads.hpp"
+#include "common/fem/block_solver.hpp"
+#include "common/fem/sampling.hpp"
+#include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_exact.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/data_check.hpp"
+#include "common/io/config_file.hpp"
+#include "common/io/model_file.hpp"
+#include "common/io/surgery_file.hpp"
+#include "common/scene/brain_model_builder.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift {
+namespace {
+
+using Eigen::MatrixXd;
+using inversion::PreparedModel;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kExactBound_mm = 1e-6;
+constexpr double kReducedBound_mm = 0.01;
+constexpr int kRanks[] = {32, 64, 128};
+
+struct Arguments {
+  std::string case_file = BRAINSHIFT_DEFAULT_CASE;
+  std::string model_file, surgery, out;
+  std::string scenario = "paper";
+  std::uint64_t seed = 1;
+};
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Model and case: from a model file, or made from the case file.
+Result<io::ModelFile> load_head(const Arguments& arguments) {
+  if (!arguments.model_file.empty()) return io::read_model(arguments.model_file);
+  auto config = io::read_case_config(arguments.case_file);
+  if (!config) return tl::unexpected(config.error());
+  const auto inputs = io::load_case_inputs(*config);
+  if (!inputs) return tl::unexpected(inputs.error());
+  auto model = scene::build_brain_model(*inputs);
+  if (!model) return tl::unexpected(model.error());
+  return io::ModelFile{std::move(*config), std::move(*model)};
+}
+
+// The first observation: of a surgery file, or of a scenario played here.
+Result<Observation> first_observation(const Arguments& arguments, const io::ModelFile& head) {
+  if (arguments.surgery.empty()) {
+    const auto* scenario = twin::find_scenario(arguments.scenario);
+    if (scenario == nullptr) {
+      return fail(ErrorCode::kInvalidArgument, "--scenario " + arguments.scenario + ": unknown");
+    }
+    auto played = twin::play_scenario(head.model, head.config, *scenario, arguments.seed);
+    if (!played) return tl::unexpected(played.error());
+    return played->observations.front();
+  }
+  auto file = io::SurgeryFile::open(arguments.surgery);
+  if (!file) return tl::unexpected(file.error());
+  const auto records = file->records("observation");
+  if (!records) return tl::unexpected(records.error());
+  if (records->empty()) {
+    return fail(ErrorCode::kInvalidArgument, arguments.surgery + ": holds no observation");
+  }
+  return wire::decode_observation(records->front().payload);
+}
+
+Result<SparseData> sparse_data(const Observation& observation, const CaseConfig& config) {
+  const auto* pairs = std::get_if<LandmarkPairs>(&observation.body);
+  if (pairs == nullptr) {
+    return fail(ErrorCode::kInvalidArgument,
+                "the surgery's first observation holds no landmark pairs; choose a scenario with "
+                "displacements, such as paper");
+  }
+  return SparseData{pairs->undeformed, pairs->deformed - pairs->undeformed,
+                    VecX::Constant(pairs->undeformed.cols(), config.inversion.sigma_mm)};
+}
+
+Eigen::Map<const VecX> flat(const Points& field) { return {field.data(), field.size()}; }
+
+// The posterior mean for a set of active slaves by the road described above.
+Result<Points> direct_posterior(const PreparedModel& model, const SparseData& data,
+                                const std::vector<NodeIndex>& active_nodes) {
+  const contact::ForwardModel& forward = model.forward();
+  const int nodes = model.model().mesh.num_nodes(), rows = 3 * data.size();
+  contact::ActiveSet active;
+  for (const auto& pair : forward.contact().pairs()) {
+    active.push_back(static_cast<char>(
+        std::binary_search(active_nodes.begin(), active_nodes.end(), pair.slave)));
+  }
+  fem::SymmetricMatrix k_p = forward.stiffness();
+  forward.contact().add_stiffness(k_p, forward.dofs(), active);
+  const auto factor = fem::SparseCholesky::factorise(k_p);
+  if (!factor) return tl::unexpected(factor.error());
+  const auto solve = [&](const Points& load) {
+    return forward.dofs().expand(factor->solve(forward.dofs().restrict_to(load)));
+  };
+
+  const auto weights =
+      fem::sampling_matrix(model.locator(), nodes, data.positions, inversion::kOutsideTolerance_mm);
+  if (!weights) return tl::unexpected(weights.error());
+  MatrixXd a_transposed = MatrixXd::Zero(3 * nodes, rows), v, block, forces(3 * nodes, rows);
+  for (int i = 0; i < data.size(); ++i) {
+    for (fem::SamplingMatrix::InnerIterator it(*weights, i); it; ++it) {
+      for (int axis = 0; axis < 3; ++axis) {
+        a_transposed(3 * it.col() + axis, 3 * i + axis) = it.value();
+      }
+    }
+  }
+  fem::BlockSolver(*factor, forward.dofs()).solve(a_transposed, v);
+  for (int j = 0; j < rows; ++j) {
+    forces.col(j) = flat(model.prior().apply(Eigen::Map<const Points>(v.col(j).data(), 3, nodes)));
+  }
+  MatrixXd covariance(rows, rows);
+  fem::blas::multiply_transposed(1.0, v, forces, 0.0, covariance);
+  for (int i = 0; i < rows; ++i) covariance(i, i) += data.sd_mm[i / 3] * data.sd_mm[i / 3];
+
+  Points gap_load = Points::Zero(3, nodes);
+  forward.contact().add_load(gap_load, active);
+  const Points shift = solve(gap_load);
+  const VecX misfit = flat(data.displacements) - a_transposed.transpose() * flat(shift);
+  const VecX mu = covariance.llt().solve(misfit);
+  const VecX load = forces * mu;
+  const Points mean = shift + solve(Eigen::Map<const Points>(load.data(), 3, nodes));
+  if (!mean.allFinite()) return fail(ErrorCode::kNotFinite, "the direct posterior is not finite");
+  return mean;
+}
+
+struct Difference {
+  double max_mm = 0.0, mean_mm = 0.0;
+};
+Difference difference(const Points& a, const Points& b) {
+  const VecX each = (a - b).colwise().norm();
+  return {each.maxCoeff(), each.mean()};
+}
+
+int slaves_in_one_only(std::vector<NodeIndex> a, std::vector<NodeIndex> b) {
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  std::vector<NodeIndex> other;
+  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(other));
+  return static_cast<int>(other.size());
+}
+
+// active_slaves of an estimate are in the order of the pairs.
+Result<Points> direct_posterior(const PreparedModel& model, const SparseData& data,
+                                const Estimate& estimate) {
+  std::vector<NodeIndex> sorted = estimate.active_slaves;
+  std::sort(sorted.begin(), sorted.end());
+  return direct_posterior(model, data, sorted);
+}
+
+// How well contact holds: the deepest slave without a force, mm, and the strongest pull, N; 0 when it holds.
+nlohmann::json contact_left_open(const PreparedModel& model, const Estimate& estimate) {
+  const auto& contact = model.forward().contact();
+  const VecX penetration = contact.penetration(estimate.displacement);
+  std::vector<NodeIndex> active = estimate.active_slaves;
+  std::sort(active.begin(), active.end());
+  double deepest_mm = 0.0;
+  for (int i = 0; i < contact.num_slaves(); ++i) {
+    const NodeIndex slave = contact.pairs()[static_cast<std::size_t>(i)].slave;
+    if (std::binary_search(active.begin(), active.end(), slave)) continue;
+    deepest_mm = std::max(deepest_mm, penetration[i]);
+  }
+  double pull_n = 0.0;
+  for (const double force : estimate.contact_force_n) pull_n = std::max(pull_n, -force);
+  return {{"deepest_open_mm", deepest_mm}, {"strongest_pull_n", pull_n}};
+}
+
+struct Compared {
+  nlohmann::json json;
+  bool within_bounds = true;
+};
+
+// The reduced method at every rank. exact: the exact method's estimate, direct: the posterior of its set.
+Status compare_reduced(const PreparedModel& model, const io::ModelFile& head,
+                       const SparseData& data, const Estimate& exact, const Points& direct,
+                       Compared& compared) {
+  const auto start = Clock::now();
+  auto made = inversion::condense(model);
+  if (!made) return tl::unexpected(made.error());
+  const auto operators = std::make_shared<const CondensedOperators>(std::move(*made));
+  compared.json["reduced_prepare_s"] = seconds_since(start);
+  CaseConfig config = head.config;
+  config.condensed.deadline_ms = 1e6;  // accuracy is asked for here, not speed
+  const auto locator = std::make_shared<const geometry::TetLocator>(head.model.mesh);
+  for (const int rank : kRanks) {
+    inversion::CondensedOptions options;
+    options.rank = rank;
+    auto inverter = inversion::CondensedInverter::build(operators, locator, config, options);
+    if (!inverter) return tl::unexpected(inverter.error());
+    Estimate reduced;
+    if (auto status = inverter->update(data, reduced); !status) return status;
+    const int other = slaves_in_one_only(exact.active_slaves, reduced.active_slaves);
+    Difference own = difference(reduced.displacement, direct);
+    const Difference to_exact = own;
+    if (other > 0) {
+      const auto own_direct = direct_posterior(model, data, reduced);
+      if (!own_direct) return tl::unexpected(own_direct.error());
+      own = difference(reduced.displacement, *own_direct);
+    }
+    compared.json["reduced"].push_back({{"rank", rank},
+                                        {"max_mm", own.max_mm},
+                                        {"mean_mm", own.mean_mm},
+                                        {"active", reduced.contact.active},
+                                        {"iterations", reduced.contact.iterations},
+                                        {"slaves_in_one_set_only", other},
+                                        {"max_mm_to_direct_of_exact_set", to_exact.max_mm},
+                                        {"contact", contact_left_open(model, reduced)},
+                                        {"status", std::string(to_string(reduced.status))}});
+    if (rank == CondensedConfig{}.max_rank) {
+      compared.within_bounds = compared.within_bounds && own.max_mm <= kReducedBound_mm;
+    }
+  }
+  return {};
+}
+
+Result<Compared> compare(const Arguments& arguments) {
+  const auto head = load_head(arguments);
+  if (!head) return tl::unexpected(head.error());
+  const auto observation = first_observation(arguments, *head);
+  if (!observation) return tl::unexpected(observation.error());
+  const auto data = sparse_data(*observation, head->config);
+  if (!data) return tl::unexpected(data.error());
+  const auto model = PreparedModel::prepare(std::make_shared<const BrainModel>(head->model),
+                                            head->config, Boundary::kContact);
+  if (!model) return tl::unexpected(model.error());
+
+  Compared compared;
+  compared.json = {{"case", head->config.case_id},
+                   {"model_id", head->model.model_id},
+                   {"scenario", arguments.surgery.empty() ? arguments.scenario : arguments.surgery},
+                   {"seed", arguments.seed},
+                   {"nodes", head->model.mesh.num_nodes()},
+                   {"slaves", model->forward().contact().num_slaves()},
+                   {"data", data->size()},
+                   {"reduced", nlohmann::json::array()}};
+  Estimate exact;
+  Points direct;
+  {  // its memory goes before the reduced method is prepared
+    auto start = Clock::now();
+    auto inverter = inversion::CondensedExact::prepare(*model);
+    if (!inverter) return tl::unexpected(inverter.error());
+    compared.json["exact_prepare_s"] = seconds_since(start);
+    compared.json["exact_bytes"] = inverter->bytes();
+    start = Clock::now();
+    if (auto status = inverter->update(*data, exact); !status) {
+      return tl::unexpected(status.error());
+    }
+    compared.json["exact_update_s"] = seconds_since(start);
+  }
+  if (auto made = direct_posterior(*model, *data, exact); made) {
+    direct = std::move(*made);
+  } else {
+    return tl::unexpected(made.error());
+  }
+  const Difference own = difference(exact.displacement, direct);
+  compared.json["exact_max_mm"] = own.max_mm;
+  compared.json["exact_mean_mm"] = own.mean_mm;
+  compared.json["exact_status"] = std::string(to_string(exact.status));
+  compared.json["exact_iterations"] = exact.contact.iterations;
+  compared.json["exact_contact"] = contact_left_open(*model, exact);
+  compared.json["active"] = exact.contact.active;
+  compared.json["largest_displacement_mm"] = direct.colwise().norm().maxCoeff();
+  compared.within_bounds = own.max_mm <= kExactBound_mm;
+  if (auto status = compare_reduced(*model, *head, *data, exact, direct, compared); !status) {
+    return tl::unexpected(status.error());
+  }
+  compared.json["within_bounds"] = compared.within_bounds;
+  return compared;
+}
+
+bool is_bad_input(ErrorCode code) {
+  return code == ErrorCode::kInvalidArgument || code == ErrorCode::kNotFound ||
+         code == ErrorCode::kUnreadable;
+}
+
+int run(const Arguments& arguments) {
+  const std::filesystem::path out = arguments.out;
+  if (out.has_parent_path()) {
+    std::error_code ignored;  // writing fails then, and says so
+    std::filesystem::create_directories(out.parent_path(), ignored);
+  }
+  const auto compared = compare(arguments);
+  if (!compared) {
+    std::fprintf(stderr, "bench_exactness: %s\n", compared.error().message.c_str());
+    return is_bad_input(compared.error().code) ? 2 : 1;
+  }
+  std::ofstream file(out);
+  file << compared->json.dump(2) << '\n';
+  file.close();
+  if (!file) {
+    std::fprintf(stderr, "bench_exactness: %s: cannot be written\n", out.c_str());
+    return 1;
+  }
+  std::cout << compared->json.dump(2) << '\n';
+  return compared->within_bounds ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  brainshift::fem::use_single_threaded_blas();
+  CLI::App app("Compares the condensed methods with the direct posterior at every node.",
+               "bench_exactness");
+  brainshift::Arguments arguments;
+  app.add_option("--case", arguments.case_file, "Case file (YAML)");
+  app.add_option("--model-file", arguments.model_file, "Model file, instead of the case file");
+  app.add_option("--surgery", arguments.surgery,
+                 "Surgery file whose first observation is inverted, instead of a scenario");
+  app.add_option("--scenario", arguments.scenario, "Scenario to simulate (default: paper)");
+  app.add_option("--seed", arguments.seed, "Seed of the scenario (default: 1)");
+  app.add_option("--out", arguments.out, "JSON file to write")->required();
+  app.footer(
+      "Example:\n  bench_exactness --case config/cases/colin27.yaml --out out/bench/direct.json");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return brainshift::run(arguments);
+}
