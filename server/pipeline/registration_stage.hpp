@@ -3,9 +3,10 @@
 //
 //   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then a random
 //                    subset of inversion.sparse_points boundary points (paper 2.6), always the same one for
-//                    the same number of points
+//                    the same number of points. scene.rotation = off: translation only; on: about every axis,
+//                    however little the points show of it
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
-//   CorticalSurface, PatientPose   refused: method paper does not assimilate them
+//   CorticalSurface, PatientPose   refused: not assimilated in this version
 //
 // Every datum gets the standard deviation inversion.sigma_mm, the sigma_eps of the paper's W_eps, whatever
 // the observation says of itself. Assumption: independent errors, see SparseData.
@@ -31,6 +32,6 @@ struct RegisteredObservation {
 // kNotFinite: NaN or infinity. The sentence names the observation's source and the count.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config);
+                                                   const CaseConfig& config);
 
 }  // namespace brainshift::server
