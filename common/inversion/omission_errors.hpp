@@ -20,7 +20,7 @@
 namespace brainshift::inversion {
 
 // Measured: the true difference is at most 1.5 times the penetration and 1.22 times the step on the toy patient, 1.02
-// and 1.17 times on the default head (tests/benchmarks/bench_scenes.cpp).
+// and 1.19 times on the default head (tests/benchmarks/bench_scenes.cpp).
 inline constexpr double kContactSafety = 2.0;
 inline constexpr double kGravitySafety = 2.0;
 
