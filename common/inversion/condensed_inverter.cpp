@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,7 @@ struct CondensedInverter::Impl {
         team(options.threads),
         sampled(operators, std::move(given_locator), window),
         reduction(*operators, window, config.contact.penalty_n_per_mm),
-        rebuild(*operators, window),
+        rebuild(*operators, window, options.region_of_interest),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
     const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
     normal_storage.resize(most * most);
@@ -95,6 +96,7 @@ struct CondensedInverter::Impl {
   Status estimate_for_set(const SparseData& data);
   void record(const SparseData& data, Clock::time_point start, int iteration);
   void finish(const SparseData& data, Estimate& estimate);
+  void estimate_omissions(const SparseData& data);
 
   std::shared_ptr<const CondensedOperators> operators;
   CondensedOptions options;
@@ -117,6 +119,7 @@ struct CondensedInverter::Impl {
   VecX normal_storage, solution, z;
   std::vector<IterationRecord> history;
   double rebuild_ms = 0.0;
+  OmissionErrors errors;
 };
 
 Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
@@ -177,6 +180,7 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
   }
   rebuild.displacement(team, z, reduction, estimate.displacement);
   rebuild_ms = milliseconds_since(start);
+  estimate_omissions(data);
   estimate.rebuild_ms = rebuild_ms;
 
   const IterationRecord& last = history.back();
@@ -190,6 +194,23 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
     estimate.active_slaves.push_back(operators->slaves[static_cast<std::size_t>(slave)]);
   }
   estimate.history = history;
+}
+
+void CondensedInverter::Impl::estimate_omissions(const SparseData& data) {
+  const VecX& penetration = reduction.penetration();
+  errors.nearest_slave_mm =
+      penetration.size() > 0 ? -penetration.maxCoeff() : std::numeric_limits<double>::infinity();
+  errors.contact_mm = reduction.size() == 0 ? contact_error_mm(penetration) : 0.0;
+  errors.far_field_mm = rebuild.far_field_error_mm();
+  errors.gravity_modes_mm = 0.0;
+  if (!options.gravity_modes) {
+    const Eigen::Index rows = 3 * data.size(), q = sampled.common();
+    const VecX unexplained =
+        residual.head(rows) - jacobian.topLeftCorner(rows, q) * solution.head(q);
+    errors.gravity_modes_mm = gravity_modes_error_mm(sampled, reduction, rebuild,
+                                                     jacobian.topLeftCorner(rows, q + window.count),
+                                                     unexplained, normal());
+  }
 }
 
 CondensedInverter::CondensedInverter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -213,6 +234,7 @@ Result<CondensedInverter> CondensedInverter::build(
 }
 
 void CondensedInverter::reset() { impl_->search.forget(); }
+const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
 double CondensedInverter::rebuild_ms() const { return impl_->rebuild_ms; }
 
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {

@@ -17,6 +17,7 @@
 
 #include <memory>
 #include <stop_token>
+#include <vector>
 
 #include "common/core/case_config.hpp"
 #include "common/core/condensed_operators.hpp"
@@ -24,14 +25,17 @@
 #include "common/core/estimate.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/tet_locator.hpp"
+#include "common/inversion/omission_errors.hpp"
 
 namespace brainshift::inversion {
 
 struct CondensedOptions {
-  // Parts a scene leaves out (server/pipeline decides).
+  // Parts a scene leaves out (scene::plan_scene decides); what that may cost: omission_errors().
   bool contact = true;
   bool uncertainty = true;
   bool gravity_modes = true;
+  // Nodes that are rebuilt, sorted; the others are interpolated (far_field.hpp). Empty: every node.
+  std::vector<NodeIndex> region_of_interest;
   int rank = 0;  // use only so many modes; 0: all
   bool warm_start = true;
   int capacity = 1000;  // data per update reserved up front
@@ -56,6 +60,8 @@ class CondensedInverter {
   Status update(const SparseData& data, Estimate& estimate);
   // Forgets the last active set.
   void reset();
+  // Of the last update(), for the parts that the options leave out.
+  const OmissionErrors& omission_errors() const;
   // Part of the last update() spent rebuilding field and standard deviation, ms.
   double rebuild_ms() const;
 

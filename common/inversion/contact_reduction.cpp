@@ -59,6 +59,20 @@ Status ContactReduction::activate(const contact::ActiveSet& set) {
   return {};
 }
 
+Eigen::MatrixXd ContactReduction::response_before() const {
+  const int k = size();
+  Eigen::MatrixXd response(k, window_.first);
+  if (k == 0) return response;
+  for (int i = 0; i < k; ++i) {
+    response.row(i) =
+        operators_.slave_modes.row(active_[static_cast<std::size_t>(i)]).head(window_.first);
+  }
+  const Eigen::Map<const Eigen::MatrixXd> factor(factor_storage_.get(), k, k);
+  blas::solve_lower(factor, response);
+  blas::solve_lower_transposed(factor, response);
+  return response;
+}
+
 void ContactReduction::update_forces(const VecX& z) {
   const int k = size();
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);

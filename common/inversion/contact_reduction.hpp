@@ -33,6 +33,9 @@ class ContactReduction {
     return {response_.data(), size(), window_.count + 1};
   }
 
+  // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first. Allocates.
+  Eigen::MatrixXd response_before() const;
+
   // f and P for the given z.
   void update_forces(const VecX& z);
   Eigen::Map<const VecX> forces() const { return {forces_.data(), size()}; }  // of active slaves, N

@@ -31,6 +31,7 @@ void SampledOperators::reserve(int data) {
   weights_.resize(4, data);
   sd_.resize(data);
   free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
+  before_.resize(3 * data, window_.first);
   contact_storage_.reset(new double[3 * static_cast<std::size_t>(data) *
                                     static_cast<std::size_t>(operators_->num_slaves())]);
 }
@@ -75,6 +76,9 @@ Status SampledOperators::sample(const SparseData& data) {
     }
   }
   const Eigen::MatrixXf& modes = region_only ? region_modes_ : operators_->modes;
+  for (int j = 0; j < window_.first; ++j) {
+    sample_column(modes.col(j).data(), before_.col(j).data());
+  }
   for (int j = 0; j < window_.count; ++j) {
     sample_column(modes.col(window_.first + j).data(), free_body_.col(common_ + j).data());
   }

@@ -37,6 +37,8 @@ class SampledOperators {
   auto free_body() const {
     return free_body_.topLeftCorner(3 * size_, common_ + window_.count + 1);
   }
+  // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), 3m x window.first.
+  auto modes_before() const { return before_.topRows(3 * size_); }
   // Valid until the next call.
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
 
@@ -53,7 +55,7 @@ class SampledOperators {
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
   Eigen::Matrix<double, 4, Eigen::Dynamic> weights_;  // 4 x m, barycentric / sd
   VecX sd_;
-  Eigen::MatrixXd free_body_;
+  Eigen::MatrixXd free_body_, before_;
   std::unique_ptr<double[]> contact_storage_;
 };
 

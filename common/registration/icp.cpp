@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -26,6 +27,10 @@ constexpr double kStartOverMedian = 2.0;
 constexpr double kScaleFactor = 0.6;
 // Curvature below this fraction of the largest is taken for zero when a step is computed.
 constexpr double kNullCurvature = 1e-9;
+// Rotation that is left out: correspondences change along a step that was not taken, hence twice its size; and
+// two standard deviations for what the points do not tell.
+constexpr double kStepSafety = 2.0;
+constexpr double kStandardDeviations = 2.0;
 
 // What a pose gives: moved points, distances to the surface and their directions.
 struct Fit {
@@ -118,7 +123,9 @@ class Icp {
   }
   double objective(const Fit& fit, double scale) const;
   Normal normal_equations(const Fit& fit, double scale) const;
-  Vec6 step(const Fit& fit, const Normal& normal) const;
+  // An axis with less than `threshold` of curvature takes no step from the data.
+  Vec6 step(const Fit& fit, const Normal& normal, double threshold, bool rotation) const;
+  double left_out_rotation(const Fit& fit, const Normal& normal, double threshold) const;
   double start_scale(const Fit& fit) const;
   bool is_small(const Vec6& xi) const {
     return xi.head<3>().norm() <= options_.rotation_tolerance_deg * kRadiansPerDegree &&
@@ -180,13 +187,12 @@ Normal Icp::normal_equations(const Fit& fit, double scale) const {
 // Gauss-Newton. Along axes that the data do not show, the facets of the surface and the noise would still
 // pull the pose a little way in an arbitrary direction: there only the prior speaks. Rotation goes first:
 // where it can be traded against translation (a sphere seen from one side), the translation does the work.
-Vec6 Icp::step(const Fit& fit, const Normal& normal) const {
-  const double threshold = options_.observability_ratio * largest_eigenvalue(normal.hessian);
+Vec6 Icp::step(const Fit& fit, const Normal& normal, double threshold, bool rotates) const {
   Mat6 keep = Mat6::Identity();
   const Eigen::SelfAdjointEigenSolver<Mat3> rotation(rotation_information(normal.hessian));
   for (int k = 0; k < 3; ++k) {
     const Vec3 axis = rotation.eigenvectors().col(k);
-    if (rotation.eigenvalues()[k] < threshold)
+    if (!rotates || rotation.eigenvalues()[k] < threshold)
       keep.topLeftCorner<3, 3>() -= axis * axis.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Mat6> data(keep * normal.hessian * keep);
@@ -229,7 +235,8 @@ IcpResult Icp::run() const {
   while (result.iterations < options_.max_iterations) {
     ++result.iterations;
     const Normal normal = normal_equations(current, scale);
-    Vec6 xi = step(current, normal);
+    const double threshold = options_.observability_ratio * largest_eigenvalue(normal.hessian);
+    Vec6 xi = step(current, normal, threshold, options_.rotation);
     // Correspondences change under the step; halve it until the objective itself goes down.
     const double before = objective(current, scale);
     Fit next = fit(rigid_increment(xi, normal.centre) * current.T);
@@ -258,15 +265,40 @@ void Icp::summarise(const Fit& fit, IcpResult& result) const {
   }
   result.rms_mm = weights > 0.0 ? std::sqrt(sum / weights) : 0.0;
 
-  const Mat6 hessian = normal_equations(fit, options_.welsch_scale_mm).hessian;
+  const Normal normal = normal_equations(fit, options_.welsch_scale_mm);
+  const Mat6& hessian = normal.hessian;
   const Vec6 eigenvalues =
       Eigen::SelfAdjointEigenSolver<Mat6>(hessian, Eigen::EigenvaluesOnly).eigenvalues();
-  if (!(eigenvalues[5] > 0.0)) return;  // every point is an outlier: nothing is observable
+  if (!(eigenvalues[5] > 0.0)) {  // every point is an outlier: nothing is observable
+    result.left_out_rotation_mm =
+        left_out_rotation(fit, normal, std::numeric_limits<double>::min());
+    return;
+  }
   const double threshold = options_.observability_ratio * eigenvalues[5];
   for (const double value : eigenvalues) result.observable_axes += value >= threshold ? 1 : 0;
   const Eigen::SelfAdjointEigenSolver<Mat3> rotation(rotation_information(hessian),
                                                      Eigen::EigenvaluesOnly);
   result.rotation_observable = rotation.eigenvalues()[0] >= threshold;
+  result.left_out_rotation_mm = left_out_rotation(fit, normal, threshold);
+}
+
+double Icp::left_out_rotation(const Fit& fit, const Normal& normal, double threshold) const {
+  const VecX information = Eigen::SelfAdjointEigenSolver<Mat3>(rotation_information(normal.hessian),
+                                                               Eigen::EigenvaluesOnly)
+                               .eigenvalues();
+  if (options_.rotation && information[0] >= threshold) return 0.0;
+  const Vec6 missed = step(fit, normal, 0.0, true);
+  const Points arms = fit.moved.colwise() - normal.centre;
+  double greatest = 0.0;
+  for (const auto& arm : arms.colwise()) {
+    const Vec3 move = missed.head<3>().cross(Vec3(arm)) + missed.tail<3>();
+    greatest = std::max(greatest, move.norm());
+  }
+  // The least visible axis is among those left out.
+  const double known =
+      std::max(0.0, information[0]) * normal.radius_mm * normal.radius_mm + prior_information_;
+  const double arm_mm = arms.colwise().norm().maxCoeff();
+  return kStepSafety * greatest + kStandardDeviations * arm_mm / std::sqrt(known);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ struct IcpOptions {
   double sd_mm = 0.5;            // of a boundary point along the normal
   double welsch_scale_mm = 3.0;  // s: residual at which a point's weight falls to exp(-1/2)
   double rotation_sd_deg = 3.0;  // prior; <= 0 switches it off
+  bool rotation = true;          // false: translation only
   double translation_tolerance_mm = 1e-4;
   double rotation_tolerance_deg = 1e-4;
   // An axis whose Hessian eigenvalue (data only, rotation scaled by the point cloud's rms radius) is below
@@ -49,6 +50,11 @@ struct IcpResult {
   int observable_axes = 0;  // of 6
   // All three rotation axes, the translation being unknown too.
   bool rotation_observable = false;
+  // What rotation axes that took no step from the data (switched off, or not observable) may move a boundary
+  // point, mm: twice the greatest move in the Gauss-Newton step with all axes that was not taken, plus two
+  // standard deviations of the rotation about those axes, given data and prior, at the farthest point.
+  // 0 when every axis was estimated; infinite without data and prior.
+  double left_out_rotation_mm = 0.0;
 };
 
 // points: 3 x m, m >= 3 and not collinear, finite; else kInvalidArgument / kNotFinite naming the count.

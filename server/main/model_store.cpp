@@ -10,6 +10,8 @@
 #include "common/inversion/condensed_exact.hpp"
 #include "common/inversion/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/scene/scene_plan.hpp"
+#include "server/pipeline/left_out.hpp"
 #include "server/pipeline/pipeline.hpp"
 
 namespace brainshift::server {
@@ -26,8 +28,9 @@ double seconds_since(Clock::time_point start) {
 
 // The pipeline as the function that a session calls.
 Result<Prepared> with_pipeline(const std::shared_ptr<const BrainModel>& model,
-                               const CaseConfig& config, Boundary boundary, InvertFunction invert) {
-  auto pipeline = Pipeline::build(model, config, boundary, std::move(invert));
+                               const CaseConfig& config, Boundary boundary, InvertFunction invert,
+                               OmissionFunction omissions = {}) {
+  auto pipeline = Pipeline::build(model, config, boundary, std::move(invert), std::move(omissions));
   if (!pipeline) return tl::unexpected(pipeline.error());
   auto shared = std::make_shared<const Pipeline>(std::move(*pipeline));
   Prepared prepared;
@@ -35,6 +38,20 @@ Result<Prepared> with_pipeline(const std::shared_ptr<const BrainModel>& model,
     return shared->run(observation, options);
   };
   return prepared;
+}
+
+// The parts that the scene's plan leaves out, for the condensed method.
+inversion::CondensedOptions condensed_options(const scene::ScenePlan& plan, const BrainModel& model,
+                                              const CaseConfig& config) {
+  inversion::CondensedOptions options;
+  options.contact = plan.contact;
+  options.uncertainty = plan.uncertainty;
+  options.gravity_modes = plan.gravity_modes;
+  if (!plan.far_field) {
+    options.region_of_interest =
+        scene::region_of_interest(model, config.scene.region_of_interest_mm);
+  }
+  return options;
 }
 
 }  // namespace
@@ -88,22 +105,28 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(Boundary
   return shared;
 }
 
-Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& request) {
+Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& request,
+                                               const scene::ScenePlan& plan) {
   const auto operators = condensed(request.boundary);
   if (!operators) return tl::unexpected(operators.error());
-  auto made = CondensedInverter::build(*operators, locator_, config_);
+  auto made = CondensedInverter::build(*operators, locator_, config_,
+                                       condensed_options(plan, *model_, config_));
   if (!made) return tl::unexpected(made.error());
   auto inverter = std::make_shared<CondensedInverter>(std::move(*made));
   auto scratch = std::make_shared<Estimate>();  // its memory is reused from update to update
-  auto prepared =
-      with_pipeline(model_, config_, request.boundary,
-                    [inverter, scratch](const SparseData& data,
-                                        const inversion::InversionOptions&) -> Result<Estimate> {
-                      if (auto status = inverter->update(data, *scratch); !status) {
-                        return tl::unexpected(status.error());
-                      }
-                      return *scratch;
-                    });
+  auto prepared = with_pipeline(
+      model_, config_, request.boundary,
+      [inverter, scratch](const SparseData& data,
+                          const inversion::InversionOptions&) -> Result<Estimate> {
+        if (auto status = inverter->update(data, *scratch); !status) {
+          return tl::unexpected(status.error());
+        }
+        return *scratch;
+      },
+      [inverter, config = config_, boundary = request.boundary](const Estimate& estimate) {
+        return inversion_omissions(config, boundary, inverter->omission_errors(),
+                                   estimate.contact.active);
+      });
   if (!prepared) return prepared;
   prepared->begin = [inverter] { inverter->reset(); };
   prepared->info.model_bytes = (*operators)->bytes();
@@ -134,9 +157,10 @@ Result<Prepared> ModelStore::prepare_condensed_exact(const wire::SessionRequest&
   return prepared;
 }
 
-Result<Prepared> ModelStore::prepare_for_method(const wire::SessionRequest& request) {
+Result<Prepared> ModelStore::prepare_for_method(const wire::SessionRequest& request,
+                                                const scene::ScenePlan& plan) {
   switch (request.method) {
-    case Method::kCondensed: return prepare_condensed(request);
+    case Method::kCondensed: return prepare_condensed(request, plan);
     case Method::kCondensedExact: return prepare_condensed_exact(request);
     default: return prepare_iterative(request);
   }
@@ -157,7 +181,9 @@ Result<Prepared> ModelStore::prepare_iterative(const wire::SessionRequest& reque
 
 Result<Prepared> ModelStore::prepare(const wire::SessionRequest& request) {
   const auto start = Clock::now();
-  auto prepared = prepare_for_method(request);
+  const auto plan = scene::plan_scene(config_, request.method, request.boundary);
+  if (!plan) return tl::unexpected(plan.error());
+  auto prepared = prepare_for_method(request, *plan);
   if (!prepared) return prepared;
   const wire::SessionInfo common = info();
   const wire::SessionInfo own = prepared->info;

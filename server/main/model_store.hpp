@@ -14,6 +14,7 @@
 #include "common/core/error.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/prepared_model.hpp"
+#include "common/scene/scene_plan.hpp"
 #include "server/session/session.hpp"
 
 namespace brainshift::server {
@@ -24,16 +25,19 @@ class ModelStore {
   ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
              std::vector<CondensedOperators> operators);
 
-  // A pipeline for the request's method and boundary. Errors as PreparedModel::prepare and condense.
+  // A pipeline for the request's method and boundary, with the parts that the scene carries. Errors as
+  // scene::plan_scene, PreparedModel::prepare and condense.
   Result<Prepared> prepare(const wire::SessionRequest& request);
 
  private:
   Result<std::shared_ptr<const inversion::PreparedModel>> factorised(Boundary boundary);
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary);
-  Result<Prepared> prepare_condensed(const wire::SessionRequest& request);
+  Result<Prepared> prepare_for_method(const wire::SessionRequest& request,
+                                      const scene::ScenePlan& plan);
+  Result<Prepared> prepare_condensed(const wire::SessionRequest& request,
+                                     const scene::ScenePlan& plan);
   Result<Prepared> prepare_condensed_exact(const wire::SessionRequest& request);
   Result<Prepared> prepare_iterative(const wire::SessionRequest& request);
-  Result<Prepared> prepare_for_method(const wire::SessionRequest& request);
   wire::SessionInfo info() const;
 
   std::shared_ptr<const BrainModel> model_;

@@ -21,6 +21,7 @@
 #include "common/io/config_file.hpp"
 #include "common/io/model_file.hpp"
 #include "common/scene/brain_model_builder.hpp"
+#include "common/scene/scene_plan.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
 
@@ -111,6 +112,9 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto status = check_output(arguments.out); !status) return tl::unexpected(status.error());
   auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
+  if (auto plan = scene::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
+    return tl::unexpected(plan.error());
+  }
 
   Outcome outcome;
   auto start = Clock::now();

@@ -3,17 +3,27 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
+
+#include "common/inversion/set_search.hpp"
 
 namespace brainshift::server {
 namespace {
 
 constexpr double kHydraulicConductivity_m3s_kg = 1e-7;  // Table 1
-// The drained field agrees with Biot's to about 0.02 % in energy from five consolidation times on
-// (docs/DESIGN 3.1: 10 s at 2 s).
-constexpr double kDrainedAfterTimes = 5.0;
+
+// Seconds after which at most the given fraction is missing.
+double drained_after_s(double fraction, double consolidation_s) {
+  return -4.0 / (std::numbers::pi * std::numbers::pi) * std::log(fraction) * consolidation_s;
+}
+
+std::string at_most_mm(double error_mm) {
+  return std::isfinite(error_mm) ? fmt::format("at most about {:.2f} mm", error_mm)
+                                 : std::string("unknown");
+}
 
 double volume_mm3(const TetMesh& mesh) {
   double six_volumes = 0.0;
@@ -38,6 +48,10 @@ double consolidation_time_s(const TetMesh& mesh, const Material& material) {
   return radius_m * radius_m / c_v_m2_s;
 }
 
+double undrained_fraction(double seconds, double consolidation_time_s) {
+  return std::exp(-std::numbers::pi * std::numbers::pi / 4.0 * seconds / consolidation_time_s);
+}
+
 std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
                                       Method method, Boundary boundary) {
   const double drained_s = consolidation_time_s(model.mesh, config.material);
@@ -47,12 +61,16 @@ std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig&
        fmt::format("drained limit: pore pressure relaxes in about {:.1f} s (R^2/c_v), faster than "
                    "updates follow each other",
                    drained_s),
-       fmt::format("about 0.02 % in energy for updates at least {:.0f} s apart",
-                   std::ceil(kDrainedAfterTimes * drained_s))});
-  if (method == Method::kPaper) {
+       fmt::format("at most 1 % of the displacement by a load {:.1f} s old, 0.01 % after {:.1f} s",
+                   drained_after_s(0.01, drained_s), drained_after_s(0.0001, drained_s))});
+  const char* unaffected =
+      "none: displacements are unaffected, their standard deviation is unknown";
+  if (method != Method::kCondensed) {
     omissions.push_back(
-        {"uncertainty", "method paper computes no posterior covariance",
-         "none: displacements are unaffected, their standard deviation is unknown"});
+        {"uncertainty",
+         fmt::format("method {} computes no posterior covariance", to_string(method)), unaffected});
+  } else if (config.scene.uncertainty == Carry::kOff) {
+    omissions.push_back({"uncertainty", "scene.uncertainty = off", unaffected});
   }
   if (boundary == Boundary::kFixed) {
     omissions.push_back({"contact",
@@ -62,10 +80,56 @@ std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig&
   return omissions;
 }
 
-std::vector<Omission> registration_omissions(const registration::IcpResult& icp,
+std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary boundary,
+                                          const inversion::OmissionErrors& errors,
+                                          int active_slaves) {
+  const SceneConfig& scene = config.scene;
+  std::vector<Omission> omissions;
+  if (boundary == Boundary::kContact && scene.contact == Carry::kOff) {
+    const double nearest = errors.nearest_slave_mm;
+    omissions.push_back(
+        {"contact",
+         nearest < 0.0
+             ? fmt::format("scene.contact = off; the brain reaches {:.2f} mm into the skull",
+                           -nearest)
+             : fmt::format("scene.contact = off; the brain stays {:.2f} mm off the skull", nearest),
+         at_most_mm(errors.contact_mm)});
+  } else if (boundary == Boundary::kContact && scene.contact == Carry::kAuto &&
+             active_slaves == 0 && errors.nearest_slave_mm > -inversion::kContactTolerance_mm) {
+    omissions.push_back({"contact",
+                         fmt::format("no slave touches: the nearest stays {:.2f} mm off the skull",
+                                     std::max(0.0, errors.nearest_slave_mm)),
+                         at_most_mm(errors.contact_mm)});
+  }
+  const bool has_modes =
+      config.prior.gravity_mode_sd > 0.0 && !config.prior.gravity_levels_mm.empty();
+  if (!has_modes) {
+    omissions.push_back(
+        {"gravity modes",
+         fmt::format("prior.gravity_mode_sd = {:g} with {} gravity_levels_mm",
+                     config.prior.gravity_mode_sd, config.prior.gravity_levels_mm.size()),
+         "none under the prior of the case"});
+  } else if (scene.gravity_modes == Carry::kOff) {
+    omissions.push_back(
+        {"gravity modes", "scene.gravity_modes = off", at_most_mm(errors.gravity_modes_mm)});
+  }
+  if (scene.far_field == Carry::kOff) {
+    omissions.push_back(
+        {"far field",
+         fmt::format("scene.far_field = off: interpolated beyond {:g} mm from the tumour",
+                     scene.region_of_interest_mm),
+         at_most_mm(errors.far_field_mm)});
+  }
+  return omissions;
+}
+
+std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
                                              double rotation_prior_sd_deg) {
   std::vector<Omission> omissions;
-  if (!icp.rotation_observable) {
+  const std::string size = at_most_mm(icp.left_out_rotation_mm) + " at the tumour's surface";
+  if (rotation == Carry::kOff) {
+    omissions.push_back({"rotation", "scene.rotation = off: only a translation is aligned", size});
+  } else if (rotation == Carry::kAuto && !icp.rotation_observable) {
     const std::string held =
         rotation_prior_sd_deg > 0.0
             ? fmt::format("held by a prior of {:.1f} deg", rotation_prior_sd_deg)
@@ -73,10 +137,7 @@ std::vector<Omission> registration_omissions(const registration::IcpResult& icp,
     omissions.push_back({"rotation",
                          fmt::format("the boundary shows {} of 6 rigid motions; the others are {}",
                                      icp.observable_axes, held),
-                         rotation_prior_sd_deg > 0.0
-                             ? fmt::format("about {:.2f} mm per 10 mm from the tumour's centre",
-                                           10.0 * rotation_prior_sd_deg * std::numbers::pi / 180.0)
-                             : std::string("unknown")});
+                         size});
   }
   if (!icp.converged) {
     omissions.push_back({"registration convergence",

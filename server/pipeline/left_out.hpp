@@ -2,12 +2,12 @@
 // What an update leaves out of the physics, why, and how much that costs.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/core/brain_model.hpp"
 #include "common/core/case_config.hpp"
 #include "common/core/estimate.hpp"
+#include "common/inversion/omission_errors.hpp"
 #include "common/registration/icp.hpp"
 
 namespace brainshift::server {
@@ -16,12 +16,23 @@ namespace brainshift::server {
 // dimension; R is the radius of the ball with the mesh's volume, k = 1e-7 m^3 s/kg (Table 1). Seconds.
 double consolidation_time_s(const TetMesh& mesh, const Material& material);
 
+// Upper bound of the part of a load's final displacement that is still missing `seconds` after it was applied:
+// exp(-(pi^2/4) t/T), T the consolidation time. Terzaghi's series for a layer of thickness R that drains on one
+// side, 8/pi^2 sum exp(-(2m+1)^2 (pi^2/4) t/T) / (2m+1)^2, with every exponential replaced by the first.
+double undrained_fraction(double seconds, double consolidation_time_s);
+
 // Fixed by case, method and boundary: pressure, uncertainty, and contact under the fixed boundary.
 std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
                                       Method method, Boundary boundary);
 
-// What the alignment of one observation could not see: unobservable rotation, no convergence.
-std::vector<Omission> registration_omissions(const registration::IcpResult& icp,
+// What one inversion left out: contact (forced off, or no slave touched), gravity modes, far field.
+std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary boundary,
+                                          const inversion::OmissionErrors& errors,
+                                          int active_slaves);
+
+// What the alignment of one observation did not estimate: rotation (switched off, or not observable); or that it
+// did not converge.
+std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
                                              double rotation_prior_sd_deg);
 
 }  // namespace brainshift::server

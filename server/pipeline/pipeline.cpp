@@ -19,24 +19,27 @@ double milliseconds_since(Clock::time_point start) {
 }  // namespace
 
 Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                   Boundary boundary, InvertFunction invert, geometry::ClosestPointIndex tumour)
+                   Boundary boundary, InvertFunction invert, OmissionFunction omissions,
+                   geometry::ClosestPointIndex tumour)
     : model_(std::move(model)),
       config_(config),
       boundary_(boundary),
       invert_(std::move(invert)),
+      omissions_(std::move(omissions)),
       tumour_(std::move(tumour)) {}
 
 Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                                 Boundary boundary, InvertFunction invert) {
+                                 Boundary boundary, InvertFunction invert,
+                                 OmissionFunction omissions) {
   auto tumour = geometry::ClosestPointIndex::build(model->tumour);
   if (!tumour) return tl::unexpected(tumour.error());
-  return Pipeline(std::move(model), config, boundary, std::move(invert), std::move(*tumour));
+  return Pipeline(std::move(model), config, boundary, std::move(invert), std::move(omissions),
+                  std::move(*tumour));
 }
 
 Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) const {
   const auto register_start = Clock::now();
-  const auto registered =
-      register_observation(observation, tumour_, config_.inversion, options.method);
+  const auto registered = register_observation(observation, tumour_, config_, options.method);
   if (!registered) return tl::unexpected(registered.error());
 
   Update update;
@@ -48,8 +51,8 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   update.left_out = model_omissions(*model_, config_, options.method, boundary_);
   if (registered->icp) {
     update.T_undeformed_deformed = registered->icp->T_surface_points;
-    for (auto& omission :
-         registration_omissions(*registered->icp, registration::IcpOptions{}.rotation_sd_deg)) {
+    for (auto& omission : registration_omissions(*registered->icp, config_.scene.rotation,
+                                                 registration::IcpOptions{}.rotation_sd_deg)) {
       update.left_out.push_back(std::move(omission));
     }
   }
@@ -71,6 +74,11 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   if (!estimate) return tl::unexpected(estimate.error());
   update.final = true;
   update.estimate = std::move(*estimate);
+  if (omissions_) {
+    for (auto& omission : omissions_(update.estimate)) {
+      update.left_out.push_back(std::move(omission));
+    }
+  }
   update.timings.rebuild_ms = update.estimate.rebuild_ms;
   update.timings.invert_ms = milliseconds_since(invert_start) - update.timings.rebuild_ms;
   return update;

@@ -24,6 +24,9 @@ namespace brainshift::server {
 using InvertFunction =
     std::function<Result<Estimate>(const SparseData&, const inversion::InversionOptions&)>;
 
+// What the last inversion left out; called after each one that succeeded.
+using OmissionFunction = std::function<std::vector<Omission>(const Estimate&)>;
+
 struct RunOptions {
   Method method = Method::kPaper;
   // Called on the running thread with each iterate (final == false); may be empty.
@@ -35,7 +38,8 @@ class Pipeline {
  public:
   // Indexes the tumour surface; kEmptySet / kNotFinite when the model has no usable one.
   static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                                Boundary boundary, InvertFunction invert);
+                                Boundary boundary, InvertFunction invert,
+                                OmissionFunction omissions = {});
 
   // Fills everything of an Update except its sequence number and the encode and journal times, which
   // belong to later stages. Errors of registration and inversion pass through unchanged.
@@ -43,12 +47,13 @@ class Pipeline {
 
  private:
   Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Boundary boundary,
-           InvertFunction invert, geometry::ClosestPointIndex tumour);
+           InvertFunction invert, OmissionFunction omissions, geometry::ClosestPointIndex tumour);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;
   Boundary boundary_;
   InvertFunction invert_;
+  OmissionFunction omissions_;
   geometry::ClosestPointIndex tumour_;
 };
 

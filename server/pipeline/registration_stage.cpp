@@ -47,16 +47,19 @@ double datum_sd_mm(double observed_mm, const InversionConfig& config, Method met
 
 Result<RegisteredObservation> from_tumour_boundary(const TumourBoundary& boundary,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config, Method method) {
+                                                   const CaseConfig& config, Method method) {
   registration::IcpOptions options;
+  options.rotation = config.scene.rotation != Carry::kOff;
+  if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
   if (boundary.sd_mm > 0.0) options.sd_mm = boundary.sd_mm;
   // The points arrive tracked, in patient RAS, so the identity is the tracked pose.
   auto icp = registration::align(boundary.points, tumour, RigidTransform::Identity(), options);
   if (!icp) return tl::unexpected(icp.error());
   const SparseData all = registration::sparse_data_from_alignment(
-      boundary.points, icp->T_surface_points, datum_sd_mm(boundary.sd_mm, config, method));
+      boundary.points, icp->T_surface_points,
+      datum_sd_mm(boundary.sd_mm, config.inversion, method));
   RegisteredObservation registered;
-  registered.data = select(all, guiding_points(all.size(), config.sparse_points));
+  registered.data = select(all, guiding_points(all.size(), config.inversion.sparse_points));
   registered.icp = *icp;
   return registered;
 }
@@ -88,18 +91,22 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
 
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config, Method method) {
+                                                   const CaseConfig& config, Method method) {
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
     return from_tumour_boundary(*boundary, tumour, config, method);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
-    return from_landmarks(*pairs, config, method);
+    return from_landmarks(*pairs, config.inversion, method);
   }
-  const char* kind = std::holds_alternative<CorticalSurface>(observation.body) ? "cortical_surface"
-                                                                               : "patient_pose";
+  const bool surface = std::holds_alternative<CorticalSurface>(observation.body);
+  if (surface && config.scene.surface == Carry::kOff) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
+                            observation.sequence));
+  }
   return fail(ErrorCode::kInvalidArgument,
               fmt::format("observation {}: a {} is not assimilated in this version",
-                          observation.sequence, kind));
+                          observation.sequence, surface ? "cortical_surface" : "patient_pose"));
 }
 
 }  // namespace brainshift::server

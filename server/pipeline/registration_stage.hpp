@@ -3,9 +3,10 @@
 //
 //   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then a random
 //                    subset of inversion.sparse_points boundary points (paper 2.6), always the same one for
-//                    the same number of points
+//                    the same number of points. scene.rotation = off: translation only; on: about every axis,
+//                    however little the points show of it
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
-//   CorticalSurface, PatientPose   refused: method paper does not assimilate them
+//   CorticalSurface, PatientPose   refused: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the observation's own
 // where that is larger; the paper's method and its variants take the former whatever the observation says.
@@ -33,7 +34,7 @@ struct RegisteredObservation {
 // kNotFinite: NaN or infinity. The sentence names the observation's source and the count.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const geometry::ClosestPointIndex& tumour,
-                                                   const InversionConfig& config,
+                                                   const CaseConfig& config,
                                                    Method method = Method::kCondensed);
 
 }  // namespace brainshift::server

@@ -377,5 +377,78 @@ TEST(SparseDataFromAlignment, LeadsFromTheUndeformedToTheTracedPlace) {
   EXPECT_EQ(sparse_data_from_alignment(Points(3, 0), T, 0.4).size(), 0);
 }
 
+TEST(Icp, TranslationOnlyKeepsTheOrientationAndFindsATranslation) {
+  const TriangleSurface surface = bumpy();
+  const auto index = index_of(surface);
+  Random random(3);
+  const RigidTransform T_points_surface = motion(random, 4.0, 0.0);
+  IcpOptions options;
+  options.rotation = false;
+  const auto result = align(traced(surface.vertices, T_points_surface, 0.0, random), index,
+                            RigidTransform::Identity(), options);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_TRUE(result->T_surface_points.linear().isIdentity(1e-12));
+  EXPECT_LT((T_points_surface.translation() + result->T_surface_points.translation()).norm(), 1e-3);
+  EXPECT_TRUE(result->rotation_observable);
+}
+
+// The true difference: where the aligned points go with rotation and without.
+TEST(Icp, EstimateForRotationLeftOutBoundsTheTrueDifference) {
+  Random random(11);
+  double greatest = 0.0;
+  for (const TriangleSurface& surface : {ellipsoid(), bumpy()}) {
+    const auto index = index_of(surface);
+    for (const double rotation_deg : {0.0, 3.0, 10.0}) {
+      for (int repetition = 0; repetition < 2; ++repetition) {
+        const Points points =
+            traced(surface.vertices, motion(random, 2.0, rotation_deg), 0.3, random);
+        IcpOptions options;
+        const auto with = align(points, index, RigidTransform::Identity(), options);
+        options.rotation = false;
+        const auto without = align(points, index, RigidTransform::Identity(), options);
+        ASSERT_TRUE(with && without);
+        const double truth =
+            placement_error(with->T_surface_points, without->T_surface_points, points);
+        EXPECT_LE(truth, without->left_out_rotation_mm) << rotation_deg;
+        EXPECT_LE(without->left_out_rotation_mm, 10.0 * std::max(0.3, truth)) << rotation_deg;
+        EXPECT_EQ(with->left_out_rotation_mm, 0.0);
+        greatest = std::max(greatest, truth);
+      }
+    }
+  }
+  EXPECT_GT(greatest, 1.0);
+}
+
+// A ball shows no rotation: the true motion may be anything that the prior allows, two standard deviations of it.
+TEST(Icp, EstimateForUnobservableRotationBoundsRotationsWithinThePrior) {
+  const TriangleSurface ball = geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 12), 1.5);
+  const auto index = index_of(ball);
+  Random random(5);
+  for (const double rotation_deg : {1.0, 3.0, 6.0}) {
+    const RigidTransform T_points_surface = motion(random, 2.0, rotation_deg);
+    const Points points = traced(ball.vertices, T_points_surface, 0.0, random);
+    const auto result = align(points, index, RigidTransform::Identity());
+    ASSERT_TRUE(result.has_value());
+    ASSERT_FALSE(result->rotation_observable);
+    const double truth =
+        placement_error(result->T_surface_points, T_points_surface.inverse(), points);
+    EXPECT_GT(truth, 0.1);
+    EXPECT_LE(truth, result->left_out_rotation_mm) << rotation_deg;
+    EXPECT_LE(result->left_out_rotation_mm, 2.5);
+  }
+}
+
+TEST(Icp, RotationThatNothingHoldsHasNoBound) {
+  const TriangleSurface surface = ellipsoid();
+  IcpOptions options = without_prior();
+  // Every point an outlier: no information.
+  const Points far = surface.vertices.colwise() + Vec3(0, 0, 1e4);
+  options.max_iterations = 1;
+  options.welsch_scale_mm = 1e-3;
+  const auto result = align(far, index_of(surface), RigidTransform::Identity(), options);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->left_out_rotation_mm, std::numeric_limits<double>::infinity());
+}
+
 }  // namespace
 }  // namespace brainshift::registration

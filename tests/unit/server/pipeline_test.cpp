@@ -164,7 +164,7 @@ TEST(Pipeline, FewerBoundaryPointsThanWantedAreAllUsed) {
             std::get<TumourBoundary>(observation.body).points.cols());
 }
 
-TEST(Pipeline, RefusesWhatMethodPaperDoesNotAssimilate) {
+TEST(Pipeline, RefusesWhatIsNotAssimilated) {
   const FakeInversion inversion;
   Observation observation = landmarks(1);
   observation.body = CorticalSurface{};
@@ -172,6 +172,12 @@ TEST(Pipeline, RefusesWhatMethodPaperDoesNotAssimilate) {
   ASSERT_FALSE(surface.has_value());
   EXPECT_EQ(surface.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(surface.error().message, HasSubstr("cortical_surface is not assimilated"));
+  CaseConfig without_surface;
+  without_surface.scene.surface = Carry::kOff;
+  const auto off = pipeline(inversion, Boundary::kContact, without_surface).run(observation, {});
+  ASSERT_FALSE(off.has_value());
+  EXPECT_EQ(off.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(off.error().message, HasSubstr("scene.surface = off"));
   observation.body = PatientPose{};
   const auto pose = pipeline(inversion).run(observation, {});
   ASSERT_FALSE(pose.has_value());
@@ -262,6 +268,72 @@ TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
   EXPECT_TRUE(leaves_out(*update, "rotation"));
 }
 
+TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
+  for (const Method method : kAllMethods) {
+    RunOptions options;
+    options.method = method;
+    const auto update = pipeline(FakeInversion{}).run(landmarks(1), options);
+    ASSERT_TRUE(update.has_value());
+    EXPECT_EQ(leaves_out(*update, "uncertainty"), method != Method::kCondensed)
+        << to_string(method);
+  }
+  CaseConfig off;
+  off.scene.uncertainty = Carry::kOff;
+  RunOptions options;
+  options.method = Method::kCondensed;
+  const auto update = pipeline(FakeInversion{}, Boundary::kContact, off).run(landmarks(1), options);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_TRUE(leaves_out(*update, "uncertainty"));
+}
+
+TEST(Pipeline, ListsWhatTheInversionLeftOut) {
+  const auto built = Pipeline::build(model(), {}, Boundary::kContact, FakeInversion{},
+                                     [](const Estimate& estimate) -> std::vector<Omission> {
+                                       EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+                                       return {{"far field", "why", "how much"}};
+                                     });
+  ASSERT_TRUE(built.has_value());
+  const auto update = built->run(landmarks(1), {});
+  ASSERT_TRUE(update.has_value());
+  EXPECT_TRUE(leaves_out(*update, "far field"));
+}
+
+TEST(Pipeline, RotationForcedOffAlignsATranslationAndSaysSo) {
+  auto long_tumour = std::make_shared<BrainModel>(*model());
+  long_tumour->tumour = ellipsoid({20, 10, 15});
+  Observation observation = landmarks(1);
+  observation.body = TumourBoundary{
+      Eigen::AngleAxisd(0.05, Vec3::UnitZ()).toRotationMatrix() * long_tumour->tumour.vertices,
+      0.5};
+  const auto run = [&](Carry rotation) {
+    CaseConfig config;
+    config.scene.rotation = rotation;
+    const auto built = Pipeline::build(long_tumour, config, Boundary::kContact, FakeInversion{});
+    EXPECT_TRUE(built.has_value());
+    return built->run(observation, {});
+  };
+  const auto with = run(Carry::kAuto), without = run(Carry::kOff);
+  ASSERT_TRUE(with && without);
+  EXPECT_FALSE(leaves_out(*with, "rotation"));
+  EXPECT_GT((with->T_undeformed_deformed.linear() - Mat3::Identity()).norm(), 0.03);
+  EXPECT_TRUE(leaves_out(*without, "rotation"));
+  EXPECT_TRUE(without->T_undeformed_deformed.linear().isIdentity(1e-12));
+}
+
+TEST(Pipeline, RotationForcedOnIsNotLeftOutWhereASphereCannotShowIt) {
+  auto sphere = std::make_shared<BrainModel>(*model());
+  sphere->tumour = ellipsoid({10, 10, 10});
+  CaseConfig on;
+  on.scene.rotation = Carry::kOn;
+  const auto built = Pipeline::build(sphere, on, Boundary::kContact, FakeInversion{});
+  ASSERT_TRUE(built.has_value());
+  Observation observation = landmarks(1);
+  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
+  const auto update = built->run(observation, {});
+  ASSERT_TRUE(update.has_value());
+  EXPECT_FALSE(leaves_out(*update, "rotation"));
+}
+
 TEST(Pipeline, NeedsATumourSurface) {
   auto without = std::make_shared<BrainModel>(*model());
   without->tumour = {};
@@ -280,6 +352,27 @@ TEST(ConsolidationTime, GrowsWithTheSquareOfTheSize) {
   const double small = consolidation_time_s(cube(50.0), Material{});
   ASSERT_GT(small, 0.0);
   EXPECT_NEAR(consolidation_time_s(cube(100.0), Material{}) / small, 4.0, 1e-12);
+}
+
+// Terzaghi's layer of thickness 1, drained at x = 0, sealed at x = 1, in finite differences: the pressure that is
+// left is the settlement that is missing.
+TEST(UndrainedFraction, BoundsWhatALayerThatConsolidatesIsMissing) {
+  constexpr int kCells = 100;
+  constexpr double kStep = 0.4 / (kCells * kCells);  // explicit Euler is stable below 0.5 h^2
+  VecX pressure = VecX::Ones(kCells);
+  double time = 0.0;
+  for (const double until : {0.01, 0.1, 0.5, 1.0, 2.0}) {
+    for (; time < until; time += kStep) {
+      const VecX old = pressure;
+      for (int i = 0; i < kCells; ++i) {
+        const double below = i == 0 ? -old[0] : old[i - 1];  // p = 0 on the face
+        const double above = i == kCells - 1 ? old[i] : old[i + 1];
+        pressure[i] += kStep * kCells * kCells * (below - 2.0 * old[i] + above);
+      }
+    }
+    EXPECT_LE(pressure.mean(), undrained_fraction(time, 1.0)) << until;
+    EXPECT_GE(pressure.mean(), 0.7 * undrained_fraction(time, 1.0)) << until;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What leaving parts of a scene out saves and costs on the default head: every scenario of the twin without ICP,
+// updates with and without a part; true difference beside the estimate that the inverter gives.
+//   build/release/bin/bench_scenes [case.yaml]
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+
+#include "client/twin/surgery.hpp"
+#include "common/core/statistics.hpp"
+#include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "common/io/config_file.hpp"
+#include "common/scene/brain_model_builder.hpp"
+#include "common/scene/scene_plan.hpp"
+
+namespace brainshift {
+namespace {
+
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (result) return std::move(*result);
+  std::fprintf(stderr, "%s\n", result.error().message.c_str());
+  std::exit(2);
+}
+
+SparseData data_of(const LandmarkPairs& pairs, double sigma_mm) {
+  return {pairs.undeformed, pairs.deformed - pairs.undeformed,
+          VecX::Constant(pairs.undeformed.cols(), sigma_mm)};
+}
+
+struct Part {
+  const char* name;
+  inversion::CondensedOptions options;
+  double inversion::OmissionErrors::*error;  // null: displacements do not change
+};
+
+struct Measured {
+  std::vector<double> invert_ms, rebuild_ms;
+  void add(inversion::CondensedInverter& inverter, const SparseData& data, Estimate& estimate) {
+    for (int i = 0; i < 5; ++i) {  // warm: the set is known from the first on
+      if (auto status = inverter.update(data, estimate); !status) {
+        std::fprintf(stderr, "%s\n", status.error().message.c_str());
+        std::exit(1);
+      }
+      if (i == 0) continue;
+      invert_ms.push_back(estimate.history.back().elapsed_ms);
+      rebuild_ms.push_back(inverter.rebuild_ms());
+    }
+  }
+};
+
+void run(const std::string& case_file) {
+  const CaseConfig config = value_or_exit(io::read_case_config(case_file));
+  const auto model = std::make_shared<const BrainModel>(
+      value_or_exit(scene::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+  const auto prepared =
+      value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
+  const auto operators =
+      std::make_shared<const CondensedOperators>(value_or_exit(inversion::condense(prepared)));
+  const auto locator = std::make_shared<const geometry::TetLocator>(model->mesh);
+
+  std::vector<Part> parts(5);
+  parts[0] = {"everything", {}, nullptr};
+  parts[1] = {"contact", {}, &inversion::OmissionErrors::contact_mm};
+  parts[1].options.contact = false;
+  parts[2] = {"uncertainty", {}, nullptr};
+  parts[2].options.uncertainty = false;
+  parts[3] = {"gravity_modes", {}, &inversion::OmissionErrors::gravity_modes_mm};
+  parts[3].options.gravity_modes = false;
+  parts[4] = {"far_field", {}, &inversion::OmissionErrors::far_field_mm};
+  parts[4].options.region_of_interest =
+      scene::region_of_interest(*model, config.scene.region_of_interest_mm);
+  std::printf("%d nodes, %d slaves, %zu nodes within %.0f mm of the tumour\n",
+              operators->num_nodes(), operators->num_slaves(),
+              parts[4].options.region_of_interest.size(), config.scene.region_of_interest_mm);
+  std::vector<inversion::CondensedInverter> inverters;
+  for (const Part& part : parts) {
+    inverters.push_back(value_or_exit(
+        inversion::CondensedInverter::build(operators, locator, config, part.options)));
+  }
+  std::printf("%-13s%-14s%8s%9s%11s%12s%11s%11s\n", "scenario", "left out", "active", "max mm",
+              "diff mm", "estimate mm", "invert ms", "rebuild ms");
+  for (const char* name : {"paper", "no-contact", "distension", "sag-progress"}) {
+    const auto surgery =
+        value_or_exit(twin::play_scenario(*model, config, *twin::find_scenario(name), 1));
+    const std::size_t step = std::max<std::size_t>(1, surgery.observations.size() / 3);
+    for (std::size_t o = 0; o < surgery.observations.size(); o += step) {
+      const SparseData data =
+          data_of(std::get<LandmarkPairs>(surgery.observations[o].body), config.inversion.sigma_mm);
+      Estimate full, estimate;
+      for (std::size_t p = 0; p < parts.size(); ++p) {
+        Measured measured;
+        inverters[p].reset();
+        measured.add(inverters[p], data, estimate);
+        if (p == 0) full = estimate;
+        const auto& error = parts[p].error;
+        std::printf("%-13s%-14s%8d%9.3f%11.4f%12.4f%11.2f%11.2f\n", name, parts[p].name,
+                    estimate.contact.active, estimate.displacement.colwise().norm().maxCoeff(),
+                    (estimate.displacement - full.displacement).colwise().norm().maxCoeff(),
+                    error != nullptr ? inverters[p].omission_errors().*error : 0.0,
+                    percentile(measured.invert_ms, 50), percentile(measured.rebuild_ms, 50));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  brainshift::run(argc > 1 ? argv[1] : BRAINSHIFT_DEFAULT_CASE);
+  return 0;
+}
