@@ -121,7 +121,8 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
   auto info = client->start_session({.case_id = surgery.case_id,
                                      .method = options.method,
                                      .boundary = boundary,
-                                     .publish_iterates = options.repeat == 1});
+                                     .publish_iterates = options.repeat == 1,
+                                     .measure_full_solve = true});
   if (!info) return tl::unexpected<Error>(info.error());
   auto model = client->model();
   if (!model) return tl::unexpected<Error>(model.error());

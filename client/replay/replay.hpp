@@ -21,7 +21,7 @@ struct ReplayOptions {
   std::filesystem::path report;  // report.json to write; replaced if it exists
   Speed speed = Speed::kMax;
   std::vector<Boundary> boundaries = {Boundary::kContact, Boundary::kFixed};
-  Method method = Method::kPaper;
+  Method method = Method::kCondensed;
   // Each observation is played so many times, in a cycle; above 1 only at Speed::kMax. Iterates are asked for
   // only when it is 1: they would weigh on the latencies that repeating is there to measure.
   int repeat = 1;

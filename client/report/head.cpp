@@ -103,7 +103,11 @@ std::vector<RunGroup> group_runs(const std::vector<ReportedRun>& runs) {
       slot_of(*open, run) = i;
       continue;
     }
-    const std::string base = file_name_from(run.scenario);
+    const bool several_methods = std::any_of(runs.begin(), runs.end(), [&](const ReportedRun& r) {
+      return r.report.scenario == run.scenario && r.report.method != run.method;
+    });
+    const std::string base =
+        file_name_from(several_methods ? run.scenario + "-" + run.method : run.scenario);
     std::string name = base;
     const auto taken = [&] {
       return std::any_of(groups.begin(), groups.end(),

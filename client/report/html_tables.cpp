@@ -37,8 +37,8 @@ class Table {
       : runs_(runs), with_paper_(with_paper) {
     html_ = "<div class=\"scroll\"><table>\n<thead><tr><th></th>";
     for (const ReportedRun& run : runs) {
-      html_ += "<th>" + escape_html(run.report.scenario) + "<br>" +
-               escape_html(run.report.boundary) + "</th>";
+      html_ += "<th>" + escape_html(run.report.scenario) + "<br>" + escape_html(run.report.method) +
+               "<br>" + escape_html(run.report.boundary) + "</th>";
     }
     if (with_paper) {
       for (const char* name : {"contact", "fixed", "ICP, contact"}) {
@@ -147,9 +147,9 @@ std::string error_table(const std::vector<ReportedRun>& runs) {
   add_craniotomy_rows(table);
   add_field_rows(table);
   add_contact_rows(table);
-  table.row("time for the estimate (s)",
+  table.row("time from observation to update (s)",
             [](const RunReport& r) -> std::string {
-              return r.latency_ms ? number(1e-3 * r.latency_ms->p50, 2) : kNothing;
+              return r.latency_ms ? number(1e-3 * r.latency_ms->p50, 3) : kNothing;
             },
             {number(paper::kTime_s, 0)});
   return table.finish();

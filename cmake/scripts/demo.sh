@@ -79,11 +79,14 @@ for scenario in "${scenarios[@]}"; do
     --out "$out/$scenario.surgery"
 done
 for scenario in "${scenarios[@]}"; do
-  step "replay: scenario $scenario, contact and fixed" \
+  step "replay: scenario $scenario, condensed method, contact and fixed" \
     "$bin/brainshift" replay "$out/$scenario.surgery" --endpoint "$endpoint" --boundary both \
     --report "$out/runs/$scenario.json"
 done
-reports=("${scenarios[@]/%/.json}")
+step "replay: scenario paper, the paper's method, contact and fixed" \
+  "$bin/brainshift" replay "$out/paper.surgery" --endpoint "$endpoint" --boundary both \
+  --method paper --report "$out/runs/paper-method.json"
+reports=("${scenarios[@]/%/.json}" paper-method.json)
 step "report: tables and pictures" "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
 step "stop: daemon" stop_daemon
 

@@ -8,8 +8,8 @@ function spread(key) {
   return number(key ".mean", "%.3f") (key ".std" in value ? " +- " number(key ".std", "%.3f") : "")
 }
 BEGIN {
-  layout = "%-11s %-9s %14s %14s %8s %16s %8s %12s %8s\n"
-  printf layout, "scenario", "boundary", "shift mm", "error mm", "tumour %", "craniotomy mm", "cran. %", "penetrating", "p50 s"
+  layout = "%-11s %-10s %-9s %14s %14s %8s %16s %8s %12s %8s\n"
+  printf layout, "scenario", "method", "boundary", "shift mm", "error mm", "tumour %", "craniotomy mm", "cran. %", "penetrating", "p50 s"
 }
 match($0, /^ *"[^"]*":/) {
   depth = (match($0, /[^ ]/) - 1) / 2
@@ -23,9 +23,9 @@ match($0, /^ *"[^"]*":/) {
 }
 /^  [}]/ {
   latency = value["latency_ms.p50"] + 0
-  printf layout, value["scenario"], value["boundary"], spread("error_mm.initial"), spread("error_mm.cross"),
+  printf layout, value["scenario"], value["method"], value["boundary"], spread("error_mm.initial"), spread("error_mm.cross"),
     number("recovery_pct", "%.1f"), spread("error_mm.craniotomy_displacement"),
     number("craniotomy_displacement_recovery_pct", "%.1f"), number("contact.penetrating", "%d"),
-    (latency > 0 ? sprintf("%.1f", latency / 1000) : "-")
+    (latency > 0 ? sprintf("%.3f", latency / 1000) : "-")
   split("", value)
 }

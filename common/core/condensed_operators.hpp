@@ -26,6 +26,7 @@ struct CondensedOperators {
   Boundary boundary = Boundary::kContact;
   std::string model_id;  // of the BrainModel they belong to
 
+  double prepare_s = 0.0;  // time it took to factorise and condense
   int gravity_modes = 0;
   Eigen::MatrixXf modes;            // U, 3n x r, mm
   Eigen::MatrixXf contact_columns;  // G, 3n x s, mm/N

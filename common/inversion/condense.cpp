@@ -92,13 +92,12 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
   }
   std::mutex store_mutex;
   const bool finished = runner.run("contact columns", s, [&](int first, int count, auto& solver) {
-    MatrixXf columns;
-    MatrixXd compliance;
+    MatrixXf columns(rows, count);
+    MatrixXd compliance(s, count);
     bool kept = false;
     if (options.store.load) {
       const std::lock_guard lock(store_mutex);
-      kept = options.store.load(first / kBlock, columns, compliance) && columns.rows() == rows &&
-             columns.cols() == count && compliance.rows() == s && compliance.cols() == count;
+      kept = options.store.load(first / kBlock, columns, compliance);
     }
     if (!kept) {
       MatrixXd loads = MatrixXd::Zero(rows, count), u;
@@ -107,7 +106,6 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
             result.slave_normals.col(first + j);
       }
       solver.solve(loads, u);
-      compliance.resize(s, count);
       for (int j = 0; j < count; ++j) {
         for (int i = 0; i < s; ++i) {
           compliance(i, j) = result.slave_normals.col(i).dot(

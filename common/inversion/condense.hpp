@@ -24,7 +24,7 @@ namespace brainshift::inversion {
 // Keeps finished blocks of contact columns, so that an interrupted preparation can go on. Called by one thread
 // at a time.
 struct BlockStore {
-  // False when block `index` is not kept.
+  // Fills both arrays, which have the shape of the block; false when block `index` is not kept.
   std::function<bool(int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance)> load;
   std::function<void(int index, const Eigen::MatrixXf& columns, const Eigen::MatrixXd& compliance)>
       save;

@@ -6,7 +6,7 @@
 // with W_e = diag(1 / sd^2) and Sigma = W_b^-1 from prior/force_prior.hpp. Iteration k:
 //   1. forward     u = K_p^-1 b_p with the active set of the step before (none at first)
 //   2. contact     slaves that penetrate form the new active set; if it changed, K_p = K + Q^T beta Q is
-//                  refactorised and u = K_p^-1 b_p solved again (eq. 16): one contact iteration per step
+//                  renewed and u = K_p^-1 b_p solved again (eq. 16): one contact iteration per step
 //   3. misfit      e = d - A u; stop if mean_i |e_i^k - e_i^{k-1}| < 0.001 mean_i |e_i^1|          (eq. 17)
 //   4. adjoint     K_p lambda = 2 A^T W_e e                                                       (eq. 5)
 //   5. gradient    g = 2 W_b b - lambda (eq. 6); direction -Sigma g = Sigma lambda - 2 b
@@ -19,13 +19,15 @@
 #include "common/core/error.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/penalised_system.hpp"
 #include "common/inversion/prepared_model.hpp"
 
 namespace brainshift::inversion {
 
-// Preconditions: check_data(data) is ok. Errors as SparseCholesky::refactorise and fem::sampling_matrix.
+// system: of model.forward(), no slave active; the paper's is a RefactorisedSystem.
+// Preconditions: check_data(data) is ok. Errors as the system's, and as Misfit::build.
 Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& data,
-                                  const InversionOptions& options);
+                                  const InversionOptions& options, PenalisedSystem& system);
 
 // Omega and its gradient 2 w - lambda with respect to b (3 x n, in RAS axes, W_b b = w), for a given active
 // set; what steps 2-5 compute, exposed for verification against finite differences.

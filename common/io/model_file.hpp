@@ -15,7 +15,8 @@
 //   /inputs/KEY         one group per input, attributes path, bytes (uint64), crc32 (uint32); model_inputs.hpp
 //   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles}, /tumour/{vertices,triangles},
 //   /sets/{craniotomy,brainstem,slaves,fixed}
-//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes (int32)
+//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes (int32),
+//                                         prepare_s (float64, s)
 //     modes                   r x 3n      float32  mm     U, one mode per row
 //     contact_columns         s x 3n      float32  mm/N   G, one slave per row
 //     compliance_lower        s(s+1)/2    float64  mm/N   Phi: columns of the lower triangle, diagonal first

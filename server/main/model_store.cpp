@@ -77,8 +77,10 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(Boundary
   if (!factor) return tl::unexpected(factor.error());
   spdlog::info("condensing boundary={}: the model file holds no operators for it",
                to_string(boundary));
+  const auto start = Clock::now();
   auto made = inversion::condense(**factor);
   if (!made) return tl::unexpected(made.error());
+  made->prepare_s = (*factor)->timings().total_s + seconds_since(start);
   auto shared = std::make_shared<const CondensedOperators>(std::move(*made));
   condensed_.emplace(boundary, shared);
   return shared;
@@ -103,6 +105,7 @@ Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& reque
   if (!prepared) return prepared;
   prepared->begin = [inverter] { inverter->reset(); };
   prepared->info.model_bytes = (*operators)->bytes();
+  prepared->info.prepare_s = (*operators)->prepare_s;
   return prepared;
 }
 
@@ -125,10 +128,11 @@ Result<Prepared> ModelStore::prepare(const wire::SessionRequest& request) {
   auto prepared = condensed_method ? prepare_condensed(request) : prepare_iterative(request);
   if (!prepared) return prepared;
   const wire::SessionInfo common = info();
-  const std::uint64_t bytes = prepared->info.model_bytes;
+  const wire::SessionInfo own = prepared->info;
   prepared->info = common;
-  prepared->info.model_bytes = bytes;
-  prepared->info.prepare_s = seconds_since(start);
+  prepared->info.model_bytes = own.model_bytes;
+  // What was done before surgery counts.
+  prepared->info.prepare_s = own.prepare_s > 0.0 ? own.prepare_s : seconds_since(start);
   if (!condensed_method || request.measure_full_solve) {
     const auto factor = factorised(request.boundary);
     if (!factor) return tl::unexpected(factor.error());

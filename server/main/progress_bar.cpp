@@ -17,6 +17,8 @@ void ProgressBar::show(std::string_view prefix, std::string_view stage, double f
   if (!new_stage && percent == percent_) return;
   stage_ = name;
   percent_ = percent;
+  const auto now = std::chrono::steady_clock::now();
+  if (new_stage) stage_start_ = now;
   if (style_ == Style::kLines && new_stage) {
     std::printf("%s\n", name.c_str());
     std::fflush(stdout);
@@ -26,8 +28,19 @@ void ProgressBar::show(std::string_view prefix, std::string_view stage, double f
   const auto filled = static_cast<std::size_t>(percent * kWidth / 100);
   const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, '.');
   std::fprintf(stderr, "\r\033[K[%s] %3d %%  %s", bar.c_str(), percent, name.c_str());
+  // As if the rest of the stage went on at the same pace; worth saying from two seconds on.
+  const double elapsed_s = std::chrono::duration<double>(now - stage_start_).count();
+  const double remaining_s = percent > 0 ? elapsed_s * (100 - percent) / percent : 0.0;
+  if (remaining_s >= 2.0) std::fprintf(stderr, ", %.0f s to go", remaining_s);
   std::fflush(stderr);
   drawn_ = true;
+}
+
+void ProgressBar::note(const std::string& text) {
+  clear();
+  if (style_ == Style::kSilent) return;
+  std::fprintf(style_ == Style::kBar ? stderr : stdout, "%s\n", text.c_str());
+  std::fflush(style_ == Style::kBar ? stderr : stdout);
 }
 
 void ProgressBar::clear() {

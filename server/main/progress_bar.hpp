@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Progress of a long command: a bar on stderr that redraws itself, or one line per stage on stdout when
+// Progress of a long command: a bar on stderr that redraws itself with the time its stage still needs, or one line per stage on stdout when
 // stderr is no terminal, so that stderr of a script holds nothing but errors; or nothing.
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <string_view>
 
@@ -21,6 +22,8 @@ class ProgressBar {
 
   // fraction in [0, 1]; `prefix` stands before the stage ("contact: factor").
   void show(std::string_view prefix, std::string_view stage, double fraction);
+  // A line of its own, where the style has lines.
+  void note(const std::string& text);
   // Wipes the bar, so that what is printed next starts on a clean line.
   void clear();
   // A Progress that draws here; must not outlive the bar.
@@ -30,6 +33,7 @@ class ProgressBar {
   Style style_;
   bool drawn_ = false;
   int percent_ = -1;
+  std::chrono::steady_clock::time_point stage_start_;
   std::string stage_;
 };
 

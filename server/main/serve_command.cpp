@@ -43,11 +43,17 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   if (config.model.empty()) return options;
   auto file = io::read_model(config.model);
   if (!file) return tl::unexpected(file.error());
+  const auto notes = io::check_inputs(file->inputs);
+  if (!notes) {
+    return tl::unexpected(
+        Error{notes.error().code, config.model.string() + ": " + notes.error().message});
+  }
+  for (const std::string& note : *notes) spdlog::info("{}", note);
   auto model = std::make_shared<const BrainModel>(std::move(file->model));
   options.model = model;
   options.case_file = file->config.file;
-  auto store = std::make_shared<ModelStore>(model, std::move(file->config),
-                                            std::vector<CondensedOperators>());
+  auto store =
+      std::make_shared<ModelStore>(model, std::move(file->config), std::move(file->condensed));
   options.prepare = [store](const wire::SessionRequest& request) {
     return store->prepare(request);
   };
