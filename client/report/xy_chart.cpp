@@ -154,14 +154,17 @@ void draw_label(cv::Mat& image, const cv::Rect& area, cv::Point2d at, const XyPo
 
 void draw_all(cv::Mat& image, const Frame& frame, const XyChartSpec& spec) {
   std::vector<cv::Rect> taken;
-  const auto shown = [&](const XyPoint& p) { return drawable(p.x, spec.x) && drawable(p.y, spec.y); };
+  const auto shown = [&](const XyPoint& p) {
+    return drawable(p.x, spec.x) && drawable(p.y, spec.y);
+  };
   for (const XySeries& series : spec.series) {
     std::vector<cv::Point2d> run;
     for (const XyPoint& p : series.points) {
       if (!shown(p)) continue;
       run.push_back(frame(p.x, p.y));
       const cv::Point centre(static_cast<int>(run.back().x), static_cast<int>(run.back().y));
-      if (series.marker != Marker::kNone) taken.emplace_back(centre - cv::Point(11, 11), cv::Size(22, 22));
+      if (series.marker != Marker::kNone)
+        taken.emplace_back(centre - cv::Point(11, 11), cv::Size(22, 22));
     }
     if (series.line) draw_polyline(image, run, {series.colour, 4, series.dash_px});
     for (const cv::Point2d& p : run) draw_marker(image, p, series.marker, series.colour, 10);

@@ -37,10 +37,10 @@ Result<CsvTable> CsvTable::parse(std::string_view text, const std::string& origi
       continue;
     }
     if (cells.size() != table.columns_.size()) {
-      return fail(ErrorCode::kUnreadable,
-                  origin + ": line " + std::to_string(line_number) + " has " +
-                      std::to_string(cells.size()) + " cells, the heading has " +
-                      std::to_string(table.columns_.size()));
+      return fail(ErrorCode::kUnreadable, origin + ": line " + std::to_string(line_number) +
+                                              " has " + std::to_string(cells.size()) +
+                                              " cells, the heading has " +
+                                              std::to_string(table.columns_.size()));
     }
     table.cells_.push_back(std::move(cells));
   }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <stop_token>
 #include <thread>
@@ -112,14 +113,14 @@ Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int r
   trial.scenario = scenario.name;
   trial.truth = std::move(surgery->truths.front());
   trial.data.push_back(sparse_data(*pairs, head.config));
-  const Points at = pairs->undeformed;
   const Points moved = client::at_points(trial.truth.displacement, trial.truth.points.at("sparse"));
   Random random(seed + 1);
-  // The sparse points are recorded in the pool's order, the observation lists them in the order drawn.
-  const Points recorded = client::at_points(head.model->mesh.nodes, trial.truth.points.at("sparse"));
-  if (recorded.cols() != at.cols()) {
-    return fail(ErrorCode::kInternal, "scenario " + scenario.name +
-                                          ": truth and observation differ in their points");
+  // The same points, in the order of the record.
+  const Points recorded =
+      client::at_points(head.model->mesh.nodes, trial.truth.points.at("sparse"));
+  if (recorded.cols() != pairs->undeformed.cols()) {
+    return fail(ErrorCode::kInternal,
+                "scenario " + scenario.name + ": truth and observation differ in their points");
   }
   for (int r = 1; r < repetitions; ++r) {
     trial.data.push_back(sparse_data(
@@ -182,7 +183,8 @@ Status run_method(const Head& head, const Trial& trial, Method method, int repet
       if (Status ok = write_estimate(head, trial, row, *estimate, out); !ok) return ok;
       continue;
     }
-    const bool missing = estimate.error().code == ErrorCode::kInternal;  // "unknown inversion method"
+    const bool missing =
+        estimate.error().code == ErrorCode::kInternal;  // "unknown inversion method"
     row.status = missing        ? "not_available"
                  : alarm.rang() ? "stopped"
                                 : to_string(estimate.error().code);

@@ -31,7 +31,8 @@ Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int r
 // estimate's, "stopped" (out of time), "not_available" or the code of the error; without an estimate the
 // cells of errors are empty.
 inline constexpr const char* kErrorTimeHeading =
-    "mesh,nodes,scenario,method,rank,start,repetition,time_ms,time_over_tsolve,cross_mm,field_mean_mm,"
+    "mesh,nodes,scenario,method,rank,start,repetition,time_ms,time_over_tsolve,cross_mm,field_mean_"
+    "mm,"
     "field_max_mm,recovery_pct,active,iterations,status,coverage_90,t_solve_ms";
 
 // Times each repetition of one method and writes a row for it. The first set of rows is cold: nothing is kept
