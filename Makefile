@@ -29,7 +29,7 @@ test: build ## build and run all tests
 	ctest --preset $(PRESET) -j 2
 
 bench: configure ## error against run time, latency, memory, into out/bench; QUICK=1 for a short run
-	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift bench_error_time bench_summary
+	cmake --build --preset $(PRESET) -j $(JOBS) --target bench_programs
 	cmake/scripts/bench.sh $(BUILD)/bin
 
 format: ## rewrite the C++ sources in the house format

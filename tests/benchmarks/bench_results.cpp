@@ -75,7 +75,11 @@ Result<CsvTable> read_all(const fs::path& folder, const std::string& stem) {
       files.push_back(entry.path());
     }
   }
-  std::sort(files.begin(), files.end());
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    // 5k, 18k, 100k, 18k-refined
+    const std::string first = a.filename().string(), second = b.filename().string();
+    return std::pair(first.size(), first) < std::pair(second.size(), second);
+  });
   CsvTable all;
   for (const fs::path& file : files) {
     const auto table = CsvTable::read(file);
@@ -196,10 +200,14 @@ std::vector<MethodSummary> summarise(const CsvTable& table) {
                   [&](std::size_t row) { return !shared.contains(table.text(row, "repetition")); });
     one.compared = static_cast<int>(shared.size());
     one.repetitions = static_cast<int>(rows.size());
-    const auto times = finite(table, rows, "time_ms");
-    one.p50_ms = percentile(times, 50.0);
-    one.max_ms = percentile(times, 100.0);
-    one.over_tsolve = percentile(finite(table, rows, "time_over_tsolve"), 50.0);
+    // A repetition that was stopped shows how long it was given, not how long it takes.
+    std::vector<std::size_t> finished = rows;
+    std::erase_if(finished, [&](std::size_t row) {
+      return !std::isfinite(table.number(row, "field_mean_mm"));
+    });
+    one.p50_ms = percentile(finite(table, finished, "time_ms"), 50.0);
+    one.max_ms = percentile(finite(table, rows, "time_ms"), 100.0);
+    one.over_tsolve = percentile(finite(table, finished, "time_over_tsolve"), 50.0);
     one.cross_mm = mean_of(table, compared, "cross_mm");
     one.field_mean_mm = mean_of(table, compared, "field_mean_mm");
     one.field_max_mm = mean_of(table, compared, "field_max_mm");

@@ -26,8 +26,8 @@ struct MethodSummary {
   std::string mesh, scenario, method, start;
   int rank = 0;  // 0: not applicable
   int repetitions = 0;
-  double p50_ms = 0.0;
-  double max_ms = 0.0;
+  double p50_ms = 0.0;       // of those that gave an estimate; NaN for none
+  double max_ms = 0.0;       // of all
   double over_tsolve = 0.0;  // median of time / t_solve
   double active = 0.0;       // mean, as iterations
   double iterations = 0.0;

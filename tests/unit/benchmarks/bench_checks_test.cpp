@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -66,6 +67,8 @@ TEST(BenchSummary, TakesMediansOfTimeAndErrorsOfSharedRepetitions) {
   ASSERT_NE(stopped, nullptr);
   EXPECT_EQ(stopped->status, "stopped");
   EXPECT_TRUE(std::isnan(stopped->cross_mm));
+  EXPECT_TRUE(std::isnan(stopped->p50_ms)) << "a time limit is no run time";
+  EXPECT_DOUBLE_EQ(stopped->max_ms, 60000.0);
   EXPECT_EQ(results.find("40k", "paper", "condensed", "warm"), nullptr);
 }
 
