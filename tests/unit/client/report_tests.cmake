@@ -1,5 +1,5 @@
 brainshift_test(client_report_test
-  SOURCES report_chart_test.cpp report_page_test.cpp report_slice_test.cpp
+  SOURCES report_chart_test.cpp report_page_test.cpp report_slice_test.cpp report_xy_chart_test.cpp
   LINKS brainshift::report brainshift::geometry brainshift::io brainshift_opencv)
 
 # The command line: exit status and the one line on stderr.

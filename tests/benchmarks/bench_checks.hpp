@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The figures that `make bench` holds to a bound, and its summary.json and tables.md.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "tests/benchmarks/bench_results.hpp"
+
+namespace brainshift::bench {
+
+struct Check {
+  std::string name;  // stable
+  double value = 0.0;
+  std::string bound;  // in words, with the unit
+  bool pass = false;
+  std::string command;  // that the value comes from
+};
+
+// A value that was not measured is NaN and does not pass. Times in units of t_solve are divided by
+// full_solve_ms of the same report. `folder` is named in the commands. `with_100k`: the checks of that mesh too.
+std::vector<Check> checks(const Results& results, const std::string& folder, bool with_100k);
+
+// {"checks": [...], "left_out": [...]}; a value that is not finite is null.
+std::string to_json(const std::vector<Check>& checks, const std::vector<std::string>& left_out);
+
+// Markdown: machine and commit, checks, meshes, methods, latencies.
+std::string tables(const Results& results, const std::vector<Check>& checks,
+                   const std::string& commit);
+
+}  // namespace brainshift::bench

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/benchmarks/error_time.hpp"
+
+#include <chrono>
+#include <condition_variable>
+#include <limits>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include "client/replay/score.hpp"
+#include "client/twin/measure.hpp"
+#include "client/twin/surgery.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/invert.hpp"
+
+namespace brainshift::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+SparseData sparse_data(const LandmarkPairs& pairs, const CaseConfig& config) {
+  return {pairs.undeformed, pairs.deformed - pairs.undeformed,
+          VecX::Constant(pairs.undeformed.cols(), config.inversion.sigma_mm)};
+}
+
+// Requests a stop when the time is up, or not at all when destroyed before.
+class Alarm {
+ public:
+  explicit Alarm(double seconds)
+      : thread_([this, seconds](const std::stop_token& cancelled) {
+          std::unique_lock lock(mutex_);
+          std::condition_variable_any wake;
+          wake.wait_for(lock, cancelled, std::chrono::duration<double>(seconds),
+                        [] { return false; });
+          if (!cancelled.stop_requested()) source_.request_stop();
+        }) {}
+  std::stop_token token() const { return source_.get_token(); }
+  bool rang() const { return source_.stop_requested(); }
+
+ private:
+  std::mutex mutex_;
+  std::stop_source source_;
+  std::jthread thread_;  // last: it uses the others
+};
+
+struct Row {
+  Method method = Method::kCondensed;
+  int rank = 0;  // 0: not applicable
+  const char* start = "cold";
+  int repetition = 1;
+  double time_ms = 0.0;
+  double t_solve_ms = 0.0;
+  std::string status;
+};
+
+std::vector<std::string> lead(const Head& head, const Trial& trial, const Row& row) {
+  return {head.name,
+          std::to_string(head.model->mesh.num_nodes()),
+          trial.scenario,
+          std::string(to_string(row.method)),
+          row.rank > 0 ? std::to_string(row.rank) : "",
+          row.start,
+          std::to_string(row.repetition),
+          csv_number(row.time_ms),
+          csv_number(row.time_ms / row.t_solve_ms)};
+}
+
+Status write_estimate(const Head& head, const Trial& trial, const Row& row,
+                      const Estimate& estimate, CsvWriter& out) {
+  client::RunReport report;
+  if (Status ok = client::score(*head.model, trial.truth, estimate, report); !ok) return ok;
+  const VecX field_mm =
+      (estimate.displacement - trial.truth.displacement).colwise().norm().transpose();
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? csv_number(*value) : std::string();
+  };
+  auto cells = lead(head, trial, row);
+  cells.insert(cells.end(),
+               {report.error_mm.cross ? csv_number(report.error_mm.cross->mean) : std::string(),
+                csv_number(field_mm.mean()), csv_number(field_mm.maxCoeff()),
+                optional(report.recovery_pct), std::to_string(estimate.contact.active),
+                std::to_string(estimate.history.size()), std::string(to_string(estimate.status)),
+                optional(report.coverage_90), csv_number(row.t_solve_ms)});
+  return out.row(cells);
+}
+
+Status write_failure(const Head& head, const Trial& trial, const Row& row, CsvWriter& out) {
+  auto cells = lead(head, trial, row);
+  cells.insert(cells.end(), {"", "", "", "", "", "", row.status, "", csv_number(row.t_solve_ms)});
+  return out.row(cells);
+}
+
+}  // namespace
+
+Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int repetitions,
+                         std::uint64_t seed, const Progress& progress) {
+  twin::Scenario first = scenario;
+  first.fluid_levels_mm.resize(1);
+  auto surgery = twin::play_scenario(*head.model, head.config, first, seed, progress);
+  if (!surgery) return tl::unexpected(surgery.error());
+  const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
+  if (pairs == nullptr) {
+    return fail(ErrorCode::kInvalidArgument,
+                "scenario " + scenario.name + ": measures no displacements; choose another");
+  }
+  Trial trial;
+  trial.scenario = scenario.name;
+  trial.truth = std::move(surgery->truths.front());
+  trial.data.push_back(sparse_data(*pairs, head.config));
+  const Points moved = client::at_points(trial.truth.displacement, trial.truth.points.at("sparse"));
+  Random random(seed + 1);
+  // The same points, in the order of the record.
+  const Points recorded =
+      client::at_points(head.model->mesh.nodes, trial.truth.points.at("sparse"));
+  if (recorded.cols() != pairs->undeformed.cols()) {
+    return fail(ErrorCode::kInternal,
+                "scenario " + scenario.name + ": truth and observation differ in their points");
+  }
+  for (int r = 1; r < repetitions; ++r) {
+    trial.data.push_back(sparse_data(
+        twin::measure_displacements(recorded, moved, scenario.noise_sd_mm, random), head.config));
+  }
+  return trial;
+}
+
+Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& out) {
+  inversion::CondensedOptions options;
+  options.rank = rank;
+  auto inverter =
+      inversion::CondensedInverter::build(head.operators, head.locator, head.config, options);
+  if (!inverter) return tl::unexpected(inverter.error());
+  Row row;
+  row.rank = rank;
+  row.t_solve_ms = solve_ms(*head.prepared);
+  Estimate estimate;
+  // Memory is claimed and caches are filled by an update that does not count.
+  if (Status ok = inverter->update(trial.data.back(), estimate); !ok) return ok;
+  for (const char* start : {"cold", "warm"}) {
+    row.start = start;
+    row.repetition = 0;
+    for (const SparseData& data : trial.data) {
+      ++row.repetition;
+      if (row.start == std::string_view("cold")) inverter->reset();
+      const auto begin = Clock::now();
+      const Status updated = inverter->update(data, estimate);
+      row.time_ms = ms_since(begin);
+      if (updated) {
+        if (Status ok = write_estimate(head, trial, row, estimate, out); !ok) return ok;
+      } else {
+        row.status = to_string(updated.error().code);
+        if (Status ok = write_failure(head, trial, row, out); !ok) return ok;
+      }
+    }
+  }
+  return {};
+}
+
+Status run_method(const Head& head, const Trial& trial, Method method, int repetitions,
+                  double budget_s, CsvWriter& out) {
+  Row row;
+  row.method = method;
+  row.t_solve_ms = solve_ms(*head.prepared);
+  const auto started = Clock::now();
+  for (int r = 0; r < repetitions && r < static_cast<int>(trial.data.size()); ++r) {
+    const double left_s = budget_s - 1e-3 * ms_since(started);
+    if (left_s <= 0.0) break;
+    const Alarm alarm(left_s);
+    inversion::InversionOptions options;
+    options.method = method;
+    options.stop = alarm.token();
+    row.repetition = r + 1;
+    const auto begin = Clock::now();
+    const auto estimate =
+        inversion::invert(*head.prepared, trial.data[static_cast<std::size_t>(r)], options);
+    row.time_ms = ms_since(begin);
+    if (estimate) {
+      if (Status ok = write_estimate(head, trial, row, *estimate, out); !ok) return ok;
+      continue;
+    }
+    const bool missing =
+        estimate.error().code == ErrorCode::kInternal;  // "unknown inversion method"
+    row.status = missing        ? "not_available"
+                 : alarm.rang() ? "stopped"
+                                : to_string(estimate.error().code);
+    if (missing) row.time_ms = std::numeric_limits<double>::quiet_NaN();
+    return write_failure(head, trial, row, out);
+  }
+  return {};
+}
+
+}  // namespace brainshift::bench
