@@ -28,6 +28,8 @@ constexpr int kOversampling = 192;
 constexpr double kSlaveWeight = 0.1;
 // Control nodes at which diag(C) is computed; it is smooth, and interpolated to the others.
 constexpr int kVarianceNodes = 128;
+// Below it a neighbour does not count: at a probe its own weight is all but 1.
+constexpr float kLeastWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
 // Step 1: G and Phi.
@@ -195,11 +197,13 @@ bool left_out_variance(const PreparedModel& model, BlockRunner& runner,
     control.col(static_cast<Eigen::Index>(i)) = nodes.col(result.control[i]);
   }
   const Interpolation to_control = interpolate(positions, control);
+  // The largest of the neighbours, except at a probe itself: an error bar must not be too short.
   result.truncated_variance_mm2.setZero(control.cols());
   for (Eigen::Index i = 0; i < control.cols(); ++i) {
     for (int k = 0; k < 4; ++k) {
-      result.truncated_variance_mm2[i] +=
-          to_control.weights(k, i) * left_out[to_control.neighbours(k, i)];
+      if (to_control.weights(k, i) < kLeastWeight) continue;
+      result.truncated_variance_mm2[i] =
+          std::max(result.truncated_variance_mm2[i], left_out[to_control.neighbours(k, i)]);
     }
   }
   Interpolation to_nodes = interpolate(control, nodes);

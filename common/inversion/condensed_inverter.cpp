@@ -30,10 +30,13 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+// From here on the reason says that the data are not explained. 600 independent residuals exceed it by chance never.
+constexpr double kUnexplained = 1.5;
+
 // Into memory that `reason` has already.
 void set_reason(EstimateStatus outcome, const SetSearch& search, const CondensedConfig& config,
-                std::string& reason) {
-  char text[160];
+                double misfit_ratio, std::string& reason) {
+  char text[240];
   switch (outcome) {
     case EstimateStatus::kConverged:
       std::snprintf(text, sizeof text, "contact holds to %g mm at iteration %d",
@@ -50,6 +53,12 @@ void set_reason(EstimateStatus outcome, const SetSearch& search, const Condensed
                     search.iteration());
   }
   reason.assign(text);
+  if (misfit_ratio > kUnexplained) {
+    std::snprintf(text, sizeof text,
+                  "; the prior does not explain the data: they lie %.1f standard deviations off",
+                  misfit_ratio);
+    reason.append(text);
+  }
 }
 
 }  // namespace
@@ -63,8 +72,8 @@ struct CondensedInverter::Impl {
         window(mode_window(*operators, options)),
         condensed(config.condensed),
         team(options.threads),
-        sampled(operators, std::move(given_locator), window),
-        reduction(*operators, window, config.contact.penalty_n_per_mm),
+        sampled(operators, std::move(given_locator), window, team),
+        reduction(*operators, window, config.contact.penalty_n_per_mm, team),
         rebuild(*operators, window, options.region_of_interest),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
     const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
@@ -117,6 +126,8 @@ struct CondensedInverter::Impl {
   MatrixXd jacobian;  // whitened [common error | J | d - A G f0], 3m x (q + r + 1)
   VecX residual;      // whitened d - A u, 3m
   VecX normal_storage, solution, z;
+  double misfit_ratio =
+      0.0;  // root mean square of d - A u - common error over its standard deviation
   std::vector<IterationRecord> history;
   double rebuild_ms = 0.0;
   OmissionErrors errors;
@@ -127,8 +138,12 @@ Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
   auto j = jacobian.topLeftCorner(rows, unknowns + 1);
   j = sampled.free_body();
   if (reduction.size() > 0) {  // contact does not touch the common error
-    blas::multiply(-1.0, sampled.contact(reduction.active()), reduction.response(), 1.0,
-                   j.rightCols(r + 1));
+    const auto contact = sampled.contact(reduction.active());
+    const auto response = reduction.response();
+    team.split(r + 1, [&](long begin, long end) {
+      blas::multiply(-1.0, contact, response.middleCols(begin, end - begin), 1.0,
+                     j.middleCols(sampled.common() + begin, end - begin));
+    });
   }
   auto factor = normal();
   factor.setIdentity();
@@ -142,7 +157,9 @@ Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
   blas::solve_lower_transposed(factor, cz);
   z = cz.tail(r);
   residual.head(rows) = j.col(unknowns);
-  residual.head(rows).noalias() -= j.middleCols(sampled.common(), r) * z;
+  residual.head(rows).noalias() -= j.leftCols(unknowns) * cz;
+  misfit_ratio = std::sqrt(residual.head(rows).squaredNorm() / static_cast<double>(rows));
+  residual.head(rows).noalias() += j.leftCols(sampled.common()) * cz.head(sampled.common());
   reduction.update_forces(z);
   return {};
 }
@@ -175,6 +192,8 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
     // The common error comes first, so the last block is the factor of the Schur complement of z.
     rebuild.standard_deviation(
         team, reduction, normal().bottomRightCorner(window.count, window.count), estimate.sd_mm);
+    // Data that lie farther off than their standard deviations say: so may the estimate (Birge 1932).
+    if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
   } else {
     estimate.sd_mm.resize(0);
   }
@@ -277,7 +296,7 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
   }
   impl.finish(data, estimate);
   estimate.status = outcome;
-  set_reason(outcome, search, impl.condensed, estimate.reason);
+  set_reason(outcome, search, impl.condensed, impl.misfit_ratio, estimate.reason);
   return {};
 }
 

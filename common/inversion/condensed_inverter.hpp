@@ -11,6 +11,9 @@
 // before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best
 // iterate, the one with the least violation, is kept; limits on iterations and time end with it.
 //
+// The standard deviation is that of the model above, times the ratio of the misfit to the one expected where that
+// is above 1; a ratio above 1.5 is said in the reason.
+//
 // Not thread-safe. update() allocates nothing as long as the data fit the capacity, but for members of the
 // estimate whose size changes.
 #pragma once

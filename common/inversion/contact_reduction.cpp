@@ -10,10 +10,11 @@ namespace brainshift::inversion {
 namespace blas = fem::blas;
 
 ContactReduction::ContactReduction(const CondensedOperators& operators, ModeWindow window,
-                                   double beta)
+                                   double beta, ThreadTeam& team)
     : operators_(operators),
       window_(window),
       beta_(beta),
+      team_(team),
       factor_storage_(new double[static_cast<std::size_t>(operators.compliance.size())]),
       response_(operators.num_slaves(), window.count + 1),
       forces_(operators.num_slaves()),
@@ -54,8 +55,11 @@ Status ContactReduction::activate(const contact::ActiveSet& set) {
     return fail(ErrorCode::kSingularMatrix, "contact: the compliance of " + std::to_string(k) +
                                                 " active slaves is not positive definite");
   }
-  blas::solve_lower(d, response);
-  blas::solve_lower_transposed(d, response);
+  team_.split(response.cols(), [&](long begin, long end) {
+    auto columns = response.middleCols(begin, end - begin);
+    blas::solve_lower(d, columns);
+    blas::solve_lower_transposed(d, columns);
+  });
   return {};
 }
 
@@ -83,12 +87,14 @@ void ContactReduction::update_forces(const VecX& z) {
   auto f = forces_.head(k);
   f = t.col(window_.count);
   f.noalias() -= t.leftCols(window_.count) * z;
-  for (int j = 0; j < k; ++j) {
-    const int slave = active_[static_cast<std::size_t>(j)];
-    all_forces_[slave] = f[j];
-    blas::add_scaled(penetration_.size(), -f[j], operators_.compliance.col(slave).data(),
-                     penetration_.data());
-  }
+  for (int j = 0; j < k; ++j) all_forces_[active_[static_cast<std::size_t>(j)]] = f[j];
+  team_.split(penetration_.size(), [&](long begin, long end) {
+    for (int j = 0; j < k; ++j) {
+      const int slave = active_[static_cast<std::size_t>(j)];
+      blas::add_scaled(end - begin, -f[j], operators_.compliance.col(slave).data() + begin,
+                       penetration_.data() + begin);
+    }
+  });
   // By construction; the sum above has it up to rounding.
   for (int j = 0; j < k; ++j) penetration_[active_[static_cast<std::size_t>(j)]] = f[j] / beta_;
 }

@@ -15,14 +15,16 @@
 #include "common/contact/penalty.hpp"
 #include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/inversion/mode_window.hpp"
 
 namespace brainshift::inversion {
 
 class ContactReduction {
  public:
-  // Keeps a reference to the operators. beta: penalty, N/mm.
-  ContactReduction(const CondensedOperators& operators, ModeWindow window, double beta);
+  // Keeps references to the operators and to the team that shares the work. beta: penalty, N/mm.
+  ContactReduction(const CondensedOperators& operators, ModeWindow window, double beta,
+                   ThreadTeam& team);
 
   // kSingularMatrix when D cannot be factorised. set: one flag per slave, or empty for none.
   Status activate(const contact::ActiveSet& set);
@@ -47,6 +49,7 @@ class ContactReduction {
   const CondensedOperators& operators_;
   ModeWindow window_;
   double beta_;
+  ThreadTeam& team_;
   contact::ActiveSet set_;
   std::vector<int> active_;
   // Uninitialised: the system hands out memory when it is first used.

@@ -12,10 +12,11 @@
 namespace brainshift::inversion {
 SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,
                                    std::shared_ptr<const geometry::TetLocator> locator,
-                                   ModeWindow window)
+                                   ModeWindow window, ThreadTeam& team)
     : operators_(std::move(operators)),
       locator_(std::move(locator)),
       window_(window),
+      team_(team),
       region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
       region_modes_(gather_rows(operators_->modes, operators_->region)),
       region_contact_(gather_rows(operators_->contact_columns, operators_->region)) {
@@ -110,11 +111,12 @@ void SampledOperators::sample_column(const float* array, double* out) const {
 Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
   const Eigen::MatrixXf& columns =
       outside_region_ == 0 ? region_contact_ : operators_->contact_columns;
-  double* out = contact_storage_.get();
-  for (const int slave : active) {
-    sample_column(columns.col(slave).data(), out);
-    out += 3 * size_;
-  }
+  team_.split(static_cast<long>(active.size()), [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      sample_column(columns.col(active[static_cast<std::size_t>(j)]).data(),
+                    contact_storage_.get() + 3 * size_ * j);
+    }
+  });
   return {contact_storage_.get(), 3 * size_, static_cast<Eigen::Index>(active.size())};
 }
 

@@ -15,6 +15,7 @@
 #include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/sparse_data.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/fem/blas.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/mode_window.hpp"
@@ -24,7 +25,8 @@ namespace brainshift::inversion {
 class SampledOperators {
  public:
   SampledOperators(std::shared_ptr<const CondensedOperators> operators,
-                   std::shared_ptr<const geometry::TetLocator> locator, ModeWindow window);
+                   std::shared_ptr<const geometry::TetLocator> locator, ModeWindow window,
+                   ThreadTeam& team);
 
   void reserve(int data);
   // Locates the data and fills free_body. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside
@@ -49,6 +51,7 @@ class SampledOperators {
   std::shared_ptr<const CondensedOperators> operators_;
   std::shared_ptr<const geometry::TetLocator> locator_;
   ModeWindow window_;
+  ThreadTeam& team_;             // shares the work
   std::vector<int> region_row_;  // per node, -1 outside the region
   Eigen::MatrixXf region_modes_, region_contact_;
   int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;

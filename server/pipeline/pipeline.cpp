@@ -26,7 +26,11 @@ Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& co
       boundary_(boundary),
       invert_(std::move(invert)),
       omissions_(std::move(omissions)),
-      tumour_(std::move(tumour)) {}
+      tumour_(std::move(tumour)) {
+  for (const Method method : kAllMethods) {
+    model_omissions_.emplace(method, model_omissions(*model_, config_, method, boundary_));
+  }
+}
 
 Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
                                  Boundary boundary, InvertFunction invert,
@@ -48,7 +52,7 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   update.observation_sequence = observation.sequence;
   update.method = options.method;
   update.boundary = boundary_;
-  update.left_out = model_omissions(*model_, config_, options.method, boundary_);
+  update.left_out = model_omissions_.at(options.method);
   if (registered->icp) {
     update.T_undeformed_deformed = registered->icp->T_surface_points;
     for (auto& omission : registration_omissions(*registered->icp, config_.scene.rotation,

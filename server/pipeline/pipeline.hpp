@@ -6,6 +6,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <stop_token>
 #include <vector>
@@ -55,6 +56,7 @@ class Pipeline {
   InvertFunction invert_;
   OmissionFunction omissions_;
   geometry::ClosestPointIndex tumour_;
+  std::map<Method, std::vector<Omission>> model_omissions_;  // the same for every update
 };
 
 }  // namespace brainshift::server

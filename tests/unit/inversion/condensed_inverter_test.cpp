@@ -39,7 +39,8 @@ TEST_P(Condensed, EstimateEqualsTheDirectPosteriorOfThePenalisedSystem) {
 
 // Equal in the data region; elsewhere the modes leave variance out, which is added as that of the free body.
 TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
-  const SparseData data = sagging_data(GetParam(), 0.3);
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.sd_mm.setConstant(1.0);  // the prior explains the data: nothing is widened
   Estimate estimate;
   auto inverter = Condensed::inverter(GetParam());
   ASSERT_TRUE(inverter.update(data, estimate));
@@ -117,6 +118,20 @@ TEST_P(Condensed, LeavingPartsOutChangesOnlyThem) {
   ASSERT_TRUE(Condensed::inverter(GetParam(), options).update(data, without_contact));
   EXPECT_EQ(without_contact.contact.active, 0);
   EXPECT_EQ(without_contact.displacement == full.displacement, GetParam() == Boundary::kFixed);
+}
+
+// Two kinds of data that no load explains together, with a standard deviation far too small.
+TEST_F(Condensed, DataThatThePriorDoesNotExplainWidenTheErrorBarsAndAreSaid) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  Estimate fits, off;
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact).update(data, fits));
+  EXPECT_THAT(fits.reason, testing::Not(HasSubstr("does not explain")));
+  for (int i = 0; i < data.size(); ++i) {
+    data.displacements.col(i) += (i % 2 == 0 ? 2.0 : -2.0) * Vec3::UnitX();
+  }
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact).update(data, off));
+  EXPECT_THAT(off.reason, HasSubstr("the prior does not explain the data"));
+  EXPECT_GT(off.sd_mm.mean(), 1.5 * fits.sd_mm.mean());
 }
 
 TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
