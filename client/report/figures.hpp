@@ -3,6 +3,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run);
 
 // Recovery at tumour and craniotomy over all groups, contact and fixed, with the paper's values.
 Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs);
+
+// Error at the tumour against the time of an update, over all runs; nullopt when they are all by one method.
+std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs);
 
 // Slices of one group (the paper's Fig. 4): displacement arrows with tumour outlines and a close-up of the
 // tumour, axial and coronal; true field and differences, error map (axial; need truth). Empty when no run of

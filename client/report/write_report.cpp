@@ -70,6 +70,7 @@ std::vector<Figure> draw_figures(const std::vector<ReportedRun>& runs,
                                  const Progress& progress) {
   std::vector<Figure> figures;
   figures.push_back(recovery_figure(groups, runs));
+  if (auto figure = error_time_figure(runs)) figures.push_back(std::move(*figure));
   for (std::size_t g = 0; g < groups.size(); ++g) {
     report(progress, "draw", static_cast<double>(g) / static_cast<double>(groups.size()));
     const RunGroup& group = groups[g];

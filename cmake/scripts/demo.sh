@@ -73,7 +73,7 @@ mkdir -p "$out/runs"
 step "prepare: MRI to mesh and model" \
   "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5"
 step "serve: daemon on a loopback port" start_daemon
-for scenario in "${scenarios[@]}"; do
+for scenario in "${scenarios[@]}" sag-progress; do
   step "simulate: scenario $scenario, seed $seed" \
     "$bin/brainshift" simulate --case "$case_file" --scenario "$scenario" --seed "$seed" \
     --out "$out/$scenario.surgery"
@@ -86,7 +86,10 @@ done
 step "replay: scenario paper, the paper's method, contact and fixed" \
   "$bin/brainshift" replay "$out/paper.surgery" --endpoint "$endpoint" --boundary both \
   --method paper --report "$out/runs/paper-method.json"
-reports=("${scenarios[@]/%/.json}" paper-method.json)
+step "replay: scenario sag-progress, 100 updates by the condensed method, contact" \
+  "$bin/brainshift" replay "$out/sag-progress.surgery" --endpoint "$endpoint" --boundary contact \
+  --repeat 5 --report "$out/runs/sag-progress.json" --latency-csv "$out/runs/sag-progress-latency.csv"
+reports=("${scenarios[@]/%/.json}" paper-method.json sag-progress.json)
 step "report: tables and pictures" "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
 step "stop: daemon" stop_daemon
 
