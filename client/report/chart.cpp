@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
 
 namespace brainshift::client {
 namespace {
@@ -235,8 +236,13 @@ cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area_out) {
       180.0, 0.8 * group_width / static_cast<double>(std::max<std::size_t>(1, spec.series.size())));
   for (std::size_t g = 0; g < spec.groups.size(); ++g) {
     const double middle = map(static_cast<double>(g) + 0.5, 0.0).x;
-    draw_text(image, {static_cast<int>(middle), area.y + area.height + 44}, spec.groups[g],
-              {.cap_px = 21.0, .align = Align::kCentre});
+    // One line per part of the name: side by side, whole names would run into each other.
+    int baseline = area.y + area.height + 36;
+    std::istringstream lines(spec.groups[g]);
+    for (std::string line; std::getline(lines, line); baseline += 28) {
+      draw_text(image, {static_cast<int>(middle), baseline}, line,
+                {.cap_px = 17.0, .align = Align::kCentre});
+    }
     for (std::size_t s = 0; s < spec.series.size(); ++s) {
       const double offset = static_cast<double>(s) - 0.5 * static_cast<double>(spec.series.size());
       const cv::Rect2d slot(middle + offset * bar_width + 4, 0, bar_width - 8, 0);

@@ -53,7 +53,7 @@ struct BarSpec {
   std::string title;
   std::string subtitle;
   std::string y_label;
-  std::vector<std::string> groups;
+  std::vector<std::string> groups;  // names, up to three lines each
   std::vector<BarSeries> series;
   // Published values to compare with, one list per series; drawn as a black tick across the bar.
   std::string reference_legend;

@@ -26,7 +26,7 @@ Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<Re
     };
     const RunReport& any = runs[group.contact ? *group.contact : *group.fixed].report;
     const bool tumour = value == &RunReport::recovery_pct;
-    spec.groups.push_back(group.name + ": " + place);
+    spec.groups.push_back(any.scenario + "\n" + any.method + "\n" + place);
     spec.series[0].values.push_back(of(group.contact));
     spec.series[1].values.push_back(of(group.fixed));
     std::optional<double> contact;
