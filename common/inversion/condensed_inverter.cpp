@@ -129,7 +129,6 @@ struct CondensedInverter::Impl {
   double misfit_ratio =
       0.0;  // root mean square of d - A u - common error over its standard deviation
   std::vector<IterationRecord> history;
-  double rebuild_ms = 0.0;
   OmissionErrors errors;
 };
 
@@ -198,9 +197,8 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
     estimate.sd_mm.resize(0);
   }
   rebuild.displacement(team, z, reduction, estimate.displacement);
-  rebuild_ms = milliseconds_since(start);
+  estimate.rebuild_ms = milliseconds_since(start);
   estimate_omissions(data);
-  estimate.rebuild_ms = rebuild_ms;
 
   const IterationRecord& last = history.back();
   estimate.misfit_mm = last.misfit_mm;
@@ -254,7 +252,6 @@ Result<CondensedInverter> CondensedInverter::build(
 
 void CondensedInverter::reset() { impl_->search.forget(); }
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
-double CondensedInverter::rebuild_ms() const { return impl_->rebuild_ms; }
 
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
   const auto start = Clock::now();

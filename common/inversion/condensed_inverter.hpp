@@ -65,8 +65,6 @@ class CondensedInverter {
   void reset();
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;
-  // Part of the last update() spent rebuilding field and standard deviation, ms.
-  double rebuild_ms() const;
 
  private:
   struct Impl;

@@ -33,9 +33,8 @@ class SampledOperators {
   // the brain (named). Preconditions: check_data; reserve(data.size()).
   Status sample(const SparseData& data);
   int size() const { return size_; }
-  int common() const { return common_; }                  // q
-  int outside_region() const { return outside_region_; }  // data sampled from the full arrays
-  double sd(int datum) const { return sd_[datum]; }       // mm, with what the modes leave out
+  int common() const { return common_; }             // q
+  double sd(int datum) const { return sd_[datum]; }  // mm, with what the modes leave out
   auto free_body() const {
     return free_body_.topLeftCorner(3 * size_, common_ + window_.count + 1);
   }

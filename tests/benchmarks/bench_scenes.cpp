@@ -46,7 +46,7 @@ struct Measured {
       }
       if (i == 0) continue;
       invert_ms.push_back(estimate.history.back().elapsed_ms);
-      rebuild_ms.push_back(inverter.rebuild_ms());
+      rebuild_ms.push_back(estimate.rebuild_ms);
     }
   }
 };

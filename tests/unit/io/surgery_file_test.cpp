@@ -13,6 +13,8 @@
 #include <fstream>
 #include <limits>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace brainshift::io {
 namespace {
 
@@ -42,13 +44,6 @@ SurgeryTruth sample_truth() {
 
 class SurgeryFileTest : public ::testing::Test {
  protected:
-  SurgeryFileTest() {
-    std::string pattern = (fs::temp_directory_path() / "surgery-XXXXXX").string();
-    folder = ::mkdtemp(pattern.data());
-    path = folder / "one.surgery";
-  }
-  ~SurgeryFileTest() override { fs::remove_all(folder); }
-
   SurgeryFile make() {
     auto file = SurgeryFile::create(path, kMeta);
     EXPECT_TRUE(file) << file.error().message;
@@ -77,13 +72,13 @@ class SurgeryFileTest : public ::testing::Test {
   }
   std::vector<std::string> files_in_folder() const {
     std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder))
+    for (const auto& entry : fs::directory_iterator(folder.path()))
       names.push_back(entry.path().filename());
     return names;
   }
 
-  fs::path folder;
-  fs::path path;
+  const test_support::TemporaryFolder folder;
+  fs::path path = folder / "one.surgery";
 };
 
 void expect_error(const Status& status, ErrorCode code, const std::string& text) {

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/core/thread_team.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+namespace brainshift {
+namespace {
+
+TEST(ThreadTeam, RunsEveryMemberOncePerTask) {
+  ThreadTeam team(3);
+  ASSERT_EQ(team.size(), 3);
+  std::vector<int> calls(3, 0);  // one entry per member: no two threads write the same
+  auto task = [&](int member) { ++calls[static_cast<std::size_t>(member)]; };
+  for (int round = 0; round < 1000; ++round) team.run(task);
+  EXPECT_EQ(calls, (std::vector<int>{1000, 1000, 1000}));
+}
+
+TEST(ThreadTeam, SplitsCoverEveryItemOnceAndAlwaysAlike) {
+  ThreadTeam team(3);
+  for (const long count : {0L, 1L, 2L, 3L, 10L}) {
+    std::vector<int> seen(static_cast<std::size_t>(count), 0);
+    team.split(count, [&](long begin, long end) {
+      for (long i = begin; i < end; ++i) ++seen[static_cast<std::size_t>(i)];
+    });
+    EXPECT_EQ(std::accumulate(seen.begin(), seen.end(), 0L), count);
+    for (const int times : seen) EXPECT_EQ(times, 1);
+  }
+}
+
+TEST(ThreadTeam, OneMemberIsTheCaller) {
+  ThreadTeam team(1);
+  std::thread::id id;
+  team.split(5, [&](long, long) { id = std::this_thread::get_id(); });
+  EXPECT_EQ(id, std::this_thread::get_id());
+}
+
+}  // namespace
+}  // namespace brainshift
