@@ -115,11 +115,18 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
                                        const Progress& progress) {
   const auto forward = contact::ForwardModel::build(model, config, Boundary::kContact, progress);
   if (!forward) return tl::unexpected(forward.error());
+  return play_scenario(model, config, *forward, scenario, seed, progress);
+}
+
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const contact::ForwardModel& forward,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress) {
   const std::vector<io::ScorePoint> pool = tumour_pool(model);
   const Points swelling = swelling_load(
       model.mesh, config.material, swelling_centre(model, scenario.swelling), scenario.swelling);
   const Vec3 g = model.gravity_direction;
-  TruthSolver solver(*forward);
+  TruthSolver solver(forward);
   Random random(seed);
   SimulatedSurgery surgery;
   const std::size_t moments = scenario.fluid_levels_mm.size();

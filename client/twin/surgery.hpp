@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/twin/scenario.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/brain_model.hpp"
 #include "common/core/case_config.hpp"
 #include "common/core/error.hpp"
@@ -28,6 +29,11 @@ struct SimulatedSurgery {
 // Everything random comes from the seed. kInvalidArgument when the scenario promises that nothing touches the
 // skull and something does; kNotConverged when a contact search does not settle; else as contact::ForwardModel.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress = {});
+// The same with a forward model that is at hand: contact boundary, of this model and case.
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const contact::ForwardModel& forward,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 

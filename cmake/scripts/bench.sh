@@ -5,7 +5,7 @@
 # summary.json. Exit status 0 only if every check holds.
 #   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold
 #   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs 20 GiB
-#   BUDGET_S=.. time per method, mesh and scenario, default 120 s
+#   BUDGET_S=.. time per method, mesh and scenario, default 200 s
 #   REFINED=... sizes that are meshed with refinement too, default 18 (QUICK: none)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -20,60 +20,16 @@ else
   sizes=${SIZES-5,18,40,100} refined=${REFINED-18} repetitions=20 cycles=100 growth_updates=10000
 fi
 
-# A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-
-daemon=
-stop_daemon() {
-  local pid=$daemon
-  daemon=
-  kill -TERM "$pid"
-  wait "$pid"
-}
-finish() {
-  local status=$?
-  [ -z "$daemon" ] || stop_daemon || true
-  if [ "$status" -ne 0 ] && [ "$current" != summary ]; then
-    echo "bench: failed (exit $status) at: $current" >&2
-    if [ -s "$out/daemon.log" ]; then tail -n 5 "$out/daemon.log" >&2; fi
-  fi
-}
-trap finish EXIT
-trap 'exit 130' INT TERM
-
-current=start
-step() {
-  current=$1
-  shift
-  local begin=$EPOCHREALTIME
-  printf '== %s\n' "$current"
-  "$@"
-  awk -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN { printf "   %.1f s\n", b - a }'
-}
+name=bench
+. cmake/scripts/steps.sh
 
 fact() { printf '%s,%s\n' "$1" "$2" >>"$out/facts.csv"; }
 
-# Starts the daemon, notes the time from its start to the line with its endpoint, sets `endpoint`.
-start_daemon() {
-  local pipe=$out/daemon.pipe line begin=$EPOCHREALTIME
-  mkfifo "$pipe"
-  "$bin/brainshiftd" serve --config config/daemon.yaml --model "$out/colin27.h5" \
-    --endpoint 'tcp://127.0.0.1:*' >"$pipe" 2>"$out/daemon.log" &
-  daemon=$!
-  exec {daemon_output}<"$pipe"
-  rm "$pipe"
-  endpoint=
-  while IFS= read -r -t 120 -u "$daemon_output" line; do
-    case $line in
-      *"listening on "*) endpoint=${line##*listening on }; break ;;
-    esac
-  done
-  if [ -z "$endpoint" ]; then
-    echo "bench: brainshiftd ended or said nothing within 120 s" >&2
-    return 1
-  fi
-  fact load_to_ready_s "$(awk -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN { printf "%.3f", b - a }')"
-  cat <&"$daemon_output" >>"$out/daemon.log" &
+# Notes the time from the daemon's start to the line with its endpoint.
+serve() {
+  local begin=$EPOCHREALTIME
+  start_daemon "$out/colin27.h5"
+  fact load_to_ready_s "$(seconds_since "$begin" 3)"
 }
 
 # Resident memory of the daemon, bytes.
@@ -96,15 +52,11 @@ prepare() {
   "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" --json >"$out/prepare.json"
 }
 
-case $out in
-  "" | / | . | ..) echo "bench: $out is no folder to empty" >&2; exit 2 ;;
-esac
-rm -rf "$out"
-mkdir -p "$out"
+empty_folder "$out"
 echo "name,value" >"$out/facts.csv"
 
 step "prepare: default case, both boundaries" prepare
-step "serve: load the model file" start_daemon
+step "serve: load the model file" serve
 for scenario in no-contact paper distension sag-progress; do
   step "simulate: $scenario, seed $seed" "$bin/brainshift" simulate --case "$case_file" \
     --scenario "$scenario" --seed "$seed" --out "$out/$scenario.surgery"
@@ -120,13 +72,14 @@ step "stop: daemon" stop_daemon
 # One process per mesh, so that the memory of one does not count for the next.
 error_time() {
   "$bin/bench_error_time" --case "$case_file" --repetitions "$repetitions" \
-    --method-budget-s "${BUDGET_S:-120}" --out "$out" "$@"
+    --method-budget-s "${BUDGET_S:-200}" --out "$out" "$@"
 }
 for size in ${sizes//,/ }; do
   step "error against time: $size thousand nodes" error_time --sizes "$size"
 done
 for size in ${refined//,/ }; do
-  step "error against time: $size thousand nodes, refined" error_time --sizes "$size" --local-factor 0.6
+  step "error against time: $size thousand nodes, refined" error_time --sizes "$size" --local-factor 0.6 \
+    --methods condensed,paper-woodbury,cg
 done
 
 options=()
@@ -138,8 +91,13 @@ if [ "${QUICK:-0}" = 1 ]; then
   options+=(--left-out "QUICK=1: $((20 * cycles)) updates for the tail, $growth_updates for the memory")
 elif [ -x "$bin/bench_exactness" ]; then
   # Its exit status repeats what the checks below say of its numbers.
-  exactness() { "$bin/bench_exactness" --case "$case_file" --out "$out/direct.json" || [ -s "$out/direct.json" ]; }
-  step "exactness: condensed against the direct posterior" exactness
+  exactness() {
+    "$bin/bench_exactness" --case "$case_file" --scenario "$1" --out "$out/direct-$1.json" >/dev/null ||
+      [ -s "$out/direct-$1.json" ]
+  }
+  for scenario in paper distension; do
+    step "exactness: condensed against the direct posterior, $scenario" exactness "$scenario"
+  done
 fi
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 current=summary

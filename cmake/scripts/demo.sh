@@ -11,68 +11,15 @@ case_file=config/cases/colin27.yaml
 scenarios=(paper paper-icp)
 seed=1
 
-# A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+name=demo
+. cmake/scripts/steps.sh
 
-daemon=
-stop_daemon() {  # a daemon that does not end cleanly fails the demo
-  local pid=$daemon
-  daemon=
-  kill -TERM "$pid"
-  wait "$pid"
-}
-finish() {
-  local status=$?
-  [ -z "$daemon" ] || stop_daemon || true
-  if [ "$status" -ne 0 ]; then
-    echo "demo: failed (exit $status) at: $current" >&2
-    if [ -s "$out/daemon.log" ]; then echo "demo: last lines of $out/daemon.log:" >&2; tail -n 5 "$out/daemon.log" >&2; fi
-  fi
-}
-trap finish EXIT
-trap 'exit 130' INT TERM
-
-# step NAME COMMAND...: runs the command and prints how long it took.
-current=start
-step() {
-  current=$1
-  shift
-  local begin=$EPOCHREALTIME
-  printf '== %s\n' "$current"
-  "$@"
-  awk -v name="$current" -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN { printf "   %.1f s\n", b - a }'
-}
-
-# Starts the daemon on a free loopback port and sets `endpoint` from its first line on stdout.
-start_daemon() {
-  local pipe=$out/daemon.pipe line
-  mkfifo "$pipe"
-  "$bin/brainshiftd" serve --config config/daemon.yaml --model "$out/colin27.h5" \
-    --endpoint 'tcp://127.0.0.1:*' >"$pipe" 2>"$out/daemon.log" &
-  daemon=$!
-  exec {daemon_output}<"$pipe"
-  rm "$pipe"
-  endpoint=
-  while IFS= read -r -t 60 -u "$daemon_output" line; do
-    case $line in
-      *"listening on "*) endpoint=${line##*listening on }; break ;;
-    esac
-  done
-  if [ -z "$endpoint" ]; then
-    echo "demo: brainshiftd ended or said nothing within 60 s" >&2
-    return 1
-  fi
-  # Whatever it says later must not fill the pipe.
-  cat <&"$daemon_output" >>"$out/daemon.log" &
-  echo "   $endpoint"
-}
-
-rm -rf "$out"
-mkdir -p "$out/runs"
+empty_folder "$out"
+mkdir "$out/runs"
 
 step "prepare: MRI to mesh and model" \
   "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5"
-step "serve: daemon on a loopback port" start_daemon
+step "serve: daemon on a loopback port" start_daemon "$out/colin27.h5"
 for scenario in "${scenarios[@]}" sag-progress; do
   step "simulate: scenario $scenario, seed $seed" \
     "$bin/brainshift" simulate --case "$case_file" --scenario "$scenario" --seed "$seed" \
@@ -92,8 +39,10 @@ step "replay: scenario sag-progress, 100 updates by the condensed method, contac
 reports=("${scenarios[@]/%/.json}" paper-method.json sag-progress.json)
 step "report: tables and pictures" "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
 step "stop: daemon" stop_daemon
+step "error against time: all methods on a mesh of 5 thousand nodes (make bench has the others)" \
+  "$bin/bench_error_time" --case "$case_file" --sizes 5 --scenarios paper --quick --out "$out/bench"
+step "error against time: figure" "$bin/bench_summary" --dir "$out/bench" --figures-only
 
-current="summary"
 echo
 awk -f cmake/scripts/summary.awk "$out/report.json"
 echo

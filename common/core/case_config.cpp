@@ -124,6 +124,10 @@ Status validate(const CaseConfig& config) {
   return check.status();
 }
 
+std::string_view to_string(OutsideRegion outside) {
+  return outside == OutsideRegion::kExtend ? "extend" : "refuse";
+}
+
 std::string_view to_string(Carry carry) {
   switch (carry) {
     case Carry::kAuto: return "auto";

@@ -85,6 +85,9 @@ struct PriorConfig {
   double gravity_direction_sd_deg = 10.0;
   std::vector<double> gravity_levels_mm = {0.0, 20.0,
                                            40.0};  // fluid planes below the reference plane
+  // Method condensed: the strength of the prior's parts is estimated from the data, starting from the standard
+  // deviations above, known to a factor of 9 (two standard deviations of ln).
+  bool estimate_scales = true;
 };
 
 struct InversionConfig {
@@ -93,6 +96,13 @@ struct InversionConfig {
   int max_iterations = 40;  // the paper needed 10 to 19 with contact (Table 5); twice that
   double relative_misfit_change = 0.001;  // eq. 17
 };
+
+// What becomes of data outside the region that was prepared (method condensed).
+enum class OutsideRegion {
+  kExtend,  // all modes are read there; what they leave out of the prior is added to the datum's variance
+  kRefuse,  // kInvalidArgument names the datum
+};
+std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
@@ -106,6 +116,7 @@ struct CondensedConfig {
   int max_contact_iterations = 30;
   // Nodes at which the standard deviation is evaluated; interpolated between them.
   int uncertainty_nodes = 600;
+  OutsideRegion outside_region = OutsideRegion::kExtend;
 };
 
 // Which parts of the work a scene carries. kAuto: decided from case and data; every omission is listed in the

@@ -2,6 +2,7 @@
 // Estimate: the result of one inversion; and Update: an Estimate on its way to the clients.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -69,6 +70,9 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
+  // Estimated strength of the prior's parts in units of the case's: buoyancy along gravity, across it, all other
+  // forces; condensed method only.
+  std::array<double, 3> prior_scales{1.0, 1.0, 1.0};
   double rebuild_ms =
       0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };

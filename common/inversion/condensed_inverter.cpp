@@ -16,6 +16,7 @@
 #include "common/inversion/data_check.hpp"
 #include "common/inversion/field_rebuild.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/prior_scales.hpp"
 #include "common/inversion/sampled_operators.hpp"
 #include "common/inversion/set_search.hpp"
 
@@ -32,6 +33,9 @@ double milliseconds_since(Clock::time_point start) {
 
 // From here on the reason says that the data are not explained. 600 independent residuals exceed it by chance never.
 constexpr double kUnexplained = 1.5;
+
+// Contact and scales settle in turn; twice is the rule when a surgery begins, once later.
+constexpr int kScaleRounds = 4;
 
 // Into memory that `reason` has already.
 void set_reason(EstimateStatus outcome, const SetSearch& search, const CondensedConfig& config,
@@ -72,12 +76,16 @@ struct CondensedInverter::Impl {
         window(mode_window(*operators, options)),
         condensed(config.condensed),
         team(options.threads),
-        sampled(operators, std::move(given_locator), window, team),
+        sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
         reduction(*operators, window, config.contact.penalty_n_per_mm, team),
         rebuild(*operators, window, options.region_of_interest),
+        scales(operators->gravity_modes, window, SparseData::kMaxCommonErrors),
+        estimate_scales(config.prior.estimate_scales),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
     const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
+    gram_storage.resize(most * most);
     normal_storage.resize(most * most);
+    right.setZero(most);
     solution.setZero(most);
     z.setZero(window.count);
     reserve(options.capacity);
@@ -101,9 +109,15 @@ struct CondensedInverter::Impl {
     return window;
   }
 
+  void reset() {
+    search.forget();
+    scales.reset();
+  }
+  // Contact for the present scales, from the last set on: kConverged, kIterationLimit or kDeadline.
+  Result<EstimateStatus> settle_contact(const SparseData& data, Clock::time_point start);
   // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
   Status estimate_for_set(const SparseData& data);
-  void record(const SparseData& data, Clock::time_point start, int iteration);
+  void record(const SparseData& data, Clock::time_point start);
   void finish(const SparseData& data, Estimate& estimate);
   void estimate_omissions(const SparseData& data);
 
@@ -115,8 +129,15 @@ struct CondensedInverter::Impl {
   SampledOperators sampled;
   ContactReduction reduction;
   FieldRebuild rebuild;
+  PriorScales scales;
+  bool estimate_scales;
   SetSearch search;
 
+  // J^T R^-1 J of (c, z), lower triangle, without the prior.
+  Eigen::Map<MatrixXd> gram() {
+    const Eigen::Index size = sampled.common() + window.count;
+    return {gram_storage.data(), size, size};
+  }
   // Lower Cholesky factor of the normal equations of (c, z), (q + r) x (q + r).
   Eigen::Map<MatrixXd> normal() {
     const Eigen::Index size = sampled.common() + window.count;
@@ -125,7 +146,7 @@ struct CondensedInverter::Impl {
 
   MatrixXd jacobian;  // whitened [common error | J | d - A G f0], 3m x (q + r + 1)
   VecX residual;      // whitened d - A u, 3m
-  VecX normal_storage, solution, z;
+  VecX gram_storage, normal_storage, right, solution, z;
   double misfit_ratio =
       0.0;  // root mean square of d - A u - common error over its standard deviation
   std::vector<IterationRecord> history;
@@ -144,14 +165,21 @@ Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
                      j.middleCols(sampled.common() + begin, end - begin));
     });
   }
+  auto g = gram();
+  blas::gram(j.leftCols(unknowns), 0.0, g);
   auto factor = normal();
-  factor.setIdentity();
-  blas::gram(j.leftCols(unknowns), 1.0, factor);
+  factor = g;
+  factor.diagonal().head(sampled.common()).array() += 1.0;
+  for (int i = 0; i < r; ++i) {
+    const double scale = scales.of_mode(i);
+    factor(sampled.common() + i, sampled.common() + i) += 1.0 / (scale * scale);
+  }
   if (!blas::cholesky(factor)) {
     return fail(ErrorCode::kNotFinite, "inversion: the normal equations are not positive definite");
   }
+  right.head(unknowns).noalias() = j.leftCols(unknowns).transpose() * j.col(unknowns);
   auto cz = solution.head(unknowns);
-  cz.noalias() = j.leftCols(unknowns).transpose() * j.col(unknowns);
+  cz = right.head(unknowns);
   blas::solve_lower(factor, cz);
   blas::solve_lower_transposed(factor, cz);
   z = cz.tail(r);
@@ -163,8 +191,39 @@ Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
   return {};
 }
 
-void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point start,
-                                     int iteration) {
+Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData& data,
+                                                               Clock::time_point start) {
+  search.begin();
+  EstimateStatus outcome = EstimateStatus::kIterating;
+  while (outcome == EstimateStatus::kIterating) {
+    if (auto status = reduction.activate(search.current()); !status) {
+      return tl::unexpected(status.error());
+    }
+    if (auto status = estimate_for_set(data); !status) return tl::unexpected(status.error());
+    record(data, start);
+    switch (search.next(reduction.all_forces(), reduction.penetration(),
+                        reduction.compliance_diagonal())) {
+      case SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
+      case SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
+      case SetSearch::Step::kContinue: break;
+    }
+    if (outcome == EstimateStatus::kIterating &&
+        (options.stop.stop_requested() || milliseconds_since(start) > condensed.deadline_ms)) {
+      outcome = EstimateStatus::kDeadline;
+    }
+  }
+  if (outcome == EstimateStatus::kConverged) return outcome;
+  // The best set seen, evaluated once more.
+  if (auto status = reduction.activate(search.best()); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (auto status = estimate_for_set(data); !status) return tl::unexpected(status.error());
+  record(data, start);
+  search.adopt_best();
+  return outcome;
+}
+
+void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point start) {
   const int m = data.size();
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < m; ++i) {
@@ -173,7 +232,7 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
     squares += norm * norm;
   }
   IterationRecord entry;
-  entry.iteration = iteration;
+  entry.iteration = static_cast<int>(history.size()) + 1;
   entry.misfit_mm.mean = sum / m;
   entry.misfit_mm.std = m > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / m) / (m - 1))) : 0.0;
   const VecX& penetration = reduction.penetration();
@@ -189,8 +248,9 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
   const auto start = Clock::now();
   if (options.uncertainty) {
     // The common error comes first, so the last block is the factor of the Schur complement of z.
-    rebuild.standard_deviation(
-        team, reduction, normal().bottomRightCorner(window.count, window.count), estimate.sd_mm);
+    rebuild.standard_deviation(team, reduction,
+                               normal().bottomRightCorner(window.count, window.count),
+                               scales.of_other() * scales.of_other(), estimate.sd_mm);
     // Data that lie farther off than their standard deviations say: so may the estimate (Birge 1932).
     if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
   } else {
@@ -211,6 +271,7 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
     estimate.active_slaves.push_back(operators->slaves[static_cast<std::size_t>(slave)]);
   }
   estimate.history = history;
+  estimate.prior_scales = scales.scales();
 }
 
 void CondensedInverter::Impl::estimate_omissions(const SparseData& data) {
@@ -246,11 +307,12 @@ Result<CondensedInverter> CondensedInverter::build(
   }
   fem::use_single_threaded_blas();
   auto impl = std::make_unique<Impl>(std::move(operators), std::move(locator), config, options);
-  impl->history.reserve(static_cast<std::size_t>(config.condensed.max_contact_iterations) + 1);
+  impl->history.reserve(static_cast<std::size_t>(kScaleRounds + 1) *
+                        static_cast<std::size_t>(config.condensed.max_contact_iterations + 1));
   return CondensedInverter(std::move(impl));
 }
 
-void CondensedInverter::reset() { impl_->search.forget(); }
+void CondensedInverter::reset() { impl_->reset(); }
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
 
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
@@ -258,37 +320,22 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
   Impl& impl = *impl_;
   if (auto status = check_data(data); !status) return status;
   impl.reserve(data.size());
-  if (auto status = impl.sampled.sample(data); !status) return status;
-
   SetSearch& search = impl.search;
-  if (!impl.options.warm_start) search.forget();
-  search.begin();
+  if (!impl.options.warm_start) impl.reset();
   impl.history.clear();
   EstimateStatus outcome = EstimateStatus::kIterating;
-  while (outcome == EstimateStatus::kIterating) {
-    if (auto status = impl.reduction.activate(search.current()); !status) return status;
-    if (auto status = impl.estimate_for_set(data); !status) return status;
-    impl.record(data, start, search.iteration() + 1);
-    switch (search.next(impl.reduction.all_forces(), impl.reduction.penetration(),
-                        impl.reduction.compliance_diagonal())) {
-      case SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
-      case SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
-      case SetSearch::Step::kContinue: break;
+  for (int round = 0;; ++round) {
+    if (auto status = impl.sampled.sample(data, impl.scales.of_other()); !status) return status;
+    const auto settled = impl.settle_contact(data, start);
+    if (!settled) return tl::unexpected(settled.error());
+    outcome = *settled;
+    if (outcome != EstimateStatus::kConverged || !impl.estimate_scales || round == kScaleRounds ||
+        !impl.scales.fit(impl.gram(), impl.right.head(impl.gram().rows()))) {
+      break;
     }
-    if (outcome == EstimateStatus::kIterating &&
-        (impl.options.stop.stop_requested() ||
-         milliseconds_since(start) > impl.condensed.deadline_ms)) {
-      outcome = EstimateStatus::kDeadline;
-    }
-  }
-  if (outcome != EstimateStatus::kConverged) {  // the best set seen, evaluated once more
-    if (auto status = impl.reduction.activate(search.best()); !status) return status;
-    if (auto status = impl.estimate_for_set(data); !status) return status;
-    impl.record(data, start, search.iteration() + 1);
-    search.adopt_best();
   }
   if (!impl.z.allFinite() || !impl.reduction.forces().allFinite()) {
-    search.forget();
+    impl.reset();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
   impl.finish(data, estimate);

@@ -12,7 +12,8 @@ namespace brainshift::inversion {
 
 inline constexpr double kRegionMargin_mm = 8.0;
 
-// Nodes within the margin of the tumour surface or of a craniotomy node, sorted.
+// Nodes within the margin of the tumour surface or of a craniotomy node, and those of the tetrahedra that the tumour
+// surface passes through (at its vertices and the centres of its triangles); sorted.
 std::vector<NodeIndex> data_region(const BrainModel& model);
 
 // Ok, or kInvalidArgument when a preparation that needs so many bytes (the model's own included) exceeds

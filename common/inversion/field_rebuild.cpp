@@ -119,7 +119,8 @@ double FieldRebuild::greatest_control_move(const VecX& dg, const VecX& dz,
 }
 
 void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                                      const fem::blas::In<double>& normal_factor, VecX& sd) {
+                                      const fem::blas::In<double>& normal_factor,
+                                      double left_out_scale, VecX& sd) {
   const int r = window_.count, k = contact.size();
   sd.resize(operators_.num_nodes());
   // The diagonal blocks of a float factor are exact enough for a standard deviation.
@@ -143,7 +144,7 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
     for (long i = begin; i < end; ++i) {
       control_variance_[i] =
           static_cast<double>(conditioned_.middleRows<3>(3 * i).squaredNorm()) / 3.0 +
-          operators_.truncated_variance_mm2[i];
+          left_out_scale * operators_.truncated_variance_mm2[i];
     }
   });
   team.split(sd.size(), [&](long begin, long end) {

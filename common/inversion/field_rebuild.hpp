@@ -33,9 +33,11 @@ class FieldRebuild {
   // Greatest |U_g dg + U dz + G_A df| at a control node, mm; U_g: the modes before the window.
   double greatest_control_move(const VecX& dg, const VecX& dz, const ContactReduction& contact,
                                const VecX& df) const;
-  // normal_factor: lower Cholesky factor of I + J^T J, r x r. sd: n, mm.
+  // normal_factor: lower Cholesky factor of S^-2 + J^T J, r x r. left_out_scale: of the variance that the modes leave
+  // out. sd: n, mm.
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                          const fem::blas::In<double>& normal_factor, VecX& sd);
+                          const fem::blas::In<double>& normal_factor, double left_out_scale,
+                          VecX& sd);
 
  private:
   const CondensedOperators& operators_;

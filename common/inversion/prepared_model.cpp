@@ -66,6 +66,16 @@ Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config)
   return modes;
 }
 
+prior::ForcePrior scaled_prior(const PreparedModel& model, const std::array<double, 3>& scales) {
+  CaseConfig config = model.config();
+  config.prior.force_density_sd_n_m3 *= scales[2];
+  Eigen::MatrixXd modes = model.prior().modes();
+  for (Eigen::Index j = 0; j < modes.cols(); ++j) modes.col(j) *= scales[j % 3 == 0 ? 0 : 1];
+  const TetMesh& mesh = model.model().mesh;
+  return {mesh.nodes, fem::nodal_volumes(mesh), config.prior.correlation_length_mm,
+          units::force_density_from_n_m3(config.prior.force_density_sd_n_m3), std::move(modes)};
+}
+
 PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
                              contact::ForwardModel forward, prior::ForcePrior prior)
     : model_(std::move(model)),

@@ -12,10 +12,11 @@
 namespace brainshift::inversion {
 SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,
                                    std::shared_ptr<const geometry::TetLocator> locator,
-                                   ModeWindow window, ThreadTeam& team)
+                                   ModeWindow window, OutsideRegion outside, ThreadTeam& team)
     : operators_(std::move(operators)),
       locator_(std::move(locator)),
       window_(window),
+      outside_(outside),
       team_(team),
       region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
       region_modes_(gather_rows(operators_->modes, operators_->region)),
@@ -37,7 +38,7 @@ void SampledOperators::reserve(int data) {
                                     static_cast<std::size_t>(operators_->num_slaves())]);
 }
 
-Status SampledOperators::sample(const SparseData& data) {
+Status SampledOperators::sample(const SparseData& data, double scale) {
   assert(data.size() <= capacity_);
   size_ = data.size();
   outside_region_ = 0;
@@ -65,7 +66,15 @@ Status SampledOperators::sample(const SparseData& data) {
       }
     }
     if (!in_region) ++outside_region_;
-    sd_[i] = std::sqrt(data.sd_mm[i] * data.sd_mm[i] + std::max(0.0, left_out));
+    if (!in_region && outside_ == OutsideRegion::kRefuse) {
+      std::ostringstream text;
+      text << "sparse data: point " << i << " at (" << data.positions.col(i).transpose()
+           << ") mm lies outside the region that was prepared; condensed.outside_region = extend "
+              "would use it";
+      size_ = 0;
+      return fail(ErrorCode::kInvalidArgument, text.str());
+    }
+    sd_[i] = std::sqrt(data.sd_mm[i] * data.sd_mm[i] + scale * scale * std::max(0.0, left_out));
     weights_.col(i) /= sd_[i];
   }
   const bool region_only = outside_region_ == 0;

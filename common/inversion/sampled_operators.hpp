@@ -12,6 +12,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/core/case_config.hpp"
 #include "common/core/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/sparse_data.hpp"
@@ -26,12 +27,12 @@ class SampledOperators {
  public:
   SampledOperators(std::shared_ptr<const CondensedOperators> operators,
                    std::shared_ptr<const geometry::TetLocator> locator, ModeWindow window,
-                   ThreadTeam& team);
+                   OutsideRegion outside, ThreadTeam& team);
 
   void reserve(int data);
   // Locates the data and fills free_body. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside
-  // the brain (named). Preconditions: check_data; reserve(data.size()).
-  Status sample(const SparseData& data);
+  // the brain, or outside the region where the case refuses that (named). scale: of the prior's standard deviation, for what the modes leave out. Preconditions: check_data; reserve(data.size()).
+  Status sample(const SparseData& data, double scale);
   int size() const { return size_; }
   int common() const { return common_; }             // q
   double sd(int datum) const { return sd_[datum]; }  // mm, with what the modes leave out
@@ -50,6 +51,7 @@ class SampledOperators {
   std::shared_ptr<const CondensedOperators> operators_;
   std::shared_ptr<const geometry::TetLocator> locator_;
   ModeWindow window_;
+  OutsideRegion outside_;
   ThreadTeam& team_;             // shares the work
   std::vector<int> region_row_;  // per node, -1 outside the region
   Eigen::MatrixXf region_modes_, region_contact_;

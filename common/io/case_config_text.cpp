@@ -122,6 +122,7 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.number("  gravity_mode_sd", config.prior.gravity_mode_sd);
   out.number("  gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   out.list("  gravity_levels_mm", config.prior.gravity_levels_mm);
+  out.text("  scales", config.prior.estimate_scales ? "estimated" : "fixed");
   out.section("inversion");
   out.number("  sigma_mm", config.inversion.sigma_mm);
   out.integer("  sparse_points", config.inversion.sparse_points);
@@ -133,6 +134,7 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.number("  deadline_ms", config.condensed.deadline_ms);
   out.integer("  max_contact_iterations", config.condensed.max_contact_iterations);
   out.integer("  uncertainty_nodes", config.condensed.uncertainty_nodes);
+  out.text("  outside_region", std::string(to_string(config.condensed.outside_region)));
   out.section("scene");
   const auto carry = [&out](const std::string& key, Carry value) {
     out.text("  " + key, std::string(to_string(value)));

@@ -110,6 +110,9 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   prior.number("gravity_mode_sd", config.prior.gravity_mode_sd);
   prior.number("gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   prior.numbers("gravity_levels_mm", config.prior.gravity_levels_mm);
+  std::string scales = config.prior.estimate_scales ? "estimated" : "fixed";
+  prior.choice("scales", scales, {"estimated", "fixed"});
+  config.prior.estimate_scales = scales == "estimated";
   prior.done();
 
   YamlSection inversion = root.section("inversion");
@@ -125,6 +128,10 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   condensed.number("deadline_ms", config.condensed.deadline_ms);
   condensed.integer("max_contact_iterations", config.condensed.max_contact_iterations);
   condensed.integer("uncertainty_nodes", config.condensed.uncertainty_nodes);
+  std::string outside(to_string(config.condensed.outside_region));
+  condensed.choice("outside_region", outside, {"extend", "refuse"});
+  config.condensed.outside_region =
+      outside == "extend" ? OutsideRegion::kExtend : OutsideRegion::kRefuse;
   condensed.done();
 }
 

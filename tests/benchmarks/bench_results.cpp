@@ -106,7 +106,8 @@ Status read_json(const fs::path& file, const std::map<std::string, std::string>&
 }
 
 // bench_exactness compares several ranks; what counts is the one in everyday use, the largest.
-Status read_direct(const fs::path& file, std::map<std::string, double>& facts) {
+Status read_direct(const fs::path& file, const std::string& scenario,
+                   std::map<std::string, double>& facts) {
   std::ifstream text(file);
   if (!text) return {};
   const auto json = nlohmann::json::parse(text, nullptr, false);
@@ -117,8 +118,9 @@ Status read_direct(const fs::path& file, std::map<std::string, double>& facts) {
   for (const auto& one : json["reduced"]) {
     if (!one.is_object() || one.value("rank", -1.0) <= rank) continue;
     rank = one.value("rank", -1.0);
-    facts["direct_max_mm"] = one.value("max_mm", kNone);
+    facts["direct_max_mm " + scenario] = one.value("max_mm", kNone);
   }
+  facts["exact_max_mm " + scenario] = json.value("exact_max_mm", kNone);
   return {};
 }
 
@@ -219,6 +221,34 @@ std::vector<MethodSummary> summarise(const CsvTable& table) {
   return summaries;
 }
 
+PairedErrors paired_errors(const CsvTable& table, const MethodSummary& first,
+                           const MethodSummary& second) {
+  const auto by_repetition = [&](const MethodSummary& one) {
+    std::map<std::string, double> errors;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      const double rank = table.number(row, "rank"), error = table.number(row, "cross_mm");
+      if (table.text(row, "mesh") == one.mesh && table.text(row, "scenario") == one.scenario &&
+          table.text(row, "method") == one.method && table.text(row, "start") == one.start &&
+          (std::isfinite(rank) ? static_cast<int>(rank) : 0) == one.rank && std::isfinite(error)) {
+        errors[table.text(row, "repetition")] = error;
+      }
+    }
+    return errors;
+  };
+  const auto a = by_repetition(first), b = by_repetition(second);
+  PairedErrors paired;
+  for (const auto& [repetition, error] : a) {
+    const auto other = b.find(repetition);
+    if (other == b.end()) continue;
+    ++paired.measurements;
+    paired.first_mm += error;
+    paired.second_mm += other->second;
+  }
+  paired.first_mm /= paired.measurements;
+  paired.second_mm /= paired.measurements;
+  return paired;
+}
+
 Result<Results> read_results(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     return fail(ErrorCode::kNotFound, folder.string() + ": the folder does not exist");
@@ -246,8 +276,11 @@ Result<Results> read_results(const fs::path& folder) {
   if (Status ok = read_json(folder / "prepare.json", prepare, results.facts); !ok) {
     return tl::unexpected(ok.error());
   }
-  if (Status ok = read_direct(folder / "direct.json", results.facts); !ok) {
-    return tl::unexpected(ok.error());
+  for (const std::string scenario : {"paper", "distension"}) {
+    const fs::path file = folder / ("direct-" + scenario + ".json");
+    if (Status ok = read_direct(file, scenario, results.facts); !ok) {
+      return tl::unexpected(ok.error());
+    }
   }
   return results;
 }

@@ -5,7 +5,7 @@
 //   NAME.json, latency-NAME.csv      `brainshift replay` of scenario NAME
 //   facts.csv                        name,value: what the script measured itself
 //   prepare.json                     `brainshiftd prepare --json`
-//   direct.json                      bench_exactness
+//   direct-NAME.json                 bench_exactness --scenario NAME
 #pragma once
 
 #include <filesystem>
@@ -57,6 +57,14 @@ struct Results {
 };
 
 std::vector<MethodSummary> summarise(const CsvTable& error_time);
+
+// Mean errors at the tumour of two methods, over the measurements that both of them have inverted.
+struct PairedErrors {
+  int measurements = 0;
+  double first_mm = 0.0, second_mm = 0.0;  // NaN without measurements
+};
+PairedErrors paired_errors(const CsvTable& error_time, const MethodSummary& first,
+                           const MethodSummary& second);
 
 // Parts that are missing stay empty; kUnreadable for a part that is there and makes no sense.
 Result<Results> read_results(const std::filesystem::path& folder);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -108,7 +109,8 @@ Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int r
                          std::uint64_t seed, const Progress& progress) {
   twin::Scenario first = scenario;
   first.fluid_levels_mm.resize(1);
-  auto surgery = twin::play_scenario(*head.model, head.config, first, seed, progress);
+  auto surgery = twin::play_scenario(*head.model, head.config, head.prepared->forward(), first,
+                                     seed, progress);
   if (!surgery) return tl::unexpected(surgery.error());
   const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
   if (pairs == nullptr) {
@@ -218,6 +220,8 @@ Status run_method(const Head& head, const Trial& trial, Method method, int repet
     }
     const bool missing =
         estimate.error().code == ErrorCode::kInternal;  // "unknown inversion method"
+    std::fprintf(stderr, "  %s %s: %s: %s\n", head.name.c_str(), trial.scenario.c_str(),
+                 std::string(to_string(method)).c_str(), estimate.error().message.c_str());
     row.status = missing        ? "not_available"
                  : alarm.rang() ? "stopped"
                                 : to_string(estimate.error().code);

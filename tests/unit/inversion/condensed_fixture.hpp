@@ -28,6 +28,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     CaseConfig config = test_support::toy_config();
     config.condensed.max_rank = 600;
     config.condensed.uncertainty_nodes = 300;  // more than there are: all
+    config.prior.estimate_scales = false;
     return config;
   }
   static std::shared_ptr<const BrainModel> patient() {
@@ -78,8 +79,10 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
   }
 
   static DirectPosterior direct_posterior(Boundary boundary, const SparseData& data,
-                                          const std::vector<NodeIndex>& active_nodes) {
+                                          const std::vector<NodeIndex>& active_nodes,
+                                          const std::array<double, 3>& scales = {1, 1, 1}) {
     const PreparedModel& model = prepared(boundary);
+    const prior::ForcePrior forces = scaled_prior(model, scales);
     const contact::ForwardModel& forward = model.forward();
     const Eigen::Index n3 = patient()->mesh.nodes.size();
     contact::ActiveSet active(static_cast<std::size_t>(forward.contact().num_slaves()), 0);
@@ -96,7 +99,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
       unit(j % 3, j / 3) = 1.0;
       const Points column = forward.dofs().expand(factor->solve(forward.dofs().restrict_to(unit)));
       inverse.col(j) = Eigen::Map<const VecX>(column.data(), n3);
-      const Points force = model.prior().apply(column);
+      const Points force = forces.apply(column);
       loaded.col(j) = Eigen::Map<const VecX>(force.data(), n3);
     }
     const Eigen::MatrixXd prior = inverse * loaded;

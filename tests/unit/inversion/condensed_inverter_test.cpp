@@ -37,6 +37,24 @@ TEST_P(Condensed, EstimateEqualsTheDirectPosteriorOfThePenalisedSystem) {
   EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(), kFloatTolerance * largest_mm);
 }
 
+TEST_P(Condensed, EstimateWithEstimatedScalesEqualsTheDirectPosteriorOfTheScaledPrior) {
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.displacements *= 0.01;  // less than the case's prior expects
+  CaseConfig with = config();
+  with.prior.estimate_scales = true;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam(), {}, with);
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  const auto& scales = estimate.prior_scales;
+  EXPECT_LT(*std::min_element(scales.begin(), scales.end()), 0.8) << "the test shows nothing";
+  EXPECT_LE(*std::max_element(scales.begin(), scales.end()), 1.0);
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves, scales);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(),
+            kFloatTolerance * direct.mean.cwiseAbs().maxCoeff());
+}
+
 // Equal in the data region; elsewhere the modes leave variance out, which is added as that of the free body.
 TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
   const SparseData data = sagging_data(GetParam(), 0.3);
@@ -160,6 +178,23 @@ TEST_F(Condensed, IterationLimitReturnsTheBestIterateAndSaysSo) {
   auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
   ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
   EXPECT_EQ(estimate.status, EstimateStatus::kIterationLimit);
+}
+
+TEST_F(Condensed, DataOutsideTheRegionAreRefusedWhereTheCaseSaysSo) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  CaseConfig strict = config();
+  strict.condensed.outside_region = OutsideRegion::kRefuse;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, strict);
+  Estimate estimate;
+  EXPECT_TRUE(inverter.update(data, estimate));
+  const Points before = estimate.displacement;
+  data.positions.col(7) = Vec3(5, 5, 5);  // far from tumour and craniotomy
+  const Status refused = inverter.update(data, estimate);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("point 7 at (5 5 5) mm"));
+  EXPECT_THAT(refused.error().message, HasSubstr("condensed.outside_region"));
+  EXPECT_TRUE(estimate.displacement == before);
 }
 
 TEST_F(Condensed, DataFarFromTheRegionAreBelievedLess) {

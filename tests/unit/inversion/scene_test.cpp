@@ -186,7 +186,7 @@ TEST_F(Scene, ContactThatDoesNotTouchIsLeftOutExactly) {
   ASSERT_TRUE(everything.update(one, full));
   ASSERT_TRUE(without.update(one, part));
   EXPECT_EQ(full.contact.active, 0);
-  EXPECT_EQ(full.contact.iterations, 1);
+  EXPECT_LE(full.contact.iterations, 2);  // the empty set, again when the prior's scales are known
   EXPECT_GT(everything.omission_errors().nearest_slave_mm, 0.1);
   EXPECT_EQ(everything.omission_errors().contact_mm, 0.0);
   EXPECT_EQ(difference(full, part), 0.0);

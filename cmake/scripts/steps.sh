@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Sourced by the scripts that run a job in steps: demo.sh, bench.sh and their like. They set `name` (first word of
+# messages), `bin` (folder of the binaries) and `out` (folder of results) before.
+
+# A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+current=start
+daemon=
+endpoint=
+
+# step TITLE COMMAND...: runs the command and prints how long it took.
+step() {
+  current=$1
+  shift
+  local begin=$EPOCHREALTIME
+  printf '== %s\n' "$current"
+  "$@"
+  printf '   %s s\n' "$(seconds_since "$begin" 1)"
+}
+
+# seconds_since EPOCHREALTIME DIGITS
+seconds_since() { awk -v a="$1" -v b="$EPOCHREALTIME" -v d="$2" 'BEGIN { printf "%.*f", d, b - a }'; }
+
+# empty_folder DIR: makes it, empty. Refuses what nobody means.
+empty_folder() {
+  case $1 in
+    "" | / | . | ..) echo "$name: $1 is no folder to empty" >&2; exit 2 ;;
+  esac
+  rm -rf "$1"
+  mkdir -p "$1"
+}
+
+# start_daemon MODEL: on a free loopback port; sets `endpoint` and `daemon`.
+start_daemon() {
+  local pipe=$out/daemon.pipe line
+  mkfifo "$pipe"
+  "$bin/brainshiftd" serve --config config/daemon.yaml --model "$1" \
+    --endpoint 'tcp://127.0.0.1:*' >"$pipe" 2>"$out/daemon.log" &
+  daemon=$!
+  exec {daemon_output}<"$pipe"
+  rm "$pipe"
+  endpoint=
+  while IFS= read -r -t 120 -u "$daemon_output" line; do
+    case $line in
+      *"listening on "*) endpoint=${line##*listening on }; break ;;
+    esac
+  done
+  if [ -z "$endpoint" ]; then
+    echo "$name: brainshiftd ended or said nothing within 120 s" >&2
+    return 1
+  fi
+  # Whatever it says later must not fill the pipe.
+  cat <&"$daemon_output" >>"$out/daemon.log" &
+}
+
+# A daemon that does not end cleanly fails the script.
+stop_daemon() {
+  local pid=$daemon
+  daemon=
+  kill -TERM "$pid"
+  wait "$pid"
+}
+
+finish() {
+  local status=$?
+  [ -z "$daemon" ] || stop_daemon || true
+  if [ "$status" -ne 0 ] && [ "$current" != summary ]; then
+    echo "$name: failed (exit $status) at: $current" >&2
+    if [ -s "$out/daemon.log" ]; then
+      echo "$name: last lines of $out/daemon.log:" >&2
+      tail -n 5 "$out/daemon.log" >&2
+    fi
+  fi
+}
+trap finish EXIT
+trap 'exit 130' INT TERM
