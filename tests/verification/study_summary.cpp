@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Turns what the verification tests recorded (tests/support/study_record.hpp) into one chart per study, tables.md and
+// summary.json. Exit status 0 only if there are checks and every one holds.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "client/replay/write_file.hpp"
+#include "client/report/xy_chart.hpp"
+#include "tests/benchmarks/bench_checks.hpp"
+#include "tests/benchmarks/csv_table.hpp"
+
+namespace brainshift::verification {
+namespace {
+
+namespace fs = std::filesystem;
+namespace palette = client::palette;
+using bench::CsvTable;
+using client::Marker;
+
+struct Arguments {
+  fs::path folder = "out/verify";
+  std::string commit = "unknown";
+  std::string command = "ctest --preset release -L verification";
+};
+
+// Errors, sizes, times and the like span powers of ten; positions and pressures do not.
+bool logarithmic(const std::string& axis) {
+  const char* const words[] = {"error", "size",     "steps",     " s",
+                               "unknowns", "elements", "roughness", "over bound"};
+  if (axis == "T") return true;  // time over consolidation time
+  return std::any_of(std::begin(words), std::end(words), [&](const char* word) {
+    return axis.find(word) != std::string::npos;
+  });
+}
+
+// "element size mm" -> "element size (mm)": a last word that is a unit.
+std::string with_unit(const std::string& axis) {
+  const std::size_t space = axis.find_last_of(' ');
+  if (space == std::string::npos) return axis;
+  const std::string unit = axis.substr(space + 1);
+  const char* const units[] = {"mm", "s", "%", "kPa", "Pa", "N", "MPa"};
+  const bool known = std::any_of(std::begin(units), std::end(units),
+                                 [&](const char* one) { return unit == one; });
+  return known ? axis.substr(0, space) + " (" + unit + ")" : axis;
+}
+
+struct Chart {
+  std::string study;
+  client::XyChartSpec spec;
+};
+
+// One chart per study and pair of axes, one line per series, in the order of the record.
+std::vector<Chart> charts_of(const CsvTable& points) {
+  const cv::Scalar colours[] = {palette::kBlue,  palette::kVermillion, palette::kGreen,
+                                palette::kPurple, palette::kOrange,    palette::kSkyBlue};
+  const Marker markers[] = {Marker::kCircle, Marker::kSquare, Marker::kTriangle};
+  std::vector<Chart> charts;
+  for (std::size_t row = 0; row < points.rows(); ++row) {
+    const std::string& study = points.text(row, "study");
+    const std::string x = with_unit(points.text(row, "x_name"));
+    const std::string y = with_unit(points.text(row, "y_name"));
+    auto chart = std::find_if(charts.begin(), charts.end(), [&](const Chart& one) {
+      return one.study == study && one.spec.x.label == x && one.spec.y.label == y;
+    });
+    if (chart == charts.end()) {
+      chart = charts.insert(charts.end(), {study, {}});
+      chart->spec.title = "Verification: " + study;
+      chart->spec.x = {x, logarithmic(points.text(row, "x_name"))};
+      chart->spec.y = {y, logarithmic(points.text(row, "y_name"))};
+    }
+    auto& all = chart->spec.series;
+    const std::string& legend = points.text(row, "series");
+    auto series = std::find_if(all.begin(), all.end(),
+                               [&](const auto& one) { return one.legend == legend; });
+    if (series == all.end()) {
+      const std::size_t k = all.size();
+      series = all.insert(all.end(), client::XySeries{});
+      series->legend = legend;
+      series->colour = colours[k % std::size(colours)];
+      // What is known exactly is a thin line, what was computed a marker on it.
+      const bool reference = legend.find("series") != std::string::npos;
+      series->marker = reference ? Marker::kNone : markers[k % std::size(markers)];
+      series->line = true;
+      series->dash_px = reference ? 10.0 : 0.0;
+    }
+    series->points.push_back({points.number(row, "x"), points.number(row, "y"), ""});
+  }
+  return charts;
+}
+
+Result<std::vector<std::string>> draw(const std::vector<Chart>& charts, const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const Chart& chart : charts) {
+    std::string name = chart.study;
+    for (int k = 2; std::find(names.begin(), names.end(), name + ".png") != names.end(); ++k) {
+      name = chart.study + "-" + std::to_string(k);
+    }
+    const fs::path file = folder / (name + ".png");
+    if (!cv::imwrite(file.string(), client::draw_xy_chart(chart.spec))) {
+      return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+    }
+    names.push_back(name + ".png");
+  }
+  return names;
+}
+
+std::string markdown(const CsvTable& checks, const Arguments& arguments) {
+  std::ostringstream text;
+  text << "Commit " << arguments.commit << "; `" << arguments.command << "`\n\n"
+       << "| study | figure | value | bound | holds | reference |\n|---|---|---|---|---|---|\n";
+  for (std::size_t row = 0; row < checks.rows(); ++row) {
+    text << "| " << checks.text(row, "study") << " | " << checks.text(row, "name") << " | "
+         << bench::csv_number(checks.number(row, "value"), 3) << " | " << checks.text(row, "bound")
+         << " | " << (checks.text(row, "pass") == "1" ? "yes" : "**no**") << " | "
+         << checks.text(row, "source") << " |\n";
+  }
+  return text.str();
+}
+
+// True when every check holds.
+Result<bool> run(const Arguments& arguments) {
+  const auto points = CsvTable::read(arguments.folder / "points.csv");
+  if (!points) return tl::unexpected(points.error());
+  const auto rows = CsvTable::read(arguments.folder / "checks.csv");
+  if (!rows) return tl::unexpected(rows.error());
+  const auto names = draw(charts_of(*points), arguments.folder);
+  if (!names) return tl::unexpected(names.error());
+  std::vector<bench::Check> checks;
+  bool pass = rows->rows() > 0;
+  for (std::size_t row = 0; row < rows->rows(); ++row) {
+    bench::Check check{rows->text(row, "study") + ": " + rows->text(row, "name"),
+                       rows->number(row, "value"), rows->text(row, "bound"),
+                       rows->text(row, "pass") == "1", arguments.command};
+    pass = pass && check.pass;
+    std::printf("%-6s %-75s %10s   %s\n", check.pass ? "ok" : "FAILS", check.name.c_str(),
+                bench::csv_number(check.value, 4).c_str(), check.bound.c_str());
+    checks.push_back(std::move(check));
+  }
+  Status ok =
+      client::write_file(arguments.folder / "summary.json", bench::to_json(checks, {}))
+          .and_then([&] {
+            return client::write_file(arguments.folder / "tables.md", markdown(*rows, arguments));
+          });
+  if (!ok) return tl::unexpected(ok.error());
+  std::printf("%zu checks, %zu charts in %s\n", checks.size(), names->size(),
+              arguments.folder.c_str());
+  return pass;
+}
+
+}  // namespace
+}  // namespace brainshift::verification
+
+int main(int argc, char** argv) {
+  using namespace brainshift;
+  CLI::App app{"Charts, table and checks of what the verification tests recorded.",
+               "study_summary"};
+  verification::Arguments arguments;
+  app.add_option("--dir", arguments.folder, "folder with points.csv and checks.csv; results go there")
+      ->capture_default_str();
+  app.add_option("--commit", arguments.commit, "for tables.md")->capture_default_str();
+  app.add_option("--command", arguments.command, "that the figures come from")
+      ->capture_default_str();
+  app.footer("Exit status: 0 every check holds, 1 one does not or failure, 2 bad usage or input.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "study_summary: %s (see study_summary --help)\n", error.what());
+    return 2;
+  }
+  const auto pass = verification::run(arguments);
+  if (pass) return *pass ? 0 : 1;
+  std::fprintf(stderr, "study_summary: %s\n", pass.error().message.c_str());
+  return pass.error().code == ErrorCode::kWriteFailed ? 1 : 2;
+}
