@@ -73,6 +73,7 @@ struct ContactResult {
   std::string name;
   int points = 0, active = 0;       // quadrature points
   Vec3 force = Vec3::Zero();        // on the body, N
+  double area_mm2 = 0.0;            // of the active points
   double max_penetration_mm = 0.0;  // what the penalty leaves
   double max_pressure = 0.0;        // N/mm^2
 };

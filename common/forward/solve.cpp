@@ -168,6 +168,7 @@ void add_contact_results(const ForwardProblem& problem, const contact::SurfaceCo
     ++result.points;
     if (!active[static_cast<std::size_t>(i)]) continue;
     ++result.active;
+    result.area_mm2 += point.area;
     result.force += point.stiffness * penetration[i] * point.normal;
     result.max_penetration_mm = std::max(result.max_penetration_mm, penetration[i]);
     result.max_pressure =
