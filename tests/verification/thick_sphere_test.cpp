@@ -25,8 +25,15 @@ double exact(double r, double nu) {
          kYoungs;
 }
 
+// Radial and hoop stress differ by this.
+double exact_von_mises(double r) {
+  const double a3 = std::pow(kInner, 3), b3 = std::pow(kOuter, 3);
+  return 1.5 * kPressure * a3 * b3 / ((b3 - a3) * r * r * r);
+}
+
 struct Outcome {
-  double error_pct = 0.0;  // of the cavity's mean radial displacement
+  double error_pct = 0.0;   // of the cavity's mean radial displacement
+  double stress_pct = 0.0;  // von Mises stress at the centroids, L2 norm relative to the exact one
   int unknowns = 0;
   double seconds = 0.0;
 };
@@ -47,13 +54,29 @@ double error_pct(const TetMesh& mesh, const std::vector<NodeIndex>& cavity, cons
   return 100.0 * std::abs(sum / static_cast<double>(cavity.size()) / exact(kInner, nu) - 1.0);
 }
 
+double stress_pct(const fem::DisplacementSpace& space, const Points& u, double nu) {
+  double error = 0.0, scale = 0.0;
+  for (int e = 0; e < space.num_elements(); ++e) {
+    const Eigen::Vector4d centre = Eigen::Vector4d::Constant(0.25);
+    const Vec3 x = 0.25 * space.mesh.nodes(Eigen::all, space.mesh.tets.col(e)).rowwise().sum();
+    const double expected = exact_von_mises(x.norm());
+    const double found = fem::von_mises(
+        fem::stress_from(elasticity(kYoungs, nu), fem::displacement_gradient(space, u, e, centre)));
+    const double volume = fem::tet_geometry(space.mesh, e).volume;
+    error += volume * (found - expected) * (found - expected);
+    scale += volume * expected * expected;
+  }
+  return 100.0 * std::sqrt(error / scale);
+}
+
 Outcome thick_sphere(fem::Element element, double nu, int cells) {
   auto problem = problem_on(shell(cells), element, elasticity(kYoungs, nu));
   add_symmetry(problem, true);
   add_condition(problem, "cavity", in_cavity, forward::Pressure{kPressure});
   const auto solution = solved(problem);
   return {error_pct(problem.mesh, problem.groups.at("cavity").vertices, solution.displacement, nu),
-          solution.unknowns, solution.assemble_s + solution.solve_s};
+          stress_pct(solution.space, solution.displacement, nu), solution.unknowns,
+          solution.assemble_s + solution.solve_s};
 }
 
 // The third candidate, for the comparison only: P1 with the dilatation averaged around each node (Bonet & Burton
@@ -98,7 +121,8 @@ Outcome nodal_average(double nu, int cells) {
   const Points load = fem::pressure_load(space, cavity.faces, kPressure);
   const Points u = dofs.expand(factor->solve(dofs.restrict_to(load)));
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  return {error_pct(space.mesh, cavity.vertices, u, nu), dofs.num_unknowns(), elapsed.count()};
+  return {error_pct(space.mesh, cavity.vertices, u, nu), stress_pct(space, u, nu),
+          dofs.num_unknowns(), elapsed.count()};
 }
 
 std::string series(const std::string& element, double nu) {
@@ -110,6 +134,8 @@ std::string series(const std::string& element, double nu) {
 void record_outcome(const std::string& name, const Outcome& outcome) {
   test_support::record({kStudy, name, "unknowns", "displacement error %",
                         static_cast<double>(outcome.unknowns), outcome.error_pct});
+  test_support::record({"thick-sphere-stress", name, "unknowns", "von Mises stress error %",
+                        static_cast<double>(outcome.unknowns), outcome.stress_pct});
   test_support::record({"thick-sphere-time", name, "assembly and solve s", "displacement error %",
                         outcome.seconds, outcome.error_pct});
 }

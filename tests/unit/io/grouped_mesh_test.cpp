@@ -110,9 +110,9 @@ TEST(GroupedMesh, ANameWithoutQuotationMarksIsRefused) {
 
 TEST(GroupedMesh, VtuTrianglesTakeTheirLabels) {
   const TemporaryFolder folder;
-  const auto mesh = read_grouped_mesh(folder.write(
-      "m.vtu",
-      R"(<VTKFile type="UnstructuredGrid" byte_order="LittleEndian"><UnstructuredGrid>
+  const auto mesh = read_grouped_mesh(
+      folder.write("m.vtu",
+                   R"(<VTKFile type="UnstructuredGrid" byte_order="LittleEndian"><UnstructuredGrid>
 <Piece NumberOfPoints="4" NumberOfCells="2"><Points>
 <DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
 <Cells><DataArray type="Int64" Name="connectivity" format="ascii">1 2 3 0 1 2 3</DataArray>
