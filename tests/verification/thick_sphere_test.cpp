@@ -154,7 +154,7 @@ TEST(ThickSphere, AveragedDilatationDoesNotLockEither) {
 
 TEST(ThickSphere, LinearElementsLockAndQuadraticOnesDoNot) {
   std::map<std::pair<fem::Element, double>, Outcome> finest;
-  for (const double nu : {0.3, 0.45, 0.48, 0.49, 0.499, 0.4999}) {
+  for (const double nu : {0.3, 0.45, 0.48, 0.499, 0.4999}) {
     for (const auto& [element, sizes] : {std::pair{fem::Element::kP1, std::vector<int>{4, 8, 16}},
                                          std::pair{fem::Element::kP2, std::vector<int>{2, 4, 8}}}) {
       for (const int cells : sizes) {

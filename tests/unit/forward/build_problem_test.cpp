@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/contact/surface_contact.hpp"
+#include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::forward {
@@ -99,6 +101,51 @@ TEST(BuildProblem, RefusesWhatTheMeshDoesNotHave) {
   file = spec();
   file.time = TimeSpec{{1.0}};
   EXPECT_THAT(message(file), HasSubstr("time: "));
+}
+
+// A block on a ball, held at its top: the stress, the pressed points and nothing else balance at every free node.
+TEST(Solve, ContactSolutionIsInEquilibriumWithWhatPresses) {
+  for (const fem::Element element : {fem::Element::kP1, fem::Element::kP2}) {
+    ForwardProblem problem;
+    problem.mesh = test_support::box_mesh(4, 4, 3, Vec3(4.0, 4.0, 3.0));
+    problem.element = element;
+    problem.materials =
+        fem::MaterialMap::uniform({fem::Elasticity{0.003, 0.002}}, problem.mesh.num_tets());
+    const auto boundary = geometry::boundary_triangles(problem.mesh);
+    std::vector<int> low, high;
+    for (int f = 0; f < boundary.cols(); ++f) {
+      const auto z = problem.mesh.nodes(2, boundary.col(f).array());
+      if (z.maxCoeff() == 0.0) low.push_back(f);
+      if (z.minCoeff() == 3.0) high.push_back(f);
+    }
+    for (const auto& [name, faces] : {std::pair{"low", low}, std::pair{"high", high}}) {
+      FaceGroup group{{}, boundary(Eigen::all, faces), {}};
+      group.vertices.assign(group.faces.data(), group.faces.data() + group.faces.size());
+      problem.groups[name] = group;
+    }
+    problem.conditions = {{"push", "high", Displacement{{0.0, 0.0, -0.3}}}};
+    problem.contacts = {{"ball", "low", contact::RigidSphere{Vec3(1.7, 2.1, -9.9), 10.0}, {}}};
+    const auto solution = solve(problem);
+    ASSERT_TRUE(solution) << solution.error().message;
+    EXPECT_GT(solution->iterations, 2);
+    ASSERT_GT(solution->contacts[0].active, 3);
+    ASSERT_LT(solution->contacts[0].active, solution->contacts[0].points);
+
+    contact::SurfaceContact contact(solution->space);
+    ASSERT_TRUE(contact.add(problem.groups["low"].faces, problem.contacts[0].obstacle,
+                            default_penalty(problem, problem.groups["low"])));
+    const VecX pressed = contact.penetration(solution->displacement).cwiseMax(0.0);
+    Points force = -fem::internal_force(solution->space, problem.materials, solution->displacement);
+    const double scale = force.norm();
+    ASSERT_GT(scale, 0.0);
+    contact.add_force(pressed, contact::ActiveSet(static_cast<std::size_t>(pressed.size()), 1),
+                      force);
+    for (int n = 0; n < solution->space.num_nodes(); ++n) {
+      if (solution->space.nodes(2, n) == 3.0) force.col(n).setZero();
+    }
+    EXPECT_LT(force.norm(), 1e-10 * scale);
+    EXPECT_LT((solution->contacts[0].force + solution->reaction).norm(), 1e-10 * scale);
+  }
 }
 
 TEST(Solve, RefusesLoadsOnInnerFaces) {

@@ -126,6 +126,25 @@ TEST(GroupedMesh, VtuTrianglesTakeTheirLabels) {
   EXPECT_EQ(mesh->triangles.col(0), Eigen::Vector3i(1, 2, 3));
 }
 
+TEST(ElementGrid, FieldsOfAnotherLengthAreRefusedAndGoodOnesWritten) {
+  const TemporaryFolder folder;
+  ElementGrid grid;
+  grid.nodes = Points::Random(3, 10);
+  grid.elements = Eigen::VectorXi::LinSpaced(10, 0, 9);
+  const NodeField node{"displacement", Eigen::MatrixXd::Ones(3, 10)};
+  const NodeField cell{"stress", Eigen::MatrixXd::Ones(6, 1)};
+  EXPECT_FALSE(write_vtu(folder / "u.vtu", grid, {cell}, {}));
+  EXPECT_FALSE(write_vtu(folder / "u.vtu", grid, {node}, {node}));
+  EXPECT_EQ(folder.entries(), 0U);
+  ASSERT_TRUE(write_vtu(folder / "u.vtu", grid, {node}, {cell}));
+  const std::string text = test_support::content_of(folder / "u.vtu");
+  EXPECT_THAT(text, HasSubstr("NumberOfPoints=\"10\" NumberOfCells=\"1\""));
+  EXPECT_LT(text.find("displacement"), text.find("<CellData>"));
+  EXPECT_GT(text.find("stress"), text.find("<CellData>"));
+  // Its cell is no linear tetrahedron.
+  EXPECT_FALSE(read_vtu(folder / "u.vtu"));
+}
+
 TEST(ProblemFile, EveryKeyIsRead) {
   const auto problem = parse_problem(R"(
 mesh: {file: m.msh, element: p1}
