@@ -16,6 +16,7 @@
 
 #include "common/contact/obstacle.hpp"
 #include "common/core/progress.hpp"
+#include "common/fem/displacement_constraints.hpp"
 #include "common/fem/space_elasticity.hpp"
 
 namespace brainshift::forward {
@@ -99,6 +100,15 @@ Status validate(const ForwardProblem& problem);
 // kappa = 100 E / h: E of the stiffest tissue at the group, h its mean edge; the penetration it leaves is below a
 // hundredth of an edge's own compression.
 double default_penalty(const ForwardProblem& problem, const FaceGroup& group);
+
+// What any solver of the problem starts from: nodes, prescribed displacements, and the consistent nodal forces (3 x n,
+// N) of body forces, tractions and pressures, contact aside. Fails as validate, or on a contradiction.
+struct Discretised {
+  fem::DisplacementSpace space;
+  fem::DisplacementConstraints constraints;
+  Points load;
+};
+Result<Discretised> discretise(const ForwardProblem& problem);
 
 // kInvalidArgument, kFloatingBody, kSingularMatrix, kNotFinite, kNotConverged.
 Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress = {});

@@ -204,20 +204,29 @@ void add_warnings(const ForwardProblem& problem, ForwardSolution& solution) {
 
 }  // namespace
 
-Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress) {
+Result<Discretised> discretise(const ForwardProblem& problem) {
   if (Status ok = validate(problem); !ok) return tl::unexpected(ok.error());
-  const auto start = Clock::now();
-  report(progress, "assemble", 0.0);
-  ForwardSolution solution;
-  solution.space = fem::make_space(problem.mesh, problem.element);
-  const fem::DisplacementSpace& space = solution.space;
-
+  fem::DisplacementSpace space = fem::make_space(problem.mesh, problem.element);
   fem::DisplacementConstraints constraints(space.num_nodes());
   Points load = body_load(problem, space);
   ConditionAdder adder(problem, space, constraints, load);
   for (const Condition& condition : problem.conditions) {
     if (Status ok = adder.add(condition); !ok) return tl::unexpected(ok.error());
   }
+  return Discretised{std::move(space), std::move(constraints), std::move(load)};
+}
+
+Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress) {
+  const auto start = Clock::now();
+  report(progress, "assemble", 0.0);
+  auto discretised = discretise(problem);
+  if (!discretised) return tl::unexpected(discretised.error());
+  ForwardSolution solution;
+  solution.space = std::move(discretised->space);
+  const fem::DisplacementSpace& space = solution.space;
+  const fem::DisplacementConstraints& constraints = discretised->constraints;
+  const Points& load = discretised->load;
+
   const fem::ConstrainedDofs constrained = constraints.build();
   auto contact = build_contact(problem, space);
   if (!contact) return tl::unexpected(contact.error());
