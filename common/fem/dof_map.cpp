@@ -24,6 +24,20 @@ void DofMap::fix_normal(NodeIndex node, const Vec3& normal) {
   index_[node] = {-1, 0, 0};
 }
 
+void DofMap::fix_plane(NodeIndex node, const Vec3& first, const Vec3& second) {
+  assert(std::abs(first.dot(second)) < 1e-9);
+  frames_[node].col(0) = first;
+  frames_[node].col(1) = second;
+  frames_[node].col(2) = first.cross(second);
+  identity_[node] = 0;
+  index_[node] = {-1, -1, 0};
+}
+
+void DofMap::fix_component(NodeIndex node, int axis) {
+  assert(identity_[node] != 0);
+  index_[node][static_cast<std::size_t>(axis)] = -1;
+}
+
 void DofMap::fix_all(NodeIndex node) { index_[node] = {-1, -1, -1}; }
 
 void DofMap::finalise() {

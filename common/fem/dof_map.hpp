@@ -24,7 +24,11 @@ class DofMap {
 
   // Fixes the displacement of `node` along unit vector `normal`.
   void fix_normal(NodeIndex node, const Vec3& normal);
-  // Fixes all three components (verification problems).
+  // Fixes the displacement along two orthonormal directions.
+  void fix_plane(NodeIndex node, const Vec3& first, const Vec3& second);
+  // Fixes one component in RAS; others may follow. Precondition: the node's frame is the identity.
+  void fix_component(NodeIndex node, int axis);
+  // Fixes all three components.
   void fix_all(NodeIndex node);
   // Numbers the unknowns; call after the last fix_*.
   void finalise();

@@ -13,6 +13,7 @@ namespace brainshift::io {
 namespace {
 
 constexpr int kTetrahedron = 4;
+constexpr int kTriangle = 2;
 
 // Thrown inside this file only, so that the readers stay a plain list of numbers; parse_gmsh catches it.
 struct FormatProblem {
@@ -99,28 +100,37 @@ class Cursor {
 class Reader {
  public:
   explicit Reader(std::string_view content) : cursor_(content) {}
-  TetMesh read();
+  GroupedMesh read();
 
  private:
   void read_format();
+  void read_physical_names();
   void read_entities();
   void read_nodes_2();
   void read_nodes_4();
   void read_elements_2();
   void read_elements_4();
   void add_node(std::int64_t tag, double x, double y, double z);
-  // Takes over the element's vertices if it is a tetrahedron.
+  // Takes over the element's vertices if it is a tetrahedron or a triangle.
   void add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical);
-  TetMesh mesh() const;
+  // Indices of nodes given by tags.
+  template <int Vertices>
+  Eigen::Matrix<int, Vertices, Eigen::Dynamic> cells(const std::vector<std::int64_t>& tags,
+                                                     const std::string& name) const;
+  GroupedMesh mesh() const;
 
   Cursor cursor_;
   bool version_4_ = false;
   bool has_nodes_ = false;
   std::map<int, int> physical_of_volume_;
+  std::map<int, std::vector<int>> physicals_of_surface_;
+  std::map<std::string, int> volume_names_, surface_names_;
   std::unordered_map<std::int64_t, int> index_of_tag_;
   std::vector<double> coordinates_;
   std::vector<std::int64_t> tets_;  // tags
   std::vector<int> labels_;
+  std::vector<std::int64_t> triangles_;  // tags
+  std::vector<int> triangle_labels_;
 };
 
 void Reader::read_format() {
@@ -145,6 +155,23 @@ void Reader::read_format() {
   cursor_.skip_section();
 }
 
+// "dimension tag "name"" per line, as text in binary files too.
+void Reader::read_physical_names() {
+  const std::int64_t count = cursor_.checked(cursor_.text_number<std::int64_t>());
+  cursor_.line();
+  for (std::int64_t i = 0; i < count; ++i) {
+    const auto dimension = cursor_.text_number<int>();
+    const auto tag = cursor_.text_number<int>();
+    const std::string_view rest = cursor_.line();
+    const std::size_t open = rest.find('"');
+    const std::size_t close = rest.rfind('"');
+    if (open == close) refuse("section '$PhysicalNames' holds a name without quotation marks");
+    const std::string name(rest.substr(open + 1, close - open - 1));
+    if (dimension == 3) volume_names_.emplace(name, tag);
+    if (dimension == 2) surface_names_.emplace(name, tag);
+  }
+}
+
 void Reader::read_entities() {
   std::int64_t counts[4];
   for (std::int64_t& count : counts) count = cursor_.checked(cursor_.size());
@@ -156,6 +183,7 @@ void Reader::read_entities() {
       for (std::int64_t k = 0; k < physical_tags; ++k) {
         const int physical = cursor_.integer();
         if (dimension == 3 && k == 0) physical_of_volume_[tag] = physical;
+        if (dimension == 2) physicals_of_surface_[tag].push_back(physical);
       }
       if (dimension == 0) continue;
       const std::int64_t bounding = cursor_.checked(cursor_.size());
@@ -202,9 +230,13 @@ void Reader::read_nodes_4() {
 }
 
 void Reader::add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical) {
-  if (type != kTetrahedron) return;
-  tets_.insert(tets_.end(), tags.begin(), tags.end());
-  labels_.push_back(physical);
+  if (type == kTetrahedron) {
+    tets_.insert(tets_.end(), tags.begin(), tags.end());
+    labels_.push_back(physical);
+  } else if (type == kTriangle && physical != 0) {
+    triangles_.insert(triangles_.end(), tags.begin(), tags.end());
+    triangle_labels_.push_back(physical);
+  }
 }
 
 int checked_vertices(std::int64_t type) {
@@ -260,35 +292,52 @@ void Reader::read_elements_4() {
     for (std::int64_t i = 0; i < count; ++i) {
       cursor_.size();  // element tag
       for (std::int64_t& vertex : vertices) vertex = cursor_.size();
+      if (dimension == 2) {
+        for (const int group : physicals_of_surface_[entity]) add_element(type, vertices, group);
+        continue;
+      }
       const bool has_label = dimension == 3 && physical != physical_of_volume_.end();
       add_element(type, vertices, has_label ? physical->second : 0);
     }
   }
 }
 
-TetMesh Reader::mesh() const {
-  if (tets_.empty()) refuse("has no 4-node tetrahedron");
-  TetMesh mesh;
-  mesh.nodes = Eigen::Map<const Points>(coordinates_.data(), 3,
-                                        static_cast<Eigen::Index>(coordinates_.size() / 3));
-  mesh.tets.resize(4, static_cast<Eigen::Index>(tets_.size() / 4));
-  for (std::size_t i = 0; i < tets_.size(); ++i) {
-    const auto found = index_of_tag_.find(tets_[i]);
+template <int Vertices>
+Eigen::Matrix<int, Vertices, Eigen::Dynamic> Reader::cells(const std::vector<std::int64_t>& tags,
+                                                           const std::string& name) const {
+  Eigen::Matrix<int, Vertices, Eigen::Dynamic> indices(
+      Vertices, static_cast<Eigen::Index>(tags.size() / Vertices));
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    const auto found = index_of_tag_.find(tags[i]);
     if (found == index_of_tag_.end()) {
-      refuse("tetrahedron " + std::to_string(i / 4) + " has node " + std::to_string(tets_[i]) +
+      refuse(name + " " + std::to_string(i / Vertices) + " has node " + std::to_string(tags[i]) +
              ", which does not exist");
     }
-    mesh.tets.data()[i] = found->second;
+    indices.data()[i] = found->second;
   }
+  return indices;
+}
+
+GroupedMesh Reader::mesh() const {
+  if (tets_.empty()) refuse("has no 4-node tetrahedron");
+  GroupedMesh result;
+  TetMesh& mesh = result.mesh;
+  mesh.nodes = Eigen::Map<const Points>(coordinates_.data(), 3,
+                                        static_cast<Eigen::Index>(coordinates_.size() / 3));
+  mesh.tets = cells<4>(tets_, "tetrahedron");
   // A file without physical groups has no labels.
   for (const int label : labels_) {
     if (label != 0) mesh.labels = labels_;
     if (label != 0) break;
   }
-  return mesh;
+  result.triangles = cells<3>(triangles_, "triangle");
+  result.triangle_labels = triangle_labels_;
+  result.volume_names = volume_names_;
+  result.surface_names = surface_names_;
+  return result;
 }
 
-TetMesh Reader::read() {
+GroupedMesh Reader::read() {
   read_format();
   bool has_elements = false;
   while (!cursor_.rest().empty()) {
@@ -304,6 +353,8 @@ TetMesh Reader::read() {
       has_elements = true;
     } else if (name == "$Entities") {
       read_entities();
+    } else if (name == "$PhysicalNames") {
+      read_physical_names();
     }
     cursor_.skip_section();
   }
@@ -314,7 +365,7 @@ TetMesh Reader::read() {
 
 }  // namespace
 
-Result<TetMesh> parse_gmsh(const std::string& content) {
+Result<GroupedMesh> parse_gmsh(const std::string& content) {
   try {
     return Reader(content).read();
   } catch (const FormatProblem& problem) {

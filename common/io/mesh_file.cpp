@@ -40,23 +40,36 @@ Status check_indices(const Points& points, const Cells& cells, const std::string
   return {};
 }
 
-TetMesh without_unreferenced_nodes(const TetMesh& mesh) {
+// Drops nodes without a tetrahedron, and triangles that need one of them.
+GroupedMesh without_unreferenced_nodes(const GroupedMesh& grouped) {
+  const TetMesh& mesh = grouped.mesh;
   std::vector<int> new_index(static_cast<std::size_t>(mesh.num_nodes()), -1);
   for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
     new_index[static_cast<std::size_t>(mesh.tets.data()[i])] = 0;
   }
-  TetMesh kept = mesh;
+  GroupedMesh kept = grouped;
   int next = 0;
   for (int node = 0; node < mesh.num_nodes(); ++node) {
     int& index = new_index[static_cast<std::size_t>(node)];
     if (index < 0) continue;
     index = next++;
-    kept.nodes.col(index) = mesh.nodes.col(node);
+    kept.mesh.nodes.col(index) = mesh.nodes.col(node);
   }
-  kept.nodes.conservativeResize(Eigen::NoChange, next);
+  kept.mesh.nodes.conservativeResize(Eigen::NoChange, next);
   for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
-    kept.tets.data()[i] = new_index[static_cast<std::size_t>(mesh.tets.data()[i])];
+    kept.mesh.tets.data()[i] = new_index[static_cast<std::size_t>(mesh.tets.data()[i])];
   }
+  kept.triangle_labels.clear();
+  Eigen::Index triangles = 0;
+  for (Eigen::Index t = 0; t < grouped.triangles.cols(); ++t) {
+    Eigen::Vector3i corners;
+    for (int k = 0; k < 3; ++k)
+      corners[k] = new_index[static_cast<std::size_t>(grouped.triangles(k, t))];
+    if (corners.minCoeff() < 0) continue;
+    kept.triangles.col(triangles++) = corners;
+    kept.triangle_labels.push_back(grouped.triangle_labels[static_cast<std::size_t>(t)]);
+  }
+  kept.triangles.conservativeResize(Eigen::NoChange, triangles);
   return kept;
 }
 
@@ -71,34 +84,32 @@ Result<MeshWithFields> load_vtu(const fs::path& path, bool with_fields) {
   return read;
 }
 
-Result<TetMesh> load_gmsh(const fs::path& path) {
-  const Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  Result<TetMesh> mesh = parse_gmsh(*content);
-  if (!mesh) return file_error(mesh.error().code, path, mesh.error().message);
-  if (Status ok = check_indices(mesh->nodes, mesh->tets, "tetrahedron"); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
+Result<GroupedMesh> load_grouped(const fs::path& path) {
+  if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
+  const std::string extension = lower_extension(path);
+  if (extension != ".msh" && extension != ".vtu") {
+    return file_error(ErrorCode::kUnreadable, path,
+                      "unknown mesh format '" + extension + "': must be .msh or .vtu");
   }
-  return mesh;
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Result<GroupedMesh> read =
+      extension == ".msh" ? parse_gmsh(*content) : parse_grouped_vtu(std::move(*content));
+  if (!read) return file_error(read.error().code, path, read.error().message);
+  const Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron").and_then([&] {
+    return check_indices(read->mesh.nodes, read->triangles, "triangle");
+  });
+  if (!ok) return file_error(ok.error().code, path, ok.error().message);
+  return without_unreferenced_nodes(*read);
 }
 
 }  // namespace
 
 Result<TetMesh> read_tet_mesh(const fs::path& path) {
-  if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
-  const std::string extension = lower_extension(path);
-  Result<TetMesh> mesh;
-  if (extension == ".msh") {
-    mesh = load_gmsh(path);
-  } else if (extension == ".vtu") {
-    mesh = load_vtu(path, false).map([](MeshWithFields&& read) { return std::move(read.mesh); });
-  } else {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "unknown mesh format '" + extension + "': must be .msh or .vtu");
-  }
-  if (!mesh) return mesh;
-  return without_unreferenced_nodes(*mesh);
+  return load_grouped(path).map([](GroupedMesh&& read) { return std::move(read.mesh); });
 }
+
+Result<GroupedMesh> read_grouped_mesh(const fs::path& path) { return load_grouped(path); }
 
 Result<MeshWithFields> read_vtu(const fs::path& path) { return load_vtu(path, true); }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/grouped_mesh.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::io {
@@ -17,6 +18,10 @@ namespace brainshift::io {
 // Physical groups / a cell array named "label" become labels. Unreferenced nodes are dropped.
 // Does not judge the elements: see geometry/mesh_quality.hpp.
 Result<TetMesh> read_tet_mesh(const std::filesystem::path& path);
+
+// The same with triangles and the names of physical groups (.msh), or triangles with their labels (.vtu). A triangle of
+// nodes that no tetrahedron has is dropped.
+Result<GroupedMesh> read_grouped_mesh(const std::filesystem::path& path);
 
 // Triangles of an .stl (ASCII, binary), .ply (ascii, little-endian), .obj or .vtp file. Coincident STL
 // vertices are merged.
@@ -31,6 +36,16 @@ struct NodeField {
 // VTU, base64 zlib-compressed; written to a temporary name, synced, renamed. kWriteFailed names the file.
 Status write_vtu(const std::filesystem::path& path, const TetMesh& mesh,
                  const std::vector<NodeField>& node_fields);
+
+// The same for linear (4 rows) or quadratic (10 rows, edges 01 12 02 03 13 23) tetrahedra, with fields on the cells.
+struct ElementGrid {
+  Points nodes;
+  Eigen::MatrixXi elements;
+  std::vector<int> labels;  // one per element, or none
+};
+Status write_vtu(const std::filesystem::path& path, const ElementGrid& grid,
+                 const std::vector<NodeField>& node_fields,
+                 const std::vector<NodeField>& cell_fields);
 
 // A VTU's mesh with all of its point arrays that are float or double, in file order. Keeps unreferenced
 // nodes, so that node i is the file's point i.

@@ -6,15 +6,18 @@
 #include <string>
 
 #include "common/core/error.hpp"
+#include "common/core/grouped_mesh.hpp"
 #include "common/core/mesh.hpp"
 #include "common/io/mesh_file.hpp"
 
 namespace brainshift::io {
 
 // Gmsh reference manual, "MSH file format": 2.2 and 4.1. Keeps unreferenced nodes.
-Result<TetMesh> parse_gmsh(const std::string& content);
+Result<GroupedMesh> parse_gmsh(const std::string& content);
 // VTK XML. Keeps unreferenced nodes. Fields are decoded on request.
 Result<MeshWithFields> parse_vtu(std::string content, bool with_fields);
+// Tetrahedra and triangles; labels are numbers, a VTU names nothing.
+Result<GroupedMesh> parse_grouped_vtu(std::string content);
 Result<TriangleSurface> parse_vtp(std::string content);
 Result<TriangleSurface> parse_stl(const std::string& content);
 Result<TriangleSurface> parse_ply(const std::string& content);

@@ -9,6 +9,7 @@ namespace brainshift::io {
 namespace {
 
 constexpr std::int64_t kVtkTetra = 10;
+constexpr std::int64_t kVtkTriangle = 5;
 
 tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
@@ -78,7 +79,8 @@ Result<std::vector<std::int64_t>> read_labels(const VtkXmlFile& file, std::int64
   return std::vector<std::int64_t>{};
 }
 
-Result<TetMesh> read_tets(const VtkXmlFile& file) {
+// Triangles count when the file labels its cells; without labels they have no group.
+Result<GroupedMesh> read_grouped(const VtkXmlFile& file) {
   Result<Points> points = read_points(file);
   if (!points) return tl::unexpected(points.error());
   const Result<std::int64_t> count = file.count("NumberOfCells");
@@ -91,25 +93,34 @@ Result<TetMesh> read_tets(const VtkXmlFile& file) {
   const Result<std::vector<std::int64_t>> labels = read_labels(file, *count);
   if (!labels) return tl::unexpected(labels.error());
 
-  TetMesh mesh;
+  GroupedMesh result;
+  TetMesh& mesh = result.mesh;
   mesh.nodes = std::move(*points);
-  std::vector<int> tets;
+  std::vector<int> tets, triangles;
   for (std::size_t cell = 0; cell < types->integers.size(); ++cell) {
-    if (types->integers[cell] != kVtkTetra) continue;
-    if (cells->size(cell) != 4) {
-      return unreadable("cell " + std::to_string(cell) + " is a tetrahedron with " +
-                        std::to_string(cells->size(cell)) + " vertices: must have 4");
+    const bool tetra = types->integers[cell] == kVtkTetra;
+    if (!tetra && (types->integers[cell] != kVtkTriangle || labels->empty())) continue;
+    const int vertices = tetra ? 4 : 3;
+    if (cells->size(cell) != vertices) {
+      return unreadable("cell " + std::to_string(cell) + " is a " +
+                        (tetra ? "tetrahedron" : "triangle") + " with " +
+                        std::to_string(cells->size(cell)) + " vertices: must have " +
+                        std::to_string(vertices));
     }
-    for (int k = 0; k < 4; ++k) {
-      tets.push_back(
-          to_index(cells->connectivity[static_cast<std::size_t>(cells->begin(cell) + k)]));
+    for (int k = 0; k < vertices; ++k) {
+      (tetra ? tets : triangles)
+          .push_back(
+              to_index(cells->connectivity[static_cast<std::size_t>(cells->begin(cell) + k)]));
     }
-    if (!labels->empty()) mesh.labels.push_back(static_cast<int>((*labels)[cell]));
+    if (labels->empty()) continue;
+    (tetra ? mesh.labels : result.triangle_labels).push_back(static_cast<int>((*labels)[cell]));
   }
   if (tets.empty()) return unreadable("has no tetrahedron");
   mesh.tets = Eigen::Map<const Eigen::Matrix<int, 4, Eigen::Dynamic>>(
       tets.data(), 4, static_cast<Eigen::Index>(tets.size() / 4));
-  return mesh;
+  result.triangles = Eigen::Map<const Eigen::Matrix<int, 3, Eigen::Dynamic>>(
+      triangles.data(), 3, static_cast<Eigen::Index>(triangles.size() / 3));
+  return result;
 }
 
 }  // namespace
@@ -117,9 +128,9 @@ Result<TetMesh> read_tets(const VtkXmlFile& file) {
 Result<MeshWithFields> parse_vtu(std::string content, bool with_fields) {
   const Result<VtkXmlFile> file = VtkXmlFile::parse(std::move(content), "UnstructuredGrid");
   if (!file) return tl::unexpected(file.error());
-  Result<TetMesh> mesh = read_tets(*file);
-  if (!mesh) return tl::unexpected(mesh.error());
-  MeshWithFields result{std::move(*mesh), {}};
+  Result<GroupedMesh> grouped = read_grouped(*file);
+  if (!grouped) return tl::unexpected(grouped.error());
+  MeshWithFields result{std::move(grouped->mesh), {}};
   if (!with_fields) return result;
   const std::size_t arrays = file->array_names("PointData").size();
   for (std::size_t i = 0; i < arrays; ++i) {
@@ -131,6 +142,12 @@ Result<MeshWithFields> parse_vtu(std::string content, bool with_fields) {
                                                         result.mesh.num_nodes())});
   }
   return result;
+}
+
+Result<GroupedMesh> parse_grouped_vtu(std::string content) {
+  const Result<VtkXmlFile> file = VtkXmlFile::parse(std::move(content), "UnstructuredGrid");
+  if (!file) return tl::unexpected(file.error());
+  return read_grouped(*file);
 }
 
 Result<TriangleSurface> parse_vtp(std::string content) {

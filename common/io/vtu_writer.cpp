@@ -14,6 +14,7 @@ namespace {
 // Readers expand one block at a time; 1 MiB compresses as well as larger ones.
 constexpr std::size_t kBlockSize = std::size_t{1} << 20;
 constexpr std::uint8_t kVtkTetra = 10;
+constexpr std::uint8_t kVtkQuadraticTetra = 24;
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -55,51 +56,73 @@ std::string data_array(const std::string& name, const std::string& type, Eigen::
          std::to_string(components) + "\" format=\"binary\">" + encoded(bytes) + "</DataArray>\n";
 }
 
-std::string cells_xml(const TetMesh& mesh) {
-  const auto cells = static_cast<std::size_t>(mesh.num_tets());
+std::string cells_xml(const Eigen::MatrixXi& elements) {
+  const auto cells = static_cast<std::size_t>(elements.cols());
   std::vector<std::int64_t> offsets(cells);
-  for (std::size_t i = 0; i < cells; ++i) offsets[i] = static_cast<std::int64_t>(4 * (i + 1));
-  const std::vector<std::int64_t> connectivity(mesh.tets.data(),
-                                               mesh.tets.data() + mesh.tets.size());
-  const std::vector<std::uint8_t> types(cells, kVtkTetra);
+  for (std::size_t i = 0; i < cells; ++i) {
+    offsets[i] = static_cast<std::int64_t>(i + 1) * elements.rows();
+  }
+  const std::vector<std::int64_t> connectivity(elements.data(), elements.data() + elements.size());
+  const std::vector<std::uint8_t> types(cells,
+                                        elements.rows() == 4 ? kVtkTetra : kVtkQuadraticTetra);
   return "<Cells>\n" +
          data_array("connectivity", "Int64", 1, connectivity.data(), connectivity.size()) +
          data_array("offsets", "Int64", 1, offsets.data(), cells) +
          data_array("types", "UInt8", 1, types.data(), cells) + "</Cells>\n";
 }
 
+Status check_columns(const std::filesystem::path& path, const std::vector<NodeField>& fields,
+                     Eigen::Index columns, const std::string& what) {
+  for (const NodeField& field : fields) {
+    if (field.values.cols() == columns && field.values.rows() > 0) continue;
+    return fail(ErrorCode::kInvalidArgument, path.string() + ": field '" + field.name + "' has " +
+                                                 std::to_string(field.values.cols()) +
+                                                 " columns: must have one per " + what + ", " +
+                                                 std::to_string(columns));
+  }
+  return {};
+}
+
+std::string fields_xml(const std::vector<NodeField>& fields) {
+  std::string xml;
+  for (const NodeField& field : fields) {
+    xml += data_array(field.name, "Float64", field.values.rows(), field.values.data(),
+                      static_cast<std::size_t>(field.values.size()));
+  }
+  return xml;
+}
+
 }  // namespace
 
 Status write_vtu(const std::filesystem::path& path, const TetMesh& mesh,
                  const std::vector<NodeField>& node_fields) {
-  for (const NodeField& field : node_fields) {
-    if (field.values.cols() == mesh.num_nodes() && field.values.rows() > 0) continue;
-    return fail(ErrorCode::kInvalidArgument, path.string() + ": field '" + field.name + "' has " +
-                                                 std::to_string(field.values.cols()) +
-                                                 " columns: must have one per node, " +
-                                                 std::to_string(mesh.num_nodes()));
-  }
-  assert(mesh.labels.empty() || static_cast<int>(mesh.labels.size()) == mesh.num_tets());
+  return write_vtu(path, ElementGrid{mesh.nodes, mesh.tets, mesh.labels}, node_fields, {});
+}
+
+Status write_vtu(const std::filesystem::path& path, const ElementGrid& grid,
+                 const std::vector<NodeField>& node_fields,
+                 const std::vector<NodeField>& cell_fields) {
+  if (Status ok = check_columns(path, node_fields, grid.nodes.cols(), "node"); !ok) return ok;
+  if (Status ok = check_columns(path, cell_fields, grid.elements.cols(), "element"); !ok) return ok;
+  assert(grid.elements.rows() == 4 || grid.elements.rows() == 10);
+  assert(grid.labels.empty() ||
+         static_cast<Eigen::Index>(grid.labels.size()) == grid.elements.cols());
 
   std::string xml = "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" ";
   xml += std::string("byte_order=\"") +
          (std::endian::native == std::endian::little ? "LittleEndian" : "BigEndian") +
          "\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n";
-  xml += "<Piece NumberOfPoints=\"" + std::to_string(mesh.num_nodes()) + "\" NumberOfCells=\"" +
-         std::to_string(mesh.num_tets()) + "\">\n<PointData>\n";
-  for (const NodeField& field : node_fields) {
-    xml += data_array(field.name, "Float64", field.values.rows(), field.values.data(),
-                      static_cast<std::size_t>(field.values.size()));
-  }
-  xml += "</PointData>\n<CellData>\n";
-  if (!mesh.labels.empty()) {
-    const std::vector<std::int32_t> labels(mesh.labels.begin(), mesh.labels.end());
+  xml += "<Piece NumberOfPoints=\"" + std::to_string(grid.nodes.cols()) + "\" NumberOfCells=\"" +
+         std::to_string(grid.elements.cols()) + "\">\n<PointData>\n" + fields_xml(node_fields) +
+         "</PointData>\n<CellData>\n";
+  if (!grid.labels.empty()) {
+    const std::vector<std::int32_t> labels(grid.labels.begin(), grid.labels.end());
     xml += data_array("label", "Int32", 1, labels.data(), labels.size());
   }
-  xml += "</CellData>\n<Points>\n" +
-         data_array("Points", "Float64", 3, mesh.nodes.data(),
-                    static_cast<std::size_t>(mesh.nodes.size())) +
-         "</Points>\n" + cells_xml(mesh) + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+  xml += fields_xml(cell_fields) + "</CellData>\n<Points>\n" +
+         data_array("Points", "Float64", 3, grid.nodes.data(),
+                    static_cast<std::size_t>(grid.nodes.size())) +
+         "</Points>\n" + cells_xml(grid.elements) + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
   return write_file(path, xml);
 }
 

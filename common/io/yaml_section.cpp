@@ -282,6 +282,17 @@ void YamlSection::numbers(const std::string& key, std::vector<double>& value, Pr
                   full_key(key) + " = " + shown(node->yaml) + ": must be a list of finite numbers");
 }
 
+std::vector<std::string> YamlSection::names() {
+  std::vector<std::string> keys;
+  if (!node_) return keys;
+  for (const auto& entry : node_->yaml) {
+    if (!entry.first.IsScalar()) continue;
+    keys.push_back(entry.first.Scalar());
+    has(keys.back());
+  }
+  return keys;
+}
+
 void YamlSection::done() {
   if (!node_) return;
   for (const auto& entry : node_->yaml) {

@@ -67,6 +67,8 @@ class YamlSection {
   // [a, b, ...], possibly empty
   void numbers(const std::string& key, std::vector<double>& value,
                Presence presence = Presence::kOptional);
+  // All keys, in order, for sections whose keys are names; they count as known.
+  std::vector<std::string> names();
   // Every key of the section must have been asked for.
   void done();
 

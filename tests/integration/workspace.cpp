@@ -37,6 +37,8 @@ std::string brainshiftd() { return BRAINSHIFTD; }
 std::string brainshift() { return BRAINSHIFT; }
 std::string coarse_case() { return BRAINSHIFT_SOURCE_DIR "/config/cases/colin27-coarse.yaml"; }
 
+std::string examples_folder() { return BRAINSHIFT_SOURCE_DIR "/docs/examples/solve"; }
+
 std::string coarse_case_text() {
   std::ifstream stream(coarse_case(), std::ios::binary);
   if (!stream) throw std::runtime_error("cannot read " + coarse_case());

@@ -26,6 +26,7 @@ std::string brainshiftd();
 std::string brainshift();
 std::string coarse_case();       // path
 std::string coarse_case_text();  // content
+std::string examples_folder();   // docs/examples/solve
 bool head_is_installed();        // Debian's mricron-data
 
 // The YAML text with the first line below the top-level `section:` whose key is `key` replaced, indentation

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Frictionless penalty contact of a body's faces with rigid obstacles, integrated over the faces.
+//
+//   E_c(u) = 1/2 int kappa <P(u)>^2 dA,   P = 0p - N . u,   <P> = max(P, 0)           contact pressure kappa <P>
+//
+// kappa: N/mm^3. Evaluated at quadrature points of the faces (3 for P1, 6 for P2), each with the pair found in the
+// undeformed place: displacements along the obstacle must be small against its radius. Nodal contact
+// (penalty.hpp) is the paper's; on P2 it would be wrong, because the vertices of a P2 face carry no load.
+// The points' blocks couple nodes of a face only, so the pattern of K holds K + its stiffness.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "common/contact/obstacle.hpp"
+#include "common/contact/penalty.hpp"
+#include "common/fem/displacement_space.hpp"
+
+namespace brainshift::contact {
+
+struct SurfaceContactPoint {
+  std::array<int, fem::kMaxFaceNodes> nodes{};
+  std::array<double, fem::kMaxFaceNodes> shape{};  // N_k
+  std::array<double, 3> vertex_weight{};           // barycentric
+  Vec3 normal = Vec3::Zero();                      // N, out of the obstacle
+  double initial_penetration_mm = 0.0;
+  double area = 0.0;       // mm^2: weight of the point
+  double stiffness = 0.0;  // kappa area, N/mm
+  int obstacle = 0;        // order of add()
+};
+
+class SurfaceContact {
+ public:
+  explicit SurfaceContact(const fem::DisplacementSpace& space);
+
+  // faces: 3 x f vertices; kappa > 0. Fails as contact_pairs.
+  Status add(const Eigen::Matrix<int, 3, Eigen::Dynamic>& faces, const Obstacle& obstacle,
+             double kappa);
+
+  const std::vector<SurfaceContactPoint>& points() const { return points_; }
+  int num_points() const { return static_cast<int>(points_.size()); }
+  int num_obstacles() const { return num_obstacles_; }
+
+  VecX penetration(const Points& u) const;
+  // N . u at every point: penetration changes by minus this.
+  VecX approach(const Points& u) const;
+  void add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+                     const ActiveSet& active) const;
+  // Adds sum over the active points of stiffness * values_i N_k N to the nodal forces (3 x n).
+  void add_force(const VecX& values, const ActiveSet& active, Points& force) const;
+
+  // Pressure at the vertices, N/mm^2: mean over the points around each, weighted by area and by nearness.
+  VecX vertex_pressure(const Points& u) const;
+
+ private:
+  const fem::DisplacementSpace* space_;
+  std::vector<SurfaceContactPoint> points_;
+  int num_obstacles_ = 0;
+};
+
+}  // namespace brainshift::contact

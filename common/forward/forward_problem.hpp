@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// ForwardProblem and ForwardSolution: one elastic body on any tetrahedral mesh, its conditions, and what became of it.
+//
+//   div sigma(u) + b = 0 in the body,   u or sigma n = t on parts of its boundary,   contact with rigid obstacles
+//
+// Small strains; drained steady state. Units mm, N. Conditions and contacts name groups; each has a name of its own,
+// which messages begin with ("conditions.NAME: ...", "contact.NAME: ...").
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/contact/obstacle.hpp"
+#include "common/core/progress.hpp"
+#include "common/fem/displacement_constraints.hpp"
+#include "common/fem/space_elasticity.hpp"
+
+namespace brainshift::forward {
+
+// Part of the boundary. faces: vertices, oriented outwards; vertices may hold some that belong to no face. inner:
+// faces inside the body, which have no outward side; displacements can be prescribed on them, nothing else.
+struct FaceGroup {
+  std::vector<NodeIndex> vertices;
+  Eigen::Matrix<int, 3, Eigen::Dynamic> faces, inner;
+};
+
+// Components that are set are prescribed at the group's nodes, mm.
+struct Displacement {
+  std::array<std::optional<double>, 3> components;
+};
+struct DisplacementField {
+  fem::VectorField u;
+};
+// n . u, n: the group's own mean nodal normal (0: free to slide, exactly). Flat faces that meet at an angle need
+// groups of their own.
+struct NormalDisplacement {
+  double value = 0.0;
+};
+struct Traction {
+  fem::VectorField t;  // N/mm^2
+};
+// Pushes against the outward normal, N/mm^2.
+struct Pressure {
+  double value = 0.0;
+};
+
+struct Condition {
+  std::string name, group;
+  std::variant<Displacement, DisplacementField, NormalDisplacement, Traction, Pressure> what;
+};
+
+struct Contact {
+  std::string name, group;
+  contact::Obstacle obstacle;
+  std::optional<double> penalty;  // kappa, N/mm^3; default: default_penalty()
+};
+
+struct ForwardProblem {
+  TetMesh mesh;
+  fem::Element element = fem::Element::kP2;
+  fem::MaterialMap materials;
+  Points body_force;            // N/mm^3, 3 x tets; no column: none
+  fem::VectorField body_field;  // N/mm^3, added where set
+  std::map<std::string, FaceGroup> groups;
+  std::vector<Condition> conditions;
+  std::vector<Contact> contacts;
+};
+
+struct ContactResult {
+  std::string name;
+  int points = 0, active = 0;       // quadrature points
+  Vec3 force = Vec3::Zero();        // on the body, N
+  double area_mm2 = 0.0;            // of the active points
+  double max_penetration_mm = 0.0;  // what the penalty leaves
+  double max_pressure = 0.0;        // N/mm^2
+};
+
+struct ForwardSolution {
+  fem::DisplacementSpace space;
+  Points displacement;             // 3 x nodes, mm
+  Eigen::MatrixXd element_stress;  // 6 x tets, at the centroids, N/mm^2 (xx yy zz xy yz xz)
+  Eigen::MatrixXd nodal_stress;    // 6 x nodes, averaged
+  VecX contact_pressure;           // at vertices, N/mm^2; no entry without contact
+  std::vector<ContactResult> contacts;
+  Vec3 reaction = Vec3::Zero();  // sum over prescribed displacements, N
+  // Diagnostics.
+  int unknowns = 0, iterations = 0;
+  double relative_residual = 0.0, rcond = 0.0, min_jacobian = 0.0;
+  std::vector<std::string> warnings;
+  double assemble_s = 0.0, solve_s = 0.0;
+};
+
+// Ok, or the first thing wrong with the problem itself, support included (kFloatingBody).
+Status validate(const ForwardProblem& problem);
+
+// kappa = 100 E / h: E of the stiffest tissue at the group, h its mean edge; the penetration it leaves is below a
+// hundredth of an edge's own compression.
+double default_penalty(const ForwardProblem& problem, const FaceGroup& group);
+
+// What any solver of the problem starts from: nodes, prescribed displacements, and the consistent nodal forces (3 x n,
+// N) of body forces, tractions and pressures, contact aside. Fails as validate, or on a contradiction.
+struct Discretised {
+  fem::DisplacementSpace space;
+  fem::DisplacementConstraints constraints;
+  Points load;
+};
+Result<Discretised> discretise(const ForwardProblem& problem);
+
+// kInvalidArgument, kFloatingBody, kSingularMatrix, kNotFinite, kNotConverged.
+Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress = {});
+
+// Displacement at a point. kInvalidArgument when it lies more than tolerance_mm outside.
+struct ProbeValue {
+  Vec3 displacement = Vec3::Zero();
+  double contact_pressure = 0.0;  // N/mm^2, of the nearest face point, 0 away from contact
+};
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
+                                      double tolerance_mm);
+
+}  // namespace brainshift::forward
