@@ -24,6 +24,11 @@ void DofMap::fix_normal(NodeIndex node, const Vec3& normal) {
   index_[node] = {-1, 0, 0};
 }
 
+void DofMap::fix_component(NodeIndex node, int axis) {
+  assert(identity_[node]);
+  index_[node][static_cast<std::size_t>(axis)] = -1;
+}
+
 void DofMap::fix_all(NodeIndex node) { index_[node] = {-1, -1, -1}; }
 
 void DofMap::finalise() {

@@ -24,6 +24,8 @@ class DofMap {
 
   // Fixes the displacement of `node` along unit vector `normal`.
   void fix_normal(NodeIndex node, const Vec3& normal);
+  // Fixes one RAS component (0, 1, 2); may be called for several. Not together with fix_normal at one node.
+  void fix_component(NodeIndex node, int axis);
   // Fixes all three components (verification problems).
   void fix_all(NodeIndex node);
   // Numbers the unknowns; call after the last fix_*.

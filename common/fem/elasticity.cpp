@@ -98,9 +98,17 @@ TetGeometry tet_geometry(const TetMesh& mesh, int tet) {
 
 SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
                                    const DofMap& dofs) {
+  return assemble_stiffness(
+      mesh, std::vector<Elasticity>(static_cast<std::size_t>(mesh.num_tets()), material), dofs);
+}
+
+SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
+                                   const DofMap& dofs) {
+  assert(of_tet.size() == static_cast<std::size_t>(mesh.num_tets()));
   SymmetricMatrix lower = lower_pattern(lower_adjacency(mesh), dofs);
   for (int t = 0; t < mesh.num_tets(); ++t) {
     const TetGeometry geometry = tet_geometry(mesh, t);
+    const Elasticity& material = of_tet[static_cast<std::size_t>(t)];
     for (int i = 0; i < 4; ++i) {
       for (int j = 0; j < 4; ++j) {
         const int row_node = mesh.tets(i, t);
