@@ -28,7 +28,7 @@ class SymmetricIndefinite {
   static constexpr double kMaxBackwardError = 1e-10;
 
   // lower: lower triangle, diagonal stored. kNotFinite; kEmptySet; kFloatingBody (wrong inertia or reciprocal
-  // condition: not enough support); kSingularMatrix.
+  // condition: not enough support, or incompressible fluid in a body that cannot change its volume); kSingularMatrix.
   static Result<SymmetricIndefinite> factorise(const SymmetricMatrix& lower, int negative_pivots);
   SymmetricIndefinite(SymmetricIndefinite&&) noexcept;
   SymmetricIndefinite& operator=(SymmetricIndefinite&&) noexcept;

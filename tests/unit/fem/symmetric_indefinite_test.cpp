@@ -116,6 +116,35 @@ TEST(SymmetricIndefinite, RefusesABodyThatFloats) {
   EXPECT_THAT(factor.error().message, HasSubstr("not held"));
 }
 
+TEST(SymmetricIndefinite, RefusesAMatrixOfTheRightInertiaThatIsAsGoodAsSingular) {
+  SymmetricMatrix lower(3, 3);
+  for (int i = 0; i < 3; ++i) lower.insert(i, i) = i < 2 ? 1.0 : -1.0;
+  lower.insert(1, 0) = 1.0 - 1e-15;
+  lower.makeCompressed();
+  const auto factor = SymmetricIndefinite::factorise(lower, 1);
+  ASSERT_FALSE(factor.has_value());
+  EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+  EXPECT_THAT(factor.error().message, HasSubstr("reciprocal condition"));
+}
+
+// Nothing moves at the boundary and nothing drains: a constant pressure is left open.
+TEST(SymmetricIndefinite, RefusesFluidEnclosedInABodyThatCannotChangeItsVolume) {
+  Block block;
+  block.dofs = DofMap(block.mesh.num_nodes());
+  const Vec3 size(30, 20, 20);
+  for (int n = 0; n < block.mesh.num_nodes(); ++n) {
+    const Vec3 x = block.mesh.nodes.col(n);
+    if (x.minCoeff() == 0.0 || (size - x).minCoeff() == 0.0) block.dofs.fix_all(n);
+  }
+  block.dofs.finalise();
+  ASSERT_GT(block.dofs.num_unknowns(), 0);
+  block.pressure = PressureMap(block.mesh.num_nodes(), {});
+  const auto factor = factor_of(block.matrix(0.1));
+  ASSERT_FALSE(factor.has_value());
+  EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+  EXPECT_THAT(factor.error().message, HasSubstr("fluid is enclosed"));
+}
+
 TEST(SymmetricIndefinite, RefusesTheWrongInertia) {
   BiotMatrix matrix = Block().matrix(0.1);
   // A tissue that pushes back with negative stiffness at one unknown.
