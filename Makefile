@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test bench format format-check tidy image clean
+.PHONY: help setup configure build demo test bench verify format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -31,6 +31,10 @@ test: build ## build and run all tests
 bench: configure ## error against run time, latency, memory, into out/bench; QUICK=1 for a short run
 	cmake --build --preset $(PRESET) -j $(JOBS) --target bench_programs
 	cmake/scripts/bench.sh $(BUILD)/bin
+
+verify: configure ## the solver against closed forms and series, into out/verify
+	cmake --build --preset $(PRESET) -j $(JOBS) --target verification_programs
+	cmake/scripts/verify.sh $(BUILD)
 
 format: ## rewrite the C++ sources in the house format
 	@cmake/scripts/clang-format.sh write

@@ -23,6 +23,16 @@ add_library(brainshift_cholmod INTERFACE)
 target_include_directories(brainshift_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 target_link_libraries(brainshift_cholmod INTERFACE ${CHOLMOD_LIBRARY})
 
+# The sequential MUMPS: its own stub of MPI, no message passing. Debian has the headers beside those of the parallel one.
+find_path(MUMPS_INCLUDE_DIR dmumps_c.h REQUIRED)
+find_library(MUMPS_LIBRARY dmumps_seq REQUIRED)
+find_library(MUMPS_COMMON_LIBRARY mumps_common_seq REQUIRED)
+find_library(MUMPS_MPI_STUB_LIBRARY mpiseq_seq REQUIRED)
+add_library(brainshift_mumps INTERFACE)
+target_include_directories(brainshift_mumps SYSTEM INTERFACE ${MUMPS_INCLUDE_DIR})
+target_link_libraries(brainshift_mumps INTERFACE
+  ${MUMPS_LIBRARY} ${MUMPS_COMMON_LIBRARY} ${MUMPS_MPI_STUB_LIBRARY})
+
 # BLAS and LAPACK by their standard names, as CHOLMOD links them.
 find_path(CBLAS_INCLUDE_DIR cblas.h PATH_SUFFIXES openblas-pthread REQUIRED)
 find_library(BLAS_LIBRARY blas REQUIRED)

@@ -29,7 +29,7 @@ class TruthSolver {
   explicit TruthSolver(const contact::ForwardModel& forward);
 
   // load: 3 x n, N. kNotConverged when the set has not repeated after kMaxIterations solves; else as
-  // fem::SparseCholesky.
+  // fem::StiffnessFactor.
   Result<Truth> solve(const Points& load);
 
   static constexpr int kMaxIterations = 40;
@@ -41,7 +41,7 @@ class TruthSolver {
   Result<Points> solve_with(const contact::ActiveSet& active, const Points& load);
 
   const contact::ForwardModel& forward_;
-  fem::SparseCholesky penalised_;
+  fem::StiffnessFactor penalised_;
   contact::ActiveSet active_;
   contact::ActiveSet factored_;  // the set that penalised_ holds; empty: none yet
 };

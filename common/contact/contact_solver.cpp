@@ -4,13 +4,13 @@
 namespace brainshift::contact {
 
 Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
-                                           const fem::SparseCholesky& factor,
+                                           const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
                                            const Points& load,
                                            const ContactSolverOptions& options) {
   ContactSolution solution;
   solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
-  fem::SparseCholesky penalised = factor.clone_analysis();
+  fem::StiffnessFactor penalised = factor.clone_analysis();
   while (solution.iterations < options.max_iterations && !solution.converged) {
     VecX unknowns;
     if (count(solution.active) == 0) {

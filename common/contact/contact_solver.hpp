@@ -11,7 +11,7 @@
 
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
-#include "common/fem/cholesky.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
@@ -27,9 +27,9 @@ struct ContactSolverOptions {
 };
 
 // stiffness: K (lower), dofs and contact as prepared; load: 3 x n, N.
-// Fails as SparseCholesky does; kNotConverged only by converged == false in the result (best iterate kept).
+// Fails as StiffnessFactor does; kNotConverged only by converged == false in the result (best iterate kept).
 Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
-                                           const fem::SparseCholesky& factor,
+                                           const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
                                            const Points& load,
                                            const ContactSolverOptions& options = {});

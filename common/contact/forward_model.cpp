@@ -25,10 +25,29 @@ fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
   return dofs;
 }
 
+Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig& config,
+                                       const fem::DofMap& dofs,
+                                       const fem::SymmetricMatrix& stiffness) {
+  if (config.scene.pressure != Carry::kOn) {
+    auto drained = fem::SparseCholesky::factorise(stiffness);
+    if (!drained) return tl::unexpected(drained.error());
+    return fem::StiffnessFactor(std::move(*drained));
+  }
+  const Eigen::Matrix3Xi& triangles = model.boundary_triangles;
+  const std::vector<NodeIndex> drained(triangles.data(), triangles.data() + triangles.size());
+  const auto materials =
+      fem::MaterialMap::uniform(fem::poro_material_from(config.material), model.mesh.num_tets());
+  auto step = fem::BiotFactor::factorise(fem::assemble_biot(
+      model.mesh, materials, dofs, fem::PressureMap(model.mesh.num_nodes(), drained),
+      config.scene.pressure_step_s));
+  if (!step) return tl::unexpected(step.error());
+  return fem::StiffnessFactor(std::move(*step));
+}
+
 }  // namespace
 
 ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
-                           fem::SparseCholesky factor, PenaltyContact contact, double assemble_s)
+                           fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s)
     : boundary_(boundary),
       dofs_(std::move(dofs)),
       stiffness_(std::move(stiffness)),
@@ -54,7 +73,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
     pairs = std::move(*found);
   }
   report(progress, "factorise", 0.0);
-  auto factor = fem::SparseCholesky::factorise(stiffness);
+  auto factor = factorise(model, config, dofs, stiffness);
   if (!factor) return tl::unexpected(factor.error());
   report(progress, "factorise", 1.0);
   return ForwardModel(boundary, std::move(dofs), std::move(stiffness), std::move(*factor),

@@ -5,6 +5,10 @@
 //   slaves                  kContact: free, with penalty contact against the skull; kFixed: normal-fixed
 //   fixed                   normal-fixed, tangentially free, exactly (rotated frames, eliminated)
 //
+// K is that of drained elasticity, or, with scene.pressure = on, of one backward-Euler step of consolidation of
+// scene.pressure_step_s from rest, with the pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0):
+// cerebrospinal fluid or air surrounds it.
+//
 // Normals of fixed nodes are the average nodal normals of the brain's boundary.
 #pragma once
 
@@ -15,21 +19,22 @@
 #include "common/core/error.hpp"
 #include "common/core/estimate.hpp"
 #include "common/core/progress.hpp"
-#include "common/fem/cholesky.hpp"
 #include "common/fem/dof_map.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
 class ForwardModel {
  public:
-  // kFloatingBody, kSingularMatrix, kNotFinite, kEmptySet: see SparseCholesky and search_contact.
+  // kFloatingBody, kSingularMatrix, kNotFinite, kEmptySet: see StiffnessFactor and search_contact.
   static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
                                     Boundary boundary, const Progress& progress = {});
 
   Boundary boundary() const { return boundary_; }
   const fem::DofMap& dofs() const { return dofs_; }
+  // Of drained elasticity, with or without pressure; the contact stiffness is added to it.
   const fem::SymmetricMatrix& stiffness() const { return stiffness_; }
-  const fem::SparseCholesky& factor() const { return factor_; }
+  const fem::StiffnessFactor& factor() const { return factor_; }
   // No pairs under the fixed boundary condition.
   const PenaltyContact& contact() const { return contact_; }
   double assemble_seconds() const { return assemble_s_; }
@@ -42,11 +47,11 @@ class ForwardModel {
 
  private:
   ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
-               fem::SparseCholesky factor, PenaltyContact contact, double assemble_s);
+               fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s);
   Boundary boundary_;
   fem::DofMap dofs_;
   fem::SymmetricMatrix stiffness_;
-  fem::SparseCholesky factor_;
+  fem::StiffnessFactor factor_;
   PenaltyContact contact_;
   double assemble_s_;
 };

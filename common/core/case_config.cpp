@@ -95,6 +95,10 @@ Status validate(const CaseConfig& config) {
                 config.material.fluid_density_saturated_kg_m3, 0, 2000);
   check.between("material.fluid_density_unsaturated_kg_m3",
                 config.material.fluid_density_unsaturated_kg_m3, 0, 2000);
+  // Gels to gravel; the ends keep the matrix of a step within what double precision carries.
+  check.between("material.permeability_m3_s_kg", config.material.permeability_m3_s_kg, 1e-16, 1e-2);
+  check.between("material.biot_coefficient", config.material.biot_coefficient, 0.0, 1.0);
+  check.between("material.storage_per_pa", config.material.storage_per_pa, 0.0, 1.0);
 
   check.between("contact.gap_mm", config.contact.gap_mm, 0.0, 20.0);
   check.between("contact.slave_depth_mm", config.contact.slave_depth_mm, 0.0, 300.0);
@@ -121,6 +125,7 @@ Status validate(const CaseConfig& config) {
                 1000);
   check.between("condensed.uncertainty_nodes", config.condensed.uncertainty_nodes, 8, 1e5);
   check.between("scene.region_of_interest_mm", config.scene.region_of_interest_mm, 1.0, 300.0);
+  check.between("scene.pressure_step_s", config.scene.pressure_step_s, 1e-6, 1e9);
   return check.status();
 }
 

@@ -66,6 +66,9 @@ struct Material {  // Table 1
   double tissue_density_kg_m3 = 1000.0;
   double fluid_density_saturated_kg_m3 = 1000.0;
   double fluid_density_unsaturated_kg_m3 = 1.0;
+  double permeability_m3_s_kg = 1e-7;  // k
+  double biot_coefficient = 1.0;       // alpha
+  double storage_per_pa = 0.0;         // 1/S
 };
 
 struct ContactConfig {
@@ -131,6 +134,7 @@ struct SceneConfig {
   Carry gravity_modes = Carry::kAuto;
   Carry far_field = Carry::kAuto;       // off: only the region of interest is rebuilt
   double region_of_interest_mm = 40.0;  // around the tumour, used with far_field off
+  double pressure_step_s = 60.0;        // since the load changed, used with pressure on
 };
 
 struct CaseConfig {

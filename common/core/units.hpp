@@ -13,6 +13,10 @@ constexpr double kStandardGravity_m_s2 = 9.80665;
 constexpr double weight_density_from_kg_m3(double kg_m3) {
   return force_density_from_n_m3(kg_m3 * kStandardGravity_m_s2);
 }
+// m^3 s/kg = m^4/(N s) -> mm^4/(N s)
+constexpr double permeability_from_m3_s_kg(double m3_s_kg) { return m3_s_kg * 1e12; }
+// 1/Pa = m^2/N -> mm^2/N
+constexpr double storage_from_per_pa(double per_pa) { return per_pa * 1e6; }
 // mm^3 -> cc
 constexpr double cc_from_mm3(double mm3) { return mm3 * 1e-3; }
 

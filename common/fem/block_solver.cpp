@@ -3,7 +3,7 @@
 
 namespace brainshift::fem {
 
-BlockSolver::BlockSolver(const SparseCholesky& factor, const DofMap& dofs)
+BlockSolver::BlockSolver(const StiffnessFactor& factor, const DofMap& dofs)
     : factor_(factor), dofs_(dofs), nodal_(3, dofs.num_nodes()) {}
 
 void BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements) {

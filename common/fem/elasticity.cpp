@@ -2,6 +2,7 @@
 #include "common/fem/elasticity.hpp"
 
 #include <cassert>
+#include <vector>
 
 #include "common/core/units.hpp"
 #include "common/fem/assembly.hpp"
@@ -26,7 +27,15 @@ TetGeometry tet_geometry(const TetMesh& mesh, int tet) {
 
 SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
                                    const DofMap& dofs) {
+  return assemble_stiffness(
+      mesh, std::vector<Elasticity>(static_cast<std::size_t>(mesh.num_tets()), material), dofs);
+}
+
+SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
+                                   const DofMap& dofs) {
+  assert(of_tet.size() == static_cast<std::size_t>(mesh.num_tets()));
   return assemble_lower(mesh.tets, dofs, [&](int tet) {
+    const Elasticity& material = of_tet[static_cast<std::size_t>(tet)];
     return [&material, geometry = tet_geometry(mesh, tet)](int i, int j) {
       const Vec3 gi = geometry.gradients.col(i);
       const Vec3 gj = geometry.gradients.col(j);

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <vector>
 
 #include "common/core/case_config.hpp"
 #include "common/core/error.hpp"
@@ -38,6 +39,9 @@ TetGeometry tet_geometry(const TetMesh& mesh, int tet);
 // Lower triangle (diagonal included) of T^T K T in the unknowns of `dofs`, compressed, sorted; N/mm.
 using SymmetricMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, long>;
 SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
+                                   const DofMap& dofs);
+// One material per tetrahedron.
+SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
                                    const DofMap& dofs);
 
 // Adds a symmetric 3 x 3 block (RAS axes) to the diagonal block of `node`. Precondition: the node has the

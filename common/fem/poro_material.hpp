@@ -19,6 +19,9 @@ struct PoroMaterial {
   double permeability = 0.0;      // k: hydraulic conductivity over unit weight, mm^4/(N s)
 };
 
+// Of a case, in internal units.
+PoroMaterial poro_material_from(const Material& material);
+
 // of_tet: one index into `materials` per tetrahedron.
 struct MaterialMap {
   std::vector<PoroMaterial> materials;

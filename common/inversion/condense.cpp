@@ -242,6 +242,10 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
   BlockRunner runner(model, options.progress, options.stop, options.threads);
   if (!contact_columns(model, options, runner, result))
     return tl::unexpected(BlockRunner::stopped());
+  if (!result.compliance.allFinite()) {
+    return fail(ErrorCode::kNotFinite,
+                "contact columns: the compliance of the slaves is not finite");
+  }
   if (auto status = prior_modes(model, runner, result); !status) {
     return tl::unexpected(status.error());
   }

@@ -96,7 +96,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   const double prior_s = seconds_since(prior_start);
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));
-  const fem::SparseCholesky& factor = prepared.forward_.factor();
+  const fem::StiffnessFactor& factor = prepared.forward_.factor();
   report(progress, "measure", 0.0);
   PrepareTimings& timings = prepared.timings_;
   timings.assemble_s = prepared.forward_.assemble_seconds();

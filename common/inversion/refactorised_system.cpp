@@ -14,7 +14,7 @@ Status RefactorisedSystem::refresh() {
 }
 
 Status RefactorisedSystem::solve(const Points& f, Points& u) const {
-  const fem::SparseCholesky& factor =
+  const fem::StiffnessFactor& factor =
       contact::count(active()) > 0 ? penalised_ : forward().factor();
   u = forward().dofs().expand(factor.solve(forward().dofs().restrict_to(f)));
   return {};

@@ -2,7 +2,7 @@
 // K_p refactorised for every new active set, as the paper does; ordering and symbolic analysis are those of K.
 #pragma once
 
-#include "common/fem/cholesky.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/inversion/penalised_system.hpp"
 
 namespace brainshift::inversion {
@@ -14,7 +14,7 @@ class RefactorisedSystem final : public PenalisedSystem {
 
  private:
   Status refresh() override;
-  fem::SparseCholesky penalised_;
+  fem::StiffnessFactor penalised_;
 };
 
 }  // namespace brainshift::inversion

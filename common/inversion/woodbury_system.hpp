@@ -13,7 +13,7 @@
 #include <Eigen/Cholesky>
 #include <vector>
 
-#include "common/fem/cholesky.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/inversion/penalised_system.hpp"
 
 namespace brainshift::inversion {
@@ -33,7 +33,7 @@ class WoodburySystem final : public PenalisedSystem {
   std::vector<char> known_;  // per slave: its column of Phi is known
   Eigen::MatrixXd phi_;      // slaves x slaves; columns that are not known hold nothing
   Eigen::LLT<Eigen::MatrixXd> capacitance_;
-  fem::SparseCholesky::Workspace workspace_;  // of blocks of columns
+  fem::StiffnessFactor::Workspace workspace_;  // of blocks of columns
 };
 
 }  // namespace brainshift::inversion

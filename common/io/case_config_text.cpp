@@ -108,6 +108,9 @@ void write_physics(const CaseConfig& config, Writer& out) {
   out.number("  tissue_density_kg_m3", config.material.tissue_density_kg_m3);
   out.number("  fluid_density_saturated_kg_m3", config.material.fluid_density_saturated_kg_m3);
   out.number("  fluid_density_unsaturated_kg_m3", config.material.fluid_density_unsaturated_kg_m3);
+  out.number("  permeability_m3_s_kg", config.material.permeability_m3_s_kg);
+  out.number("  biot_coefficient", config.material.biot_coefficient);
+  out.number("  storage_per_pa", config.material.storage_per_pa);
   out.section("contact");
   out.number("  gap_mm", config.contact.gap_mm);
   if (config.contact.skull_file) out.path("  skull_file", *config.contact.skull_file);
@@ -147,6 +150,7 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   carry("gravity_modes", config.scene.gravity_modes);
   carry("far_field", config.scene.far_field);
   out.number("  region_of_interest_mm", config.scene.region_of_interest_mm);
+  out.number("  pressure_step_s", config.scene.pressure_step_s);
 }
 
 }  // namespace

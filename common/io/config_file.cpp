@@ -91,6 +91,9 @@ void read_physics(YamlSection& root, CaseConfig& config) {
   material.number("fluid_density_saturated_kg_m3", config.material.fluid_density_saturated_kg_m3);
   material.number("fluid_density_unsaturated_kg_m3",
                   config.material.fluid_density_unsaturated_kg_m3);
+  material.number("permeability_m3_s_kg", config.material.permeability_m3_s_kg);
+  material.number("biot_coefficient", config.material.biot_coefficient);
+  material.number("storage_per_pa", config.material.storage_per_pa);
   material.done();
 
   YamlSection contact = root.section("contact");
@@ -150,6 +153,7 @@ void read_scene(YamlSection& root, CaseConfig& config) {
   carry("gravity_modes", config.scene.gravity_modes);
   carry("far_field", config.scene.far_field);
   scene.number("region_of_interest_mm", config.scene.region_of_interest_mm);
+  scene.number("pressure_step_s", config.scene.pressure_step_s);
   scene.done();
 }
 

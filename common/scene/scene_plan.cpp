@@ -21,8 +21,8 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary b
   const bool condensed = method == Method::kCondensed;
   const bool has_modes =
       config.prior.gravity_mode_sd > 0.0 && !config.prior.gravity_levels_mm.empty();
-  if (scene.pressure == Carry::kOn) {
-    return refused("pressure", "on", "pore pressure is not available in this version");
+  if (scene.pressure == Carry::kOn && method == Method::kIterativeSolver) {
+    return refused("pressure", "on", "method " + name + " has no solver for pore pressure");
   }
   if (scene.surface == Carry::kOn) {
     return refused("surface", "on", "cortical surface data are not available in this version");
@@ -45,6 +45,7 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary b
                    "method " + name + " always carries them; set prior.gravity_mode_sd to 0");
   }
   ScenePlan plan;
+  plan.pressure = scene.pressure == Carry::kOn;
   plan.contact = boundary == Boundary::kContact && scene.contact != Carry::kOff;
   plan.uncertainty = condensed && scene.uncertainty != Carry::kOff;
   plan.gravity_modes = has_modes && scene.gravity_modes != Carry::kOff;

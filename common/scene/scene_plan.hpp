@@ -15,14 +15,15 @@
 namespace brainshift::scene {
 
 struct ScenePlan {
+  bool pressure = false;
   bool contact = true;  // searched for; an update without any leaves it out by itself
   bool uncertainty = true;
   bool gravity_modes = true;
   bool far_field = true;
 };
 
-// Fails with kInvalidArgument for a part that is forced on but not available (scene.pressure, scene.surface;
-// scene.contact under the fixed boundary; scene.uncertainty with a method without covariance;
+// Fails with kInvalidArgument for a part that is forced on but not available (scene.surface;
+// scene.pressure with method pcg; scene.contact under the fixed boundary; scene.uncertainty with a method without covariance;
 // scene.gravity_modes without modes in the prior), and for one that is forced off but that the method always
 // carries. The sentence names the key.
 Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary boundary);

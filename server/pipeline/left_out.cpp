@@ -13,8 +13,6 @@
 namespace brainshift::server {
 namespace {
 
-constexpr double kHydraulicConductivity_m3s_kg = 1e-7;  // Table 1
-
 // Seconds after which at most the given fraction is missing.
 double drained_after_s(double fraction, double consolidation_s) {
   return -4.0 / (std::numbers::pi * std::numbers::pi) * std::log(fraction) * consolidation_s;
@@ -43,7 +41,10 @@ double consolidation_time_s(const TetMesh& mesh, const Material& material) {
   const double shear_pa = material.shear_modulus_pa;
   const double lame_pa =
       2.0 * shear_pa * material.poisson_ratio / (1.0 - 2.0 * material.poisson_ratio);
-  const double c_v_m2_s = kHydraulicConductivity_m3s_kg * (lame_pa + 2.0 * shear_pa);
+  const double alpha = material.biot_coefficient;
+  const double capacity_per_pa =
+      material.storage_per_pa + alpha * alpha / (lame_pa + 2.0 * shear_pa);
+  const double c_v_m2_s = material.permeability_m3_s_kg / capacity_per_pa;
   const double radius_m = 1e-3 * std::cbrt(3.0 * volume_mm3(mesh) / (4.0 * std::numbers::pi));
   return radius_m * radius_m / c_v_m2_s;
 }
@@ -52,17 +53,30 @@ double undrained_fraction(double seconds, double consolidation_time_s) {
   return std::exp(-std::numbers::pi * std::numbers::pi / 4.0 * seconds / consolidation_time_s);
 }
 
+double implicit_step_fraction(double seconds, double consolidation_time_s) {
+  return 1.0 / (1.0 + std::numbers::pi * std::numbers::pi / 4.0 * seconds / consolidation_time_s);
+}
+
+Omission pressure_omission(const TetMesh& mesh, const CaseConfig& config) {
+  const double relaxation_s = consolidation_time_s(mesh, config.material);
+  const double step_s = config.scene.pressure_step_s;
+  return {
+      "pressure",
+      fmt::format("drained limit: pore pressure relaxes in about {:.3g} s (R^2/c_v)", relaxation_s),
+      fmt::format(
+          "at most {:.2g} % of the displacement by a load {:.3g} s old, 1 % after {:.3g} s; "
+          "one implicit step (scene.pressure = on) differs by at most {:.2g} %",
+          100.0 * undrained_fraction(step_s, relaxation_s), step_s,
+          drained_after_s(0.01, relaxation_s),
+          100.0 * implicit_step_fraction(step_s, relaxation_s))};
+}
+
 std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
                                       Method method, Boundary boundary) {
-  const double drained_s = consolidation_time_s(model.mesh, config.material);
   std::vector<Omission> omissions;
-  omissions.push_back(
-      {"pressure",
-       fmt::format("drained limit: pore pressure relaxes in about {:.1f} s (R^2/c_v), faster than "
-                   "updates follow each other",
-                   drained_s),
-       fmt::format("at most 1 % of the displacement by a load {:.1f} s old, 0.01 % after {:.1f} s",
-                   drained_after_s(0.01, drained_s), drained_after_s(0.0001, drained_s))});
+  if (config.scene.pressure != Carry::kOn) {
+    omissions.push_back(pressure_omission(model.mesh, config));
+  }
   const char* unaffected =
       "none: displacements are unaffected, their standard deviation is unknown";
   if (method != Method::kCondensed) {

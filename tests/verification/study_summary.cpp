@@ -33,12 +33,11 @@ struct Arguments {
 
 // Errors, sizes, times and the like span powers of ten; positions and pressures do not.
 bool logarithmic(const std::string& axis) {
-  const char* const words[] = {"error", "size",     "steps",     " s",
+  const char* const words[] = {"error",    "size",     "steps",     " s",
                                "unknowns", "elements", "roughness", "over bound"};
   if (axis == "T") return true;  // time over consolidation time
-  return std::any_of(std::begin(words), std::end(words), [&](const char* word) {
-    return axis.find(word) != std::string::npos;
-  });
+  return std::any_of(std::begin(words), std::end(words),
+                     [&](const char* word) { return axis.find(word) != std::string::npos; });
 }
 
 // "element size mm" -> "element size (mm)": a last word that is a unit.
@@ -47,8 +46,8 @@ std::string with_unit(const std::string& axis) {
   if (space == std::string::npos) return axis;
   const std::string unit = axis.substr(space + 1);
   const char* const units[] = {"mm", "s", "%", "kPa", "Pa", "N", "MPa"};
-  const bool known = std::any_of(std::begin(units), std::end(units),
-                                 [&](const char* one) { return unit == one; });
+  const bool known =
+      std::any_of(std::begin(units), std::end(units), [&](const char* one) { return unit == one; });
   return known ? axis.substr(0, space) + " (" + unit + ")" : axis;
 }
 
@@ -59,8 +58,8 @@ struct Chart {
 
 // One chart per study and pair of axes, one line per series, in the order of the record.
 std::vector<Chart> charts_of(const CsvTable& points) {
-  const cv::Scalar colours[] = {palette::kBlue,  palette::kVermillion, palette::kGreen,
-                                palette::kPurple, palette::kOrange,    palette::kSkyBlue};
+  const cv::Scalar colours[] = {palette::kBlue,   palette::kVermillion, palette::kGreen,
+                                palette::kPurple, palette::kOrange,     palette::kSkyBlue};
   const Marker markers[] = {Marker::kCircle, Marker::kSquare, Marker::kTriangle};
   std::vector<Chart> charts;
   for (std::size_t row = 0; row < points.rows(); ++row) {
@@ -78,8 +77,8 @@ std::vector<Chart> charts_of(const CsvTable& points) {
     }
     auto& all = chart->spec.series;
     const std::string& legend = points.text(row, "series");
-    auto series = std::find_if(all.begin(), all.end(),
-                               [&](const auto& one) { return one.legend == legend; });
+    auto series =
+        std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.legend == legend; });
     if (series == all.end()) {
       const std::size_t k = all.size();
       series = all.insert(all.end(), client::XySeries{});
@@ -163,7 +162,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Charts, table and checks of what the verification tests recorded.",
                "study_summary"};
   verification::Arguments arguments;
-  app.add_option("--dir", arguments.folder, "folder with points.csv and checks.csv; results go there")
+  app.add_option("--dir", arguments.folder,
+                 "folder with points.csv and checks.csv; results go there")
       ->capture_default_str();
   app.add_option("--commit", arguments.commit, "for tables.md")->capture_default_str();
   app.add_option("--command", arguments.command, "that the figures come from")

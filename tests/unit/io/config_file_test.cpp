@@ -195,6 +195,24 @@ TEST(CaseFile, TextKeepsAwkwardNamesAndNumbers) {
   EXPECT_EQ(read->inversion.sigma_mm, config.inversion.sigma_mm);
 }
 
+TEST(CaseFile, KeysOfPorePressureAreReadAndWritten) {
+  const std::string text = replaced(
+      std::string(kFull) + "scene: {pressure: on, pressure_step_s: 5}\n", "_unsaturated_kg_m3: 1.2",
+      "_unsaturated_kg_m3: 1.2\n  permeability_m3_s_kg: 2e-8\n  biot_coefficient: 0.75\n"
+      "  storage_per_pa: 3e-6");
+  const auto read = parse_case_config(text, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto again = parse_case_config(case_config_text(*read), "/cases/c.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  for (const CaseConfig& config : {*read, *again}) {
+    EXPECT_EQ(config.scene.pressure, Carry::kOn);
+    EXPECT_EQ(config.scene.pressure_step_s, 5.0);
+    EXPECT_EQ(config.material.permeability_m3_s_kg, 2e-8);
+    EXPECT_EQ(config.material.biot_coefficient, 0.75);
+    EXPECT_EQ(config.material.storage_per_pa, 3e-6);
+  }
+}
+
 struct BadCase {
   const char* name;
   const char* from;  // replaced in kFull by...

@@ -56,6 +56,16 @@ TEST(PlanScene, CarriesWhatIsForcedOn) {
   EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
 }
 
+TEST(PlanScene, CarriesPressureOnlyWhenAsked) {
+  CaseConfig config;
+  EXPECT_FALSE(plan_scene(config, Method::kCondensed, Boundary::kContact)->pressure);
+  config.scene.pressure = Carry::kOn;
+  for (const Method method : {Method::kCondensed, Method::kPaper}) {
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kContact)->pressure);
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kFixed)->pressure);
+  }
+}
+
 TEST(PlanScene, APriorWithoutGravityModesHasNoneToCarry) {
   CaseConfig config;
   config.prior.gravity_mode_sd = 0.0;
@@ -65,8 +75,8 @@ TEST(PlanScene, APriorWithoutGravityModesHasNoneToCarry) {
 TEST(PlanScene, RefusesPartsForcedOnThatAreNotAvailable) {
   CaseConfig config;
   config.scene.pressure = Carry::kOn;
-  expect_refused(config, Method::kCondensed, Boundary::kContact,
-                 "scene.pressure = on: pore pressure is not available in this version");
+  expect_refused(config, Method::kIterativeSolver, Boundary::kContact,
+                 "scene.pressure = on: method pcg has no solver for pore pressure");
   config = {};
   config.scene.surface = Carry::kOn;
   expect_refused(config, Method::kCondensed, Boundary::kContact, "scene.surface = on");

@@ -348,6 +348,20 @@ TEST(ConsolidationTime, AgreesWithHandCalculation) {
   EXPECT_NEAR(consolidation_time_s(cube(100.0), Material{}), 0.062035 * 0.062035 / 2.835e-3, 1e-4);
 }
 
+TEST(ConsolidationTime, FollowsTheMaterialOfTheCase) {
+  const double table = consolidation_time_s(cube(100.0), Material{});
+  Material tight;
+  tight.permeability_m3_s_kg = 1e-9;
+  EXPECT_NEAR(consolidation_time_s(cube(100.0), tight), 100.0 * table, 1e-9 * table);
+  // Fluid that can be stored drains later; S = 1 / (lambda + 2 G) doubles the capacity.
+  Material storing;
+  storing.storage_per_pa = 1.0 / 28350.0;
+  EXPECT_NEAR(consolidation_time_s(cube(100.0), storing), 2.0 * table, 1e-9 * table);
+  Material uncoupled;
+  uncoupled.biot_coefficient = 0.0;
+  EXPECT_EQ(consolidation_time_s(cube(100.0), uncoupled), 0.0);
+}
+
 TEST(ConsolidationTime, GrowsWithTheSquareOfTheSize) {
   const double small = consolidation_time_s(cube(50.0), Material{});
   ASSERT_GT(small, 0.0);
@@ -371,6 +385,7 @@ TEST(UndrainedFraction, BoundsWhatALayerThatConsolidatesIsMissing) {
       }
     }
     EXPECT_LE(pressure.mean(), undrained_fraction(time, 1.0)) << until;
+    EXPECT_LE(undrained_fraction(time, 1.0), implicit_step_fraction(time, 1.0)) << until;
     EXPECT_GE(pressure.mean(), 0.7 * undrained_fraction(time, 1.0)) << until;
   }
 }

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/fem/gravity.hpp"
 #include "common/inversion/condense.hpp"
 #include "server/main/model_store.hpp"
+#include "server/pipeline/left_out.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
@@ -102,10 +104,47 @@ TEST_F(SceneSession, ByDefaultOnlyPressureIsLeftOutWhenTheBrainTouches) {
   EXPECT_EQ(update.left_out[0].part, "pressure");
 }
 
+// What the drained limit moves a displacement by, against what the update says that it does.
+TEST_F(SceneSession, PressureDiffersByNoMoreThanIsReported) {
+  const auto limit = inversion::PreparedModel::prepare(patient(), config(), Boundary::kContact);
+  const Points load =
+      fem::buoyancy_load(patient()->mesh, config().material, {0, 0, -1}, 60.0, {0, 0, -1});
+  const Points drained = limit->forward().solve(load);
+  const double relaxation_s = consolidation_time_s(patient()->mesh, config().material);
+  double before = 1.0;
+  for (const double relaxations : {0.3, 1.0, 10.0, 100.0}) {
+    CaseConfig on = config();
+    on.scene.pressure = Carry::kOn;
+    on.scene.pressure_step_s = relaxations * relaxation_s;
+    const auto model = inversion::PreparedModel::prepare(patient(), on, Boundary::kContact);
+    ASSERT_TRUE(model.has_value()) << model.error().message;
+    const double missing = (drained - model->forward().solve(load)).colwise().norm().maxCoeff() /
+                           drained.colwise().norm().maxCoeff();
+    EXPECT_LE(missing, implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
+    EXPECT_GT(missing, 0.02 * implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
+    EXPECT_LT(missing, before);
+    before = missing;
+  }
+}
+
+TEST_F(SceneSession, PressureThatIsCarriedIsNotLeftOut) {
+  CaseConfig on = config();
+  on.scene.pressure = Carry::kOn;
+  EXPECT_EQ(find(run(on, {3, 0, 3}), "pressure"), nullptr);
+  CaseConfig slow = config();
+  slow.scene.pressure_step_s = 2.0;
+  slow.material.permeability_m3_s_kg = 1e-8;
+  const Update update = run(slow, {3, 0, 3});
+  const Omission* pressure = find(update, "pressure");
+  ASSERT_NE(pressure, nullptr);
+  EXPECT_THAT(pressure->reason, HasSubstr("relaxes in about 4.89 s"));
+  EXPECT_THAT(pressure->estimated_error, HasSubstr("of the displacement by a load 2 s old"));
+}
+
 TEST_F(SceneSession, RefusesWhatIsNotAvailableBeforeASessionStarts) {
   CaseConfig pressure = config();
   pressure.scene.pressure = Carry::kOn;
-  const auto refused = session(pressure);
+  const auto refused = session(pressure, Method::kIterativeSolver);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(refused.error().message, HasSubstr("scene.pressure = on"));

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/fem/biot_factor.hpp"
+
+#include <limits>
+#include <utility>
+
+namespace brainshift::fem {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+BiotFactor::BiotFactor(BiotMatrix matrix, SymmetricIndefinite factor)
+    : matrix_(std::move(matrix)), factor_(std::move(factor)) {}
+
+Result<BiotFactor> BiotFactor::factorise(BiotMatrix matrix) {
+  auto factor = SymmetricIndefinite::factorise(matrix.lower, matrix.pressure_unknowns);
+  if (!factor) return tl::unexpected(factor.error());
+  return BiotFactor(std::move(matrix), std::move(*factor));
+}
+
+Status BiotFactor::refactorise(const SymmetricMatrix& stiffness) {
+  replace_stiffness(matrix_, stiffness);
+  return factor_.refactorise(matrix_.lower);
+}
+
+BiotFactor BiotFactor::clone_analysis() const {
+  return BiotFactor(matrix_, factor_.clone_analysis());
+}
+
+void BiotFactor::solve(const VecX& b, VecX& x) const {
+  VecX whole = VecX::Zero(factor_.size());
+  whole.head(size()) = b;
+  VecX solution;
+  if (factor_.solve(whole, solution)) {
+    x = solution.head(size());
+  } else {
+    x = VecX::Constant(size(), kNan);
+  }
+}
+
+void BiotFactor::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const {
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(factor_.size(), b.cols());
+  whole.topRows(size()) = b;
+  Eigen::MatrixXd solution;
+  if (factor_.solve_many(whole, solution)) {
+    x = solution.topRows(size());
+  } else {
+    x = Eigen::MatrixXd::Constant(size(), b.cols(), kNan);
+  }
+}
+
+std::uint64_t BiotFactor::bytes() const {
+  return factor_.bytes() +
+         static_cast<std::uint64_t>(matrix_.lower.nonZeros()) * (sizeof(double) + sizeof(long));
+}
+
+}  // namespace brainshift::fem

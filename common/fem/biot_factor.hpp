@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// BiotFactor: displacement after one backward-Euler step from rest, with the pressure eliminated:
+//
+//   u = K_b^-1 f,   K_b = K + G (dt H + M + P)^-1 G^T        symmetric positive definite (biot_matrix.hpp)
+//
+// so whatever is done with a factor of K (contact stiffness, adjoints, covariances) can be done with this one. K_b is
+// dense and never formed: a solve is one with the factor of the whole matrix.
+#pragma once
+
+#include "common/core/case_config.hpp"
+#include "common/fem/biot_matrix.hpp"
+#include "common/fem/symmetric_indefinite.hpp"
+
+namespace brainshift::fem {
+
+class BiotFactor {
+ public:
+  // Errors as SymmetricIndefinite::factorise.
+  static Result<BiotFactor> factorise(BiotMatrix matrix);
+
+  // Another stiffness of the same pattern (K_p for K); the pressure's blocks stay.
+  Status refactorise(const SymmetricMatrix& stiffness);
+  BiotFactor clone_analysis() const;
+
+  // A solve that fails its guards (SymmetricIndefinite::solve) leaves NaN everywhere.
+  void solve(const VecX& b, VecX& x) const;
+  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const;
+
+  int size() const { return matrix_.displacement_unknowns; }
+  double rcond() const { return factor_.rcond(); }
+  std::uint64_t nonzeros() const { return factor_.nonzeros(); }
+  std::uint64_t bytes() const;
+  double analyse_seconds() const { return factor_.analyse_seconds(); }
+  double factor_seconds() const { return factor_.factor_seconds(); }
+
+ private:
+  BiotFactor(BiotMatrix matrix, SymmetricIndefinite factor);
+  BiotMatrix matrix_;
+  SymmetricIndefinite factor_;
+};
+
+}  // namespace brainshift::fem

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// StiffnessFactor: what solves K u = f for the displacement, whichever physics K holds.
+//
+//   SparseCholesky   drained elasticity
+//   BiotFactor       one step of consolidation, pressure eliminated
+//
+// Both are symmetric positive definite in u and can be refactorised with a stiffness of the same pattern (K_p).
+#pragma once
+
+#include <utility>
+#include <variant>
+
+#include "common/fem/biot_factor.hpp"
+#include "common/fem/cholesky.hpp"
+
+namespace brainshift::fem {
+
+class StiffnessFactor {
+ public:
+  // What one thread needs to solve with a factor that several threads share.
+  using Workspace = SparseCholesky::Workspace;
+
+  StiffnessFactor(SparseCholesky factor) : factor_(std::move(factor)) {}  // NOLINT: a factor is one
+  StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}      // NOLINT
+
+  bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
+
+  // As SparseCholesky. With pressure, a solve that fails its guards is NaN everywhere.
+  Status refactorise(const SymmetricMatrix& stiffness) {
+    return std::visit([&](auto& f) { return f.refactorise(stiffness); }, factor_);
+  }
+  StiffnessFactor clone_analysis() const {
+    return std::visit([](const auto& f) { return StiffnessFactor(f.clone_analysis()); }, factor_);
+  }
+  void solve(const VecX& b, VecX& x) const {
+    std::visit([&](const auto& f) { f.solve(b, x); }, factor_);
+  }
+  VecX solve(const VecX& b) const {
+    VecX x;
+    solve(b, x);
+    return x;
+  }
+  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const {
+    if (const auto* cholesky = std::get_if<SparseCholesky>(&factor_)) {
+      cholesky->solve_many(b, x, workspace);
+    } else {
+      std::get<BiotFactor>(factor_).solve_many(b, x);
+    }
+  }
+  Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const {
+    Workspace workspace;
+    Eigen::MatrixXd x;
+    solve_many(b, x, workspace);
+    return x;
+  }
+
+  int size() const {
+    return std::visit([](const auto& f) { return f.size(); }, factor_);
+  }
+  double rcond() const {
+    return std::visit([](const auto& f) { return f.rcond(); }, factor_);
+  }
+  std::uint64_t nonzeros() const {
+    return std::visit([](const auto& f) { return f.nonzeros(); }, factor_);
+  }
+  std::uint64_t bytes() const {
+    return std::visit([](const auto& f) { return f.bytes(); }, factor_);
+  }
+  double analyse_seconds() const {
+    return std::visit([](const auto& f) { return f.analyse_seconds(); }, factor_);
+  }
+  double factor_seconds() const {
+    return std::visit([](const auto& f) { return f.factor_seconds(); }, factor_);
+  }
+
+ private:
+  std::variant<SparseCholesky, BiotFactor> factor_;
+};
+
+}  // namespace brainshift::fem

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Ways to solve one backward-Euler step of Biot consolidation on the default head (docs/decisions/0011): L D L^T of
+// the whole matrix, and conjugate gradients on the pressure Schur complement with the Cholesky factor of K. One BLAS
+// thread. Prints a table; about two minutes. Arguments: step sizes in seconds (default 60 1 0.01).
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "common/contact/forward_model.hpp"
+#include "common/core/units.hpp"
+#include "common/fem/biot_matrix.hpp"
+#include "common/fem/blas_threads.hpp"
+#include "common/fem/symmetric_indefinite.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/io/config_file.hpp"
+#include "common/scene/brain_model_builder.hpp"
+
+namespace brainshift {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr int kColumns = 64;
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (!result) {
+    std::fprintf(stderr, "%s\n", result.error().message.c_str());
+    std::exit(2);
+  }
+  return std::move(*result);
+}
+
+template <typename Work>
+double median_ms(int repetitions, const Work& work) {
+  std::vector<double> times;
+  for (int i = 0; i < repetitions; ++i) {
+    const auto start = Clock::now();
+    work();
+    times.push_back(ms_since(start));
+  }
+  std::nth_element(times.begin(), times.begin() + repetitions / 2, times.end());
+  return times[static_cast<std::size_t>(repetitions / 2)];
+}
+
+double peak_gib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / (1024.0 * 1024.0);
+}
+
+// |b - A x| / |b|.
+double relative_residual(const fem::SymmetricMatrix& lower, const VecX& b, const VecX& x) {
+  return (b - fem::multiply(lower, x)).norm() / b.norm();
+}
+
+// (C + G^T K^-1 G) p = -g - G^T K^-1 f by conjugate gradients, preconditioned with C + M / (lambda + 2 G).
+class SchurComplement {
+ public:
+  SchurComplement(const fem::BiotMatrix& biot, const fem::SymmetricMatrix& preconditioner)
+      : nu_(biot.displacement_unknowns), np_(biot.pressure_unknowns) {
+    const auto& a = biot.lower;
+    stiffness_ = a.block(0, 0, nu_, nu_);
+    coupling_ = -a.block(nu_, 0, np_, nu_);  // G^T
+    pressure_ = -a.block(nu_, nu_, np_, np_);
+    factor_.emplace_back(value_or_exit(fem::SparseCholesky::factorise(stiffness_)));
+    const fem::SymmetricMatrix p = pressure_ + preconditioner;
+    inner_.emplace_back(value_or_exit(fem::SparseCholesky::factorise(p)));
+  }
+  VecX solve(const VecX& b, double tolerance) {
+    const VecX f = b.head(nu_);
+    const VecX w = factor_[0].solve(f);
+    VecX r = -b.tail(np_) - coupling_ * w;
+    VecX p = VecX::Zero(np_), z = inner_[0].solve(r), d = z;
+    double rz = r.dot(z);
+    const double stop = tolerance * r.norm();
+    for (iterations = 0; iterations < 500 && r.norm() > stop; ++iterations) {
+      const VecX gd = coupling_.transpose() * d;
+      const VecX s = fem::multiply(pressure_, d) + coupling_ * factor_[0].solve(gd);
+      const double step = rz / d.dot(s);
+      p += step * d;
+      r -= step * s;
+      z = inner_[0].solve(r);
+      const double next = r.dot(z);
+      d = z + next / rz * d;
+      rz = next;
+    }
+    VecX x(nu_ + np_);
+    x.head(nu_) = factor_[0].solve(VecX(f + coupling_.transpose() * p));
+    x.tail(np_) = p;
+    return x;
+  }
+  std::uint64_t bytes() const { return factor_[0].bytes() + inner_[0].bytes(); }
+  int iterations = 0;
+
+ private:
+  long nu_, np_;
+  fem::SymmetricMatrix stiffness_, coupling_, pressure_;
+  std::vector<fem::SparseCholesky> factor_, inner_;
+};
+
+fem::PoroMaterial tissue(const Material& material) {
+  fem::PoroMaterial poro;
+  poro.elastic = fem::elasticity_from(material);
+  poro.permeability = 1e5;  // 1e-7 m^3 s/kg
+  return poro;
+}
+
+void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
+  const contact::ForwardModel forward =
+      value_or_exit(contact::ForwardModel::build(model, config, Boundary::kContact));
+  std::vector<NodeIndex> surface;
+  geometry::boundary_surface(model.mesh, &surface);
+  const fem::PressureMap pressure(model.mesh.num_nodes(), surface);
+  const auto materials = fem::MaterialMap::uniform(tissue(config.material), model.mesh.num_tets());
+  auto start = Clock::now();
+  const fem::BiotMatrix biot =
+      fem::assemble_biot(model.mesh, materials, forward.dofs(), pressure, dt_s);
+  std::printf("dt %g s: %ld unknowns, %d of %d tets stabilised, assembled in %.0f ms\n", dt_s,
+              static_cast<long>(biot.lower.rows()), biot.stabilised_tets, model.mesh.num_tets(),
+              ms_since(start));
+  const VecX b = VecX::LinSpaced(biot.lower.rows(), -1.0, 1.0);
+  VecX x;
+
+  start = Clock::now();
+  const auto ldl =
+      value_or_exit(fem::SymmetricIndefinite::factorise(biot.lower, biot.pressure_unknowns));
+  const double ldl_s = ms_since(start) / 1e3;
+  const double ldl_ms = median_ms(7, [&] { (void)ldl.solve(b, x); });
+  const double residual = relative_residual(biot.lower, b, x);
+  Eigen::MatrixXd columns(biot.lower.rows(), kColumns), y;
+  for (int j = 0; j < kColumns; ++j) columns.col(j) = (1.0 + j) * b.array().sin();
+  const double block_ms = median_ms(3, [&] { (void)ldl.solve_many(columns, y); }) / kColumns;
+  std::printf(
+      "  L D L^T (MUMPS)     analyse %.2f s  factor %.2f s  total %.2f s  solve %.0f ms  column "
+      "%.1f ms  "
+      "factor %.2f GiB  peak %.2f GiB  residual %.1e  backward %.1e  rcond %.1e  nnz %.1f M\n",
+      ldl.analyse_seconds(), ldl.factor_seconds(), ldl_s, ldl_ms, block_ms,
+      static_cast<double>(ldl.bytes()) / (1 << 30), peak_gib(), residual,
+      ldl.last_check().backward_error, ldl.rcond(), static_cast<double>(ldl.nonzeros()) / 1e6);
+
+  // Mass over the confined modulus: the pressure Schur complement of an incompressible fluid, undrained.
+  auto mass_only = materials;
+  for (auto& m : mass_only.materials) {
+    m.storage = 1.0 / (m.elastic.lambda + 2.0 * m.elastic.shear);
+    m.permeability = 0.0;
+  }
+  const fem::BiotMatrix mass =
+      fem::assemble_biot(model.mesh, mass_only, forward.dofs(), pressure, 1.0, false);
+  const long nu = mass.displacement_unknowns, np = mass.pressure_unknowns;
+  start = Clock::now();
+  SchurComplement schur(biot, fem::SymmetricMatrix(-mass.lower.block(nu, nu, np, np)));
+  const double schur_s = ms_since(start) / 1e3;
+  const double schur_ms = median_ms(3, [&] { x = schur.solve(b, 1e-12); });
+  std::printf(
+      "  Schur complement    total %.2f s  solve %.0f ms (%d iterations)  factor %.2f GiB  "
+      "residual %.1e\n",
+      schur_s, schur_ms, schur.iterations, static_cast<double>(schur.bytes()) / (1 << 30),
+      relative_residual(biot.lower, b, x));
+  std::printf("  elasticity alone    factor %.2f s  solve %.0f ms\n",
+              forward.factor().factor_seconds(),
+              median_ms(7, [&] { (void)forward.factor().solve(VecX(b.head(nu))); }));
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  using namespace brainshift;
+  fem::use_single_threaded_blas();
+  const char* name = std::getenv("BRAINSHIFT_CASE");
+  auto config =
+      value_or_exit(io::read_case_config(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE));
+  const auto inputs = value_or_exit(io::load_case_inputs(config));
+  const auto model = value_or_exit(scene::build_brain_model(inputs));
+  std::vector<double> steps;
+  for (int i = 1; i < argc; ++i) steps.push_back(std::atof(argv[i]));
+  if (steps.empty()) steps = {60.0, 1.0, 0.01};
+  for (const double dt_s : steps) measure(model, config, dt_s);
+  return 0;
+}
