@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "client/cli/command.hpp"
 #include "common/forward/build_problem.hpp"
@@ -51,11 +52,32 @@ Result<forward::ForwardProblem> load(const ProblemSpec& spec) {
 }
 
 Result<std::vector<forward::ProbeValue>> probe_values(const ProblemSpec& spec,
-                                                      const forward::ForwardSolution& solution) {
+                                                      const forward::ForwardSolution& solution,
+                                                      std::optional<std::size_t> moment = {}) {
   Points points(3, static_cast<Eigen::Index>(spec.probes.size()));
   for (std::size_t i = 0; i < spec.probes.size(); ++i)
     points.col(static_cast<Eigen::Index>(i)) = spec.probes[i].at_mm;
-  return forward::probe(solution, points, kProbeTolerance * mesh_size(solution.space.mesh));
+  const double tolerance_mm = kProbeTolerance * mesh_size(solution.space.mesh);
+  return moment ? forward::probe(solution, *moment, points, tolerance_mm)
+                : forward::probe(solution, points, tolerance_mm);
+}
+
+// The values at the end and, for a problem with time steps, after each of them.
+struct Probed {
+  std::vector<forward::ProbeValue> end;
+  std::vector<std::vector<forward::ProbeValue>> after_step;
+};
+Result<Probed> probe_all(const ProblemSpec& spec, const forward::ForwardSolution& solution) {
+  Probed probed;
+  auto end = probe_values(spec, solution);
+  if (!end) return tl::unexpected(end.error());
+  probed.end = std::move(*end);
+  for (std::size_t moment = 0; moment < solution.history.size(); ++moment) {
+    auto values = probe_values(spec, solution, moment);
+    if (!values) return tl::unexpected(values.error());
+    probed.after_step.push_back(std::move(*values));
+  }
+  return probed;
 }
 
 // Before the work: a probe outside the mesh is found here.
@@ -93,30 +115,45 @@ Status write_field(const std::filesystem::path& out, const forward::ForwardSolut
     }
     nodes.push_back({"contact_pressure_pa", pressure});
   }
+  if (!solution.history.empty()) {
+    nodes.push_back(
+        {"pore_pressure_pa", kPaPerMegapascal * solution.history.back().pore_pressure.transpose()});
+  }
   return io::write_vtu(out,
                        {solution.space.nodes, solution.space.elements, solution.space.mesh.labels},
                        nodes, cells);
 }
 
 Status write_probes(const std::filesystem::path& path, const ProblemSpec& spec,
-                    const std::vector<forward::ProbeValue>& values) {
-  std::string csv = "name,x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,contact_pressure_pa\n";
-  for (std::size_t i = 0; i < values.size(); ++i) {
+                    const forward::ForwardSolution& solution, const Probed& values) {
+  const auto row = [&](std::size_t i, const forward::ProbeValue& value) {
     const Vec3& x = spec.probes[i].at_mm;
-    const Vec3& u = values[i].displacement;
-    csv += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", spec.probes[i].name,
+    const Vec3& u = value.displacement;
+    return fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}", spec.probes[i].name,
                        x[0], x[1], x[2], u[0], u[1], u[2],
-                       kPaPerMegapascal * values[i].contact_pressure);
+                       kPaPerMegapascal * value.contact_pressure);
+  };
+  std::string csv = "name,x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,contact_pressure_pa";
+  csv += solution.history.empty() ? "\n" : ",time_s,pore_pressure_pa\n";
+  for (std::size_t i = 0; i < spec.probes.size(); ++i) {
+    if (solution.history.empty()) csv += row(i, values.end[i]) + "\n";
+    for (std::size_t k = 0; k < solution.history.size(); ++k) {
+      const forward::ProbeValue& value = values.after_step[k][i];
+      csv += fmt::format("{},{:.9g},{:.9g}\n", row(i, value), solution.history[k].time_s,
+                         kPaPerMegapascal * value.pore_pressure);
+    }
   }
   return io::write_file(path, csv);
 }
 
 nlohmann::json array_of(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
+const char* name_of(fem::Element element) { return element == fem::Element::kP1 ? "p1" : "p2"; }
+
 nlohmann::json summary(const ProblemSpec& spec, const forward::ForwardSolution& solution,
-                       const std::vector<forward::ProbeValue>& values) {
+                       const Probed& values) {
   nlohmann::json json = {{"problem", spec.file.string()},
-                         {"element", spec.element},
+                         {"element", name_of(solution.space.element)},
                          {"nodes", solution.space.num_nodes()},
                          {"tets", solution.space.num_elements()},
                          {"unknowns", solution.unknowns},
@@ -140,21 +177,24 @@ nlohmann::json summary(const ProblemSpec& spec, const forward::ForwardSolution& 
                                {"max_pressure_pa", kPaPerMegapascal * c.max_pressure},
                                {"max_penetration_mm", c.max_penetration_mm}});
   }
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  for (std::size_t i = 0; i < values.end.size(); ++i) {
     json["probes"].push_back(
         {{"name", spec.probes[i].name},
          {"at_mm", array_of(spec.probes[i].at_mm)},
-         {"displacement_mm", array_of(values[i].displacement)},
-         {"contact_pressure_pa", kPaPerMegapascal * values[i].contact_pressure}});
+         {"displacement_mm", array_of(values.end[i].displacement)},
+         {"contact_pressure_pa", kPaPerMegapascal * values.end[i].contact_pressure},
+         {"pore_pressure_pa", kPaPerMegapascal * values.end[i].pore_pressure}});
   }
+  if (!solution.history.empty()) json["time_s"] = solution.history.back().time_s;
   return json;
 }
 
 void print(const ProblemSpec& spec, const forward::ForwardSolution& solution,
-           const std::vector<forward::ProbeValue>& values) {
+           const Probed& values) {
   std::printf("%d nodes, %d tetrahedra (%s), %d unknowns, %d linear solve%s\n",
-              solution.space.num_nodes(), solution.space.num_elements(), spec.element.c_str(),
-              solution.unknowns, solution.iterations, solution.iterations == 1 ? "" : "s");
+              solution.space.num_nodes(), solution.space.num_elements(),
+              name_of(solution.space.element), solution.unknowns, solution.iterations,
+              solution.iterations == 1 ? "" : "s");
   std::printf("largest displacement %.6g mm, residual %.1e, smallest det(I + grad u) %.4g\n",
               solution.displacement.colwise().norm().maxCoeff(), solution.relative_residual,
               solution.min_jacobian);
@@ -163,10 +203,15 @@ void print(const ProblemSpec& spec, const forward::ForwardSolution& solution,
                 c.name.c_str(), c.force[0], c.force[1], c.force[2], c.active, c.points,
                 kPaPerMegapascal * c.max_pressure);
   }
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const Vec3& u = values[i].displacement;
-    std::printf("probe %s: u = (%.6g, %.6g, %.6g) mm\n", spec.probes[i].name.c_str(), u[0], u[1],
+  for (std::size_t i = 0; i < values.end.size(); ++i) {
+    const Vec3& u = values.end[i].displacement;
+    std::printf("probe %s: u = (%.6g, %.6g, %.6g) mm", spec.probes[i].name.c_str(), u[0], u[1],
                 u[2]);
+    if (!solution.history.empty()) {
+      std::printf(", pore pressure %.6g Pa at %.6g s",
+                  kPaPerMegapascal * values.end[i].pore_pressure, solution.history.back().time_s);
+    }
+    std::printf("\n");
   }
 }
 
@@ -179,11 +224,11 @@ Status run(const Arguments& arguments) {
   if (Status ok = check_probes(*spec, problem->mesh); !ok) return ok;
   const auto solution = forward::solve(*problem, progress);
   if (!solution) return tl::unexpected(io::locate_in_problem(spec->file, solution.error()));
-  const auto values = probe_values(*spec, *solution);
+  const auto values = probe_all(*spec, *solution);
   if (!values) return tl::unexpected(values.error());
   if (Status ok = write_field(arguments.out, *solution); !ok) return ok;
   if (!arguments.probes.empty()) {
-    if (Status ok = write_probes(arguments.probes, *spec, *values); !ok) return ok;
+    if (Status ok = write_probes(arguments.probes, *spec, *solution, *values); !ok) return ok;
   }
   if (arguments.json) {
     std::printf("%s\n", summary(*spec, *solution, *values).dump(2).c_str());
@@ -206,7 +251,7 @@ void add_solve(CLI::App& app, Status& status) {
   command->add_option("--out", arguments->out, "VTU file to write: displacement, stress, contact")
       ->required();
   command->add_option("--probes", arguments->probes,
-                      "CSV file to write: displacement at the probes");
+                      "CSV file to write: displacement and pressures at the probes");
   command->add_flag("--json", arguments->json, "print the summary as JSON");
   command->footer(
       "The problem file names a mesh (Gmsh .msh or VTK .vtu), a material per region, conditions "

@@ -45,8 +45,8 @@ void check(const MaterialSpec& m, Checks& checks) {
   checks.that(m.biot_coefficient >= 0.0 && m.biot_coefficient <= 1.0, key + "biot_coefficient",
               m.biot_coefficient, "between 0 and 1");
   checks.that(m.storage_per_pa >= 0.0, key + "storage_per_pa", m.storage_per_pa, ">= 0");
-  checks.that(m.permeability_m3_s_per_kg >= 0.0, key + "permeability_m3_s_per_kg",
-              m.permeability_m3_s_per_kg, ">= 0");
+  checks.that(m.permeability_m3_s_kg >= 0.0, key + "permeability_m3_s_kg", m.permeability_m3_s_kg,
+              ">= 0");
 }
 
 void check(const GroupSpec& group, Checks& checks) {
@@ -95,7 +95,7 @@ void check(const ContactSpec& contact, Checks& checks) {
 
 Status validate(const ProblemSpec& problem) {
   Checks checks;
-  checks.that(problem.element == "p1" || problem.element == "p2",
+  checks.that(problem.element.empty() || problem.element == "p1" || problem.element == "p2",
               "mesh.element = " + problem.element + ": must be p1 or p2");
   checks.that(!problem.materials.empty(), "materials: must name at least one material");
   checks.that(!problem.regions.empty(),

@@ -24,7 +24,7 @@ struct MaterialSpec {
   // Read by problems with time steps.
   double biot_coefficient = 1.0;
   double storage_per_pa = 0.0;
-  double permeability_m3_s_per_kg = 0.0;
+  double permeability_m3_s_kg = 0.0;
 };
 
 // Vertices of the mesh's boundary by their place, and the boundary faces between them.
@@ -82,7 +82,7 @@ struct ProbeSpec {
 struct ProblemSpec {
   std::filesystem::path file;  // absolute
   std::filesystem::path mesh;
-  std::string element = "p2";  // p1, p2
+  std::string element;  // p1, p2; empty: p2, or p1 with time steps
   std::vector<GroupSpec> groups;
   std::vector<MaterialSpec> materials;
   std::vector<std::pair<std::string, std::string>> regions;  // volume group or "all", material

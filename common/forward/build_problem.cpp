@@ -17,8 +17,6 @@ namespace {
 
 using Faces = Eigen::Matrix<int, 3, Eigen::Dynamic>;
 
-// m^3 s / kg -> mm^4 / (N s)
-constexpr double kPermeability = 1e12;
 // kg/m^3 x m/s^2 = N/m^3
 constexpr double kForceDensity = units::force_density_from_n_m3(1.0);
 
@@ -56,16 +54,12 @@ class Builder {
       : spec_(spec), file_(std::move(mesh)), surfaces_(surfaces) {}
 
   Result<ForwardProblem> build() {
-    if (spec_.time) {
-      return fail(
-          ErrorCode::kInvalidArgument,
-          "time: problems with time steps are not solved yet; leave the section out for the "
-          "drained steady state");
-    }
     if (Status ok = geometry::check_mesh(file_.mesh); !ok) {
       return fail(ok.error().code, "mesh.file: " + ok.error().message);
     }
-    problem_.element = spec_.element == "p1" ? fem::Element::kP1 : fem::Element::kP2;
+    if (spec_.time) problem_.steps_s = spec_.time->steps_s;
+    const bool linear = spec_.element == "p1" || (spec_.element.empty() && spec_.time);
+    problem_.element = linear ? fem::Element::kP1 : fem::Element::kP2;
     for (const auto step :
          {&Builder::set_materials, &Builder::set_mesh_groups, &Builder::set_selected_groups,
           &Builder::set_conditions, &Builder::set_contacts}) {
@@ -247,12 +241,6 @@ Status Builder::set_selected_groups() {
 Status Builder::set_conditions() {
   for (const ConditionSpec& spec : spec_.conditions) {
     Condition condition{spec.name, spec.on, Displacement{spec.displacement_mm}};
-    if (spec.pore_pressure_pa) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("conditions.{}.pore_pressure_pa: only problems with a section time "
-                              "have a pore pressure",
-                              spec.name));
-    }
     if (spec.normal_displacement_mm) {
       condition.what = NormalDisplacement{*spec.normal_displacement_mm};
     } else if (spec.traction_pa) {
@@ -260,6 +248,8 @@ Status Builder::set_conditions() {
       condition.what = Traction{[t](const Vec3&) { return t; }};
     } else if (spec.pressure_pa) {
       condition.what = Pressure{units::stress_from_pa(*spec.pressure_pa)};
+    } else if (spec.pore_pressure_pa) {
+      condition.what = PorePressure{units::stress_from_pa(*spec.pore_pressure_pa)};
     }
     problem_.conditions.push_back(std::move(condition));
   }
@@ -294,7 +284,7 @@ fem::PoroMaterial poro_material_from(const MaterialSpec& material) {
   result.elastic = {2.0 * shear * nu / (1.0 - 2.0 * nu), shear};
   result.biot_coefficient = material.biot_coefficient;
   result.storage = material.storage_per_pa / units::stress_from_pa(1.0);
-  result.permeability = material.permeability_m3_s_per_kg * kPermeability;
+  result.permeability = units::permeability_from_m3_s_kg(material.permeability_m3_s_kg);
   return result;
 }
 

@@ -11,7 +11,7 @@
 namespace brainshift::forward {
 
 // Messages begin with the key. kInvalidArgument, kEmptySet (a name that selects nothing), kDegenerateMesh.
-// surfaces: one per contact that names a surface file, in order. `time` is refused: see docs/solve.md.
+// surfaces: one per contact that names a surface file, in order.
 Result<ForwardProblem> build_problem(const ProblemSpec& spec, GroupedMesh mesh,
                                      const std::vector<TriangleSurface>& surfaces);
 

@@ -69,13 +69,34 @@ Status validate(const ForwardProblem& problem) {
   }
   if (Status ok = check_materials(problem); !ok) return ok;
   for (const Condition& condition : problem.conditions) {
-    const bool needs_faces = !std::holds_alternative<Displacement>(condition.what) &&
+    const bool pore_pressure = std::holds_alternative<PorePressure>(condition.what);
+    if (pore_pressure && problem.steps_s.empty()) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "conditions." + condition.name +
+                      ".pore_pressure_pa: only problems with a section time have a pore pressure");
+    }
+    const bool needs_faces = !pore_pressure &&
+                             !std::holds_alternative<Displacement>(condition.what) &&
                              !std::holds_alternative<DisplacementField>(condition.what);
     if (Status ok =
             check_group(problem, "conditions." + condition.name, condition.group, needs_faces);
         !ok) {
       return ok;
     }
+  }
+  if (!problem.steps_s.empty() && !problem.contacts.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "contact." + problem.contacts.front().name +
+                    ": contact is not solved together with a section time");
+  }
+  if (!problem.steps_s.empty() && problem.element != fem::Element::kP1) {
+    return fail(ErrorCode::kInvalidArgument,
+                "mesh.element = p2: problems with a section time are solved on p1");
+  }
+  for (const double step_s : problem.steps_s) {
+    if (step_s > 0.0 && std::isfinite(step_s)) continue;
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("time.steps_s: {} s: must be finite and > 0", step_s));
   }
   for (const Contact& contact : problem.contacts) {
     if (Status ok = check_group(problem, "contact." + contact.name, contact.group, true); !ok) {
@@ -106,7 +127,10 @@ double default_penalty(const ForwardProblem& problem, const FaceGroup& group) {
   return 100.0 * stiffest / (edges / static_cast<double>(3 * group.faces.cols()));
 }
 
-Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
+namespace {
+
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& displacement,
+                                      const VecX& pore_pressure, const Points& points,
                                       double tolerance_mm) {
   const geometry::TetLocator locator(solution.space.mesh);
   std::vector<ProbeValue> values;
@@ -126,11 +150,30 @@ Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Poi
       if (solution.contact_pressure.size() > 0) {
         value.contact_pressure += at.weights[k] * solution.contact_pressure[at.nodes[k]];
       }
+      if (pore_pressure.size() > 0) {
+        value.pore_pressure += at.weights[k] * pore_pressure[at.nodes[k]];
+      }
     }
-    value.displacement = fem::displacement_at(solution.space, solution.displacement, at.tet, l);
+    value.displacement = fem::displacement_at(solution.space, displacement, at.tet, l);
     values.push_back(value);
   }
   return values;
+}
+
+}  // namespace
+
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
+                                      double tolerance_mm) {
+  if (!solution.history.empty()) {
+    return probe(solution, solution.history.size() - 1, points, tolerance_mm);
+  }
+  return probe(solution, solution.displacement, VecX(), points, tolerance_mm);
+}
+
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, std::size_t moment,
+                                      const Points& points, double tolerance_mm) {
+  const ForwardSolution::Moment& at = solution.history.at(moment);
+  return probe(solution, at.displacement, at.pore_pressure, points, tolerance_mm);
 }
 
 }  // namespace brainshift::forward

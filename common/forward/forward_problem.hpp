@@ -3,7 +3,8 @@
 //
 //   div sigma(u) + b = 0 in the body,   u or sigma n = t on parts of its boundary,   contact with rigid obstacles
 //
-// Small strains; drained steady state. Units mm, N. Conditions and contacts name groups; each has a name of its own,
+// Small strains. Drained steady state, or with steps_s consolidation from rest (fem/biot.hpp): all loads act from t = 0
+// on, and boundaries without a prescribed pore pressure are sealed. Units mm, N. Conditions and contacts name groups; each has a name of its own,
 // which messages begin with ("conditions.NAME: ...", "contact.NAME: ...").
 #pragma once
 
@@ -48,9 +49,16 @@ struct Pressure {
   double value = 0.0;
 };
 
+// Prescribed, N/mm^2; 0: drained. Problems with time steps only.
+struct PorePressure {
+  double value = 0.0;
+};
+
 struct Condition {
   std::string name, group;
-  std::variant<Displacement, DisplacementField, NormalDisplacement, Traction, Pressure> what;
+  std::variant<Displacement, DisplacementField, NormalDisplacement, Traction, Pressure,
+               PorePressure>
+      what;
 };
 
 struct Contact {
@@ -68,6 +76,7 @@ struct ForwardProblem {
   std::map<std::string, FaceGroup> groups;
   std::vector<Condition> conditions;
   std::vector<Contact> contacts;
+  std::vector<double> steps_s;  // lengths of time steps; element P1, no contacts
 };
 
 struct ContactResult {
@@ -86,6 +95,13 @@ struct ForwardSolution {
   Eigen::MatrixXd nodal_stress;    // 6 x nodes, averaged
   VecX contact_pressure;           // at vertices, N/mm^2; no entry without contact
   std::vector<ContactResult> contacts;
+  // Consolidation: state after every step; the last one is `displacement` above.
+  struct Moment {
+    double time_s = 0.0;
+    Points displacement;  // 3 x n, mm
+    VecX pore_pressure;   // n, N/mm^2
+  };
+  std::vector<Moment> history;
   Vec3 reaction = Vec3::Zero();  // sum over prescribed displacements, N
   // Diagnostics.
   int unknowns = 0, iterations = 0;
@@ -107,6 +123,7 @@ struct Discretised {
   fem::DisplacementSpace space;
   fem::DisplacementConstraints constraints;
   Points load;
+  std::map<NodeIndex, double> pore_pressure;  // prescribed, N/mm^2
 };
 Result<Discretised> discretise(const ForwardProblem& problem);
 
@@ -117,8 +134,12 @@ Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& pro
 struct ProbeValue {
   Vec3 displacement = Vec3::Zero();
   double contact_pressure = 0.0;  // N/mm^2, of the nearest face point, 0 away from contact
+  double pore_pressure = 0.0;     // N/mm^2, 0 without time steps
 };
 Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
                                       double tolerance_mm);
+// The same after step `moment` (0 is the first) of a consolidation.
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, std::size_t moment,
+                                      const Points& points, double tolerance_mm);
 
 }  // namespace brainshift::forward

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/contact/unilateral_solver.hpp"
+#include "common/forward/consolidate.hpp"
 #include "common/forward/forward_problem.hpp"
 #include "common/forward/support.hpp"
 #include "common/geometry/surface.hpp"
@@ -15,11 +16,6 @@ namespace brainshift::forward {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// P1 locks above this (DESIGN: sag rises 1.5 % at 0.46, 26 % at 0.499).
-constexpr double kLockingPoissonRatio = 0.48;
-// A backward error above this is worth a warning.
-constexpr double kLargeResidual = 1e-8;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -57,9 +53,12 @@ Points group_normals(const fem::DisplacementSpace& space, const FaceGroup& group
 // Adds one condition to the constraints or to the load.
 class ConditionAdder {
  public:
-  ConditionAdder(const ForwardProblem& problem, const fem::DisplacementSpace& space,
-                 fem::DisplacementConstraints& constraints, Points& load)
-      : problem_(problem), space_(space), constraints_(constraints), load_(load) {}
+  ConditionAdder(const ForwardProblem& problem, Discretised& into)
+      : problem_(problem),
+        space_(into.space),
+        constraints_(into.constraints),
+        load_(into.load),
+        pore_pressure_(into.pore_pressure) {}
 
   Status add(const Condition& condition) {
     name_ = "conditions." + condition.name;
@@ -102,11 +101,21 @@ class ConditionAdder {
     load_ += fem::pressure_load(space_, group_->faces, pressure.value);
     return {};
   }
+  Status add(const PorePressure& pressure) {
+    for (const NodeIndex node : group_->vertices) {
+      const auto [held, fresh] = pore_pressure_.emplace(node, pressure.value);
+      if (fresh || held->second == pressure.value) continue;
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("{}: node {} has another pore pressure already", name_, node));
+    }
+    return {};
+  }
 
   const ForwardProblem& problem_;
   const fem::DisplacementSpace& space_;
   fem::DisplacementConstraints& constraints_;
   Points& load_;
+  std::map<NodeIndex, double>& pore_pressure_;
   std::string name_;
   const FaceGroup* group_ = nullptr;
 };
@@ -177,7 +186,13 @@ void add_contact_results(const ForwardProblem& problem, const contact::SurfaceCo
   solution.contact_pressure = contact.vertex_pressure(solution.displacement);
 }
 
+}  // namespace
+
 void add_warnings(const ForwardProblem& problem, ForwardSolution& solution) {
+  // P1 locks above this (DESIGN: sag rises 1.5 % at 0.46, 26 % at 0.499).
+  constexpr double kLockingPoissonRatio = 0.48;
+  // A backward error above this is worth a warning.
+  constexpr double kLargeResidual = 1e-8;
   double largest = 0.0;
   for (const int m :
        std::set<int>(problem.materials.of_tet.begin(), problem.materials.of_tet.end())) {
@@ -202,18 +217,23 @@ void add_warnings(const ForwardProblem& problem, ForwardSolution& solution) {
   }
 }
 
-}  // namespace
+Status check_supports(const Discretised& discretised) {
+  const fem::DisplacementSpace& space = discretised.space;
+  const Points at_rest = Points::Zero(3, space.num_nodes());
+  return check_held(space, discretised.constraints, contact::SurfaceContact(space), at_rest, 0.0);
+}
 
 Result<Discretised> discretise(const ForwardProblem& problem) {
   if (Status ok = validate(problem); !ok) return tl::unexpected(ok.error());
   fem::DisplacementSpace space = fem::make_space(problem.mesh, problem.element);
-  fem::DisplacementConstraints constraints(space.num_nodes());
+  const int nodes = space.num_nodes();
   Points load = body_load(problem, space);
-  ConditionAdder adder(problem, space, constraints, load);
+  Discretised result{std::move(space), fem::DisplacementConstraints(nodes), std::move(load), {}};
+  ConditionAdder adder(problem, result);
   for (const Condition& condition : problem.conditions) {
     if (Status ok = adder.add(condition); !ok) return tl::unexpected(ok.error());
   }
-  return Discretised{std::move(space), std::move(constraints), std::move(load)};
+  return result;
 }
 
 Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress) {
@@ -221,6 +241,7 @@ Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& pro
   report(progress, "assemble", 0.0);
   auto discretised = discretise(problem);
   if (!discretised) return tl::unexpected(discretised.error());
+  if (!problem.steps_s.empty()) return consolidate(problem, std::move(*discretised), progress);
   ForwardSolution solution;
   solution.space = std::move(discretised->space);
   const fem::DisplacementSpace& space = solution.space;

@@ -54,7 +54,7 @@ void read_materials(YamlSection materials, ProblemSpec& problem) {
     keys.number("density_kg_m3", material.density_kg_m3);
     keys.number("biot_coefficient", material.biot_coefficient);
     keys.number("storage_per_pa", material.storage_per_pa);
-    keys.number("permeability_m3_s_per_kg", material.permeability_m3_s_per_kg);
+    keys.number("permeability_m3_s_kg", material.permeability_m3_s_kg);
     keys.done();
     problem.materials.push_back(std::move(material));
   }
@@ -126,7 +126,7 @@ ProblemSpec read_keys(YamlDocument& document, const fs::path& file) {
 
   YamlSection mesh = root.section("mesh", Presence::kRequired);
   mesh.path("file", problem.mesh, Presence::kRequired);
-  mesh.choice("element", problem.element, {"p1", "p2"});
+  if (mesh.has("element")) mesh.choice("element", problem.element, {"p1", "p2"});
   mesh.done();
   read_groups(root.section("groups"), problem);
   read_materials(root.section("materials", Presence::kRequired), problem);

@@ -32,11 +32,12 @@ std::string content_of(const std::string& path) {
 
 std::string example(const std::string& name) { return examples_folder() + "/" + name; }
 
-// name -> x, y, z, ux, uy, uz, contact pressure
+// name -> x, y, z, ux, uy, uz, contact pressure; with time steps also time and pore pressure, step after step
 std::map<std::string, std::vector<double>> probes_of(const std::string& csv) {
   std::map<std::string, std::vector<double>> probes;
   const auto rows = lines(content_of(csv));
-  EXPECT_EQ(rows.at(0), "name,x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,contact_pressure_pa");
+  const std::string heading = "name,x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,contact_pressure_pa";
+  EXPECT_THAT(rows.at(0), testing::AnyOf(heading, heading + ",time_s,pore_pressure_pa"));
   for (std::size_t i = 1; i < rows.size(); ++i) {
     std::istringstream row(rows[i]);
     std::string name, cell;
@@ -94,6 +95,24 @@ TEST(SolveExamples, LayeredColumnSagsAsTheOneDimensionalSolution) {
   const Solved solved = solve(example("layered_column.yaml"));
   expect_within(u(solved, "interface", 2), -2.280046125, 1e-6);
   expect_within(u(solved, "top", 2), -4.486542375, 1e-6);
+}
+
+// p = q sum 4 / ((2m+1) pi) sin(...) exp(...) and its settlement at T = 0.5 (tests/verification/terzaghi_test.cpp);
+// 8 elements over the height.
+TEST(SolveExamples, ConsolidatingColumnFollowsTerzaghi) {
+  const Solved solved = solve(example("consolidating_column.yaml"));
+  constexpr std::size_t kRow = 9, kSteps = 40;
+  const std::vector<double>& bottom = solved.probes.at("bottom");
+  const std::vector<double>& top = solved.probes.at("top");
+  ASSERT_EQ(bottom.size(), kRow * kSteps);
+  expect_within(bottom[kRow - 1], 100.0, 3.0);  // at first the fluid carries the load
+  EXPECT_NEAR(bottom[bottom.size() - 2], 6.0, 1e-9);
+  expect_within(bottom.back(), 37.08, 3.0);
+  EXPECT_EQ(top.back(), 0.0);
+  expect_within(top[top.size() - kRow + 5], -1.528, 2.0);
+  EXPECT_EQ(solved.summary["element"], "p1");
+  EXPECT_DOUBLE_EQ(solved.summary["probes"][0]["pore_pressure_pa"], bottom.back());
+  EXPECT_THAT(solved.vtu, HasSubstr("\"pore_pressure_pa\""));
 }
 
 // ---------- bad problem files ----------
@@ -182,7 +201,12 @@ INSTANTIATE_TEST_SUITE_P(
                    "contact:\n  ball:\n    on: bottom\n    sphere: {centre_mm: [0, 0, -9], "
                    "radius_mm: -1}\nprobes:",
                    "contact.ball.sphere.radius_mm"},
-        BadProblem{"TimeSteps", "probes:", "time:\n  steps_s: [0.1, 0.2]\nprobes:", "time: "},
+        BadProblem{"TimeStepsWithQuadraticElements",
+                   "probes:", "time:\n  steps_s: [0.1, 0.2]\nprobes:", "mesh.element = p2"},
+        BadProblem{"ContactWithTimeSteps", "element: p2",
+                   "element: p1\ntime: {steps_s: [1.0]}\ncontact:\n  floor:\n    on: bottom\n    "
+                   "plane: {point_mm: [0, 0, 0], normal: [0, 0, 1]}",
+                   "contact.floor"},
         BadProblem{"NegativeTimeStep",
                    "probes:", "time:\n  steps_s: [0.1, -0.2]\nprobes:", "time.steps_s"},
         BadProblem{"PorePressure", "pressure_pa: 10.0", "pore_pressure_pa: 10.0",

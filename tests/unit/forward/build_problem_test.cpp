@@ -37,7 +37,7 @@ ProblemSpec spec() {
   tissue.youngs_modulus_pa = 3000.0;
   tissue.poisson_ratio = 0.25;
   tissue.density_kg_m3 = 1000.0;
-  tissue.permeability_m3_s_per_kg = 1e-7;
+  tissue.permeability_m3_s_kg = 1e-7;
   tissue.storage_per_pa = 1e-6;
   spec.materials = {tissue};
   spec.regions = {{"all", "tissue"}};
@@ -100,7 +100,7 @@ TEST(BuildProblem, RefusesWhatTheMeshDoesNotHave) {
   EXPECT_THAT(message(file), HasSubstr("groups.away"));
   file = spec();
   file.time = TimeSpec{{1.0}};
-  EXPECT_THAT(message(file), HasSubstr("time: "));
+  EXPECT_EQ(message(file), "accepted");
 }
 
 // A block on a ball, held at its top: the stress, the pressed points and nothing else balance at every free node.

@@ -153,7 +153,7 @@ groups:
   b: {box: {min_mm: [0, 0, 0], max_mm: [1, 1, 1]}}
   c: {sphere: {centre_mm: [0, 0, 0], radius_mm: 4, tolerance_mm: 0.1}}
 materials:
-  m: {shear_modulus_pa: 1000, poisson_ratio: 0.4, density_kg_m3: 7, biot_coefficient: 0.9, storage_per_pa: 1e-6, permeability_m3_s_per_kg: 1e-7}
+  m: {shear_modulus_pa: 1000, poisson_ratio: 0.4, density_kg_m3: 7, biot_coefficient: 0.9, storage_per_pa: 1e-6, permeability_m3_s_kg: 1e-7}
 regions: {white: m, all: m}
 body: {gravity_m_s2: [0, 0, -9.8], force_n_m3: [1, 0, 0]}
 conditions:
@@ -174,7 +174,7 @@ probes: {tip: [1, 2, 3]}
   EXPECT_EQ(problem->mesh, "/data/m.msh");
   EXPECT_EQ(problem->element, "p1");
   EXPECT_EQ(std::get<SphereSelector>(problem->groups[2].where).radius_mm, 4.0);
-  EXPECT_EQ(problem->materials[0].permeability_m3_s_per_kg, 1e-7);
+  EXPECT_EQ(problem->materials[0].permeability_m3_s_kg, 1e-7);
   EXPECT_THAT(problem->regions, ElementsAre(Pair("white", "m"), Pair("all", "m")));
   EXPECT_EQ(problem->body_force_n_m3, Vec3(1, 0, 0));
   ASSERT_EQ(problem->conditions.size(), 6U);
