@@ -20,8 +20,8 @@ class StiffnessFactor {
   // What one thread needs to solve with a factor that several threads share.
   using Workspace = SparseCholesky::Workspace;
 
-  StiffnessFactor(SparseCholesky factor) : factor_(std::move(factor)) {}  // NOLINT: a factor is one
-  StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}      // NOLINT
+  explicit StiffnessFactor(SparseCholesky factor) : factor_(std::move(factor)) {}
+  explicit StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}
 
   bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
 

@@ -67,9 +67,10 @@ class Column : public ::testing::Test {
     }
     const PenaltyContact contact(pairs, beta);
     const auto stiffness = fem::assemble_stiffness(mesh, tissue, dofs);
-    const auto factor = fem::SparseCholesky::factorise(stiffness);
+    auto factor = fem::SparseCholesky::factorise(stiffness);
     EXPECT_TRUE(factor.has_value());
-    const auto solution = solve_with_contact(stiffness, *factor, dofs, contact, load);
+    const auto solution = solve_with_contact(stiffness, fem::StiffnessFactor(std::move(*factor)),
+                                             dofs, contact, load);
     EXPECT_TRUE(solution.has_value());
     const VecX p = contact.penetration(solution->displacement);
     *total_force = 0.0;
