@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,6 +70,10 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
+  // Volume of an element after over before (det F), the smallest; at 0 and below it is inverted and the estimate there
+  // is no deformation of tissue. NaN before it was looked at.
+  double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
+  int inverted_elements = 0;
   double rebuild_ms =
       0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };

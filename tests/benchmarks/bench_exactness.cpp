@@ -128,7 +128,10 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
       }
     }
   }
-  fem::BlockSolver(*factor, forward.dofs()).solve(a_transposed, v);
+  if (auto status = fem::BlockSolver(k_p, *factor, forward.dofs()).solve(a_transposed, v);
+      !status) {
+    return tl::unexpected(status.error());
+  }
   for (int j = 0; j < rows; ++j) {
     forces.col(j) = flat(model.prior().apply(Eigen::Map<const Points>(v.col(j).data(), 3, nodes)));
   }
