@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test bench verify format format-check tidy image clean
+.PHONY: help setup configure build demo test bench verify stability format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -35,6 +35,10 @@ bench: configure ## error against run time, latency, memory, into out/bench; QUI
 verify: configure ## the solver against closed forms and series, into out/verify
 	cmake --build --preset $(PRESET) -j $(JOBS) --target verification_programs
 	cmake/scripts/verify.sh $(BUILD)
+
+stability: configure ## sweeps to the edges of what may be asked, maps and summary.json, into out/stability
+	cmake --build --preset $(PRESET) -j $(JOBS) --target stability_programs
+	cmake/scripts/stability.sh $(BUILD)/bin
 
 format: ## rewrite the C++ sources in the house format
 	@cmake/scripts/clang-format.sh write

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/contact_solver.hpp"
 
+#include <algorithm>
+
+#include "common/fem/checked_solve.hpp"
+
 namespace brainshift::contact {
 
 Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
@@ -13,16 +17,21 @@ Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness
   fem::StiffnessFactor penalised = factor.clone_analysis();
   while (solution.iterations < options.max_iterations && !solution.converged) {
     VecX unknowns;
+    Result<fem::SolveQuality> quality;
     if (count(solution.active) == 0) {
-      unknowns = factor.solve(dofs.restrict_to(load));
+      quality = fem::checked_solve(stiffness, fem::max_norm(stiffness), factor,
+                                   dofs.restrict_to(load), unknowns);
     } else {
       fem::SymmetricMatrix k_p = stiffness;
       contact.add_stiffness(k_p, dofs, solution.active);
       Points b_p = load;
       contact.add_load(b_p, solution.active);
       if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
-      unknowns = penalised.solve(dofs.restrict_to(b_p));
+      quality =
+          fem::checked_solve(k_p, fem::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
     }
+    if (!quality) return tl::unexpected(quality.error());
+    solution.backward_error = std::max(solution.backward_error, quality->backward_error);
     dofs.expand(unknowns, solution.displacement);
     ++solution.iterations;
     ActiveSet next = contact.penetrating(solution.displacement);

@@ -20,6 +20,7 @@ struct ContactSolution {
   ActiveSet active;
   int iterations = 0;  // linear solves
   bool converged = false;
+  double backward_error = 0.0;  // the largest of all solves
 };
 
 struct ContactSolverOptions {
@@ -27,7 +28,8 @@ struct ContactSolverOptions {
 };
 
 // stiffness: K (lower), dofs and contact as prepared; load: 3 x n, N.
-// Fails as StiffnessFactor does; kNotConverged only by converged == false in the result (best iterate kept).
+// Fails as StiffnessFactor and fem::checked_solve do; kNotConverged only by converged == false in the result (best
+// iterate kept).
 Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,

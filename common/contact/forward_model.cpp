@@ -4,6 +4,7 @@
 #include <chrono>
 #include <utility>
 
+#include "common/fem/checked_solve.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
@@ -51,6 +52,7 @@ ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMa
     : boundary_(boundary),
       dofs_(std::move(dofs)),
       stiffness_(std::move(stiffness)),
+      stiffness_norm_(fem::max_norm(stiffness_)),
       factor_(std::move(factor)),
       contact_(std::move(contact)),
       assemble_s_(assemble_s) {}
@@ -84,6 +86,15 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
 std::uint64_t ForwardModel::bytes() const {
   return factor_.bytes() +
          static_cast<std::uint64_t>(stiffness_.nonZeros()) * (sizeof(double) + sizeof(long));
+}
+
+Status ForwardModel::solve(const Points& load, Points& u) const {
+  VecX unknowns;
+  const auto quality =
+      fem::checked_solve(stiffness_, stiffness_norm_, factor_, dofs_.restrict_to(load), unknowns);
+  if (!quality) return tl::unexpected(quality.error());
+  dofs_.expand(unknowns, u);
+  return {};
 }
 
 Points ForwardModel::solve(const Points& load) const {

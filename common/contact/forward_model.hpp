@@ -34,13 +34,16 @@ class ForwardModel {
   const fem::DofMap& dofs() const { return dofs_; }
   // Of drained elasticity, with or without pressure; the contact stiffness is added to it.
   const fem::SymmetricMatrix& stiffness() const { return stiffness_; }
+  double stiffness_norm() const { return stiffness_norm_; }  // fem::max_norm
   const fem::StiffnessFactor& factor() const { return factor_; }
   // No pairs under the fixed boundary condition.
   const PenaltyContact& contact() const { return contact_; }
   double assemble_seconds() const { return assemble_s_; }
   std::uint64_t bytes() const;
 
-  // u = K^-1 b without contact; b, u: 3 x n.
+  // u = K^-1 b without contact; b, u: 3 x n. Errors as fem::checked_solve.
+  Status solve(const Points& load, Points& u) const;
+  // The same without a look at the residual.
   Points solve(const Points& load) const;
   // u with contact iterated to a stable active set; without slaves the same as solve().
   Result<ContactSolution> solve_with_contact(const Points& load) const;
@@ -51,6 +54,7 @@ class ForwardModel {
   Boundary boundary_;
   fem::DofMap dofs_;
   fem::SymmetricMatrix stiffness_;
+  double stiffness_norm_;
   fem::StiffnessFactor factor_;
   PenaltyContact contact_;
   double assemble_s_;

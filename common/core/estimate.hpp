@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,6 +74,10 @@ struct Estimate {
   // Estimated strength of the prior's parts in units of the case's: buoyancy along gravity, across it, all other
   // forces; condensed method only.
   std::array<double, 3> prior_scales{1.0, 1.0, 1.0};
+  // Volume of an element after over before (det F), the smallest; at 0 and below it is inverted and the estimate there
+  // is no deformation of tissue. NaN before it was looked at.
+  double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
+  int inverted_elements = 0;
   double rebuild_ms =
       0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/fem/block_solver.hpp"
 
+#include "common/fem/checked_solve.hpp"
+
 namespace brainshift::fem {
 
-BlockSolver::BlockSolver(const StiffnessFactor& factor, const DofMap& dofs)
-    : factor_(factor), dofs_(dofs), nodal_(3, dofs.num_nodes()) {}
+BlockSolver::BlockSolver(const SymmetricMatrix& stiffness, const StiffnessFactor& factor,
+                         const DofMap& dofs)
+    : stiffness_(stiffness),
+      norm_(max_norm(stiffness)),
+      factor_(factor),
+      dofs_(dofs),
+      nodal_(3, dofs.num_nodes()) {}
 
-void BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements) {
+Status BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements) {
   rhs_.resize(dofs_.num_unknowns(), loads.cols());
   for (Eigen::Index j = 0; j < loads.cols(); ++j) {
     nodal_ = Eigen::Map<const Points>(loads.col(j).data(), 3, dofs_.num_nodes());
@@ -14,12 +21,15 @@ void BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacem
     rhs_.col(j) = column_;
   }
   factor_.solve_many(rhs_, unknowns_, workspace_);
+  const auto checked = check_many(stiffness_, norm_, factor_, rhs_, unknowns_, workspace_);
+  if (!checked) return tl::unexpected(checked.error());
   displacements.resize(loads.rows(), loads.cols());
   for (Eigen::Index j = 0; j < loads.cols(); ++j) {
     column_ = unknowns_.col(j);
     dofs_.expand(column_, nodal_);
     displacements.col(j) = Eigen::Map<const VecX>(nodal_.data(), nodal_.size());
   }
+  return {};
 }
 
 }  // namespace brainshift::fem

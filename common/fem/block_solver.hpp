@@ -2,6 +2,7 @@
 // BlockSolver: K^-1 of several nodal load columns at once; one per thread, sharing the factor.
 #pragma once
 
+#include "common/core/error.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/stiffness_factor.hpp"
 
@@ -9,13 +10,15 @@ namespace brainshift::fem {
 
 class BlockSolver {
  public:
-  // Keeps references to both.
-  BlockSolver(const StiffnessFactor& factor, const DofMap& dofs);
+  // Keeps references to all three. stiffness: the matrix of the factor.
+  BlockSolver(const SymmetricMatrix& stiffness, const StiffnessFactor& factor, const DofMap& dofs);
 
-  // U = T K^-1 T^T F; columns are nodal vectors, node-major, 3n rows; F in N, U in mm.
-  void solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
+  // U = T K^-1 T^T F; columns are nodal vectors, node-major, 3n rows; F in N, U in mm. Errors as check_many.
+  Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
 
  private:
+  const SymmetricMatrix& stiffness_;
+  double norm_;
   const StiffnessFactor& factor_;
   const DofMap& dofs_;
   StiffnessFactor::Workspace workspace_;

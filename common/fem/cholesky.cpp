@@ -47,6 +47,19 @@ cholmod_dense view_of(const double* data, std::size_t rows, std::size_t columns)
   return view;
 }
 
+// CHOLMOD reads the lower triangle and drops what lies above it without a word.
+Status check_symmetric(const SymmetricMatrix& lower) {
+  for (long j = 0; j < lower.outerSize(); ++j) {
+    const long first = lower.outerIndexPtr()[j];
+    if (first == lower.outerIndexPtr()[j + 1] || lower.innerIndexPtr()[first] == j) continue;
+    return fail(ErrorCode::kInvalidArgument,
+                "stiffness matrix: column " + std::to_string(j) + " starts at row " +
+                    std::to_string(lower.innerIndexPtr()[first]) +
+                    "; a symmetric matrix is given by its lower triangle, diagonal included");
+  }
+  return {};
+}
+
 Status check_finite(const SymmetricMatrix& lower) {
   for (long k = 0; k < lower.nonZeros(); ++k) {
     if (!std::isfinite(lower.valuePtr()[k])) {
@@ -127,6 +140,9 @@ SparseCholesky::~SparseCholesky() = default;
 Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
   if (lower.rows() == 0) {
     return fail(ErrorCode::kEmptySet, "stiffness matrix: no unknown is left to solve for");
+  }
+  if (auto symmetric = check_symmetric(lower); !symmetric) {
+    return tl::unexpected(symmetric.error());
   }
   if (auto finite = check_finite(lower); !finite) return tl::unexpected(finite.error());
   use_single_threaded_blas();

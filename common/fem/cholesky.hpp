@@ -2,7 +2,8 @@
 // SparseCholesky: supernodal L L^T of a symmetric positive definite matrix (CHOLMOD, nested dissection).
 //
 // CHOLMOD answers "success" to NaN, to infinity and to some singular matrices, so every factorisation is
-// guarded: finite input -> no negative or zero pivot -> reciprocal condition estimate above kMinRcond.
+// guarded: lower triangle -> finite input -> no negative or zero pivot -> reciprocal condition estimate above
+// kMinRcond. Whether a solve is right is the business of checked_solve.hpp.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ class SparseCholesky {
   // has about 1e-5, with penalty springs down to 1e-8.
   static constexpr double kMinRcond = 1e-13;
 
-  // lower: lower triangle. kNotFinite, kFloatingBody (a pivot vanished: not enough support) or
+  // lower: lower triangle, sorted. kInvalidArgument (an entry above the diagonal), kNotFinite, kFloatingBody (a pivot vanished: not enough support) or
   // kSingularMatrix.
   static Result<SparseCholesky> factorise(const SymmetricMatrix& lower);
   SparseCholesky(SparseCholesky&&) noexcept;

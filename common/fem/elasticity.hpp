@@ -22,6 +22,9 @@
 
 namespace brainshift::fem {
 
+// Above it P1 tetrahedra lock: too stiff by more than a percent on a head (about 26 % at 0.499), whatever the solver.
+inline constexpr double kLockingPoissonRatio = 0.48;
+
 struct Elasticity {
   double lambda = 0.0;  // N/mm^2
   double shear = 0.0;   // G, N/mm^2

@@ -23,6 +23,8 @@ class StiffnessFactor {
   explicit StiffnessFactor(SparseCholesky factor) : factor_(std::move(factor)) {}
   explicit StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}
 
+  // The factor of drained elasticity; none with pressure.
+  const SparseCholesky* drained() const { return std::get_if<SparseCholesky>(&factor_); }
   bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
 
   // As SparseCholesky. With pressure, a solve that fails its guards is NaN everywhere.

@@ -147,6 +147,9 @@ TetLocator::TetLocator(const TetMesh& mesh) : impl_(std::make_unique<Impl>()) {
   impl_->find_boundary(mesh);
 }
 
+const Points& TetLocator::nodes() const { return impl_->nodes; }
+const Eigen::Matrix<int, 4, Eigen::Dynamic>& TetLocator::tets() const { return impl_->tets; }
+
 TetLocator::TetLocator(TetLocator&&) noexcept = default;
 TetLocator& TetLocator::operator=(TetLocator&&) noexcept = default;
 TetLocator::~TetLocator() = default;

@@ -35,6 +35,10 @@ class TetLocator {
   // A query that is not finite, or a mesh without tetrahedra: tet -1, infinite distance.
   TetLocation locate(const Vec3& query) const;
 
+  // Its copy of the mesh.
+  const Points& nodes() const;
+  const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

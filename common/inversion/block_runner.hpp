@@ -28,20 +28,29 @@ class BlockRunner {
   BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads)
       : team_(threads), progress_(std::move(progress)), stop_(std::move(stop)) {
     for (int i = 0; i < team_.size(); ++i) {
-      solvers_.push_back(
-          std::make_unique<fem::BlockSolver>(model.forward().factor(), model.forward().dofs()));
+      solvers_.push_back(std::make_unique<fem::BlockSolver>(
+          model.forward().stiffness(), model.forward().factor(), model.forward().dofs()));
     }
   }
-  // work(first, count, solver) for column ranges that cover [0, columns); false when stopped.
+  // Status work(first, count, solver) for column ranges that cover [0, columns). kUnavailable when stopped; else
+  // the error of a block, after which no other is begun.
   template <typename Work>
-  bool run(std::string_view stage, int columns, const Work& work) {
+  Status run(std::string_view stage, int columns, const Work& work) {
     const int blocks = (columns + kBlock - 1) / kBlock;
     std::atomic<int> done{0};
+    std::atomic<bool> failed{false};
+    std::vector<Status> statuses(static_cast<std::size_t>(team_.size()));
     auto task = [&](int member) {
       for (int block = member; block < blocks; block += team_.size()) {
-        if (stop_.stop_requested()) return;
+        if (stop_.stop_requested() || failed) return;
         const int first = block * kBlock;
-        work(first, std::min(kBlock, columns - first), *solvers_[static_cast<std::size_t>(member)]);
+        Status& status = statuses[static_cast<std::size_t>(member)];
+        status = work(first, std::min(kBlock, columns - first),
+                      *solvers_[static_cast<std::size_t>(member)]);
+        if (!status) {
+          failed = true;
+          return;
+        }
         ++done;
         if (member == 0) report(progress_, stage, static_cast<double>(done) / blocks);
       }
@@ -49,10 +58,12 @@ class BlockRunner {
     report(progress_, stage, 0.0);
     team_.run(task);
     report(progress_, stage, 1.0);
-    return done == blocks;
+    for (const Status& status : statuses) {
+      if (!status) return status;
+    }
+    if (done != blocks) return fail(ErrorCode::kUnavailable, "preparation was stopped");
+    return {};
   }
-
-  static Error stopped() { return {ErrorCode::kUnavailable, "preparation was stopped"}; }
 
  private:
   ThreadTeam team_;

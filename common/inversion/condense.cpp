@@ -33,8 +33,8 @@ constexpr float kLeastWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
 // Step 1: G and Phi.
-bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
-                     BlockRunner& runner, CondensedOperators& result) {
+Status contact_columns(const PreparedModel& model, const CondenseOptions& options,
+                       BlockRunner& runner, CondensedOperators& result) {
   const auto& pairs = model.forward().contact().pairs();
   const int s = static_cast<int>(pairs.size());
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
@@ -49,7 +49,7 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
     result.initial_penetration_mm[i] = pair.initial_penetration_mm;
   }
   std::mutex store_mutex;
-  const bool finished = runner.run("contact columns", s, [&](int first, int count, auto& solver) {
+  auto status = runner.run("contact columns", s, [&](int first, int count, auto& solver) -> Status {
     MatrixXf columns(rows, count);
     MatrixXd compliance(s, count);
     bool kept = false;
@@ -63,7 +63,7 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
         loads.col(j).segment<3>(3 * result.slaves[static_cast<std::size_t>(first + j)]) =
             result.slave_normals.col(first + j);
       }
-      solver.solve(loads, u);
+      if (auto solved = solver.solve(loads, u); !solved) return solved;
       for (int j = 0; j < count; ++j) {
         for (int i = 0; i < s; ++i) {
           compliance(i, j) = result.slave_normals.col(i).dot(
@@ -78,6 +78,7 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
     }
     result.contact_columns.middleCols(first, count) = columns;
     result.compliance.middleCols(first, count) = compliance;
+    return {};
   });
   // Symmetric but for rounding.
   for (int j = 0; j < s; ++j) {
@@ -86,7 +87,7 @@ bool contact_columns(const PreparedModel& model, const CondenseOptions& options,
           0.5 * (result.compliance(i, j) + result.compliance(j, i));
     }
   }
-  return finished;
+  return status;
 }
 
 // Omega: normally distributed near the data and, weaker, along the slaves' normals.
@@ -117,18 +118,25 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
 
   const MatrixXd omega = test_vectors(result, rows, tested);
   MatrixXd sketch(rows, tested), gravity_columns(rows, gravity);
-  const bool finished = runner.run("prior modes", tested, [&](int first, int count, auto& solver) {
-    MatrixXd u, load;
-    solver.solve(omega.middleCols(first, count), u);
-    prior.apply_kernel(u, load);
-    solver.solve(load, u);
-    sketch.middleCols(first, count) = u;
-  }) && runner.run("gravity modes", gravity, [&](int first, int count, auto& solver) {
+  auto status =
+      runner.run("prior modes", tested, [&](int first, int count, auto& solver) -> Status {
+        MatrixXd u, load;
+        if (auto solved = solver.solve(omega.middleCols(first, count), u); !solved) return solved;
+        prior.apply_kernel(u, load);
+        if (auto solved = solver.solve(load, u); !solved) return solved;
+        sketch.middleCols(first, count) = u;
+        return {};
+      });
+  if (!status) return status;
+  status = runner.run("gravity modes", gravity, [&](int first, int count, auto& solver) -> Status {
     MatrixXd u;
-    solver.solve(prior.modes().middleCols(first, count), u);
+    if (auto solved = solver.solve(prior.modes().middleCols(first, count), u); !solved) {
+      return solved;
+    }
     gravity_columns.middleCols(first, count) = u;
+    return {};
   });
-  if (!finished) return tl::unexpected(BlockRunner::stopped());
+  if (!status) return status;
 
   MatrixXd core(tested, tested);
   fem::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
@@ -161,23 +169,24 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
 }
 
 // Step 4: what the modes leave out of the prior variance, at the control nodes.
-bool left_out_variance(const PreparedModel& model, BlockRunner& runner,
-                       CondensedOperators& result) {
+Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
+                         CondensedOperators& result) {
   const Points& nodes = model.model().mesh.nodes;
   const std::vector<NodeIndex> spread =
       spread_nodes(nodes, model.config().condensed.uncertainty_nodes);
   const int probed = std::min<int>(kVarianceNodes, static_cast<int>(spread.size()));
   VecX variance = VecX::Zero(3 * probed);
-  const bool finished =
-      runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& solver) {
+  auto status =
+      runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& solver) -> Status {
         MatrixXd unit = MatrixXd::Zero(nodes.size(), count), u, load;
         for (int j = 0; j < count; ++j) {
           const int dof = first + j;
           unit(3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3, j) = 1.0;
         }
-        solver.solve(unit, u);
+        if (auto solved = solver.solve(unit, u); !solved) return solved;
         model.prior().apply_kernel(u, load);
         for (int j = 0; j < count; ++j) variance[first + j] = u.col(j).dot(load.col(j));
+        return {};
       });
   const Eigen::Index kernel_modes = result.modes.cols() - result.gravity_modes;
   Points positions(3, probed);
@@ -209,7 +218,7 @@ bool left_out_variance(const PreparedModel& model, BlockRunner& runner,
   Interpolation to_nodes = interpolate(control, nodes);
   result.control_neighbours = std::move(to_nodes.neighbours);
   result.control_weights = std::move(to_nodes.weights);
-  return finished;
+  return status;
 }
 
 }  // namespace
@@ -240,8 +249,9 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
   result.model_id = model.model().model_id;
   result.region = data_region(model.model());
   BlockRunner runner(model, options.progress, options.stop, options.threads);
-  if (!contact_columns(model, options, runner, result))
-    return tl::unexpected(BlockRunner::stopped());
+  if (auto status = contact_columns(model, options, runner, result); !status) {
+    return tl::unexpected(status.error());
+  }
   if (!result.compliance.allFinite()) {
     return fail(ErrorCode::kNotFinite,
                 "contact columns: the compliance of the slaves is not finite");
@@ -249,7 +259,9 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
   if (auto status = prior_modes(model, runner, result); !status) {
     return tl::unexpected(status.error());
   }
-  if (!left_out_variance(model, runner, result)) return tl::unexpected(BlockRunner::stopped());
+  if (auto status = left_out_variance(model, runner, result); !status) {
+    return tl::unexpected(status.error());
+  }
   return result;
 }
 

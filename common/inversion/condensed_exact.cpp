@@ -10,6 +10,7 @@
 #include "common/core/statistics.hpp"
 #include "common/fem/blas.hpp"
 #include "common/inversion/data_check.hpp"
+#include "common/inversion/estimate_check.hpp"
 #include "common/inversion/invert.hpp"
 #include "common/inversion/output_operators.hpp"
 #include "common/inversion/set_search.hpp"
@@ -78,7 +79,7 @@ struct CondensedExact::Impl {
   void sample(const SparseData& data);
   Status solve_for_set(const contact::ActiveSet& set);
   void record(int iteration, Clock::time_point start);
-  Points rebuild() const;
+  Status rebuild(Points& u) const;
   void finish(const SparseData& data, EstimateStatus outcome, Estimate& estimate);
 
   const PreparedModel& model;
@@ -224,7 +225,7 @@ void CondensedExact::Impl::record(int iteration, Clock::time_point start) {
   history.push_back(entry);
 }
 
-Points CondensedExact::Impl::rebuild() const {
+Status CondensedExact::Impl::rebuild(Points& u) const {
   Points load = Points::Zero(3, model.model().mesh.num_nodes());  // H^T B^T mu
   for (Eigen::Index i = 0; i < sampling.nodes.cols(); ++i) {
     for (int k = 0; k < 4; ++k) {
@@ -236,12 +237,13 @@ Points CondensedExact::Impl::rebuild() const {
     load.col(pair(active[i]).slave) +=
         slave_weights[static_cast<Eigen::Index>(i)] * pair(active[i]).normal;
   }
-  Points force = model.prior().apply(model.forward().solve(load));
+  if (auto status = model.forward().solve(load, u); !status) return status;
+  Points force = model.prior().apply(u);
   for (std::size_t i = 0; i < active.size(); ++i) {
     force.col(pair(active[i]).slave) +=
         forces[static_cast<Eigen::Index>(i)] * pair(active[i]).normal;
   }
-  return model.forward().solve(force);
+  return model.forward().solve(force, u);
 }
 
 void CondensedExact::Impl::finish(const SparseData& data, EstimateStatus outcome,
@@ -317,7 +319,8 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
     search.adopt_best();
   }
   const auto rebuild_start = Clock::now();
-  Points displacement = impl.rebuild();
+  Points displacement;
+  if (auto status = impl.rebuild(displacement); !status) return status;
   if (!displacement.allFinite() || !impl.forces.allFinite()) {
     search.forget();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
@@ -326,7 +329,7 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
   estimate.rebuild_ms = milliseconds_since(rebuild_start);
   impl.finish(data, solved ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit,
               estimate);
-  return {};
+  return check_estimate(impl.model, estimate);
 }
 
 }  // namespace brainshift::inversion

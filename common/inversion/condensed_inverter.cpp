@@ -14,6 +14,7 @@
 #include "common/fem/blas_threads.hpp"
 #include "common/inversion/contact_reduction.hpp"
 #include "common/inversion/data_check.hpp"
+#include "common/inversion/estimate_check.hpp"
 #include "common/inversion/field_rebuild.hpp"
 #include "common/inversion/invert.hpp"
 #include "common/inversion/prior_scales.hpp"
@@ -75,7 +76,9 @@ struct CondensedInverter::Impl {
         options(given_options),
         window(mode_window(*operators, options)),
         condensed(config.condensed),
+        poisson_ratio(config.material.poisson_ratio),
         team(options.threads),
+        deformation(given_locator->nodes(), given_locator->tets(), team),
         sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
         reduction(*operators, window, config.contact.penalty_n_per_mm, team),
         rebuild(*operators, window, options.region_of_interest),
@@ -88,6 +91,13 @@ struct CondensedInverter::Impl {
     right.setZero(most);
     solution.setZero(most);
     z.setZero(window.count);
+    for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
+      const NodeIndex node = operators->slaves[static_cast<std::size_t>(slave)];
+      const auto& region = options.region_of_interest;
+      if (region.empty() || std::binary_search(region.begin(), region.end(), node)) {
+        rebuilt_slaves.push_back(slave);
+      }
+    }
     reserve(options.capacity);
   }
 
@@ -118,14 +128,16 @@ struct CondensedInverter::Impl {
   // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
   Status estimate_for_set(const SparseData& data);
   void record(const SparseData& data, Clock::time_point start);
-  void finish(const SparseData& data, Estimate& estimate);
+  Status finish(const SparseData& data, Estimate& estimate);
   void estimate_omissions(const SparseData& data);
 
   std::shared_ptr<const CondensedOperators> operators;
   CondensedOptions options;
   ModeWindow window;
   CondensedConfig condensed;
+  double poisson_ratio;
   ThreadTeam team;
+  fem::DeformationCheck deformation;
   SampledOperators sampled;
   ContactReduction reduction;
   FieldRebuild rebuild;
@@ -147,6 +159,7 @@ struct CondensedInverter::Impl {
   MatrixXd jacobian;  // whitened [common error | J | d - A G f0], 3m x (q + r + 1)
   VecX residual;      // whitened d - A u, 3m
   VecX gram_storage, normal_storage, right, solution, z;
+  std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   double misfit_ratio =
       0.0;  // root mean square of d - A u - common error over its standard deviation
   std::vector<IterationRecord> history;
@@ -244,7 +257,7 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
   history.push_back(entry);
 }
 
-void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
+Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
   const auto start = Clock::now();
   if (options.uncertainty) {
     // The common error comes first, so the last block is the factor of the Schur complement of z.
@@ -257,6 +270,13 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
     estimate.sd_mm.resize(0);
   }
   rebuild.displacement(team, z, reduction, estimate.displacement);
+  if (auto status = check_equilibrium(*operators, rebuilt_slaves, reduction.penetration(),
+                                      estimate.displacement);
+      !status) {
+    return status;
+  }
+  const auto measured = deformation.measure(estimate.displacement);
+  if (auto status = check_deformation(measured, estimate); !status) return status;
   estimate.rebuild_ms = milliseconds_since(start);
   estimate_omissions(data);
 
@@ -272,6 +292,7 @@ void CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate)
   }
   estimate.history = history;
   estimate.prior_scales = scales.scales();
+  return {};
 }
 
 void CondensedInverter::Impl::estimate_omissions(const SparseData& data) {
@@ -338,9 +359,14 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
     impl.reset();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
-  impl.finish(data, estimate);
+  if (auto status = impl.finish(data, estimate); !status) {
+    estimate.status = EstimateStatus::kNotRun;
+    impl.reset();
+    return status;
+  }
   estimate.status = outcome;
   set_reason(outcome, search, impl.condensed, impl.misfit_ratio, estimate.reason);
+  append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};
 }
 

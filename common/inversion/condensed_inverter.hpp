@@ -57,9 +57,11 @@ class CondensedInverter {
   CondensedInverter& operator=(CondensedInverter&&) noexcept;
   ~CondensedInverter();
 
-  // Writes `estimate` in place, reusing its memory; on an error it is left as it was.
+  // Writes `estimate` in place, reusing its memory; on an error it is left as it was, or, when its rebuilt
+  // field is what was wrong, it has the status kNotRun.
   // Errors as check_data; kInvalidArgument for data outside the brain (the sentence names the datum);
-  // kNotFinite when the result is not finite.
+  // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact forces
+  // (estimate_check.hpp).
   Status update(const SparseData& data, Estimate& estimate);
   // Forgets the last active set.
   void reset();

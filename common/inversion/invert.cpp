@@ -4,6 +4,7 @@
 #include "common/inversion/condensed_exact.hpp"
 #include "common/inversion/conjugate_gradients.hpp"
 #include "common/inversion/data_check.hpp"
+#include "common/inversion/estimate_check.hpp"
 #include "common/inversion/iterative_system.hpp"
 #include "common/inversion/refactorised_system.hpp"
 #include "common/inversion/steepest_descent.hpp"
@@ -51,11 +52,8 @@ Result<Estimate> condensed_exact(const PreparedModel& model, const SparseData& d
   return estimate;
 }
 
-}  // namespace
-
-Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
-                        const InversionOptions& options) {
-  if (auto status = check_data(data); !status) return tl::unexpected(status.error());
+Result<Estimate> run(const PreparedModel& model, const SparseData& data,
+                     const InversionOptions& options) {
   switch (options.method) {
     case Method::kPaper: return paper(model, data, options);
     case Method::kPaperWoodbury: return paper_woodbury(model, data, options);
@@ -65,6 +63,19 @@ Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
     case Method::kCondensed: break;
   }
   return fail(ErrorCode::kInternal, "unknown inversion method");
+}
+
+}  // namespace
+
+Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
+                        const InversionOptions& options) {
+  if (auto status = check_data(data); !status) return tl::unexpected(status.error());
+  auto estimate = run(model, data, options);
+  if (!estimate || options.method == Method::kCondensedExact) return estimate;  // checks itself
+  if (auto status = check_estimate(model, *estimate); !status) {
+    return tl::unexpected(status.error());
+  }
+  return estimate;
 }
 
 }  // namespace brainshift::inversion

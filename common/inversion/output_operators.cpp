@@ -66,13 +66,13 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   MatrixXd x(3 * nodes, h);  // K^-1 H^T
   result.compliance.resize(h, h);
   result.covariance.setZero(h, h);
-  const auto solve_block = [&](int first, int count, fem::BlockSolver& solver) {
+  const auto solve_block = [&](int first, int count, fem::BlockSolver& solver) -> Status {
     MatrixXd loads = MatrixXd::Zero(3 * nodes, count), u;
     for (int j = 0; j < count; ++j) {
       const Output& output = outputs[static_cast<std::size_t>(first + j)];
       loads.col(j).segment<3>(3 * output.node) = output.direction;
     }
-    solver.solve(loads, u);
+    if (auto status = solver.solve(loads, u); !status) return status;
     for (int j = 0; j < count; ++j) {
       for (int i = first + j; i < h; ++i) {
         const Output& output = outputs[static_cast<std::size_t>(i)];
@@ -81,18 +81,19 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
       }
     }
     x.middleCols(first, count) = u;
+    return {};
   };
   // Lower triangle only: rows from the block's first one on.
-  const auto covariance_block = [&](int first, int count, fem::BlockSolver&) {
+  const auto covariance_block = [&](int first, int count, fem::BlockSolver&) -> Status {
     MatrixXd forces;
     model.prior().apply_kernel(x.middleCols(first, count), forces);
     fem::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
                                    result.covariance.block(first, first, h - first, count));
+    return {};
   };
-  if (!runner.run("influence columns", h, solve_block) ||
-      !runner.run("prior covariance", h, covariance_block)) {
-    return tl::unexpected(BlockRunner::stopped());
-  }
+  auto status = runner.run("influence columns", h, solve_block);
+  if (status) status = runner.run("prior covariance", h, covariance_block);
+  if (!status) return tl::unexpected(status.error());
   if (const MatrixXd& modes = model.prior().modes(); modes.cols() > 0) {
     MatrixXd seen(h, modes.cols()), transposed;
     fem::blas::multiply_transposed(1.0, x, modes, 0.0, seen);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/refactorised_system.hpp"
 
+#include "common/fem/checked_solve.hpp"
+
 namespace brainshift::inversion {
 
 RefactorisedSystem::RefactorisedSystem(const contact::ForwardModel& forward)
@@ -8,15 +10,19 @@ RefactorisedSystem::RefactorisedSystem(const contact::ForwardModel& forward)
 
 Status RefactorisedSystem::refresh() {
   if (contact::count(active()) == 0) return {};
-  fem::SymmetricMatrix k_p = forward().stiffness();
-  forward().contact().add_stiffness(k_p, forward().dofs(), active());
-  return penalised_.refactorise(k_p);
+  matrix_ = forward().stiffness();
+  forward().contact().add_stiffness(matrix_, forward().dofs(), active());
+  norm_ = fem::max_norm(matrix_);
+  return penalised_.refactorise(matrix_);
 }
 
 Status RefactorisedSystem::solve(const Points& f, Points& u) const {
-  const fem::StiffnessFactor& factor =
-      contact::count(active()) > 0 ? penalised_ : forward().factor();
-  u = forward().dofs().expand(factor.solve(forward().dofs().restrict_to(f)));
+  if (contact::count(active()) == 0) return forward().solve(f, u);
+  VecX unknowns;
+  const auto quality =
+      fem::checked_solve(matrix_, norm_, penalised_, forward().dofs().restrict_to(f), unknowns);
+  if (!quality) return tl::unexpected(quality.error());
+  forward().dofs().expand(unknowns, u);
   return {};
 }
 

@@ -10,10 +10,13 @@ namespace brainshift::inversion {
 class RefactorisedSystem final : public PenalisedSystem {
  public:
   explicit RefactorisedSystem(const contact::ForwardModel& forward);
+  // Errors as fem::checked_solve.
   Status solve(const Points& f, Points& u) const override;
 
  private:
   Status refresh() override;
+  fem::SymmetricMatrix matrix_;  // K_p, lower; empty while no slave is active
+  double norm_ = 0.0;
   fem::StiffnessFactor penalised_;
 };
 

@@ -71,8 +71,7 @@ Status WoodburySystem::refresh() {
 }
 
 Status WoodburySystem::solve(const Points& f, Points& u) const {
-  u = forward().solve(f);
-  if (set_.empty()) return {};
+  if (auto status = forward().solve(f, u); !status || set_.empty()) return status;
   const auto& pairs = forward().contact().pairs();
   VecX c(static_cast<Eigen::Index>(set_.size()));
   for (std::size_t i = 0; i < set_.size(); ++i) {
@@ -83,8 +82,7 @@ Status WoodburySystem::solve(const Points& f, Points& u) const {
   for (std::size_t i = 0; i < set_.size(); ++i) {
     corrected.col(pairs[set_[i]].slave) -= c[i] * pairs[set_[i]].normal;
   }
-  u = forward().solve(corrected);
-  return {};
+  return forward().solve(corrected, u);
 }
 
 }  // namespace brainshift::inversion

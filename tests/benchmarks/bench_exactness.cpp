@@ -113,10 +113,11 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
   }
   fem::SymmetricMatrix k_p = forward.stiffness();
   forward.contact().add_stiffness(k_p, forward.dofs(), active);
-  const auto factor = fem::SparseCholesky::factorise(k_p);
-  if (!factor) return tl::unexpected(factor.error());
+  auto cholesky = fem::SparseCholesky::factorise(k_p);
+  if (!cholesky) return tl::unexpected(cholesky.error());
+  const fem::StiffnessFactor factor(std::move(*cholesky));
   const auto solve = [&](const Points& load) {
-    return forward.dofs().expand(factor->solve(forward.dofs().restrict_to(load)));
+    return forward.dofs().expand(factor.solve(forward.dofs().restrict_to(load)));
   };
 
   const auto weights =
@@ -130,7 +131,9 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
       }
     }
   }
-  fem::BlockSolver(*factor, forward.dofs()).solve(a_transposed, v);
+  if (auto status = fem::BlockSolver(k_p, factor, forward.dofs()).solve(a_transposed, v); !status) {
+    return tl::unexpected(status.error());
+  }
   for (int j = 0; j < rows; ++j) {
     forces.col(j) = flat(prior.apply(Eigen::Map<const Points>(v.col(j).data(), 3, nodes)));
   }

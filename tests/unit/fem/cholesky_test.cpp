@@ -122,6 +122,17 @@ TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
 }
 
+TEST(SparseCholesky, RefusesEntriesAboveTheDiagonal) {
+  const Block block;
+  SymmetricMatrix k = block.stiffness();
+  const SymmetricMatrix upper = k.transpose();
+  for (const SymmetricMatrix& bad : {upper, SymmetricMatrix(k + upper)}) {
+    const auto factor = SparseCholesky::factorise(bad);
+    ASSERT_FALSE(factor.has_value());
+    EXPECT_EQ(factor.error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
 TEST(SparseCholesky, RefusesASystemWithoutUnknowns) {
   EXPECT_EQ(SparseCholesky::factorise(SymmetricMatrix(0, 0)).error().code, ErrorCode::kEmptySet);
 }

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# stability.sh BIN_DIR [OUT_DIR]: sweeps the product to the edges of what may be asked of it (docs/stability.md).
+# Writes OUT_DIR (default: out/stability; emptied first): points.csv, a map per sheet, guards.csv, summary.json. Exit
+# status 0 only if no answer is wrong without saying so, the maps can turn red, and the guards cost at most 3 %.
+#   QUICK=1     ends and middle of every sweep; no cost of the guards
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+bin=${1:?usage: stability.sh BIN_DIR [OUT_DIR]}
+out=${2:-out/stability}
+
+# A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+step() {
+  local begin=$EPOCHREALTIME
+  printf '== %s\n' "$1"
+  shift
+  "$@"
+  awk -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN { printf "   %.1f s\n", b - a }'
+}
+
+case $out in
+  "" | / | . | ..) echo "stability: $out is no folder to empty" >&2; exit 2 ;;
+esac
+rm -rf "$out"
+mkdir -p "$out"
+
+if [ "${QUICK:-0}" = 1 ]; then
+  step "sweeps, coarse" "$bin/stability_suite" --coarse --out "$out"
+else
+  step "guards: their cost on the default head" "$bin/bench_guards" "$out/guards.csv"
+  step "sweeps" "$bin/stability_suite" --out "$out"
+fi
+echo "wrote $out/summary.json, points.csv and maps"

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/fem/deformation.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+namespace brainshift::fem {
+namespace {
+
+// Below it single precision is not believed.
+constexpr float kSurelyUpright = 0.1F;
+// Error of J that single precision may make, otherwise the element is looked at in double.
+constexpr double kRatioError = 0.01;
+
+using Corners = Eigen::Matrix<double, 3, 4>;
+
+// 6 V
+double six_volumes(const Corners& x) {
+  return Vec3(x.col(1) - x.col(0)).cross(Vec3(x.col(2) - x.col(0))).dot(Vec3(x.col(3) - x.col(0)));
+}
+
+// Sum of 1 / height over the four corners, 1/mm: J moves by at most this times the error of a position.
+double sum_inverse_heights(const Corners& x) {
+  const Vec3 a = x.col(1) - x.col(0), b = x.col(2) - x.col(0), c = x.col(3) - x.col(0);
+  const double areas = a.cross(b).norm() + b.cross(c).norm() + c.cross(a).norm() +
+                       Vec3(b - a).cross(Vec3(c - a)).norm();
+  return areas / std::abs(a.cross(b).dot(c));
+}
+
+void include(double ratio, int tet, Deformation& deformation) {
+  if (!(ratio > 0.0)) ++deformation.inverted;
+  // A NaN stays.
+  if (deformation.worst_tet >= 0 && !(ratio < deformation.min_volume_ratio) && !std::isnan(ratio)) {
+    return;
+  }
+  if (deformation.worst_tet >= 0 && std::isnan(deformation.min_volume_ratio)) return;
+  deformation.min_volume_ratio = ratio;
+  deformation.worst_tet = tet;
+}
+
+double ratio_of(const Points& nodes, const Eigen::Vector4i& tet, const Points& u) {
+  Corners x, moved;
+  for (int k = 0; k < 4; ++k) {
+    x.col(k) = nodes.col(tet[k]);
+    moved.col(k) = x.col(k) + u.col(tet[k]);
+  }
+  return six_volumes(moved) / six_volumes(x);
+}
+
+}  // namespace
+
+Deformation measure_deformation(const TetMesh& mesh, const Points& u) {
+  Deformation deformation;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    include(ratio_of(mesh.nodes, mesh.tets.col(t), u), t, deformation);
+  }
+  return deformation;
+}
+
+DeformationCheck::DeformationCheck(const Points& nodes,
+                                   const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets,
+                                   ThreadTeam& team)
+    : team_(team),
+      nodes_(nodes),
+      tets_(tets),
+      centre_(nodes.cols() > 0 ? Vec3(nodes.rowwise().mean()) : Vec3(Vec3::Zero())),
+      deformed_(Eigen::Matrix<float, 4, Eigen::Dynamic>::Zero(4, nodes.cols())),
+      parts_(static_cast<std::size_t>(team.size())) {
+  const double extent = nodes.cols() > 0 ? (nodes.colwise() - centre_).cwiseAbs().maxCoeff() : 0.0;
+  // Room for a displacement as large as the body.
+  const double position_error =
+      2.0 * extent * static_cast<double>(std::numeric_limits<float>::epsilon());
+  inverse_volume_.reserve(static_cast<std::size_t>(tets.cols()));
+  for (Eigen::Index t = 0; t < tets.cols(); ++t) {
+    Corners x;
+    for (int k = 0; k < 4; ++k) x.col(k) = nodes.col(tets(k, t));
+    const bool coarse = position_error * sum_inverse_heights(x) < kRatioError;
+    inverse_volume_.push_back(coarse ? static_cast<float>(1.0 / six_volumes(x))
+                                     : std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+double DeformationCheck::exact_ratio(long tet, const Points& u) const {
+  return ratio_of(nodes_, tets_.col(tet), u);
+}
+
+void DeformationCheck::measure_part(long begin, long end, const Points& u,
+                                    Deformation& part) const {
+  float least = std::numeric_limits<float>::infinity();
+  long least_tet = -1;
+  for (long t = begin; t < end; ++t) {
+    const int* tet = tets_.col(t).data();
+    const auto x0 = deformed_.col(tet[0]);
+    const Eigen::Vector4f a = deformed_.col(tet[1]) - x0, b = deformed_.col(tet[2]) - x0,
+                          c = deformed_.col(tet[3]) - x0;
+    const float ratio = a.cross3(b).dot(c) * inverse_volume_[static_cast<std::size_t>(t)];
+    if (ratio > kSurelyUpright) {
+      if (ratio < least) {
+        least = ratio;
+        least_tet = t;
+      }
+    } else {
+      include(exact_ratio(t, u), static_cast<int>(t), part);
+    }
+  }
+  if (least_tet >= 0) include(static_cast<double>(least), static_cast<int>(least_tet), part);
+}
+
+Deformation DeformationCheck::measure(const Points& u) {
+  team_.split(u.cols(), [&](long begin, long end) {
+    for (long i = begin; i < end; ++i) {
+      deformed_.col(i).head<3>() = (nodes_.col(i) + u.col(i) - centre_).cast<float>();
+    }
+  });
+  auto task = [&](int member) {
+    const long count = tets_.cols(), members = team_.size();
+    Deformation& part = parts_[static_cast<std::size_t>(member)];
+    part = {};
+    measure_part(count * member / members, count * (member + 1) / members, u, part);
+  };
+  team_.run(task);
+  Deformation whole;
+  for (const Deformation& part : parts_) {
+    if (part.worst_tet < 0) continue;
+    const int inverted = whole.inverted + part.inverted;
+    include(part.min_volume_ratio, part.worst_tet, whole);
+    whole.inverted = inverted;
+  }
+  return whole;
+}
+
+}  // namespace brainshift::fem

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the guards of an update cost on the default head: the checks of estimate_check.hpp beside the whole update.
+//   build/release/bin/bench_guards [OUT.csv] [case.yaml]
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <numeric>
+
+#include "client/twin/surgery.hpp"
+#include "common/core/statistics.hpp"
+#include "common/inversion/condense.hpp"
+#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/estimate_check.hpp"
+#include "common/io/config_file.hpp"
+#include "common/scene/brain_model_builder.hpp"
+
+namespace brainshift {
+namespace {
+
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (result) return std::move(*result);
+  std::fprintf(stderr, "bench_guards: %s\n", result.error().message.c_str());
+  std::exit(2);
+}
+
+// Median of many, ms.
+template <typename Work>
+double median_ms(const Work& work) {
+  std::vector<double> times_ms;
+  for (int i = 0; i < 60; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    if (i < 10) continue;
+    times_ms.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
+  }
+  return percentile(times_ms, 50.0);
+}
+
+void run(const std::string& out, const std::string& case_file) {
+  const CaseConfig config = value_or_exit(io::read_case_config(case_file));
+  const auto model = std::make_shared<const BrainModel>(
+      value_or_exit(scene::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+  const auto prepared =
+      value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
+  const auto operators =
+      std::make_shared<const CondensedOperators>(value_or_exit(inversion::condense(prepared)));
+  const auto locator = std::make_shared<const geometry::TetLocator>(model->mesh);
+  auto inverter = value_or_exit(inversion::CondensedInverter::build(operators, locator, config));
+  const auto surgery =
+      value_or_exit(twin::play_scenario(*model, config, *twin::find_scenario("paper"), 1));
+  const auto& pairs = std::get<LandmarkPairs>(surgery.observations.front().body);
+  const SparseData data{pairs.undeformed, pairs.deformed - pairs.undeformed,
+                        VecX::Constant(pairs.undeformed.cols(), config.inversion.sigma_mm)};
+
+  Estimate estimate;
+  const double update_ms = median_ms([&] {
+    if (!inverter.update(data, estimate)) std::exit(1);
+  });
+  ThreadTeam team;
+  fem::DeformationCheck check(model->mesh.nodes, model->mesh.tets, team);
+  fem::Deformation deformation;
+  const double deformation_ms =
+      median_ms([&] { deformation = check.measure(estimate.displacement); });
+  std::vector<int> slaves(static_cast<std::size_t>(operators->num_slaves()));
+  std::iota(slaves.begin(), slaves.end(), 0);
+  const VecX penetration = prepared.forward().contact().penetration(estimate.displacement);
+  const double equilibrium_ms = median_ms([&] {
+    if (!inversion::check_equilibrium(*operators, slaves, penetration, estimate.displacement)) {
+      std::exit(1);
+    }
+  });
+  const double share = 100.0 * (deformation_ms + equilibrium_ms) / update_ms;
+  std::printf("%d nodes, %d tetrahedra, %d slaves, smallest volume ratio %.3f\n",
+              model->mesh.num_nodes(), model->mesh.num_tets(), operators->num_slaves(),
+              deformation.min_volume_ratio);
+  std::printf("update %.2f ms (p50), det F %.3f ms, equilibrium %.3f ms: %.1f %% of an update\n",
+              update_ms, deformation_ms, equilibrium_ms, share);
+  if (out.empty()) return;
+  std::ofstream file(out);
+  file << "name,value\nupdate_ms," << update_ms << "\ndeformation_ms," << deformation_ms
+       << "\nequilibrium_ms," << equilibrium_ms << "\nshare_percent," << share << "\n";
+  if (!file.flush()) {
+    std::fprintf(stderr, "bench_guards: %s: cannot be written\n", out.c_str());
+    std::exit(1);
+  }
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  brainshift::run(argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : BRAINSHIFT_DEFAULT_CASE);
+  return 0;
+}
