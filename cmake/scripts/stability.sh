@@ -10,22 +10,10 @@ cd "$(dirname "$0")/../.."
 bin=${1:?usage: stability.sh BIN_DIR [OUT_DIR]}
 out=${2:-out/stability}
 
-# A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+name=stability
+. cmake/scripts/steps.sh
 
-step() {
-  local begin=$EPOCHREALTIME
-  printf '== %s\n' "$1"
-  shift
-  "$@"
-  awk -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN { printf "   %.1f s\n", b - a }'
-}
-
-case $out in
-  "" | / | . | ..) echo "stability: $out is no folder to empty" >&2; exit 2 ;;
-esac
-rm -rf "$out"
-mkdir -p "$out"
+empty_folder "$out"
 
 if [ "${QUICK:-0}" = 1 ]; then
   step "sweeps, coarse" "$bin/stability_suite" --coarse --out "$out"

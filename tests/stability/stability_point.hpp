@@ -79,13 +79,14 @@ std::vector<double> thinned(const std::vector<double>& grid, bool coarse);
 // 10^from ... 10^to, one per decade.
 std::vector<double> decades(int from, int to);
 
-// One source file each: sweep_<name>.cpp. Sweeps of Biot (permeability, time step) and of the second element
-// (Poisson's ratio with P2) join here as files of their own.
+// One source file each: sweep_<name>.cpp.
 void sweep_penalty(const Options& options);
 void sweep_material(const Options& options);
 void sweep_mesh(const Options& options);
 void sweep_load(const Options& options);
 void sweep_data(const Options& options);
 void sweep_contact(const Options& options);
+void sweep_elements(const Options& options);
+void sweep_consolidation(const Options& options);
 
 }  // namespace brainshift::stability

@@ -34,6 +34,8 @@ const std::vector<Sheet> kSheets = {
     {"load", "Stability: large displacement; weak support", sweep_load},
     {"data", "Stability: data and prior", sweep_data},
     {"contact", "Stability: warm start from the wrong contact", sweep_contact},
+    {"elements", "Stability: elements near incompressibility", sweep_elements},
+    {"consolidation", "Stability: one step of consolidation", sweep_consolidation},
 };
 
 struct Arguments {
@@ -183,10 +185,12 @@ int main(int argc, char** argv) {
       "without saying so.",
       "stability_suite"};
   stability::Arguments arguments;
+  std::vector<std::string> names;
+  for (const auto& sheet : stability::kSheets) names.push_back(sheet.name);
   app.add_option("--out", arguments.out, "folder of points.csv, maps and summary.json")
       ->capture_default_str();
-  app.add_option("--sheet", arguments.sheets, "only these: penalty material mesh load data contact")
-      ->check(CLI::IsMember({"penalty", "material", "mesh", "load", "data", "contact"}));
+  app.add_option("--sheet", arguments.sheets, "only these sheets; see docs/stability.md")
+      ->check(CLI::IsMember(names));
   app.add_flag("--coarse", arguments.coarse, "ends and middle of every sweep");
   app.add_flag("--seed-fault", arguments.seed_fault,
                "change answers behind the product's back at random points: must end red");

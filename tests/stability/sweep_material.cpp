@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Poisson's ratio to 0.4999, shear modulus over what a case file allows, tumour against brain over ten decades.
 //
-// Linear tetrahedra lock above 0.48, whatever the solver: there an estimate must warn. The second element's sweep is
-// to stand beside this one.
+// Linear tetrahedra lock above 0.48, whatever the solver: there an estimate must warn. (quadratic ones:
+// sweep_elements.cpp)
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/toy_problem.hpp"
 
