@@ -122,6 +122,34 @@ TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
 }
 
+// Springs at three corners: answers are off by 1e-14 over their stiffness, relative to the body's.
+TEST(SparseCholesky, RefusesABodyThatSpringsHardlyHold) {
+  const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  DofMap dofs(mesh.num_nodes());
+  dofs.finalise();
+  const SymmetricMatrix body = assemble_stiffness(mesh, kTissue, dofs);
+  const auto held = [&](double stiffness) {
+    SymmetricMatrix k = body;
+    for (const NodeIndex n : {0, 3, 15}) {
+      add_to_node_block(k, dofs, n, stiffness * Mat3::Identity());
+    }
+    return SparseCholesky::factorise(k);
+  };
+  EXPECT_TRUE(held(1e-8).has_value());
+  for (const double stiffness : {1e-13, 1e-14}) {
+    const auto factor = held(stiffness);
+    ASSERT_FALSE(factor.has_value()) << stiffness;
+    EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+  }
+}
+
+TEST(SparseCholesky, StiffContactSpringsAreNoReasonToRefuse) {
+  const Block block;
+  SymmetricMatrix k = block.stiffness();
+  add_to_node_block(k, block.dofs, block.mesh.num_nodes() - 1, 1e9 * Mat3::Identity());
+  EXPECT_TRUE(SparseCholesky::factorise(k).has_value());
+}
+
 TEST(SparseCholesky, RefusesEntriesAboveTheDiagonal) {
   const Block block;
   SymmetricMatrix k = block.stiffness();
