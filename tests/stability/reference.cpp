@@ -175,8 +175,9 @@ double Reference::condition() const {
 }
 
 bool reference_posterior(Reference& reference, const inversion::PreparedModel& model,
-                         const SparseData& data, const std::vector<NodeIndex>& active_nodes,
+                         const SparseData& data, const Estimate& estimate,
                          PosteriorReference& result) {
+  const std::vector<NodeIndex>& active_nodes = estimate.active_slaves;
   const contact::PenaltyContact& contact = model.forward().contact();
   const fem::DofMap& dofs = model.forward().dofs();
   const int n = model.model().mesh.num_nodes();
@@ -200,8 +201,13 @@ bool reference_posterior(Reference& reference, const inversion::PreparedModel& m
     }
   }
   const MatrixR adjoints = reference.solve(loads);  // K_p^-1 T^T A^T
-  const MatrixR kernel = Eigen::MatrixXd(model.prior().kernel()).cast<Real>();
-  const MatrixR modes = model.prior().modes().cast<Real>();
+  const auto& scales = estimate.prior_scales;
+  MatrixR kernel = Eigen::MatrixXd(model.prior().kernel()).cast<Real>();
+  kernel *= static_cast<Real>(scales[2]) * static_cast<Real>(scales[2]);
+  MatrixR modes = model.prior().modes().cast<Real>();
+  for (Eigen::Index j = 0; j < modes.cols(); ++j) {
+    modes.col(j) *= static_cast<Real>(scales[j % 3 == 0 ? 0 : 1]);
+  }
   MatrixR forces(dofs.num_unknowns(), 3 * m);  // T^T Sigma T K_p^-1 T^T A^T
   for (Eigen::Index j = 0; j < 3 * m; ++j) {
     const VectorR nodal = expand(dofs, adjoints.col(j));

@@ -70,9 +70,9 @@ struct PosteriorReference {
   VectorR displacement;  // 3n
   VectorR penetration;   // of every slave, mm
 };
-// The posterior mean for a given active set (its nodes); false when a factor fails.
+// The posterior mean for the active set and the prior's scales of an estimate; false when a factor fails.
 bool reference_posterior(Reference& reference, const inversion::PreparedModel& model,
-                         const SparseData& data, const std::vector<NodeIndex>& active_nodes,
+                         const SparseData& data, const Estimate& estimate,
                          PosteriorReference& result);
 
 // |u - v|_2 / |v|_2

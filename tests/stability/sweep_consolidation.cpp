@@ -52,16 +52,14 @@ struct Exact {
 Exact exact_step(const Block& block, const fem::PoroMaterial& material, double dt_s) {
   const TetMesh& mesh = block.body.mesh;
   const fem::PressureMap pressure(mesh.num_nodes(), block.drained);
-  const fem::BiotMatrix biot =
-      fem::assemble_biot(mesh, fem::MaterialMap::uniform(material, mesh.num_tets()),
-                         block.body.dofs, pressure, dt_s);
+  const fem::BiotMatrix biot = fem::assemble_biot(
+      mesh, fem::MaterialMap::uniform(material, mesh.num_tets()), block.body.dofs, pressure, dt_s);
   MatrixR matrix = MatrixR(Eigen::MatrixXd(biot.lower).cast<Real>());
   matrix = MatrixR(matrix.selfadjointView<Eigen::Lower>());
   const VectorR scale = matrix.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
   matrix = scale.asDiagonal() * matrix * scale.asDiagonal();
   VectorR right = VectorR::Zero(matrix.rows());
-  right.head(biot.displacement_unknowns) =
-      restrict_to(block.body.dofs, block.load.cast<Real>());
+  right.head(biot.displacement_unknowns) = restrict_to(block.body.dofs, block.load.cast<Real>());
   const Eigen::FullPivLU<MatrixR> factor(matrix);
   const VectorR x = scale.asDiagonal() * factor.solve(scale.asDiagonal() * right);
   Exact exact;
@@ -83,8 +81,8 @@ void one_step(const Block& block, const fem::PoroMaterial& material, double dt_s
   point.sheet = "consolidation";
   point.unit = "relative";
   const TetMesh& mesh = block.body.mesh;
-  auto stepper = fem::BiotStepper::build(
-      mesh, fem::MaterialMap::uniform(material, mesh.num_tets()), block.body.dofs, block.drained);
+  auto stepper = fem::BiotStepper::build(mesh, fem::MaterialMap::uniform(material, mesh.num_tets()),
+                                         block.body.dofs, block.drained);
   if (!stepper) {
     set_refused(stepper.error(), point);
     return options.record(point);

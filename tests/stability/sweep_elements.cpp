@@ -28,8 +28,7 @@ forward::ForwardProblem block_under_weight(fem::Element element, double nu) {
     if (problem.mesh.nodes(2, node) == 0.0) floor.vertices.push_back(node);
   }
   problem.groups["floor"] = floor;
-  problem.conditions.push_back(
-      {"floor", "floor", forward::Displacement{{0.0, 0.0, 0.0}}});
+  problem.conditions.push_back({"floor", "floor", forward::Displacement{{0.0, 0.0, 0.0}}});
   return problem;
 }
 

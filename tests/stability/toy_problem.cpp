@@ -119,8 +119,7 @@ void compare_with_posterior(ToyProblem& problem, const SparseData& data, const E
                             Point& point) {
   point.bound = kInversionBound_mm;
   PosteriorReference right;
-  if (!reference_posterior(*problem.reference, *problem.model, data, estimate.active_slaves,
-                           right)) {
+  if (!reference_posterior(*problem.reference, *problem.model, data, estimate, right)) {
     point.difference = std::numeric_limits<double>::quiet_NaN();
     return;
   }

@@ -57,10 +57,9 @@ TEST_P(Adjoint, OfThePenalisedSystemIsItself) {
     ASSERT_TRUE(systems[i]->solve(g, kg));
     const double left = kf.cwiseProduct(g).sum(), right = f.cwiseProduct(kg).sum();
     const double error = std::abs(left - right) / std::abs(left);
-    EXPECT_TRUE(record_check(kStudy,
-                             std::string(names[i]) + " with contact " + GetParam().name +
-                                 ": relative asymmetry",
-                             error, "<= 1e-9", error <= 1e-9, kSource));
+    EXPECT_TRUE(record_check(
+        kStudy, std::string(names[i]) + " with contact " + GetParam().name + ": relative asymmetry",
+        error, "<= 1e-9", error <= 1e-9, kSource));
   }
 }
 
@@ -78,10 +77,9 @@ TEST_P(Adjoint, GradientEqualsCentralDifferences) {
   const auto backward = evaluate_objective(prepared, data, w - kStep * dw, active);
   const double difference = (forward->value - backward->value) / (2.0 * kStep);
   const double error = std::abs(difference - slope) / std::abs(slope);
-  EXPECT_TRUE(record_check(kStudy,
-                           std::string("gradient with contact ") + GetParam().name +
-                               ": relative error",
-                           error, "<= 1e-6", error <= 1e-6, kSource));
+  EXPECT_TRUE(record_check(
+      kStudy, std::string("gradient with contact ") + GetParam().name + ": relative error", error,
+      "<= 1e-6", error <= 1e-6, kSource));
 }
 
 }  // namespace

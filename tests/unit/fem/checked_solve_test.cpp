@@ -122,7 +122,7 @@ TEST(CheckedSolve, OneWrongColumnAmongManyIsFoundAndRefined) {
 
 TEST(CheckedSolve, BlocksOfAnotherMatrixAreRefused) {
   const Block block;
-  const SparseCholesky factor = block.factor_of_another(10.0);
+  const StiffnessFactor factor(block.factor_of_another(10.0));
   BlockSolver solver(block.stiffness, factor, block.dofs);
   Eigen::MatrixXd u;
   const Status status = solver.solve(Eigen::MatrixXd::Ones(3 * block.mesh.num_nodes(), 5), u);
