@@ -42,6 +42,7 @@ bool logarithmic(const std::string& axis) {
 
 // "element size mm" -> "element size (mm)": a last word that is a unit.
 std::string with_unit(const std::string& axis) {
+  if (axis == "T") return "T: time over consolidation time";
   const std::size_t space = axis.find_last_of(' ');
   if (space == std::string::npos) return axis;
   const std::string unit = axis.substr(space + 1);
@@ -84,20 +85,34 @@ std::vector<Chart> charts_of(const CsvTable& points) {
       series = all.insert(all.end(), client::XySeries{});
       series->legend = legend;
       series->colour = colours[k % std::size(colours)];
-      // What is known exactly is a thin line, what was computed a marker on it.
-      const bool reference = legend.find("series") != std::string::npos;
-      series->marker = reference ? Marker::kNone : markers[k % std::size(markers)];
+      series->marker = markers[k % std::size(markers)];
       series->line = true;
-      series->dash_px = reference ? 10.0 : 0.0;
+      // What is known exactly: dashes in ink, explained once.
+      if (legend.find("series") != std::string::npos) {
+        series->marker = Marker::kNone;
+        series->colour = palette::kInk;
+        series->dash_px = 10.0;
+      }
     }
     series->points.push_back({points.number(row, "x"), points.number(row, "y"), ""});
   }
   return charts;
 }
 
-Result<std::vector<std::string>> draw(const std::vector<Chart>& charts, const fs::path& folder) {
+// One entry in the legend for all that is known exactly.
+void shorten_legend(client::XyChartSpec& spec) {
+  bool explained = false;
+  for (auto& series : spec.series) {
+    if (series.marker != Marker::kNone) continue;
+    series.legend = explained ? "" : "series";
+    explained = true;
+  }
+}
+
+Result<std::vector<std::string>> draw(std::vector<Chart> charts, const fs::path& folder) {
   std::vector<std::string> names;
-  for (const Chart& chart : charts) {
+  for (Chart& chart : charts) {
+    shorten_legend(chart.spec);
     std::string name = chart.study;
     for (int k = 2; std::find(names.begin(), names.end(), name + ".png") != names.end(); ++k) {
       name = chart.study + "-" + std::to_string(k);
