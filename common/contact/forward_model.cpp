@@ -4,6 +4,7 @@
 #include <chrono>
 #include <utility>
 
+#include "common/contact/tissues.hpp"
 #include "common/fem/checked_solve.hpp"
 #include "common/geometry/surface.hpp"
 
@@ -27,7 +28,7 @@ fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
 }
 
 Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig& config,
-                                       const fem::DofMap& dofs,
+                                       const fem::MaterialMap& materials, const fem::DofMap& dofs,
                                        const fem::SymmetricMatrix& stiffness) {
   if (config.scene.pressure != Carry::kOn) {
     auto drained = fem::SparseCholesky::factorise(stiffness);
@@ -36,8 +37,6 @@ Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig
   }
   const Eigen::Matrix3Xi& triangles = model.boundary_triangles;
   const std::vector<NodeIndex> drained(triangles.data(), triangles.data() + triangles.size());
-  const auto materials =
-      fem::MaterialMap::uniform(fem::poro_material_from(config.material), model.mesh.num_tets());
   auto step = fem::BiotFactor::factorise(fem::assemble_biot(
       model.mesh, materials, dofs, fem::PressureMap(model.mesh.num_nodes(), drained),
       config.scene.pressure_step_s));
@@ -62,8 +61,10 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   const auto start = std::chrono::steady_clock::now();
   report(progress, "assemble", 0.0);
   fem::DofMap dofs = constrain(model, boundary);
+  const auto materials = tissue_map(model, config.material);
+  if (!materials) return tl::unexpected(materials.error());
   fem::SymmetricMatrix stiffness =
-      fem::assemble_stiffness(model.mesh, fem::elasticity_from(config.material), dofs);
+      fem::assemble_stiffness(model.mesh, elasticities(*materials), dofs);
   const double assemble_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -75,7 +76,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
     pairs = std::move(*found);
   }
   report(progress, "factorise", 0.0);
-  auto factor = factorise(model, config, dofs, stiffness);
+  auto factor = factorise(model, config, *materials, dofs, stiffness);
   if (!factor) return tl::unexpected(factor.error());
   report(progress, "factorise", 1.0);
   return ForwardModel(boundary, std::move(dofs), std::move(stiffness), std::move(*factor),

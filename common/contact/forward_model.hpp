@@ -9,6 +9,8 @@
 // scene.pressure_step_s from rest, with the pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0):
 // cerebrospinal fluid or air surrounds it.
 //
+// Tissues of different stiffness: tissues.hpp.
+//
 // Normals of fixed nodes are the average nodal normals of the brain's boundary.
 #pragma once
 

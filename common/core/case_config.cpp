@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/core/case_config.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -90,6 +91,14 @@ Status validate(const CaseConfig& config) {
   // Brain tissue: 100 Pa to 1 MPa covers gel phantoms to tendon; outside is a unit mistake.
   check.between("material.shear_modulus_pa", config.material.shear_modulus_pa, 100.0, 1e6);
   check.between("material.poisson_ratio", config.material.poisson_ratio, 0.0, 0.4999);
+  const auto tissue = [&check](const std::string& key, const TissueStiffness& stiffness) {
+    check.between(key + ".shear_modulus_pa", stiffness.shear_modulus_pa, 1.0, 1e9);
+    check.between(key + ".poisson_ratio", stiffness.poisson_ratio, 0.0, 0.4999);
+  };
+  if (config.material.tumour) tissue("material.tumour", *config.material.tumour);
+  for (const auto& [label, stiffness] : config.material.regions) {
+    tissue("material.regions." + std::to_string(label), stiffness);
+  }
   check.between("material.tissue_density_kg_m3", config.material.tissue_density_kg_m3, 500, 2000);
   check.between("material.fluid_density_saturated_kg_m3",
                 config.material.fluid_density_saturated_kg_m3, 0, 2000);
@@ -127,6 +136,15 @@ Status validate(const CaseConfig& config) {
   check.between("scene.region_of_interest_mm", config.scene.region_of_interest_mm, 1.0, 300.0);
   check.between("scene.pressure_step_s", config.scene.pressure_step_s, 1e-6, 1e9);
   return check.status();
+}
+
+double largest_poisson_ratio(const Material& material) {
+  double largest = material.poisson_ratio;
+  if (material.tumour) largest = std::max(largest, material.tumour->poisson_ratio);
+  for (const auto& [label, tissue] : material.regions) {
+    largest = std::max(largest, tissue.poisson_ratio);
+  }
+  return largest;
 }
 
 std::string_view to_string(OutsideRegion outside) {

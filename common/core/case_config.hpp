@@ -8,6 +8,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -60,6 +61,12 @@ struct Brainstem {
   double radius_mm = 12.0;
 };
 
+// What differs from tissue to tissue.
+struct TissueStiffness {
+  double shear_modulus_pa = 2100.0;
+  double poisson_ratio = 0.46;
+};
+
 struct Material {  // Table 1
   double shear_modulus_pa = 2100.0;
   double poisson_ratio = 0.46;
@@ -69,7 +76,11 @@ struct Material {  // Table 1
   double permeability_m3_s_kg = 1e-7;  // k
   double biot_coefficient = 1.0;       // alpha
   double storage_per_pa = 0.0;         // 1/S
+  // Tissues of another stiffness (contact/tissues.hpp): the tumour, and labels of the mesh.
+  std::optional<TissueStiffness> tumour;
+  std::map<int, TissueStiffness> regions;
 };
+double largest_poisson_ratio(const Material& material);
 
 struct ContactConfig {
   double gap_mm = 1.0;                              // brain to skull (section 2.6)

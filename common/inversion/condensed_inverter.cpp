@@ -76,7 +76,7 @@ struct CondensedInverter::Impl {
         options(given_options),
         window(mode_window(*operators, options)),
         condensed(config.condensed),
-        poisson_ratio(config.material.poisson_ratio),
+        poisson_ratio(largest_poisson_ratio(config.material)),
         team(options.threads),
         deformation(given_locator->nodes(), given_locator->tets(), team),
         sampled(operators, std::move(given_locator), window, condensed.outside_region, team),

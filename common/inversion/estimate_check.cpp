@@ -59,7 +59,7 @@ void append_warnings(const Estimate& estimate, double poisson_ratio, std::string
 Status check_estimate(const PreparedModel& model, Estimate& estimate) {
   const auto deformation = fem::measure_deformation(model.model().mesh, estimate.displacement);
   if (auto status = check_deformation(deformation, estimate); !status) return status;
-  append_warnings(estimate, model.config().material.poisson_ratio, estimate.reason);
+  append_warnings(estimate, largest_poisson_ratio(model.config().material), estimate.reason);
   return {};
 }
 

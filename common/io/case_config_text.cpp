@@ -111,6 +111,19 @@ void write_physics(const CaseConfig& config, Writer& out) {
   out.number("  permeability_m3_s_kg", config.material.permeability_m3_s_kg);
   out.number("  biot_coefficient", config.material.biot_coefficient);
   out.number("  storage_per_pa", config.material.storage_per_pa);
+  const auto tissue = [&out](const std::string& indent, const TissueStiffness& stiffness) {
+    out.number(indent + "shear_modulus_pa", stiffness.shear_modulus_pa);
+    out.number(indent + "poisson_ratio", stiffness.poisson_ratio);
+  };
+  if (config.material.tumour) {
+    out.section("  tumour");
+    tissue("    ", *config.material.tumour);
+  }
+  if (!config.material.regions.empty()) out.section("  regions");
+  for (const auto& [label, stiffness] : config.material.regions) {
+    out.section("    " + std::to_string(label));
+    tissue("      ", stiffness);
+  }
   out.section("contact");
   out.number("  gap_mm", config.contact.gap_mm);
   if (config.contact.skull_file) out.path("  skull_file", *config.contact.skull_file);

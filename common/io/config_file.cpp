@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 
 #include "common/io/file_access.hpp"
@@ -94,6 +95,29 @@ void read_physics(YamlSection& root, CaseConfig& config) {
   material.number("permeability_m3_s_kg", config.material.permeability_m3_s_kg);
   material.number("biot_coefficient", config.material.biot_coefficient);
   material.number("storage_per_pa", config.material.storage_per_pa);
+  const auto read_tissue = [&config](YamlSection section) {
+    // What is not given is that of the rest.
+    TissueStiffness tissue{config.material.shear_modulus_pa, config.material.poisson_ratio};
+    section.number("shear_modulus_pa", tissue.shear_modulus_pa);
+    section.number("poisson_ratio", tissue.poisson_ratio);
+    section.done();
+    return tissue;
+  };
+  if (material.has("tumour")) config.material.tumour = read_tissue(material.section("tumour"));
+  if (material.has("regions")) {
+    YamlSection regions = material.section("regions");
+    for (const std::string& label : regions.names()) {
+      int number = 0;
+      const char* end = label.data() + label.size();
+      const auto [stop, error] = std::from_chars(label.data(), end, number);
+      if (error != std::errc() || stop != end) {
+        regions.fail(label, "must be a label of the mesh, a whole number");
+        break;
+      }
+      config.material.regions[number] = read_tissue(regions.section(label));
+    }
+    regions.done();
+  }
   material.done();
 
   YamlSection contact = root.section("contact");

@@ -239,6 +239,10 @@ void YamlSection::choice(const std::string& key, std::string& value,
   state_->fail_at(line_of_key(key), full_key(key) + " = " + word + ": must be one of " + list);
 }
 
+void YamlSection::fail(const std::string& key, const std::string& what) {
+  state_->fail_at(line_of_key(key), full_key(key) + ": " + what);
+}
+
 void YamlSection::path(const std::string& key, fs::path& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node) return;

@@ -69,6 +69,8 @@ class YamlSection {
                Presence presence = Presence::kOptional);
   // All keys, in order, for sections whose keys are names; they count as known.
   std::vector<std::string> names();
+  // Records that a key is wrong in a way that only its reader knows: "KEY: what".
+  void fail(const std::string& key, const std::string& what);
   // Every key of the section must have been asked for.
   void done();
 

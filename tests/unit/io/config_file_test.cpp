@@ -213,6 +213,44 @@ TEST(CaseFile, KeysOfPorePressureAreReadAndWritten) {
   }
 }
 
+TEST(CaseFile, StiffnessOfTissuesIsReadAndWritten) {
+  const std::string text =
+      replaced(kFull, "_unsaturated_kg_m3: 1.2",
+               "_unsaturated_kg_m3: 1.2\n  tumour: {shear_modulus_pa: 6300}\n"
+               "  regions: {2: {poisson_ratio: 0.3}, 7: {shear_modulus_pa: 1e5}}");
+  const auto read = parse_case_config(text, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto again = parse_case_config(case_config_text(*read), "/cases/c.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  for (const CaseConfig& config : {*read, *again}) {
+    const Material& material = config.material;
+    ASSERT_TRUE(material.tumour);
+    EXPECT_EQ(material.tumour->shear_modulus_pa, 6300.0);
+    EXPECT_EQ(material.tumour->poisson_ratio, material.poisson_ratio) << "as the rest";
+    ASSERT_EQ(material.regions.size(), 2u);
+    EXPECT_EQ(material.regions.at(2).poisson_ratio, 0.3);
+    EXPECT_EQ(material.regions.at(2).shear_modulus_pa, material.shear_modulus_pa);
+    EXPECT_EQ(material.regions.at(7).shear_modulus_pa, 1e5);
+    EXPECT_EQ(largest_poisson_ratio(material), material.poisson_ratio);
+  }
+}
+
+TEST(CaseFile, BadTissuesAreRefusedByName) {
+  const auto message = [](const std::string& lines) {
+    const auto read = parse_case_config(
+        replaced(kFull, "_unsaturated_kg_m3: 1.2", "_unsaturated_kg_m3: 1.2\n" + lines),
+        "/cases/c.yaml");
+    return read ? std::string("accepted") : read.error().message;
+  };
+  EXPECT_THAT(message("  regions: {white: {shear_modulus_pa: 3000}}"),
+              HasSubstr("material.regions.white: must be a label of the mesh"));
+  EXPECT_THAT(message("  regions: {3: {shear_modulus_pa: -1}}"),
+              HasSubstr("material.regions.3.shear_modulus_pa = -1"));
+  EXPECT_THAT(message("  tumour: {poisson_ratio: 0.5}"),
+              HasSubstr("material.tumour.poisson_ratio = 0.5"));
+  EXPECT_THAT(message("  tumour: {stiffness: 0.5}"), HasSubstr("material.tumour.stiffness"));
+}
+
 struct BadCase {
   const char* name;
   const char* from;  // replaced in kFull by...

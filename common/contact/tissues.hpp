@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which tissue each tetrahedron of a patient's brain is made of, by the case's material section.
+//
+//   material.tumour    tetrahedra whose centre lies inside the tumour's surface
+//   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium, ...)
+//   the rest           material itself
+// The tumour comes before the regions. Density, permeability and storage are the same everywhere.
+#pragma once
+
+#include "common/core/brain_model.hpp"
+#include "common/core/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/fem/poro_material.hpp"
+
+namespace brainshift::contact {
+
+// kInvalidArgument: a label that the mesh does not have (the sentence names those it has); kEmptySet: no tetrahedron
+// has its centre in the tumour.
+Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
+
+// The elastic part alone, one per tetrahedron.
+std::vector<fem::Elasticity> elasticities(const fem::MaterialMap& map);
+
+}  // namespace brainshift::contact
