@@ -35,7 +35,11 @@ void TruthSolver::correct(const contact::ActiveSet& active, const std::vector<in
 }
 
 Result<Points> TruthSolver::solve_with(const contact::ActiveSet& active, const Points& load) {
-  if (contact::count(active) == 0) return forward_.solve(load);
+  if (contact::count(active) == 0) {
+    Points free;
+    if (Status ok = forward_.solve(load, free); !ok) return tl::unexpected(ok.error());
+    return free;
+  }
   std::vector<int> changed;
   for (std::size_t i = 0; i < factored_.size(); ++i) {
     if (active[i] != factored_[i]) changed.push_back(static_cast<int>(i));

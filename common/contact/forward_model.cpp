@@ -63,8 +63,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   fem::DofMap dofs = constrain(model, boundary);
   const auto materials = tissue_map(model, config.material);
   if (!materials) return tl::unexpected(materials.error());
-  fem::SymmetricMatrix stiffness =
-      fem::assemble_stiffness(model.mesh, elasticities(*materials), dofs);
+  fem::SymmetricMatrix stiffness = fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
   const double assemble_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 

@@ -36,7 +36,6 @@ class ForwardModel {
   const fem::DofMap& dofs() const { return dofs_; }
   // Of drained elasticity, with or without pressure; the contact stiffness is added to it.
   const fem::SymmetricMatrix& stiffness() const { return stiffness_; }
-  double stiffness_norm() const { return stiffness_norm_; }  // fem::max_norm
   const fem::StiffnessFactor& factor() const { return factor_; }
   // No pairs under the fixed boundary condition.
   const PenaltyContact& contact() const { return contact_; }
@@ -56,7 +55,7 @@ class ForwardModel {
   Boundary boundary_;
   fem::DofMap dofs_;
   fem::SymmetricMatrix stiffness_;
-  double stiffness_norm_;
+  double stiffness_norm_;  // fem::max_norm
   fem::StiffnessFactor factor_;
   PenaltyContact contact_;
   double assemble_s_;

@@ -60,13 +60,4 @@ Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& mat
               "there (mesh.generate.tumour_edge_mm)");
 }
 
-std::vector<fem::Elasticity> elasticities(const fem::MaterialMap& map) {
-  std::vector<fem::Elasticity> all;
-  all.reserve(map.of_tet.size());
-  for (std::size_t t = 0; t < map.of_tet.size(); ++t) {
-    all.push_back(map.at(static_cast<int>(t)).elastic);
-  }
-  return all;
-}
-
 }  // namespace brainshift::contact

@@ -18,7 +18,4 @@ namespace brainshift::contact {
 // has its centre in the tumour.
 Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
 
-// The elastic part alone, one per tetrahedron.
-std::vector<fem::Elasticity> elasticities(const fem::MaterialMap& map);
-
 }  // namespace brainshift::contact

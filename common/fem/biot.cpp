@@ -250,26 +250,4 @@ Points BiotStepper::internal_force(const BiotState& state) const {
   return force;
 }
 
-Points traction_load(const TetMesh& mesh, const Eigen::Matrix3Xi& triangles, const Vec3& traction) {
-  Points load = Points::Zero(3, mesh.num_nodes());
-  for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
-    const Vec3 a = mesh.nodes.col(triangles(0, f)), b = mesh.nodes.col(triangles(1, f)),
-               c = mesh.nodes.col(triangles(2, f));
-    const double third = (b - a).cross(c - a).norm() / 6.0;
-    for (int k = 0; k < 3; ++k) load.col(triangles(k, f)) += third * traction;
-  }
-  return load;
-}
-
-Points pressure_load(const TetMesh& mesh, const Eigen::Matrix3Xi& triangles, double pressure) {
-  Points load = Points::Zero(3, mesh.num_nodes());
-  for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
-    const Vec3 a = mesh.nodes.col(triangles(0, f)), b = mesh.nodes.col(triangles(1, f)),
-               c = mesh.nodes.col(triangles(2, f));
-    const Vec3 outward_third = (b - a).cross(c - a) / 6.0;
-    for (int k = 0; k < 3; ++k) load.col(triangles(k, f)) -= pressure * outward_third;
-  }
-  return load;
-}
-
 }  // namespace brainshift::fem

@@ -31,7 +31,7 @@ struct BiotState {
 
 // At the end of the step. An empty array is zero.
 struct BiotLoad {
-  Points force;  // 3 x n consistent nodal forces, N: tractions, body forces
+  Points force;  // 3 x n consistent nodal forces, N: tractions, body forces (space_elasticity.hpp)
   VecX
       source;  // n consistent nodal inflow, mm^3/s: the paper's psi, and flow in through the boundary
   Points displacement;  // 3 x n, read along the directions that DofMap fixes, mm
@@ -94,10 +94,5 @@ class BiotStepper {
   long steps_ = 0;
   BiotDiagnostics diagnostics_;
 };
-
-// Consistent nodal forces of a uniform pressure on triangles of the boundary (counter-clockwise from outside), pushing
-// inwards, and of a uniform traction; 3 x n, N. pressure, traction in N/mm^2.
-Points pressure_load(const TetMesh& mesh, const Eigen::Matrix3Xi& triangles, double pressure);
-Points traction_load(const TetMesh& mesh, const Eigen::Matrix3Xi& triangles, const Vec3& traction);
 
 }  // namespace brainshift::fem

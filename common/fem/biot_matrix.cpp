@@ -16,14 +16,6 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 using Triplets = std::vector<Eigen::Triplet<double, int>>;
 using RowMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor, int>;
 
-std::vector<Elasticity> elastic_of_tet(const TetMesh& mesh, const MaterialMap& materials) {
-  std::vector<Elasticity> of_tet(static_cast<std::size_t>(mesh.num_tets()));
-  for (int t = 0; t < mesh.num_tets(); ++t) {
-    of_tet[static_cast<std::size_t>(t)] = materials.at(t).elastic;
-  }
-  return of_tet;
-}
-
 // G by rows (displacement unknowns) and the lower triangle of dt H + M + P by columns.
 struct PressureBlocks {
   RowMatrix coupling;
@@ -118,7 +110,7 @@ BiotElement biot_element(const TetGeometry& geometry, const PoroMaterial& materi
 
 BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, const DofMap& dofs,
                          const PressureMap& pressure, double dt_s, bool stabilise) {
-  const SymmetricMatrix stiffness = assemble_stiffness(mesh, elastic_of_tet(mesh, materials), dofs);
+  const SymmetricMatrix stiffness = assemble_stiffness(mesh, materials.elastic(), dofs);
   const PressureBlocks blocks = pressure_blocks(mesh, materials, dofs, pressure, dt_s, stabilise);
   BiotMatrix matrix;
   matrix.displacement_unknowns = dofs.num_unknowns();

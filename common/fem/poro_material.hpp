@@ -33,6 +33,14 @@ struct MaterialMap {
   const PoroMaterial& at(int tet) const {
     return materials[static_cast<std::size_t>(of_tet[static_cast<std::size_t>(tet)])];
   }
+  // The elastic part alone, one per tetrahedron.
+  std::vector<Elasticity> elastic() const {
+    std::vector<Elasticity> all;
+    all.reserve(of_tet.size());
+    for (const int index : of_tet)
+      all.push_back(materials[static_cast<std::size_t>(index)].elastic);
+    return all;
+  }
 };
 
 }  // namespace brainshift::fem

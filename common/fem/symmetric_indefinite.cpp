@@ -16,6 +16,7 @@
 
 #include "common/core/random.hpp"
 #include "common/fem/blas_threads.hpp"
+#include "common/fem/checked_solve.hpp"
 
 namespace brainshift::fem {
 namespace {
@@ -181,15 +182,12 @@ void SymmetricIndefinite::Impl::rescale(const SymmetricMatrix& lower) {
     scale[i] = size > 0.0 ? 1.0 / std::sqrt(size) : 1.0;
   }
   scaled = lower;
-  VecX sums = VecX::Zero(lower.rows());
   for (long j = 0; j < scaled.outerSize(); ++j) {
     for (SymmetricMatrix::InnerIterator it(scaled, j); it; ++it) {
       it.valueRef() *= scale[it.row()] * scale[j];
-      sums[it.row()] += std::abs(it.value());
-      if (it.row() != j) sums[j] += std::abs(it.value());
     }
   }
-  norm = sums.maxCoeff();
+  norm = max_norm(scaled);
 }
 
 void SymmetricIndefinite::Impl::raw_solve(double* columns_in_out, int count) const {
@@ -208,11 +206,9 @@ void SymmetricIndefinite::Impl::raw_solve(double* columns_in_out, int count) con
 
 double SymmetricIndefinite::Impl::backward_error(const VecX& b, const VecX& x,
                                                  VecX& residual) const {
-  residual = b;
-  residual.noalias() -= scaled.selfadjointView<Eigen::Lower>() * x;
-  if (!residual.allFinite()) return std::numeric_limits<double>::quiet_NaN();
-  const double size = norm * x.lpNorm<Eigen::Infinity>() + b.lpNorm<Eigen::Infinity>();
-  return size > 0.0 ? residual.lpNorm<Eigen::Infinity>() / size : 0.0;
+  const double error = fem::backward_error(scaled, norm, b, x, residual);
+  residual = b - residual;
+  return error;
 }
 
 // 1 / (|A| |A^-1|), the second norm by Hager's ascent: a lower bound that is rarely off by more than three. The last

@@ -189,8 +189,6 @@ void add_contact_results(const ForwardProblem& problem, const contact::SurfaceCo
 }  // namespace
 
 void add_warnings(const ForwardProblem& problem, ForwardSolution& solution) {
-  // P1 locks above this (DESIGN: sag rises 1.5 % at 0.46, 26 % at 0.499).
-  constexpr double kLockingPoissonRatio = 0.48;
   // A backward error above this is worth a warning.
   constexpr double kLargeResidual = 1e-8;
   double largest = 0.0;
@@ -199,10 +197,10 @@ void add_warnings(const ForwardProblem& problem, ForwardSolution& solution) {
     const fem::Elasticity& e = problem.materials.materials[static_cast<std::size_t>(m)].elastic;
     largest = std::max(largest, e.lambda / (2.0 * (e.lambda + e.shear)));
   }
-  if (problem.element == fem::Element::kP1 && largest > kLockingPoissonRatio) {
+  if (problem.element == fem::Element::kP1 && largest > fem::kLockingPoissonRatio) {
     solution.warnings.push_back(
         fmt::format("element p1 locks: Poisson's ratio {:.4g} is above {}; use p2", largest,
-                    kLockingPoissonRatio));
+                    fem::kLockingPoissonRatio));
   }
   if (!(solution.min_jacobian > 0.0)) {
     solution.warnings.push_back(fmt::format(

@@ -346,7 +346,9 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
   impl.history.clear();
   EstimateStatus outcome = EstimateStatus::kIterating;
   for (int round = 0;; ++round) {
-    if (auto status = impl.sampled.sample(data, impl.scales.of_other()); !status) return status;
+    if (round == 0 || impl.sampled.outside_region()) {
+      if (auto status = impl.sampled.sample(data, impl.scales.of_other()); !status) return status;
+    }
     const auto settled = impl.settle_contact(data, start);
     if (!settled) return tl::unexpected(settled.error());
     outcome = *settled;

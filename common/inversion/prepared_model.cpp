@@ -10,6 +10,7 @@
 #include "common/core/statistics.hpp"
 #include "common/core/units.hpp"
 #include "common/fem/gravity.hpp"
+#include "common/inversion/prior_scales.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -34,11 +35,11 @@ double measure_full_solve_ms(const contact::ForwardModel& forward) {
   return percentile(times_ms, 50.0);
 }
 
-prior::ForcePrior build_prior(const BrainModel& model, const CaseConfig& config) {
-  return prior::ForcePrior(model.mesh.nodes, fem::nodal_volumes(model.mesh),
-                           config.prior.correlation_length_mm,
-                           units::force_density_from_n_m3(config.prior.force_density_sd_n_m3),
-                           gravity_modes(model, config));
+prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config,
+                              Eigen::MatrixXd modes) {
+  return prior::ForcePrior(
+      model.mesh.nodes, fem::nodal_volumes(model.mesh), config.correlation_length_mm,
+      units::force_density_from_n_m3(config.force_density_sd_n_m3), std::move(modes));
 }
 
 }  // namespace
@@ -67,13 +68,14 @@ Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config)
 }
 
 prior::ForcePrior scaled_prior(const PreparedModel& model, const std::array<double, 3>& scales) {
-  CaseConfig config = model.config();
-  config.prior.force_density_sd_n_m3 *= scales[2];
+  PriorConfig config = model.config().prior;
+  config.force_density_sd_n_m3 *= scales[2];
   Eigen::MatrixXd modes = model.prior().modes();
-  for (Eigen::Index j = 0; j < modes.cols(); ++j) modes.col(j) *= scales[j % 3 == 0 ? 0 : 1];
-  const TetMesh& mesh = model.model().mesh;
-  return {mesh.nodes, fem::nodal_volumes(mesh), config.prior.correlation_length_mm,
-          units::force_density_from_n_m3(config.prior.force_density_sd_n_m3), std::move(modes)};
+  const int gravity_modes = static_cast<int>(modes.cols());
+  for (int j = 0; j < gravity_modes; ++j) {
+    modes.col(j) *= scales[static_cast<std::size_t>(prior_part(j, gravity_modes))];
+  }
+  return build_prior(model.model(), config, std::move(modes));
 }
 
 PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
@@ -92,7 +94,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   if (!forward) return tl::unexpected(forward.error());
   const auto prior_start = Clock::now();
   report(progress, "prior", 0.0);
-  prior::ForcePrior prior = build_prior(*model, config);
+  prior::ForcePrior prior = build_prior(*model, config.prior, gravity_modes(*model, config));
   const double prior_s = seconds_since(prior_start);
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));

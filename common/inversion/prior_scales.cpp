@@ -31,12 +31,6 @@ PriorScales::PriorScales(int gravity_modes, ModeWindow window, int max_common)
   mean_.resize(most);
 }
 
-int PriorScales::part(int mode) const {
-  const int column = window_.first + mode;
-  if (column >= gravity_modes_) return 2;
-  return column % 3 == 0 ? 0 : 1;
-}
-
 bool PriorScales::slope(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
                         Slope& out) {
   const Eigen::Index size = gram.rows(), common = size - window_.count;

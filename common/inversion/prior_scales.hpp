@@ -27,6 +27,12 @@ namespace brainshift::inversion {
 // A standard deviation of ln s of ln 3: two of them are an order of magnitude.
 inline constexpr double kLogVarianceSd = 2.1972245773362196;  // 2 ln 3
 
+// The part that a column of CondensedOperators::modes belongs to, or of the prior's gravity modes: along, across, other.
+inline int prior_part(int column, int gravity_modes) {
+  if (column >= gravity_modes) return 2;
+  return column % 3 == 0 ? 0 : 1;
+}
+
 class PriorScales {
  public:
   // gravity_modes: as in CondensedOperators; their columns come in triples (along, across, across).
@@ -50,7 +56,7 @@ class PriorScales {
     Parts gradient;
     Eigen::Matrix<double, kParts, kParts> information;
   };
-  int part(int mode) const;
+  int part(int mode) const { return prior_part(window_.first + mode, gravity_modes_); }
   bool slope(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right, Slope& out);
 
   int gravity_modes_;

@@ -34,6 +34,8 @@ class SampledOperators {
   // the brain, or outside the region where the case refuses that (named). scale: of the prior's standard deviation, for what the modes leave out. Preconditions: check_data; reserve(data.size()).
   Status sample(const SparseData& data, double scale);
   int size() const { return size_; }
+  // Whether any datum's variance depends on `scale`.
+  bool outside_region() const { return outside_region_ > 0; }
   int common() const { return common_; }             // q
   double sd(int datum) const { return sd_[datum]; }  // mm, with what the modes leave out
   auto free_body() const {

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "common/fem/biot_matrix.hpp"
 #include "common/inversion/set_search.hpp"
 
 namespace brainshift::server {
@@ -23,30 +24,12 @@ std::string at_most_mm(double error_mm) {
                                  : std::string("unknown");
 }
 
-double volume_mm3(const TetMesh& mesh) {
-  double six_volumes = 0.0;
-  for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t) {
-    const Vec3 origin = mesh.nodes.col(mesh.tets(0, t));
-    const Vec3 a = mesh.nodes.col(mesh.tets(1, t)) - origin;
-    const Vec3 b = mesh.nodes.col(mesh.tets(2, t)) - origin;
-    const Vec3 c = mesh.nodes.col(mesh.tets(3, t)) - origin;
-    six_volumes += a.dot(b.cross(c));
-  }
-  return six_volumes / 6.0;
-}
-
 }  // namespace
 
 double consolidation_time_s(const TetMesh& mesh, const Material& material) {
-  const double shear_pa = material.shear_modulus_pa;
-  const double lame_pa =
-      2.0 * shear_pa * material.poisson_ratio / (1.0 - 2.0 * material.poisson_ratio);
-  const double alpha = material.biot_coefficient;
-  const double capacity_per_pa =
-      material.storage_per_pa + alpha * alpha / (lame_pa + 2.0 * shear_pa);
-  const double c_v_m2_s = material.permeability_m3_s_kg / capacity_per_pa;
-  const double radius_m = 1e-3 * std::cbrt(3.0 * volume_mm3(mesh) / (4.0 * std::numbers::pi));
-  return radius_m * radius_m / c_v_m2_s;
+  const double volume_mm3 = fem::nodal_volumes(mesh).sum();
+  const double radius_mm = std::cbrt(3.0 * volume_mm3 / (4.0 * std::numbers::pi));
+  return radius_mm * radius_mm / fem::consolidation_coefficient(fem::poro_material_from(material));
 }
 
 double undrained_fraction(double seconds, double consolidation_time_s) {

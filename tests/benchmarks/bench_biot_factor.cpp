@@ -18,6 +18,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/io/config_file.hpp"
 #include "common/scene/brain_model_builder.hpp"
+#include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
 namespace {
@@ -29,14 +30,7 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-template <typename T>
-T value_or_exit(Result<T> result) {
-  if (!result) {
-    std::fprintf(stderr, "%s\n", result.error().message.c_str());
-    std::exit(2);
-  }
-  return std::move(*result);
-}
+using bench::value_or_exit;
 
 template <typename Work>
 double median_ms(int repetitions, const Work& work) {

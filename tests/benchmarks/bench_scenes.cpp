@@ -14,16 +14,12 @@
 #include "common/io/config_file.hpp"
 #include "common/scene/brain_model_builder.hpp"
 #include "common/scene/scene_plan.hpp"
+#include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
 namespace {
 
-template <typename T>
-T value_or_exit(Result<T> result) {
-  if (result) return std::move(*result);
-  std::fprintf(stderr, "%s\n", result.error().message.c_str());
-  std::exit(2);
-}
+using bench::value_or_exit;
 
 SparseData data_of(const LandmarkPairs& pairs, double sigma_mm) {
   return {pairs.undeformed, pairs.deformed - pairs.undeformed,

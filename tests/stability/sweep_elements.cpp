@@ -34,8 +34,8 @@ forward::ForwardProblem block_under_weight(fem::Element element, double nu) {
 
 void one_ratio(fem::Element element, double nu, Point point, const Options& options) {
   point.sheet = "elements";
-  point.parameter = "Poisson's ratio";
-  point.x = nu;
+  point.parameter = "0.5 - Poisson's ratio";
+  point.x = 0.5 - nu;  // the ratios crowd near 0.5
   point.unit = "relative";
   point.row = element == fem::Element::kP1 ? "linear tetrahedra" : "quadratic tetrahedra";
   point.must_warn = element == fem::Element::kP1 && nu > kLocks;

@@ -37,8 +37,8 @@ void poisson_ratio(const Options& options) {
     config.material.poisson_ratio = nu;
     Point point;
     point.sheet = "material";
-    point.parameter = "Poisson's ratio (linear tetrahedra)";
-    point.x = nu;
+    point.parameter = "0.5 - Poisson's ratio (linear tetrahedra)";
+    point.x = 0.5 - nu;  // the ratios crowd near 0.5
     point.must_warn = nu > 0.48;
     one_patient(config, point, options);
   }

@@ -66,7 +66,7 @@ Course centre_course(int cells, double poisson_ratio) {
   }
   dofs.finalise();
   BiotLoad load;
-  load.force = pressure_load(mesh, faces_of(mesh, drained), kLoad);
+  load.force = pressure_load(make_space(mesh, Element::kP1), faces_of(mesh, drained), kLoad);
   auto stepper =
       BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs, drained);
   EXPECT_TRUE(stepper.has_value());

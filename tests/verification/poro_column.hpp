@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/fem/biot.hpp"
+#include "common/fem/space_elasticity.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 
@@ -56,7 +57,7 @@ struct Column {
       if (mesh.nodes(0, n) == 0.0 && mesh.nodes(1, n) == 0.0) axis.push_back(n);
     }
     dofs.finalise();
-    load.force = pressure_load(mesh, faces_of(mesh, top), q);
+    load.force = pressure_load(make_space(mesh, Element::kP1), faces_of(mesh, top), q);
   }
   BiotStepper stepper(const PoroMaterial& material, const BiotOptions& options = {}) const {
     auto built = BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs,

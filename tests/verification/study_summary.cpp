@@ -94,7 +94,11 @@ std::vector<Chart> charts_of(const CsvTable& points) {
         series->dash_px = 10.0;
       }
     }
-    series->points.push_back({points.number(row, "x"), points.number(row, "y"), ""});
+    // What is known exactly is recorded beside every mesh; once will do.
+    const double x_value = points.number(row, "x"), y_value = points.number(row, "y");
+    const bool known = std::any_of(series->points.begin(), series->points.end(),
+                                   [&](const auto& p) { return p.x == x_value && p.y == y_value; });
+    if (!known) series->points.push_back({x_value, y_value, ""});
   }
   return charts;
 }

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// For benchmarks that have nothing to say but the first error.
+#pragma once
+
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "common/core/error.hpp"
+
+namespace brainshift::bench {
+
+// The value, or the sentence on stderr and exit status 2.
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (result) return std::move(*result);
+  std::fprintf(stderr, "benchmark: %s\n", result.error().message.c_str());
+  std::exit(2);
+}
+
+}  // namespace brainshift::bench
