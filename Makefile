@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test bench verify stability format format-check tidy image clean
+.PHONY: help setup configure build demo test bench verify stability sensing format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -39,6 +39,12 @@ verify: configure ## the solver against closed forms and series, into out/verify
 stability: configure ## sweeps to the edges of what may be asked, maps and summary.json, into out/stability
 	cmake --build --preset $(PRESET) -j $(JOBS) --target stability_programs
 	cmake/scripts/stability.sh $(BUILD)/bin
+
+sensing: setup ## registration, ultrasound, stereopsis, joint data: accuracy and time, into out/sensing
+	@docker/install-packages.sh docker/packages-sensing.txt
+	@cmake --preset $(PRESET) --log-level=WARNING
+	cmake --build --preset $(PRESET) -j $(JOBS) --target sensing_programs
+	cmake/scripts/sensing.sh $(BUILD)
 
 format: ## rewrite the C++ sources in the house format
 	@cmake/scripts/clang-format.sh write

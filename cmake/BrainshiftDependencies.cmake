@@ -50,6 +50,11 @@ foreach(module core imgproc imgcodecs)
   target_link_libraries(brainshift_opencv INTERFACE ${OPENCV_${module}_LIBRARY})
 endforeach()
 
+# For the one folder that sees with two cameras.
+find_library(OPENCV_calib3d_LIBRARY opencv_calib3d REQUIRED)
+add_library(brainshift_opencv_calib3d INTERFACE)
+target_link_libraries(brainshift_opencv_calib3d INTERFACE ${OPENCV_calib3d_LIBRARY} brainshift_opencv)
+
 # libnifti's own CMake package names targets that Debian does not install. libnifti2 reads NIfTI-1 and -2;
 # libniftiio has the same symbols for NIfTI-1 alone, so only one is linked.
 find_path(NIFTI_INCLUDE_DIR nifti2_io.h PATH_SUFFIXES nifti REQUIRED)

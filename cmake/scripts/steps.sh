@@ -31,6 +31,14 @@ empty_folder() {
   mkdir -p "$1"
 }
 
+# empty_study DIR: the tables that study_record.hpp appends to, with their headings.
+empty_study() {
+  empty_folder "$1"
+  echo "study,series,x_name,y_name,x,y" >"$1/points.csv"
+  echo "study,name,value,bound,pass,source" >"$1/checks.csv"
+  echo "study,reason" >"$1/left_out.csv"
+}
+
 # start_daemon MODEL: on a free loopback port; sets `endpoint` and `daemon`.
 start_daemon() {
   local pipe=$out/daemon.pipe line

@@ -12,9 +12,7 @@ out=${2:-out/verify}
 name=verify
 . cmake/scripts/steps.sh
 
-empty_folder "$out"
-echo "study,series,x_name,y_name,x,y" >"$out/points.csv"
-echo "study,name,value,bound,pass,source" >"$out/checks.csv"
+empty_study "$out"
 status=0
 tests() {
   BRAINSHIFT_STUDY_DIR=$(realpath "$out") \

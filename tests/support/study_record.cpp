@@ -49,4 +49,8 @@ bool record_check(const std::string& study, const std::string& name, double valu
   return pass;
 }
 
+void record_left_out(const std::string& study, const std::string& reason) {
+  append("left_out.csv", cell(study) + "," + cell(reason));
+}
+
 }  // namespace brainshift::test_support

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Turns what the verification tests recorded (tests/support/study_record.hpp) into one chart per study, tables.md and
-// summary.json. Exit status 0 only if there are checks and every one holds.
+// Turns what studies recorded (study_record.hpp) into one chart per study, tables.md and summary.json. Exit status 0
+// only if there are checks and every one holds.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 
-namespace brainshift::verification {
+namespace brainshift::test_support {
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,6 +29,7 @@ struct Arguments {
   fs::path folder = "out/verify";
   std::string commit = "unknown";
   std::string command = "ctest --preset release -L verification";
+  std::string title = "Verification";  // of the charts, before the study's name
 };
 
 // Errors, sizes, times and the like span powers of ten; positions and pressures do not.
@@ -58,7 +59,7 @@ struct Chart {
 };
 
 // One chart per study and pair of axes, one line per series, in the order of the record.
-std::vector<Chart> charts_of(const CsvTable& points) {
+std::vector<Chart> charts_of(const CsvTable& points, const std::string& title) {
   const cv::Scalar colours[] = {palette::kBlue,   palette::kVermillion, palette::kGreen,
                                 palette::kPurple, palette::kOrange,     palette::kSkyBlue};
   const Marker markers[] = {Marker::kCircle, Marker::kSquare, Marker::kTriangle};
@@ -72,7 +73,7 @@ std::vector<Chart> charts_of(const CsvTable& points) {
     });
     if (chart == charts.end()) {
       chart = charts.insert(charts.end(), {study, {}});
-      chart->spec.title = "Verification: " + study;
+      chart->spec.title = title + ": " + study;
       chart->spec.x = {x, logarithmic(points.text(row, "x_name"))};
       chart->spec.y = {y, logarithmic(points.text(row, "y_name"))};
     }
@@ -149,7 +150,9 @@ Result<bool> run(const Arguments& arguments) {
   if (!points) return tl::unexpected(points.error());
   const auto rows = CsvTable::read(arguments.folder / "checks.csv");
   if (!rows) return tl::unexpected(rows.error());
-  const auto names = draw(charts_of(*points), arguments.folder);
+  const auto left_out = CsvTable::read(arguments.folder / "left_out.csv");
+  if (!left_out) return tl::unexpected(left_out.error());
+  const auto names = draw(charts_of(*points, arguments.title), arguments.folder);
   if (!names) return tl::unexpected(names.error());
   std::vector<bench::Check> checks;
   bool pass = rows->rows() > 0;
@@ -162,8 +165,13 @@ Result<bool> run(const Arguments& arguments) {
                 bench::csv_number(check.value, 4).c_str(), check.bound.c_str());
     checks.push_back(std::move(check));
   }
+  std::vector<std::string> not_run;
+  for (std::size_t row = 0; row < left_out->rows(); ++row) {
+    not_run.push_back(left_out->text(row, "study") + ": " + left_out->text(row, "reason"));
+    std::printf("%-6s %s\n", "left", not_run.back().c_str());
+  }
   Status ok =
-      client::write_file(arguments.folder / "summary.json", bench::to_json(checks, {}))
+      client::write_file(arguments.folder / "summary.json", bench::to_json(checks, not_run))
           .and_then([&] {
             return client::write_file(arguments.folder / "tables.md", markdown(*rows, arguments));
           });
@@ -174,19 +182,19 @@ Result<bool> run(const Arguments& arguments) {
 }
 
 }  // namespace
-}  // namespace brainshift::verification
+}  // namespace brainshift::test_support
 
 int main(int argc, char** argv) {
   using namespace brainshift;
-  CLI::App app{"Charts, table and checks of what the verification tests recorded.",
-               "study_summary"};
-  verification::Arguments arguments;
+  CLI::App app{"Charts, table and checks of what studies recorded.", "study_summary"};
+  test_support::Arguments arguments;
   app.add_option("--dir", arguments.folder,
-                 "folder with points.csv and checks.csv; results go there")
+                 "folder with points.csv, checks.csv and left_out.csv; results go there")
       ->capture_default_str();
   app.add_option("--commit", arguments.commit, "for tables.md")->capture_default_str();
   app.add_option("--command", arguments.command, "that the figures come from")
       ->capture_default_str();
+  app.add_option("--title", arguments.title, "of the charts")->capture_default_str();
   app.footer("Exit status: 0 every check holds, 1 one does not or failure, 2 bad usage or input.");
   try {
     app.parse(argc, argv);
@@ -195,7 +203,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "study_summary: %s (see study_summary --help)\n", error.what());
     return 2;
   }
-  const auto pass = verification::run(arguments);
+  const auto pass = test_support::run(arguments);
   if (pass) return *pass ? 0 : 1;
   std::fprintf(stderr, "study_summary: %s\n", pass.error().message.c_str());
   return pass.error().code == ErrorCode::kWriteFailed ? 1 : 2;

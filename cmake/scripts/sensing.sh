@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# sensing.sh BUILD_DIR [OUT_DIR]: from what the room measures to sparse data, accuracy and time (docs/sensing.md).
+# Writes OUT_DIR (default: out/sensing; emptied first): points.csv, checks.csv, left_out.csv, charts, tables.md,
+# summary.json. Exit status 0 only if every check holds. BRAINSHIFT_EXTERNAL_DATA: folder of recorded data; without it
+# those checks are reported as left out.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+build=${1:?usage: sensing.sh BUILD_DIR [OUT_DIR]}
+bin=$build/bin
+out=${2:-out/sensing}
+name=sensing
+. cmake/scripts/steps.sh
+
+empty_study "$out"
+BRAINSHIFT_STUDY_DIR=$(realpath "$out")
+export BRAINSHIFT_STUDY_DIR
+status=0
+study() { step "$1" "$bin/sensing_$1" || status=1; }
+for program in "$bin"/sensing_*; do
+  [ -x "$program" ] && study "${program##*/sensing_}"
+done
+commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
+current=summary
+"$bin/study_summary" --dir "$out" --commit "$commit" --command "make sensing" --title Sensing || status=1
+exit "$status"
