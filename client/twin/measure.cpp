@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/measure.hpp"
 
+#include <Eigen/Geometry>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::twin {
 namespace {
+
+constexpr std::uint64_t kSeeds = std::uint64_t{1} << 53;
 
 // Points every `spacing` along the polyline that the segments make up, in the order they come in.
 void walk_segments(const Points& segments, double spacing, std::vector<Vec3>& points) {
@@ -41,6 +45,28 @@ LandmarkPairs measure_displacements(const Points& undeformed, const Points& disp
   add_noise(pairs.deformed, noise_sd_mm, random);
   pairs.sd_mm = noise_sd_mm / std::sqrt(3.0);
   return pairs;
+}
+
+CorticalSurface measure_cortex(const TriangleSurface& deformed, const CortexView& view,
+                               Random& random) {
+  const auto count =
+      static_cast<int>(std::lround(view.points_per_mm2 * geometry::area(deformed)));
+  Points points = geometry::sample_surface(deformed, count, random.index(kSeeds));
+  for (Eigen::Index i = 0; i < points.size(); ++i) {
+    points.data()[i] += view.noise_sd_mm * random.normal();
+  }
+  const auto draw = [&](double sd) {
+    return Vec3(sd * random.normal(), sd * random.normal(), sd * random.normal());
+  };
+  const Vec3 turn = draw(view.pose_sd_deg * std::numbers::pi / 180.0);
+  const Vec3 shift = draw(view.pose_sd_mm);
+  const Vec3 centre = deformed.vertices.rowwise().mean();
+  const Mat3 rotation = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
+  CorticalSurface surface;
+  surface.surface.vertices =
+      (rotation * (points.colwise() - centre)).colwise() + Vec3(centre + shift);
+  surface.sd_mm = view.noise_sd_mm;
+  return surface;
 }
 
 TumourBoundary measure_probe_sections(const TriangleSurface& deformed_tumour,

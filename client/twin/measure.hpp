@@ -24,4 +24,9 @@ TumourBoundary measure_probe_sections(const TriangleSurface& deformed_tumour,
                                       const Vec3& probe_position, const Scenario& scenario,
                                       Random& random);
 
+// Points of a deformed piece of cortex, drawn by area, with noise per component and the error of the camera's pose. No
+// triangles: what is measured is points.
+CorticalSurface measure_cortex(const TriangleSurface& deformed, const CortexView& view,
+                               Random& random);
+
 }  // namespace brainshift::twin

@@ -67,11 +67,53 @@ Scenario no_contact() {
   return scenario;
 }
 
+// Tumour boundary and exposed cortex, both to be registered.
+Scenario joint(Scenario scenario, const char* name, const char* description) {
+  scenario.name = name;
+  scenario.description = description;
+  scenario.measurement = Measurement::kProbeSections;
+  scenario.sparse_points = 0;
+  scenario.interval_s = 300.0;
+  scenario.cortex = CortexView{};
+  scenario.cortex->tracks = 20;
+  return scenario;
+}
+
+Scenario joint_sag() {
+  return joint(paper(), "joint-sag",
+               "the paper's sag, seen by ultrasound, by a stereo camera and by 20 vessel forks");
+}
+
+Scenario joint_distension() {
+  return joint(distension(), "joint-distension",
+               "brain swelling, seen by ultrasound, stereo camera and vessel forks");
+}
+
+// Gravity that pulls beside its known direction shifts the cortex along itself.
+Scenario joint_tangential() {
+  Scenario scenario = joint(paper(), "joint-tangential",
+                            "a sag 25 degrees beside the direction that the case knows, along the "
+                            "exposed cortex; ultrasound, stereo camera, vessel forks");
+  scenario.gravity_tilt_deg = 25.0;
+  return scenario;
+}
+
+Scenario joint_mixed() {
+  Scenario scenario = joint(paper(), "joint-mixed",
+                            "sag 12 degrees beside its known direction with swelling deep to the "
+                            "tumour; ultrasound, stereo camera, vessel forks");
+  scenario.fluid_levels_mm = {30.0};
+  scenario.gravity_tilt_deg = 12.0;
+  scenario.swelling = {0.25, 45.0, 15.0};
+  return scenario;
+}
+
 }  // namespace
 
 const std::vector<Scenario>& all_scenarios() {
-  static const std::vector<Scenario> scenarios = {paper(), paper_icp(), distension(),
-                                                  sag_progress(), no_contact()};
+  static const std::vector<Scenario> scenarios = {
+      paper(),      paper_icp(), distension(),       sag_progress(),     no_contact(),
+      joint_sag(), joint_distension(), joint_tangential(), joint_mixed()};
   return scenarios;
 }
 

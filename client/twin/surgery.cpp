@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/surgery.hpp"
 
+#include <Eigen/Geometry>
+#include <numbers>
 #include <set>
 #include <string>
 #include <utility>
@@ -9,9 +11,12 @@
 #include "client/twin/truth.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/geometry/tet_locator.hpp"
+#include "common/registration/surface_distances.hpp"
 
 namespace brainshift::twin {
 namespace {
+
+constexpr double kBetweenInstruments_s = 2.0;
 
 Vec3 value_at(const io::ScorePoint& point, const Points& u) {
   Vec3 value = Vec3::Zero();
@@ -40,7 +45,7 @@ struct Moment {
 };
 
 io::SurgeryTruth record_truth(const BrainModel& model, const Scenario& scenario,
-                              const std::vector<io::ScorePoint>& pool, Moment moment) {
+                              const std::vector<io::ScorePoint>& pool, const Moment& moment) {
   io::SurgeryTruth record;
   const std::set<int> sparse(moment.sparse.begin(), moment.sparse.end());
   for (int i = 0; i < static_cast<int>(pool.size()); ++i) {
@@ -51,7 +56,7 @@ io::SurgeryTruth record_truth(const BrainModel& model, const Scenario& scenario,
     record.points["craniotomy"].push_back(
         {Eigen::Vector4i::Constant(node), Eigen::Vector4d(1, 0, 0, 0)});
   }
-  record.displacement = std::move(moment.truth.displacement);
+  record.displacement = moment.truth.displacement;
   auto& scalars = record.scalars;
   scalars["fluid_level_mm"] = moment.fluid_level_mm;
   scalars["noise_sd_mm"] = scenario.noise_sd_mm;
@@ -85,20 +90,73 @@ TumourBoundary measure_sections(const BrainModel& model, const Scenario& scenari
   return measure_probe_sections(deformed, craniotomy_centre(model), scenario, random);
 }
 
-Observation observe(const BrainModel& model, const Scenario& scenario, const Moment& moment,
-                    std::size_t index, Random& random) {
-  Observation observation;
-  observation.case_id = model.case_id;
-  observation.source = "ius";
-  observation.sequence = index + 1;
-  observation.acquired_ns =
-      static_cast<std::int64_t>(1e9 * scenario.interval_s * static_cast<double>(index));
+Points at_nodes(const Points& nodal, const std::vector<NodeIndex>& nodes) {
+  return nodal(Eigen::all, nodes);
+}
+
+CorticalSurface view_cortex(const registration::SurfacePatch& patch, const CortexView& view,
+                            const Moment& moment, Random& random) {
+  const TriangleSurface deformed{
+      patch.surface.vertices + at_nodes(moment.truth.displacement, patch.nodes),
+      patch.surface.triangles};
+  return measure_cortex(deformed, view, random);
+}
+
+LandmarkPairs track_cortex(const registration::SurfacePatch& patch, const CortexView& view,
+                           const Moment& moment, Random& random) {
+  const int available = static_cast<int>(patch.nodes.size());
+  const std::vector<int> chosen = random.choose(view.tracks, available);
+  const Points u = at_nodes(moment.truth.displacement, patch.nodes);
+  return measure_displacements(patch.surface.vertices(Eigen::all, chosen), u(Eigen::all, chosen),
+                               view.track_noise_sd_mm, random);
+}
+
+// What every instrument says of one moment, one after the other.
+std::vector<Observation> observe(const BrainModel& model, const Scenario& scenario,
+                                 const Moment& moment, double time_s, Random& random) {
+  std::vector<Observation> observations;
+  const auto add = [&](const char* source, auto body) {
+    Observation observation;
+    observation.case_id = model.case_id;
+    observation.source = source;
+    observation.acquired_ns = static_cast<std::int64_t>(
+        1e9 * (time_s + kBetweenInstruments_s * static_cast<double>(observations.size())));
+    observation.body = std::move(body);
+    observations.push_back(std::move(observation));
+  };
   if (scenario.measurement == Measurement::kDisplacements) {
-    observation.body = measure_sparse(model, scenario, moment, random);
+    add("ius", measure_sparse(model, scenario, moment, random));
   } else {
-    observation.body = measure_sections(model, scenario, moment, random);
+    add("ius", measure_sections(model, scenario, moment, random));
   }
-  return observation;
+  if (scenario.cortex) {
+    const registration::SurfacePatch patch = registration::craniotomy_patch(model);
+    add("stereopsis", view_cortex(patch, *scenario.cortex, moment, random));
+    if (scenario.cortex->tracks > 0) {
+      add("tracks", track_cortex(patch, *scenario.cortex, moment, random));
+    }
+  }
+  return observations;
+}
+
+// What pulls: the case's gravity, turned about the craniotomy's outward axis (through the tumour), and the fluid plane
+// through the lowest craniotomy node, perpendicular to it.
+struct Gravity {
+  Vec3 direction;
+  double fluid_plane_depth_mm = 0.0;
+};
+
+Gravity gravity_of(const BrainModel& model, const Scenario& scenario) {
+  if (scenario.gravity_tilt_deg == 0.0) {
+    return {model.gravity_direction, model.fluid_plane_depth_mm};
+  }
+  const Vec3 axis =
+      (craniotomy_centre(model) - Vec3(model.tumour.vertices.rowwise().mean())).normalized();
+  const Vec3 direction =
+      Eigen::AngleAxisd(scenario.gravity_tilt_deg * std::numbers::pi / 180.0, axis) *
+      model.gravity_direction;
+  const Points nodes = at_nodes(model.mesh.nodes, model.craniotomy);
+  return {direction, (direction.transpose() * nodes).maxCoeff()};
 }
 
 Status keeps_promise(const Scenario& scenario, const Truth& truth) {
@@ -125,7 +183,7 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   const std::vector<io::ScorePoint> pool = tumour_pool(model);
   const Points swelling = swelling_load(
       model.mesh, config.material, swelling_centre(model, scenario.swelling), scenario.swelling);
-  const Vec3 g = model.gravity_direction;
+  const Gravity gravity = gravity_of(model, scenario);
   TruthSolver solver(forward);
   Random random(seed);
   SimulatedSurgery surgery;
@@ -134,9 +192,10 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
     report(progress, "solve with contact", static_cast<double>(i) / static_cast<double>(moments));
     Moment moment;
     moment.fluid_level_mm = scenario.fluid_levels_mm[i];
-    const Points gravity = fem::buoyancy_load(
-        model.mesh, config.material, g, model.fluid_plane_depth_mm + moment.fluid_level_mm, g);
-    auto truth = solver.solve(gravity + swelling);
+    const Points buoyancy = fem::buoyancy_load(
+        model.mesh, config.material, gravity.direction,
+        gravity.fluid_plane_depth_mm + moment.fluid_level_mm, gravity.direction);
+    auto truth = solver.solve(buoyancy + swelling);
     if (!truth) return tl::unexpected(truth.error());
     if (Status ok = keeps_promise(scenario, *truth); !ok) return tl::unexpected(ok.error());
     moment.truth = std::move(*truth);
@@ -146,8 +205,13 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
           value_at(pool[static_cast<std::size_t>(k)], moment.truth.displacement);
     }
     moment.sparse = random.choose(scenario.sparse_points, model.tumour.num_vertices());
-    surgery.observations.push_back(observe(model, scenario, moment, i, random));
-    surgery.truths.push_back(record_truth(model, scenario, pool, std::move(moment)));
+    const double time_s = scenario.interval_s * static_cast<double>(i);
+    const io::SurgeryTruth record = record_truth(model, scenario, pool, moment);
+    for (Observation& observation : observe(model, scenario, moment, time_s, random)) {
+      observation.sequence = surgery.observations.size() + 1;
+      surgery.observations.push_back(std::move(observation));
+      surgery.truths.push_back(record);
+    }
   }
   report(progress, "solve with contact", 1.0);
   return surgery;

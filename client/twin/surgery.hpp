@@ -16,7 +16,7 @@
 
 namespace brainshift::twin {
 
-// One entry per moment of the scenario in both.
+// One entry per observation in both: of the moments in turn, every instrument of a moment with the same truth.
 struct SimulatedSurgery {
   std::vector<Observation> observations;  // sequences from 1, acquired_ns from 0
   std::vector<io::SurgeryTruth> truths;

@@ -127,6 +127,10 @@ Status validate(const CaseConfig& config) {
   check.between("inversion.max_iterations", config.inversion.max_iterations, 1, 100000);
   check.between("inversion.relative_misfit_change", config.inversion.relative_misfit_change, 1e-12,
                 1.0);
+  check.between("sensing.max_age_s", config.sensing.max_age_s, 0.0, 1e6);
+  check.between("sensing.surface_points", config.sensing.surface_points, 3, 1e6);
+  check.between("sensing.surface_pose_sd_mm", config.sensing.surface_pose_sd_mm, 0.0, 100.0);
+  check.between("sensing.surface_pose_sd_deg", config.sensing.surface_pose_sd_deg, 0.0, 45.0);
   check.between("condensed.max_rank", config.condensed.max_rank, 1, 2000);
   check.between("condensed.memory_limit_gib", config.condensed.memory_limit_gib, 0.1, 1e4);
   check.between("condensed.deadline_ms", config.condensed.deadline_ms, 0.1, 1e6);
@@ -145,6 +149,10 @@ double largest_poisson_ratio(const Material& material) {
     largest = std::max(largest, tissue.poisson_ratio);
   }
   return largest;
+}
+
+std::string_view to_string(SurfaceGuidance guidance) {
+  return guidance == SurfaceGuidance::kDistances ? "distances" : "rigid";
 }
 
 std::string_view to_string(OutsideRegion outside) {

@@ -111,6 +111,26 @@ struct InversionConfig {
   double relative_misfit_change = 0.001;  // eq. 17
 };
 
+// How a measured cortical surface guides the model.
+enum class SurfaceGuidance {
+  kDistances,  // distances along the normal to the deformed model's surface, which may slide; method condensed only
+  kRigid,      // displacements of a rigid alignment, as for the tumour's boundary
+};
+std::string_view to_string(SurfaceGuidance guidance);  // "distances", "rigid"
+
+// What is made of the room's measurements.
+struct SensingConfig {
+  // Observations of other sources are used beside the newest one while they are not older than this.
+  double max_age_s = 120.0;
+  // Method condensed: data far from what the others and the prior say count less (robust_weights.hpp).
+  bool robust_weights = true;
+  SurfaceGuidance surface = SurfaceGuidance::kDistances;
+  int surface_points = 300;  // that guide the model
+  // How well the camera's pose is known: an error that all points of a surface share.
+  double surface_pose_sd_mm = 0.2;
+  double surface_pose_sd_deg = 0.2;
+};
+
 // What becomes of data outside the region that was prepared (method condensed).
 enum class OutsideRegion {
   kExtend,  // all modes are read there; what they leave out of the prior is added to the datum's variance
@@ -164,6 +184,7 @@ struct CaseConfig {
   ContactConfig contact;
   PriorConfig prior;
   InversionConfig inversion;
+  SensingConfig sensing;
   CondensedConfig condensed;
   SceneConfig scene;
 };

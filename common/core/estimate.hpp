@@ -58,6 +58,24 @@ struct ContactSummary {
   int iterations = 0;  // contact iterations (active-set changes)
 };
 
+// How the data of one instrument fared in an update.
+struct SourceSummary {
+  std::string source;                      // Observation::source
+  std::uint64_t observation_sequence = 0;  // the observation they were taken from
+  double age_s = 0.0;                      // behind the newest observation of the update
+  int data = 0;
+  int outliers = 0;  // data whose robust weight fell below one half
+  // Consistency with the other sources: Mahalanobis distance between what this source says and what the others predict
+  // with the prior, squared; its expectation (degrees of freedom) and the probability of a larger one by chance. NaN
+  // for a single source and for methods that do not compute it.
+  double chi_square = std::numeric_limits<double>::quiet_NaN();
+  double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
+  double p_value = std::numeric_limits<double>::quiet_NaN();
+  bool consistent = true;  // p_value is not below kInconsistent
+};
+// A source that disagrees more than once in a thousand surgeries by chance is said to contradict the others.
+inline constexpr double kInconsistent = 1e-3;
+
 struct Estimate {
   EstimateStatus status = EstimateStatus::kNotRun;
   std::string reason;   // one sentence: why it stopped
@@ -78,6 +96,7 @@ struct Estimate {
   // is no deformation of tissue. NaN before it was looked at.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
   int inverted_elements = 0;
+  std::vector<SourceSummary> sources;  // in the order of the data; empty for data without named sources
   double rebuild_ms =
       0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };

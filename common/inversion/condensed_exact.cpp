@@ -295,6 +295,7 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
   const auto start = Clock::now();
   Impl& impl = *impl_;
   if (auto status = check_data(data); !status) return status;
+  if (auto status = check_whole(data); !status) return status;
   if (auto status = impl.locate(data); !status) return status;
   impl.sample(data);
 

@@ -10,22 +10,21 @@
 #include <vector>
 
 #include "common/core/thread_team.hpp"
-#include "common/fem/blas.hpp"
 #include "common/fem/blas_threads.hpp"
 #include "common/inversion/contact_reduction.hpp"
 #include "common/inversion/data_check.hpp"
 #include "common/inversion/estimate_check.hpp"
 #include "common/inversion/field_rebuild.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/mode_posterior.hpp"
 #include "common/inversion/prior_scales.hpp"
+#include "common/inversion/robust_weights.hpp"
 #include "common/inversion/sampled_operators.hpp"
 #include "common/inversion/set_search.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
-namespace blas = fem::blas;
-using Eigen::MatrixXd;
 using Clock = std::chrono::steady_clock;
 
 double milliseconds_since(Clock::time_point start) {
@@ -35,8 +34,9 @@ double milliseconds_since(Clock::time_point start) {
 // From here on the reason says that the data are not explained. 600 independent residuals exceed it by chance never.
 constexpr double kUnexplained = 1.5;
 
-// Contact and scales settle in turn; twice is the rule when a surgery begins, once later.
-constexpr int kScaleRounds = 4;
+// Contact, scales, robust weights and places of moving data settle in turn; twice is the rule when a surgery begins,
+// once later.
+constexpr int kMaxRounds = 6;
 
 // Into memory that `reason` has already.
 void set_reason(EstimateStatus outcome, const SetSearch& search, const CondensedConfig& config,
@@ -66,6 +66,25 @@ void set_reason(EstimateStatus outcome, const SetSearch& search, const Condensed
   }
 }
 
+// What single data and single sources are worth beside the others.
+void append_sources(Estimate& estimate) {
+  for (const SourceSummary& source : estimate.sources) {
+    char text[240];
+    if (source.outliers > 0) {
+      std::snprintf(text, sizeof text, "; %d of %d data of \"%.64s\" count less as outliers",
+                    source.outliers, source.data, source.source.c_str());
+      estimate.reason.append(text);
+    }
+    if (!source.consistent) {
+      std::snprintf(text, sizeof text,
+                    "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of "
+                    "freedom",
+                    source.source.c_str(), source.chi_square, source.degrees_of_freedom);
+      estimate.reason.append(text);
+    }
+  }
+}
+
 }  // namespace
 
 struct CondensedInverter::Impl {
@@ -81,16 +100,12 @@ struct CondensedInverter::Impl {
         deformation(given_locator->nodes(), given_locator->tets(), team),
         sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
         reduction(*operators, window, config.contact.penalty_n_per_mm, team),
+        posterior(window),
         rebuild(*operators, window, options.region_of_interest),
         scales(operators->gravity_modes, window, SparseData::kMaxCommonErrors),
         estimate_scales(config.prior.estimate_scales),
+        robust(config.sensing.robust_weights),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
-    const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
-    gram_storage.resize(most * most);
-    normal_storage.resize(most * most);
-    right.setZero(most);
-    solution.setZero(most);
-    z.setZero(window.count);
     for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
       const NodeIndex node = operators->slaves[static_cast<std::size_t>(slave)];
       const auto& region = options.region_of_interest;
@@ -98,15 +113,18 @@ struct CondensedInverter::Impl {
         rebuilt_slaves.push_back(slave);
       }
     }
+    history.reserve(static_cast<std::size_t>(kMaxRounds + 1) *
+                    static_cast<std::size_t>(condensed.max_contact_iterations + 1));
     reserve(options.capacity);
   }
 
   // Grows what depends on the number of data; nothing happens while they fit.
   void reserve(int data) {
-    if (3 * data <= jacobian.rows()) return;
-    jacobian.resize(3 * data, SparseData::kMaxCommonErrors + window.count + 1);
-    residual.resize(3 * data);
+    if (data <= norms.size()) return;
+    posterior.reserve(data);
     sampled.reserve(data);
+    weights.reserve(data);
+    norms.resize(data);
   }
 
   static ModeWindow mode_window(const CondensedOperators& operators,
@@ -123,13 +141,21 @@ struct CondensedInverter::Impl {
     search.forget();
     scales.reset();
   }
-  // Contact for the present scales, from the last set on: kConverged, kIterationLimit or kDeadline.
+  // Checks and places data that are new.
+  Status accept(const SparseData& data);
+  // Contact, scales, weights and moving data in turn, until nothing changes. `data` follows `moving`.
+  Result<EstimateStatus> settle(const SparseData*& data, const MovingData* moving,
+                                Clock::time_point start);
+  // Contact for the present scales and weights, from the last set on: kConverged, kIterationLimit or kDeadline.
   Result<EstimateStatus> settle_contact(const SparseData& data, Clock::time_point start);
   // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
-  Status estimate_for_set(const SparseData& data);
+  Status estimate_for_set();
+  bool reweigh(const SparseData& data);
+  Result<bool> relocate(const SparseData& data, const MovingData& moving);
   void record(const SparseData& data, Clock::time_point start);
   Status finish(const SparseData& data, Estimate& estimate);
-  void estimate_omissions(const SparseData& data);
+  void estimate_omissions();
+  void summarise_sources(const SparseData& data, Estimate& estimate);
 
   std::shared_ptr<const CondensedOperators> operators;
   CondensedOptions options;
@@ -140,68 +166,71 @@ struct CondensedInverter::Impl {
   fem::DeformationCheck deformation;
   SampledOperators sampled;
   ContactReduction reduction;
+  ModePosterior posterior;
   FieldRebuild rebuild;
   PriorScales scales;
   bool estimate_scales;
+  RobustWeights weights;
+  bool robust;
   SetSearch search;
 
-  // J^T R^-1 J of (c, z), lower triangle, without the prior.
-  Eigen::Map<MatrixXd> gram() {
-    const Eigen::Index size = sampled.common() + window.count;
-    return {gram_storage.data(), size, size};
-  }
-  // Lower Cholesky factor of the normal equations of (c, z), (q + r) x (q + r).
-  Eigen::Map<MatrixXd> normal() {
-    const Eigen::Index size = sampled.common() + window.count;
-    return {normal_storage.data(), size, size};
-  }
-
-  MatrixXd jacobian;  // whitened [common error | J | d - A G f0], 3m x (q + r + 1)
-  VecX residual;      // whitened d - A u, 3m
-  VecX gram_storage, normal_storage, right, solution, z;
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
-  double misfit_ratio =
-      0.0;  // root mean square of d - A u - common error over its standard deviation
+  VecX norms;                       // of the residuals, per datum
+  SparseData moved;                 // the data where they are now, when they move
+  Points moving_displacement;
   std::vector<IterationRecord> history;
   OmissionErrors errors;
 };
 
-Status CondensedInverter::Impl::estimate_for_set(const SparseData& data) {
-  const Eigen::Index rows = 3 * data.size(), r = window.count, unknowns = sampled.common() + r;
-  auto j = jacobian.topLeftCorner(rows, unknowns + 1);
-  j = sampled.free_body();
-  if (reduction.size() > 0) {  // contact does not touch the common error
-    const auto contact = sampled.contact(reduction.active());
-    const auto response = reduction.response();
-    team.split(r + 1, [&](long begin, long end) {
-      blas::multiply(-1.0, contact, response.middleCols(begin, end - begin), 1.0,
-                     j.middleCols(sampled.common() + begin, end - begin));
-    });
-  }
-  auto g = gram();
-  blas::gram(j.leftCols(unknowns), 0.0, g);
-  auto factor = normal();
-  factor = g;
-  factor.diagonal().head(sampled.common()).array() += 1.0;
-  for (int i = 0; i < r; ++i) {
-    const double scale = scales.of_mode(i);
-    factor(sampled.common() + i, sampled.common() + i) += 1.0 / (scale * scale);
-  }
-  if (!blas::cholesky(factor)) {
-    return fail(ErrorCode::kNotFinite, "inversion: the normal equations are not positive definite");
-  }
-  right.head(unknowns).noalias() = j.leftCols(unknowns).transpose() * j.col(unknowns);
-  auto cz = solution.head(unknowns);
-  cz = right.head(unknowns);
-  blas::solve_lower(factor, cz);
-  blas::solve_lower_transposed(factor, cz);
-  z = cz.tail(r);
-  residual.head(rows) = j.col(unknowns);
-  residual.head(rows).noalias() -= j.leftCols(unknowns) * cz;
-  misfit_ratio = std::sqrt(residual.head(rows).squaredNorm() / static_cast<double>(rows));
-  residual.head(rows).noalias() += j.leftCols(sampled.common()) * cz.head(sampled.common());
-  reduction.update_forces(z);
+Status CondensedInverter::Impl::accept(const SparseData& data) {
+  if (auto status = check_data(data); !status) return status;
+  reserve(data.size());
+  return sampled.locate(data);
+}
+
+Status CondensedInverter::Impl::estimate_for_set() {
+  if (auto status = posterior.solve(sampled, reduction, scales, team); !status) return status;
+  reduction.update_forces(posterior.z());
   return {};
+}
+
+bool CondensedInverter::Impl::reweigh(const SparseData& data) {
+  if (!robust) return false;
+  auto out = norms.head(data.size());
+  for (int i = 0; i < data.size(); ++i) out[i] = posterior.residual_norm(sampled, i);
+  return weights.update(data, out);
+}
+
+Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
+  rebuild.displacement_at(moving.nodes, posterior.z(), reduction, moving_displacement);
+  if (&data != &moved) moved = data;
+  const int before = moved.size();
+  if (!moving.relocate(moving_displacement, moved)) return false;
+  if (auto status = accept(moved); !status) return tl::unexpected(status.error());
+  if (moved.size() != before) weights.reset(moved.size());
+  return true;
+}
+
+Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
+                                                       const MovingData* moving,
+                                                       Clock::time_point start) {
+  bool sample = true;
+  for (int round = 0;; ++round) {
+    if (sample) sampled.sample(*data, scales.of_other(), weights.values());
+    const auto settled = settle_contact(*data, start);
+    if (!settled || *settled != EstimateStatus::kConverged || round == kMaxRounds) return settled;
+    const bool rescaled = estimate_scales && scales.fit(posterior.gram(), posterior.right());
+    const bool reweighed = reweigh(*data);
+    bool relocated = false;
+    if (moving != nullptr) {
+      const auto changed = relocate(*data, *moving);
+      if (!changed) return tl::unexpected(changed.error());
+      relocated = *changed;
+      if (relocated) data = &moved;
+    }
+    if (!rescaled && !reweighed && !relocated) return settled;
+    sample = reweighed || relocated || sampled.outside_region();
+  }
 }
 
 Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData& data,
@@ -212,7 +241,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData&
     if (auto status = reduction.activate(search.current()); !status) {
       return tl::unexpected(status.error());
     }
-    if (auto status = estimate_for_set(data); !status) return tl::unexpected(status.error());
+    if (auto status = estimate_for_set(); !status) return tl::unexpected(status.error());
     record(data, start);
     switch (search.next(reduction.all_forces(), reduction.penetration(),
                         reduction.compliance_diagonal())) {
@@ -230,7 +259,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData&
   if (auto status = reduction.activate(search.best()); !status) {
     return tl::unexpected(status.error());
   }
-  if (auto status = estimate_for_set(data); !status) return tl::unexpected(status.error());
+  if (auto status = estimate_for_set(); !status) return tl::unexpected(status.error());
   record(data, start);
   search.adopt_best();
   return outcome;
@@ -240,7 +269,7 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
   const int m = data.size();
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < m; ++i) {
-    const double norm = residual.segment<3>(3 * i).norm() * sampled.sd(i);
+    const double norm = posterior.misfit(sampled, i) * sampled.sd(i);
     sum += norm;
     squares += norm * norm;
   }
@@ -260,16 +289,15 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
 Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
   const auto start = Clock::now();
   if (options.uncertainty) {
-    // The common error comes first, so the last block is the factor of the Schur complement of z.
     rebuild.standard_deviation(team, reduction,
-                               normal().bottomRightCorner(window.count, window.count),
+                               posterior.factor().bottomRightCorner(window.count, window.count),
                                scales.of_other() * scales.of_other(), estimate.sd_mm);
     // Data that lie farther off than their standard deviations say: so may the estimate (Birge 1932).
-    if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
+    if (posterior.misfit_ratio() > 1.0) estimate.sd_mm *= posterior.misfit_ratio();
   } else {
     estimate.sd_mm.resize(0);
   }
-  rebuild.displacement(team, z, reduction, estimate.displacement);
+  rebuild.displacement(team, posterior.z(), reduction, estimate.displacement);
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, reduction.penetration(),
                                       estimate.displacement);
       !status) {
@@ -278,7 +306,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   const auto measured = deformation.measure(estimate.displacement);
   if (auto status = check_deformation(measured, estimate); !status) return status;
   estimate.rebuild_ms = milliseconds_since(start);
-  estimate_omissions(data);
+  estimate_omissions();
 
   const IterationRecord& last = history.back();
   estimate.misfit_mm = last.misfit_mm;
@@ -292,10 +320,32 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   }
   estimate.history = history;
   estimate.prior_scales = scales.scales();
+  summarise_sources(data, estimate);
   return {};
 }
 
-void CondensedInverter::Impl::estimate_omissions(const SparseData& data) {
+void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate& estimate) {
+  estimate.sources.resize(data.sources.size());
+  for (std::size_t i = 0; i < data.sources.size(); ++i) {
+    const DataSource& source = data.sources[i];
+    SourceSummary& summary = estimate.sources[i];
+    summary = {};
+    summary.source = source.name;
+    summary.data = source.count;
+    summary.outliers = weights.outliers(source.first, source.count);
+    Consistency consistency;
+    if (data.sources.size() < 2 ||
+        !posterior.check_source(sampled, scales, source, consistency)) {
+      continue;
+    }
+    summary.chi_square = consistency.chi_square;
+    summary.degrees_of_freedom = consistency.degrees_of_freedom;
+    summary.p_value = consistency.p_value;
+    summary.consistent = !(consistency.p_value < kInconsistent);
+  }
+}
+
+void CondensedInverter::Impl::estimate_omissions() {
   const VecX& penetration = reduction.penetration();
   errors.nearest_slave_mm =
       penetration.size() > 0 ? -penetration.maxCoeff() : std::numeric_limits<double>::infinity();
@@ -303,12 +353,9 @@ void CondensedInverter::Impl::estimate_omissions(const SparseData& data) {
   errors.far_field_mm = rebuild.far_field_error_mm();
   errors.gravity_modes_mm = 0.0;
   if (!options.gravity_modes) {
-    const Eigen::Index rows = 3 * data.size(), q = sampled.common();
-    const VecX unexplained =
-        residual.head(rows) - jacobian.topLeftCorner(rows, q) * solution.head(q);
-    errors.gravity_modes_mm = gravity_modes_error_mm(sampled, reduction, rebuild,
-                                                     jacobian.topLeftCorner(rows, q + window.count),
-                                                     unexplained, normal());
+    errors.gravity_modes_mm =
+        gravity_modes_error_mm(sampled, reduction, rebuild, posterior.jacobian(),
+                               posterior.residual(), posterior.factor());
   }
 }
 
@@ -328,46 +375,35 @@ Result<CondensedInverter> CondensedInverter::build(
   }
   fem::use_single_threaded_blas();
   auto impl = std::make_unique<Impl>(std::move(operators), std::move(locator), config, options);
-  impl->history.reserve(static_cast<std::size_t>(kScaleRounds + 1) *
-                        static_cast<std::size_t>(config.condensed.max_contact_iterations + 1));
   return CondensedInverter(std::move(impl));
 }
 
 void CondensedInverter::reset() { impl_->reset(); }
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
 
-Status CondensedInverter::update(const SparseData& data, Estimate& estimate) {
+Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
+                                 const MovingData* moving) {
   const auto start = Clock::now();
   Impl& impl = *impl_;
-  if (auto status = check_data(data); !status) return status;
-  impl.reserve(data.size());
-  SetSearch& search = impl.search;
   if (!impl.options.warm_start) impl.reset();
   impl.history.clear();
-  EstimateStatus outcome = EstimateStatus::kIterating;
-  for (int round = 0;; ++round) {
-    if (round == 0 || impl.sampled.outside_region()) {
-      if (auto status = impl.sampled.sample(data, impl.scales.of_other()); !status) return status;
-    }
-    const auto settled = impl.settle_contact(data, start);
-    if (!settled) return tl::unexpected(settled.error());
-    outcome = *settled;
-    if (outcome != EstimateStatus::kConverged || !impl.estimate_scales || round == kScaleRounds ||
-        !impl.scales.fit(impl.gram(), impl.right.head(impl.gram().rows()))) {
-      break;
-    }
-  }
-  if (!impl.z.allFinite() || !impl.reduction.forces().allFinite()) {
+  if (auto status = impl.accept(given); !status) return status;
+  impl.weights.reset(given.size());
+  const SparseData* data = &given;
+  const auto outcome = impl.settle(data, moving, start);
+  if (!outcome) return tl::unexpected(outcome.error());
+  if (!impl.posterior.z().allFinite() || !impl.reduction.forces().allFinite()) {
     impl.reset();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
-  if (auto status = impl.finish(data, estimate); !status) {
+  if (auto status = impl.finish(*data, estimate); !status) {
     estimate.status = EstimateStatus::kNotRun;
     impl.reset();
     return status;
   }
-  estimate.status = outcome;
-  set_reason(outcome, search, impl.condensed, impl.misfit_ratio, estimate.reason);
+  estimate.status = *outcome;
+  set_reason(*outcome, impl.search, impl.condensed, impl.posterior.misfit_ratio(), estimate.reason);
+  append_sources(estimate);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};
 }

@@ -11,6 +11,8 @@
 // before means a cycle: from there on one slave at a time changes, the one of least index (Murty 1974). The best
 // iterate, the one with the least violation, is kept; limits on iterations and time end with it.
 //
+// Contact, prior scales, robust weights (robust_weights.hpp) and the places of moving data settle in turn.
+//
 // The standard deviation is that of the model above, times the ratio of the misfit to the one expected where that
 // is above 1; a ratio above 1.5 is said in the reason.
 //
@@ -28,6 +30,7 @@
 #include "common/core/estimate.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/tet_locator.hpp"
+#include "common/inversion/moving_data.hpp"
 #include "common/inversion/omission_errors.hpp"
 
 namespace brainshift::inversion {
@@ -62,7 +65,8 @@ class CondensedInverter {
   // Errors as check_data; kInvalidArgument for data outside the brain (the sentence names the datum);
   // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact forces
   // (estimate_check.hpp).
-  Status update(const SparseData& data, Estimate& estimate);
+  // moving: data that follow the deformation, measured anew for every estimate; null: they stay.
+  Status update(const SparseData& data, Estimate& estimate, const MovingData* moving = nullptr);
   // Forgets the last active set.
   void reset();
   // Of the last update(), for the parts that the options leave out.

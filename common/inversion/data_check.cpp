@@ -30,7 +30,9 @@ Status check_agreement(const SparseData& data) {
   constexpr int kMostPairs = 2000;
   const int step = 1 + (data.size() - 1) / kMostPairs;
   for (int i = 0; i < data.size(); i += step) {
+    if (data.along_direction(i)) continue;
     for (int j = i + step; j < data.size(); j += step) {
+      if (data.along_direction(j)) continue;
       const double apart = (data.positions.col(i) - data.positions.col(j)).norm();
       const double differ = (data.displacements.col(i) - data.displacements.col(j)).norm();
       const double noise = kContradictionSds * (data.sd_mm[i] + data.sd_mm[j]);
@@ -44,7 +46,51 @@ Status check_agreement(const SparseData& data) {
   return {};
 }
 
+Status check_directions(const SparseData& data) {
+  if (data.directions.cols() == 0) return {};
+  if (data.directions.cols() != data.size()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "sparse data: " + std::to_string(data.directions.cols()) + " directions for " +
+                    std::to_string(data.size()) + " data");
+  }
+  for (int i = 0; i < data.size(); ++i) {
+    const double length = data.directions.col(i).norm();
+    if (length == 0.0 || std::abs(length - 1.0) <= kUnitTolerance) continue;
+    std::ostringstream text;
+    text << "sparse data: direction " << i << " has length " << length << ": must be 0 or 1";
+    return fail(std::isfinite(length) ? ErrorCode::kInvalidArgument : ErrorCode::kNotFinite,
+                text.str());
+  }
+  return {};
+}
+
+// One after the other, nothing left out.
+Status check_sources(const SparseData& data) {
+  int next = 0;
+  for (const DataSource& source : data.sources) {
+    if (source.first != next || source.count < 0) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "sparse data: source \"" + source.name + "\" begins at datum " +
+                      std::to_string(source.first) + ", must begin at " + std::to_string(next));
+    }
+    next += source.count;
+  }
+  if (data.sources.empty() || next == data.size()) return {};
+  return fail(ErrorCode::kInvalidArgument, "sparse data: the sources hold " + std::to_string(next) +
+                                               " of " + std::to_string(data.size()) + " data");
+}
+
 }  // namespace
+
+Status check_whole(const SparseData& data) {
+  for (int i = 0; i < data.size(); ++i) {
+    if (!data.along_direction(i)) continue;
+    return fail(ErrorCode::kInvalidArgument,
+                "sparse data: datum " + std::to_string(i) +
+                    " is a distance along a direction: only method condensed takes it");
+  }
+  return {};
+}
 
 Status check_data(const SparseData& data) {
   const int m = data.size();
@@ -85,6 +131,8 @@ Status check_data(const SparseData& data) {
       return fail(ErrorCode::kInvalidArgument, text.str());
     }
   }
+  if (auto status = check_directions(data); !status) return status;
+  if (auto status = check_sources(data); !status) return status;
   if (auto status = check_spread(data.positions); !status) return status;
   return check_agreement(data);
 }

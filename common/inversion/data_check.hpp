@@ -18,9 +18,16 @@ inline constexpr double kContradictionSds = 4.0;
 // Boundary points may lie outside a mesh that cuts corners; farther out they are no brain.
 inline constexpr double kOutsideTolerance_mm = 5.0;
 
-// Ok, or the first of: kInvalidArgument (sizes differ, fewer than 3 data, sd <= 0, collinear or coplanar positions,
+// A direction is a unit vector to this accuracy.
+inline constexpr double kUnitTolerance = 1e-6;
+
+// Ok, or the first of: kInvalidArgument (sizes differ, sources that do not cover the data one after the other,
+// directions that are neither zero nor unit vectors, fewer than 3 data, sd <= 0, collinear or coplanar positions,
 // neighbours that contradict each other),
 // kNotFinite. The sentence names the datum.
 Status check_data(const SparseData& data);
+
+// kInvalidArgument when a datum is along a direction: methods other than condensed take whole displacements only.
+Status check_whole(const SparseData& data);
 
 }  // namespace brainshift::inversion

@@ -28,6 +28,9 @@ class FieldRebuild {
 
   // u: 3 x n, mm.
   void displacement(ThreadTeam& team, const VecX& z, const ContactReduction& contact, Points& u);
+  // u: 3 x nodes, mm, at these nodes only.
+  void displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
+                       const ContactReduction& contact, Points& u) const;
   // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was rebuilt.
   double far_field_error_mm() const { return far_field_error_mm_; }
   // Greatest |U_g dg + U dz + G_A df| at a control node, mm; U_g: the modes before the window.

@@ -70,6 +70,7 @@ Result<Estimate> run(const PreparedModel& model, const SparseData& data,
 Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
                         const InversionOptions& options) {
   if (auto status = check_data(data); !status) return tl::unexpected(status.error());
+  if (auto status = check_whole(data); !status) return tl::unexpected(status.error());
   auto estimate = run(model, data, options);
   if (!estimate || options.method == Method::kCondensedExact) return estimate;  // checks itself
   if (auto status = check_estimate(model, *estimate); !status) {

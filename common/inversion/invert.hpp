@@ -8,6 +8,7 @@
 #include "common/core/error.hpp"
 #include "common/core/estimate.hpp"
 #include "common/core/sparse_data.hpp"
+#include "common/inversion/moving_data.hpp"
 #include "common/inversion/prepared_model.hpp"
 
 namespace brainshift::inversion {
@@ -21,6 +22,8 @@ struct InversionOptions {
   // Called after every iteration with the iterate so far (status kIterating); may be empty. The condensed methods
   // have no field before the last iteration and do not call it.
   std::function<void(const Estimate&)> on_iterate;
+  // Data that follow the deformation (method condensed); null: none do.
+  const MovingData* moving = nullptr;
   // Checked once per iteration; a requested stop ends the inversion with kNotConverged.
   std::stop_token stop;
 };

@@ -144,6 +144,13 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.integer("  sparse_points", config.inversion.sparse_points);
   out.integer("  max_iterations", config.inversion.max_iterations);
   out.number("  relative_misfit_change", config.inversion.relative_misfit_change);
+  out.section("sensing");
+  out.number("  max_age_s", config.sensing.max_age_s);
+  out.text("  outliers", config.sensing.robust_weights ? "downweighted" : "kept");
+  out.text("  surface", std::string(to_string(config.sensing.surface)));
+  out.integer("  surface_points", config.sensing.surface_points);
+  out.number("  surface_pose_sd_mm", config.sensing.surface_pose_sd_mm);
+  out.number("  surface_pose_sd_deg", config.sensing.surface_pose_sd_deg);
   out.section("condensed");
   out.integer("  max_rank", config.condensed.max_rank);
   out.number("  memory_limit_gib", config.condensed.memory_limit_gib);

@@ -149,6 +149,20 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   inversion.number("relative_misfit_change", config.inversion.relative_misfit_change);
   inversion.done();
 
+  YamlSection sensing = root.section("sensing");
+  sensing.number("max_age_s", config.sensing.max_age_s);
+  std::string outliers = config.sensing.robust_weights ? "downweighted" : "kept";
+  sensing.choice("outliers", outliers, {"downweighted", "kept"});
+  config.sensing.robust_weights = outliers == "downweighted";
+  std::string guidance(to_string(config.sensing.surface));
+  sensing.choice("surface", guidance, {"distances", "rigid"});
+  config.sensing.surface =
+      guidance == "rigid" ? SurfaceGuidance::kRigid : SurfaceGuidance::kDistances;
+  sensing.integer("surface_points", config.sensing.surface_points);
+  sensing.number("surface_pose_sd_mm", config.sensing.surface_pose_sd_mm);
+  sensing.number("surface_pose_sd_deg", config.sensing.surface_pose_sd_deg);
+  sensing.done();
+
   YamlSection condensed = root.section("condensed");
   condensed.integer("max_rank", config.condensed.max_rank);
   condensed.number("memory_limit_gib", config.condensed.memory_limit_gib);

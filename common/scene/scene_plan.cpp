@@ -24,9 +24,6 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary b
   if (scene.pressure == Carry::kOn && method == Method::kIterativeSolver) {
     return refused("pressure", "on", "method " + name + " has no solver for pore pressure");
   }
-  if (scene.surface == Carry::kOn) {
-    return refused("surface", "on", "cortical surface data are not available in this version");
-  }
   if (scene.contact == Carry::kOn && boundary == Boundary::kFixed) {
     return refused("contact", "on", "the fixed boundary has no contact");
   }

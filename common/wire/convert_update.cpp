@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
@@ -40,6 +41,20 @@ void set_timings(const StageTimings& timings, pb::StageTimings* out) {
   out->set_journal_ms(timings.journal_ms);
 }
 
+void set_source(const SourceSummary& source, pb::SourceSummary* out) {
+  out->set_source(to_utf8(source.source));
+  out->set_observation_sequence(source.observation_sequence);
+  out->set_age_s(source.age_s);
+  out->set_data(unsigned_count(source.data));
+  out->set_outliers(unsigned_count(source.outliers));
+  if (!std::isnan(source.p_value)) {
+    out->set_chi_square(source.chi_square);
+    out->set_degrees_of_freedom(source.degrees_of_freedom);
+    out->set_p_value(source.p_value);
+  }
+  out->set_consistent(source.consistent);
+}
+
 void set_estimate(const Estimate& estimate, pb::Update& out) {
   out.set_status(std::string(to_string(estimate.status)));
   out.set_reason(to_utf8(estimate.reason));
@@ -49,6 +64,7 @@ void set_estimate(const Estimate& estimate, pb::Update& out) {
   set(estimate.initial_misfit_mm, out.mutable_initial_misfit());
   set(estimate.misfit_mm, out.mutable_misfit());
   for (const auto& record : estimate.history) set_iteration(record, out.add_history());
+  for (const auto& source : estimate.sources) set_source(source, out.add_sources());
 }
 
 StageTimings get_timings(const pb::StageTimings& message, Checked& checked) {
@@ -84,6 +100,23 @@ void get_contact(const pb::Contact& message, int nodes, Estimate& estimate, Chec
                       std::to_string(message.active_slaves_size()) + " active slaves");
 }
 
+SourceSummary get_source(const pb::SourceSummary& message, Checked& checked) {
+  SourceSummary source;
+  source.source = message.source();
+  source.observation_sequence = message.observation_sequence();
+  source.age_s = checked.number(message.age_s(), "update.sources.age_s");
+  source.data = checked.count(message.data(), "update.sources.data");
+  source.outliers = checked.count(message.outliers(), "update.sources.outliers");
+  if (message.has_p_value()) {
+    source.chi_square = checked.non_negative(message.chi_square(), "update.sources.chi_square");
+    source.degrees_of_freedom =
+        checked.non_negative(message.degrees_of_freedom(), "update.sources.degrees_of_freedom");
+    source.p_value = checked.non_negative(message.p_value(), "update.sources.p_value");
+  }
+  source.consistent = message.consistent();
+  return source;
+}
+
 Estimate get_estimate(const pb::Update& message, Checked& checked) {
   Estimate estimate;
   const auto status = estimate_status_from(message.status());
@@ -103,6 +136,9 @@ Estimate get_estimate(const pb::Update& message, Checked& checked) {
   estimate.history.reserve(static_cast<std::size_t>(message.history_size()));
   for (const auto& record : message.history()) {
     estimate.history.push_back(get_iteration(record, checked));
+  }
+  for (const auto& source : message.sources()) {
+    estimate.sources.push_back(get_source(source, checked));
   }
   return estimate;
 }

@@ -34,9 +34,11 @@ Result<Prepared> with_pipeline(const std::shared_ptr<const BrainModel>& model,
   if (!pipeline) return tl::unexpected(pipeline.error());
   auto shared = std::make_shared<const Pipeline>(std::move(*pipeline));
   Prepared prepared;
-  prepared.run = [shared](const Observation& observation, const RunOptions& options) {
-    return shared->run(observation, options);
+  auto evidence = std::make_shared<Evidence>(config.sensing.max_age_s);
+  prepared.run = [shared, evidence](const Observation& observation, const RunOptions& options) {
+    return shared->run(observation, options, *evidence);
   };
+  prepared.begin = [evidence] { evidence->clear(); };
   return prepared;
 }
 
@@ -117,8 +119,8 @@ Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& reque
   auto prepared = with_pipeline(
       model_, config_, request.boundary,
       [inverter, scratch](const SparseData& data,
-                          const inversion::InversionOptions&) -> Result<Estimate> {
-        if (auto status = inverter->update(data, *scratch); !status) {
+                          const inversion::InversionOptions& options) -> Result<Estimate> {
+        if (auto status = inverter->update(data, *scratch, options.moving); !status) {
           return tl::unexpected(status.error());
         }
         return *scratch;
@@ -128,7 +130,10 @@ Result<Prepared> ModelStore::prepare_condensed(const wire::SessionRequest& reque
                                    estimate.contact.active);
       });
   if (!prepared) return prepared;
-  prepared->begin = [inverter] { inverter->reset(); };
+  prepared->begin = [inverter, forget = prepared->begin] {
+    inverter->reset();
+    forget();
+  };
   prepared->info.model_bytes = (*operators)->bytes();
   prepared->info.prepare_s = (*operators)->prepare_s;
   return prepared;
@@ -152,7 +157,10 @@ Result<Prepared> ModelStore::prepare_condensed_exact(const wire::SessionRequest&
         return estimate;
       });
   if (!prepared) return prepared;
-  prepared->begin = [inverter] { inverter->reset(); };
+  prepared->begin = [inverter, forget = prepared->begin] {
+    inverter->reset();
+    forget();
+  };
   prepared->info.model_bytes = (*factor)->timings().bytes + inverter->bytes();
   return prepared;
 }

@@ -20,13 +20,13 @@ double milliseconds_since(Clock::time_point start) {
 
 Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
                    Boundary boundary, InvertFunction invert, OmissionFunction omissions,
-                   geometry::ClosestPointIndex tumour)
+                   RegistrationTargets targets)
     : model_(std::move(model)),
       config_(config),
       boundary_(boundary),
       invert_(std::move(invert)),
       omissions_(std::move(omissions)),
-      tumour_(std::move(tumour)) {
+      targets_(std::move(targets)) {
   for (const Method method : kAllMethods) {
     model_omissions_.emplace(method, model_omissions(*model_, config_, method, boundary_));
   }
@@ -35,15 +35,21 @@ Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& co
 Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
                                  Boundary boundary, InvertFunction invert,
                                  OmissionFunction omissions) {
-  auto tumour = geometry::ClosestPointIndex::build(model->tumour);
-  if (!tumour) return tl::unexpected(tumour.error());
+  auto targets = RegistrationTargets::build(*model);
+  if (!targets) return tl::unexpected(targets.error());
   return Pipeline(std::move(model), config, boundary, std::move(invert), std::move(omissions),
-                  std::move(*tumour));
+                  std::move(*targets));
 }
 
 Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) const {
-  const auto register_start = Clock::now();
-  const auto registered = register_observation(observation, tumour_, config_, options.method);
+  Evidence alone(config_.sensing.max_age_s);
+  return run(observation, options, alone);
+}
+
+Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options,
+                             Evidence& evidence) const {
+  const auto start = Clock::now();
+  auto registered = register_observation(observation, targets_, config_, options.method);
   if (!registered) return tl::unexpected(registered.error());
 
   Update update;
@@ -60,31 +66,45 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
       update.left_out.push_back(std::move(omission));
     }
   }
-  update.timings.register_ms = milliseconds_since(register_start);
+  evidence.put(std::move(*registered));
+  for (auto& omission : evidence.stale(observation.acquired_ns)) {
+    update.left_out.push_back(std::move(omission));
+  }
+  update.timings.register_ms = milliseconds_since(start);
+  auto result = estimate(observation, options, evidence, std::move(update));
+  if (!result) evidence.drop(observation.source);
+  return result;
+}
 
-  const auto invert_start = Clock::now();
+Result<Update> Pipeline::estimate(const Observation& observation, const RunOptions& options,
+                                  Evidence& evidence, Update update) const {
+  const auto start = Clock::now();
+  const CombinedData combined(evidence.fresh(observation.acquired_ns), evidence);
   inversion::InversionOptions inversion_options;
   inversion_options.method = options.method;
   inversion_options.stop = options.stop;
+  inversion_options.moving = combined.moving();
   if (options.on_iterate) {
     inversion_options.on_iterate = [&](const Estimate& iterate) {
       update.final = false;
       update.estimate = iterate;
-      update.timings.invert_ms = milliseconds_since(invert_start);
+      update.timings.invert_ms = milliseconds_since(start);
       options.on_iterate(update);
     };
   }
-  auto estimate = invert_(registered->data, inversion_options);
-  if (!estimate) return tl::unexpected(estimate.error());
+  auto inverted = invert_(combined.data(), inversion_options);
+  if (!inverted) return tl::unexpected(inverted.error());
   update.final = true;
-  update.estimate = std::move(*estimate);
+  update.estimate = std::move(*inverted);
+  combined.describe(observation.acquired_ns, update.estimate.sources);
+  evidence.remember(update.estimate.displacement);
   if (omissions_) {
     for (auto& omission : omissions_(update.estimate)) {
       update.left_out.push_back(std::move(omission));
     }
   }
   update.timings.rebuild_ms = update.estimate.rebuild_ms;
-  update.timings.invert_ms = milliseconds_since(invert_start) - update.timings.rebuild_ms;
+  update.timings.invert_ms = milliseconds_since(start) - update.timings.rebuild_ms;
   return update;
 }
 

@@ -2,7 +2,8 @@
 // Pipeline: Observation -> register -> SparseData -> invert -> Estimate -> Update.
 //
 // Values in, values out; it knows no socket, no log and no wire format, and it keeps nothing between
-// observations. The inversion is given as a function, so that rules can be tested without a factorisation.
+// observations: what earlier ones said is in the Evidence that the caller keeps. The inversion is given as a function,
+// so that rules can be tested without a factorisation.
 #pragma once
 
 #include <functional>
@@ -17,8 +18,8 @@
 #include "common/core/estimate.hpp"
 #include "common/core/observation.hpp"
 #include "common/core/sparse_data.hpp"
-#include "common/geometry/closest_point.hpp"
 #include "common/inversion/invert.hpp"
+#include "server/pipeline/evidence.hpp"
 
 namespace brainshift::server {
 
@@ -37,25 +38,32 @@ struct RunOptions {
 
 class Pipeline {
  public:
-  // Indexes the tumour surface; kEmptySet / kNotFinite when the model has no usable one.
+  // Indexes the surfaces; kEmptySet / kNotFinite when the model has no usable one.
   static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
                                 Boundary boundary, InvertFunction invert,
                                 OmissionFunction omissions = {});
 
   // Fills everything of an Update except its sequence number and the encode and journal times, which
   // belong to later stages. Errors of registration and inversion pass through unchanged.
+  // `evidence` takes the observation in, and gives the other sources' that are fresh enough to be used beside it; an
+  // observation without an estimate is dropped from it.
+  Result<Update> run(const Observation& observation, const RunOptions& options,
+                     Evidence& evidence) const;
+  // One observation by itself.
   Result<Update> run(const Observation& observation, const RunOptions& options) const;
 
  private:
   Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Boundary boundary,
-           InvertFunction invert, OmissionFunction omissions, geometry::ClosestPointIndex tumour);
+           InvertFunction invert, OmissionFunction omissions, RegistrationTargets targets);
+  Result<Update> estimate(const Observation& observation, const RunOptions& options,
+                          Evidence& evidence, Update update) const;
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;
   Boundary boundary_;
   InvertFunction invert_;
   OmissionFunction omissions_;
-  geometry::ClosestPointIndex tumour_;
+  RegistrationTargets targets_;
   std::map<Method, std::vector<Omission>> model_omissions_;  // the same for every update
 };
 

@@ -45,22 +45,44 @@ double datum_sd_mm(double observed_mm, const InversionConfig& config, Method met
   return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
 }
 
-Result<RegisteredObservation> from_tumour_boundary(const TumourBoundary& boundary,
-                                                   const geometry::ClosestPointIndex& tumour,
-                                                   const CaseConfig& config, Method method) {
+// Aligned rigidly from the tracked pose: the points arrive in patient RAS, so it is the identity.
+Result<RegisteredObservation> aligned(const Points& points, double observed_sd_mm,
+                                      const geometry::ClosestPointIndex& surface, int guiding,
+                                      const CaseConfig& config, Method method) {
   registration::IcpOptions options;
   options.rotation = config.scene.rotation != Carry::kOff;
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
-  if (boundary.sd_mm > 0.0) options.sd_mm = boundary.sd_mm;
-  // The points arrive tracked, in patient RAS, so the identity is the tracked pose.
-  auto icp = registration::align(boundary.points, tumour, RigidTransform::Identity(), options);
+  if (observed_sd_mm > 0.0) options.sd_mm = observed_sd_mm;
+  auto icp = registration::align(points, surface, RigidTransform::Identity(), options);
   if (!icp) return tl::unexpected(icp.error());
   const SparseData all = registration::sparse_data_from_alignment(
-      boundary.points, icp->T_surface_points,
-      datum_sd_mm(boundary.sd_mm, config.inversion, method));
+      points, icp->T_surface_points, datum_sd_mm(observed_sd_mm, config.inversion, method));
   RegisteredObservation registered;
-  registered.data = select(all, guiding_points(all.size(), config.inversion.sparse_points));
+  registered.data = select(all, guiding_points(all.size(), guiding));
   registered.icp = *icp;
+  return registered;
+}
+
+Result<RegisteredObservation> from_surface(const CorticalSurface& body,
+                                           const registration::SurfacePatch& patch,
+                                           const CaseConfig& config, Method method) {
+  const SensingConfig& sensing = config.sensing;
+  const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
+  if (sensing.surface == SurfaceGuidance::kRigid || method != Method::kCondensed) {
+    const auto index = geometry::ClosestPointIndex::build(patch.surface);
+    if (!index) return tl::unexpected(index.error());
+    return aligned(body.surface.vertices, body.sd_mm, *index, sensing.surface_points, config,
+                   method);
+  }
+  registration::SurfaceDistanceOptions options;
+  options.points = sensing.surface_points;
+  options.sd_mm = sd_mm;
+  options.pose_sd_mm = sensing.surface_pose_sd_mm;
+  options.pose_sd_deg = sensing.surface_pose_sd_deg;
+  auto surface = registration::SurfaceDistances::build(patch, body.surface.vertices, options);
+  if (!surface) return tl::unexpected(surface.error());
+  RegisteredObservation registered;
+  registered.surface = std::move(*surface);
   return registered;
 }
 
@@ -87,26 +109,48 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
   return registered;
 }
 
-}  // namespace
-
-Result<RegisteredObservation> register_observation(const Observation& observation,
-                                                   const geometry::ClosestPointIndex& tumour,
-                                                   const CaseConfig& config, Method method) {
+Result<RegisteredObservation> register_body(const Observation& observation,
+                                            const RegistrationTargets& targets,
+                                            const CaseConfig& config, Method method) {
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    return from_tumour_boundary(*boundary, tumour, config, method);
+    return aligned(boundary->points, boundary->sd_mm, targets.tumour,
+                   config.inversion.sparse_points, config, method);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
     return from_landmarks(*pairs, config.inversion, method);
   }
-  const bool surface = std::holds_alternative<CorticalSurface>(observation.body);
-  if (surface && config.scene.surface == Carry::kOff) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
-                            observation.sequence));
+  if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
+    if (config.scene.surface == Carry::kOff) {
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
+                      observation.sequence));
+    }
+    return from_surface(*surface, targets.craniotomy, config, method);
   }
   return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation {}: a {} is not assimilated in this version",
-                          observation.sequence, surface ? "cortical_surface" : "patient_pose"));
+              fmt::format("observation {}: a patient_pose is not assimilated in this version",
+                          observation.sequence));
+}
+
+}  // namespace
+
+Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) {
+  auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  if (!tumour) return tl::unexpected(tumour.error());
+  return RegistrationTargets{std::move(*tumour), registration::craniotomy_patch(model)};
+}
+
+Result<RegisteredObservation> register_observation(const Observation& observation,
+                                                   const RegistrationTargets& targets,
+                                                   const CaseConfig& config, Method method) {
+  auto registered = register_body(observation, targets, config, method);
+  if (!registered) return registered;
+  registered->source = observation.source;
+  registered->sequence = observation.sequence;
+  registered->acquired_ns = observation.acquired_ns;
+  registered->data.sources = {{observation.source, 0, registered->data.size()}};
+  return registered;
 }
 
 }  // namespace brainshift::server

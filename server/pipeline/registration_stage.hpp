@@ -6,7 +6,12 @@
 //                    the same number of points. scene.rotation = off: translation only; on: about every axis,
 //                    however little the points show of it
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
-//   CorticalSurface, PatientPose   refused: not assimilated in this version
+//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise, and by sensing.surface:
+//                    distances  along the normal of the model's cortex, made anew for every estimate
+//                               (registration/surface_distances.hpp; method condensed)
+//                    rigid      ICP to the undeformed cortex under the craniotomy, as for the tumour (other methods)
+//                    scene.surface = off: refused
+//   PatientPose      refused: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the observation's own
 // where that is larger; the paper's method and its variants take the former whatever the observation says.
@@ -14,6 +19,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "common/core/case_config.hpp"
 #include "common/core/error.hpp"
@@ -22,18 +28,32 @@
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/registration/icp.hpp"
+#include "common/registration/surface_distances.hpp"
 
 namespace brainshift::server {
 
 struct RegisteredObservation {
-  SparseData data;
+  std::string source;
+  std::uint64_t sequence = 0;
+  std::int64_t acquired_ns = 0;
+  SparseData data;                             // one named source; empty with `surface`
   std::optional<registration::IcpResult> icp;  // when the observation had to be aligned
+  std::optional<registration::SurfaceDistances> surface;  // data that follow the deformation
+};
+
+// What observations are registered to: the undeformed patient.
+struct RegistrationTargets {
+  // kEmptySet / kNotFinite when the model has no usable tumour surface.
+  static Result<RegistrationTargets> build(const BrainModel& model);
+
+  geometry::ClosestPointIndex tumour;
+  registration::SurfacePatch craniotomy;
 };
 
 // kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3 points;
 // kNotFinite: NaN or infinity. The sentence names the observation's source and the count.
 Result<RegisteredObservation> register_observation(const Observation& observation,
-                                                   const geometry::ClosestPointIndex& tumour,
+                                                   const RegistrationTargets& targets,
                                                    const CaseConfig& config,
                                                    Method method = Method::kCondensed);
 

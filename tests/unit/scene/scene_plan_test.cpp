@@ -78,9 +78,6 @@ TEST(PlanScene, RefusesPartsForcedOnThatAreNotAvailable) {
   expect_refused(config, Method::kIterativeSolver, Boundary::kContact,
                  "scene.pressure = on: method pcg has no solver for pore pressure");
   config = {};
-  config.scene.surface = Carry::kOn;
-  expect_refused(config, Method::kCondensed, Boundary::kContact, "scene.surface = on");
-  config = {};
   config.scene.contact = Carry::kOn;
   expect_refused(config, Method::kCondensed, Boundary::kFixed, "scene.contact = on");
   config = {};

@@ -170,8 +170,8 @@ TEST(Pipeline, RefusesWhatIsNotAssimilated) {
   observation.body = CorticalSurface{};
   const auto surface = pipeline(inversion).run(observation, {});
   ASSERT_FALSE(surface.has_value());
-  EXPECT_EQ(surface.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(surface.error().message, HasSubstr("cortical_surface is not assimilated"));
+  EXPECT_EQ(surface.error().code, ErrorCode::kEmptySet);
+  EXPECT_THAT(surface.error().message, HasSubstr("craniotomy of the model has no triangle"));
   CaseConfig without_surface;
   without_surface.scene.surface = Carry::kOff;
   const auto off = pipeline(inversion, Boundary::kContact, without_surface).run(observation, {});
