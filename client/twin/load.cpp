@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/load.hpp"
 
-#include "common/fem/elasticity.hpp"
+#include "common/fem/swelling.hpp"
 
 namespace brainshift::twin {
 
@@ -26,20 +26,9 @@ double volume_strain_at(const Swelling& swelling, double distance_mm) {
 
 Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
                      const Swelling& swelling) {
-  const fem::Elasticity elasticity = fem::elasticity_from(material);
-  const double bulk = elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
-  Points load = Points::Zero(3, mesh.num_nodes());
-  for (int t = 0; t < mesh.num_tets(); ++t) {
-    Vec3 centroid = Vec3::Zero();
-    for (int k = 0; k < 4; ++k) centroid += 0.25 * mesh.nodes.col(mesh.tets(k, t));
-    const double strain = volume_strain_at(swelling, (centroid - centre).norm());
-    if (strain == 0.0) continue;
-    const fem::TetGeometry tet = fem::tet_geometry(mesh, t);
-    for (int k = 0; k < 4; ++k) {
-      load.col(mesh.tets(k, t)) += tet.volume * bulk * strain * tet.gradients.col(k);
-    }
-  }
-  return load;
+  return fem::swelling_load(mesh, material, [&](const Vec3& x) {
+    return volume_strain_at(swelling, (x - centre).norm());
+  });
 }
 
 }  // namespace brainshift::twin

@@ -1,12 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Swelling and shrinkage of tissue, as a load of the simulated surgeries.
-//
-// Tissue that takes up water (oedema) or gives it off (mannitol, a debulked tumour) wants to change its volume
-// by theta: the stress-free strain is e0 = theta / 3 I, and sigma = C (e - e0) = C e - kappa theta I with the
-// drained bulk modulus kappa = lambda + 2 G / 3. The initial stress moves to the right-hand side:
-//   f = int B^T kappa theta I dV,     per tetrahedron and node i:  f_i = V kappa theta g_i
-// (g_i gradient of the shape function, theta at the centroid). The forces balance by themselves: no net force,
-// no net moment. A body free to move would follow with u = theta / 3 x.
+// Swelling of the simulated surgeries (fem/swelling.hpp).
 #pragma once
 
 #include "common/core/brain_model.hpp"
@@ -30,7 +23,7 @@ Vec3 swelling_centre(const BrainModel& model, const Swelling& swelling);
 
 double volume_strain_at(const Swelling& swelling, double distance_mm);
 
-// Nodal forces f, 3 x n, N.
+// Nodal forces, 3 x n, N.
 Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
                      const Swelling& swelling);
 

@@ -122,6 +122,11 @@ Status validate(const CaseConfig& config) {
                   config.prior.gravity_levels_mm[i], -300.0, 300.0);
   }
 
+  check.between("prior.swelling_strain_sd", config.prior.swelling_strain_sd, 0.0, 2.0);
+  for (std::size_t i = 0; i < config.prior.swelling_radii_mm.size(); ++i) {
+    check.between("prior.swelling_radii_mm[" + std::to_string(i) + "]",
+                  config.prior.swelling_radii_mm[i], 1.0, 300.0);
+  }
   check.between("inversion.sigma_mm", config.inversion.sigma_mm, 1e-6, 1e3);
   check.between("inversion.sparse_points", config.inversion.sparse_points, 3, 1e6);
   check.between("inversion.max_iterations", config.inversion.max_iterations, 1, 100000);

@@ -90,7 +90,7 @@ struct ContactConfig {
 };
 
 // Prior on forces: zero mean, force density with standard deviation and correlation length, plus
-// buoyancy modes for what pose and drainage leave open (docs/DESIGN section 3.3).
+// modes for what pose, drainage and the water in the tissue leave open (inversion/load_modes.hpp).
 struct PriorConfig {
   double correlation_length_mm = 5.0;
   double force_density_sd_n_m3 = 1000.0;
@@ -99,6 +99,10 @@ struct PriorConfig {
   double gravity_direction_sd_deg = 10.0;
   std::vector<double> gravity_levels_mm = {0.0, 20.0,
                                            40.0};  // fluid planes below the reference plane
+  // Volume strain of swelling or shrinking tissue around the tumour, standard deviation at its centre; 0 switches the
+  // modes off. Vasogenic oedema raises the water content of white matter from 0.7 to 0.8, its volume by up to a half.
+  double swelling_strain_sd = 0.2;
+  std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};  // standard deviations of the Gaussians
   // Method condensed: the strength of the prior's parts is estimated from the data, starting from the standard
   // deviations above, known to a factor of 9 (two standard deviations of ln).
   bool estimate_scales = true;

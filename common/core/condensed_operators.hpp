@@ -7,7 +7,7 @@
 //   Phi = N^T K^-1 N     compliance of the slaves, mm/N
 // n nodes, r modes, s slaves. Nodal arrays are node-major (x0 y0 z0 x1 ...), 3n rows.
 //
-// The first `gravity_modes` columns of U are K^-1 M, exact. The others come from a randomised Nystrom
+// The first `gravity_modes + swelling_modes` columns of U are K^-1 M, exact. The others come from a randomised Nystrom
 // approximation of K^-1 Sigma_kernel K^-1 (Halko, Martinsson, Tropp 2011, SIAM Review 53:217, sec. 5.5) whose
 // test vectors are supported where data come from: near the tumour, at the craniotomy and on the slaves.
 // Single precision in what is only summed up to a displacement (relative rounding 6e-8 of each term).
@@ -28,6 +28,7 @@ struct CondensedOperators {
 
   double prepare_s = 0.0;  // time it took to factorise and condense
   int gravity_modes = 0;
+  int swelling_modes = 0;           // after the gravity modes
   Eigen::MatrixXf modes;            // U, 3n x r, mm
   Eigen::MatrixXf contact_columns;  // G, 3n x s, mm/N
   Eigen::MatrixXd compliance;       // Phi, s x s, mm/N, symmetric
@@ -48,6 +49,7 @@ struct CondensedOperators {
 
   int num_nodes() const { return static_cast<int>(modes.rows() / 3); }
   int num_modes() const { return static_cast<int>(modes.cols()); }
+  int load_modes() const { return gravity_modes + swelling_modes; }
   int num_slaves() const { return static_cast<int>(contact_columns.cols()); }
   // Memory held by the arrays.
   std::uint64_t bytes() const;

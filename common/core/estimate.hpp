@@ -51,6 +51,11 @@ struct IterationRecord {
   double elapsed_ms = 0.0;          // since the start of the inversion, monotonic clock
 };
 
+// Parts of the force prior: buoyancy along gravity, buoyancy across it, swelling, all other forces.
+enum class PriorPart { kAlongGravity, kAcrossGravity, kSwelling, kOther };
+inline constexpr int kPriorParts = 4;
+using PriorScaleValues = std::array<double, kPriorParts>;
+
 struct ContactSummary {
   int active = 0;       // slaves carrying a contact force
   int penetrating = 0;  // slaves with penetration above the reporting tolerance
@@ -89,9 +94,8 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
-  // Estimated strength of the prior's parts in units of the case's: buoyancy along gravity, across it, all other
-  // forces; condensed method only.
-  std::array<double, 3> prior_scales{1.0, 1.0, 1.0};
+  // Estimated strength of the prior's parts in units of the case's; condensed method only.
+  PriorScaleValues prior_scales{1.0, 1.0, 1.0, 1.0};
   // Volume of an element after over before (det F), the smallest; at 0 and below it is inverted and the estimate there
   // is no deformation of tissue. NaN before it was looked at.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();

@@ -11,6 +11,7 @@
 #include "common/fem/blas.hpp"
 #include "common/inversion/block_runner.hpp"
 #include "common/inversion/control_nodes.hpp"
+#include "common/inversion/load_modes.hpp"
 #include "common/inversion/data_region.hpp"
 
 namespace brainshift::inversion {
@@ -111,13 +112,13 @@ MatrixXd test_vectors(const CondensedOperators& operators, Eigen::Index rows, in
 Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOperators& result) {
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   const prior::ForcePrior& prior = model.prior();
-  const int gravity = prior.num_modes();
+  const int loads = prior.num_modes();
   const int kept = static_cast<int>(
-      std::min<Eigen::Index>(std::max(1, model.config().condensed.max_rank - gravity), rows));
+      std::min<Eigen::Index>(std::max(1, model.config().condensed.max_rank - loads), rows));
   const int tested = static_cast<int>(std::min<Eigen::Index>(kept + kOversampling, rows));
 
   const MatrixXd omega = test_vectors(result, rows, tested);
-  MatrixXd sketch(rows, tested), gravity_columns(rows, gravity);
+  MatrixXd sketch(rows, tested), load_columns(rows, loads);
   auto status =
       runner.run("prior modes", tested, [&](int first, int count, auto& solver) -> Status {
         MatrixXd u, load;
@@ -128,12 +129,12 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
         return {};
       });
   if (!status) return status;
-  status = runner.run("gravity modes", gravity, [&](int first, int count, auto& solver) -> Status {
+  status = runner.run("load modes", loads, [&](int first, int count, auto& solver) -> Status {
     MatrixXd u;
     if (auto solved = solver.solve(prior.modes().middleCols(first, count), u); !solved) {
       return solved;
     }
-    gravity_columns.middleCols(first, count) = u;
+    load_columns.middleCols(first, count) = u;
     return {};
   });
   if (!status) return status;
@@ -154,10 +155,12 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
     scaled.col(j) =
         eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
   }
-  MatrixXd modes(rows, gravity + rank);
-  modes.leftCols(gravity) = gravity_columns;
+  MatrixXd modes(rows, loads + rank);
+  modes.leftCols(loads) = load_columns;
   fem::blas::multiply(1.0, sketch, scaled, 0.0, modes.rightCols(rank));
-  result.gravity_modes = gravity;
+  const LoadModeCounts counts = load_mode_counts(model.config().prior);
+  result.gravity_modes = counts.gravity;
+  result.swelling_modes = counts.swelling;
   result.modes = modes.cast<float>();
   result.slave_modes.resize(static_cast<Eigen::Index>(result.slaves.size()), modes.cols());
   for (std::size_t i = 0; i < result.slaves.size(); ++i) {
@@ -188,12 +191,12 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
         for (int j = 0; j < count; ++j) variance[first + j] = u.col(j).dot(load.col(j));
         return {};
       });
-  const Eigen::Index kernel_modes = result.modes.cols() - result.gravity_modes;
+  const Eigen::Index kernel_modes = result.modes.cols() - result.load_modes();
   Points positions(3, probed);
   VecX left_out(probed);
   for (int i = 0; i < probed; ++i) {
     const NodeIndex node = spread[static_cast<std::size_t>(i)];
-    const double carried = result.modes.block(3 * node, result.gravity_modes, 3, kernel_modes)
+    const double carried = result.modes.block(3 * node, result.load_modes(), 3, kernel_modes)
                                .cast<double>()
                                .squaredNorm();
     left_out[i] = std::max(0.0, variance.segment<3>(3 * i).sum() - carried) / 3.0;

@@ -6,7 +6,7 @@
 // double) and two blocks per core are held at a time.
 //   1. G = K^-1 N block by block; Phi from the same blocks
 //   2. sketch F = K^-1 Sigma_k K^-1 Omega; Omega^T F = V Lambda V^T; U_k = F V Lambda^-1/2, leading columns
-//   3. gravity modes K^-1 M
+//   3. load modes K^-1 M
 //   4. diag(C) at the control nodes: |Sigma_k^1/2 K^-1 e|^2 by one more solve per control dof
 #pragma once
 
@@ -31,7 +31,7 @@ struct BlockStore {
 };
 
 struct CondenseOptions {
-  Progress progress;     // stages "contact columns", "prior modes", "gravity modes", "uncertainty"
+  Progress progress;     // stages "contact columns", "prior modes", "load modes", "uncertainty"
   std::stop_token stop;  // checked between blocks
   BlockStore store;      // both empty: nothing is kept
   int threads = 0;       // 0: as many as cores

@@ -304,7 +304,7 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
   search.begin();
   impl.history.clear();
   SetSearch::Step step = SetSearch::Step::kContinue;
-  while (step == SetSearch::Step::kContinue) {
+  while (step == SetSearch::Step::kContinue || step == SetSearch::Step::kCycling) {
     if (stop.stop_requested()) {
       return fail(ErrorCode::kNotConverged,
                   "inversion was stopped at iteration " + std::to_string(search.iteration() + 1));
@@ -312,6 +312,9 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
     if (auto status = impl.solve_for_set(search.current()); !status) return status;
     impl.record(search.iteration() + 1, start);
     step = search.next(impl.all_forces, impl.penetration, impl.compliance_diagonal);
+    if (step == SetSearch::Step::kCycling) {
+      search.pivot(impl.all_forces, impl.penetration, impl.compliance_diagonal);
+    }
   }
   const bool solved = step == SetSearch::Step::kSolved;
   if (!solved) {  // the best set seen, evaluated once more

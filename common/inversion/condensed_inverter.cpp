@@ -38,14 +38,16 @@ constexpr double kUnexplained = 1.5;
 // once later.
 constexpr int kMaxRounds = 6;
 
+constexpr int kMaxRelaxations = 10;
+
 // Into memory that `reason` has already.
 void set_reason(EstimateStatus outcome, const SetSearch& search, const CondensedConfig& config,
                 double misfit_ratio, std::string& reason) {
   char text[240];
   switch (outcome) {
     case EstimateStatus::kConverged:
-      std::snprintf(text, sizeof text, "contact holds to %g mm at iteration %d",
-                    kContactTolerance_mm, search.iteration());
+      std::snprintf(text, sizeof text, "contact holds to %.1g mm at iteration %d",
+                    search.violation_mm(), search.iteration());
       break;
     case EstimateStatus::kDeadline:
       std::snprintf(text, sizeof text,
@@ -54,8 +56,9 @@ void set_reason(EstimateStatus outcome, const SetSearch& search, const Condensed
       break;
     default:
       std::snprintf(text, sizeof text,
-                    "contact did not settle in %d iterations; best iterate returned",
-                    search.iteration());
+                    "contact did not settle in %d iterations; best iterate returned, "
+                    "which violates it by %.2g mm",
+                    search.iteration(), search.best_violation_mm());
   }
   reason.assign(text);
   if (misfit_ratio > kUnexplained) {
@@ -102,7 +105,7 @@ struct CondensedInverter::Impl {
         reduction(*operators, window, config.contact.penalty_n_per_mm, team),
         posterior(window),
         rebuild(*operators, window, options.region_of_interest),
-        scales(operators->gravity_modes, window, SparseData::kMaxCommonErrors),
+        scales({operators->gravity_modes, operators->swelling_modes}, window, SparseData::kMaxCommonErrors),
         estimate_scales(config.prior.estimate_scales),
         robust(config.sensing.robust_weights),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
@@ -150,6 +153,7 @@ struct CondensedInverter::Impl {
   Result<EstimateStatus> settle_contact(const SparseData& data, Clock::time_point start);
   // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
   Status estimate_for_set();
+  void relax();
   bool reweigh(const SparseData& data);
   Result<bool> relocate(const SparseData& data, const MovingData& moving);
   void record(const SparseData& data, Clock::time_point start);
@@ -175,6 +179,8 @@ struct CondensedInverter::Impl {
   SetSearch search;
 
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
+  int relaxations = 0;
+  VecX relaxed;                     // modes between those of the last sets, once they cycle
   VecX norms;                       // of the residuals, per datum
   SparseData moved;                 // the data where they are now, when they move
   Points moving_displacement;
@@ -192,6 +198,15 @@ Status CondensedInverter::Impl::estimate_for_set() {
   if (auto status = posterior.solve(sampled, reduction, scales, team); !status) return status;
   reduction.update_forces(posterior.z());
   return {};
+}
+
+// Contact of a point between the last sets' estimates calls for the next set.
+void CondensedInverter::Impl::relax() {
+  for (int k = 0; k < kMaxRelaxations; ++k) {
+    relaxed += (posterior.z() - relaxed) / static_cast<double>(++relaxations + 1);
+    reduction.update_forces(relaxed);
+    if (search.follow(reduction.all_forces(), reduction.penetration())) return;
+  }
 }
 
 bool CondensedInverter::Impl::reweigh(const SparseData& data) {
@@ -247,7 +262,11 @@ Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData&
                         reduction.compliance_diagonal())) {
       case SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
       case SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
-      case SetSearch::Step::kContinue: break;
+      case SetSearch::Step::kContinue: 
+        relaxed = posterior.z();
+        relaxations = 0;
+        break;
+      case SetSearch::Step::kCycling: relax(); break;
     }
     if (outcome == EstimateStatus::kIterating &&
         (options.stop.stop_requested() || milliseconds_since(start) > condensed.deadline_ms)) {
@@ -262,7 +281,8 @@ Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData&
   if (auto status = estimate_for_set(); !status) return tl::unexpected(status.error());
   record(data, start);
   search.adopt_best();
-  return outcome;
+  const bool holds = search.best_violation_mm() <= kHolds_mm;
+  return outcome == EstimateStatus::kIterationLimit && holds ? EstimateStatus::kConverged : outcome;
 }
 
 void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point start) {

@@ -2,15 +2,12 @@
 #include "common/inversion/prepared_model.hpp"
 
 #include <chrono>
-#include <cmath>
-#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "common/core/statistics.hpp"
 #include "common/core/units.hpp"
-#include "common/fem/gravity.hpp"
-#include "common/inversion/prior_scales.hpp"
+#include "common/inversion/load_modes.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -44,36 +41,13 @@ prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config
 
 }  // namespace
 
-Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config) {
-  if (config.prior.gravity_mode_sd == 0.0) return {};
-  const Vec3 g = model.gravity_direction;
-  int least = 0;
-  g.cwiseAbs().minCoeff(&least);
-  const Vec3 across = g.cross(Vec3::Unit(least)).normalized();
-  const Vec3 directions[] = {g, across, g.cross(across)};
-  const auto& levels = config.prior.gravity_levels_mm;
-  Eigen::MatrixXd modes(model.mesh.nodes.size(), 3 * static_cast<int>(levels.size()));
-  int column = 0;
-  const double across_sd = config.prior.gravity_mode_sd *
-                           std::tan(config.prior.gravity_direction_sd_deg * std::numbers::pi / 180);
-  for (double level : levels) {
-    for (const Vec3& direction : directions) {
-      const double sd = &direction == &directions[0] ? config.prior.gravity_mode_sd : across_sd;
-      const Points load = fem::buoyancy_load(model.mesh, config.material, g,
-                                             model.fluid_plane_depth_mm + level, direction);
-      modes.col(column++) = sd * Eigen::Map<const VecX>(load.data(), load.size());
-    }
-  }
-  return modes;
-}
-
-prior::ForcePrior scaled_prior(const PreparedModel& model, const std::array<double, 3>& scales) {
+prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales) {
   PriorConfig config = model.config().prior;
-  config.force_density_sd_n_m3 *= scales[2];
+  const LoadModeCounts counts = load_mode_counts(config);
+  config.force_density_sd_n_m3 *= scales[static_cast<std::size_t>(PriorPart::kOther)];
   Eigen::MatrixXd modes = model.prior().modes();
-  const int gravity_modes = static_cast<int>(modes.cols());
-  for (int j = 0; j < gravity_modes; ++j) {
-    modes.col(j) *= scales[static_cast<std::size_t>(prior_part(j, gravity_modes))];
+  for (int j = 0; j < static_cast<int>(modes.cols()); ++j) {
+    modes.col(j) *= scales[static_cast<std::size_t>(prior_part(j, counts))];
   }
   return build_prior(model.model(), config, std::move(modes));
 }
@@ -94,7 +68,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   if (!forward) return tl::unexpected(forward.error());
   const auto prior_start = Clock::now();
   report(progress, "prior", 0.0);
-  prior::ForcePrior prior = build_prior(*model, config.prior, gravity_modes(*model, config));
+  prior::ForcePrior prior = build_prior(*model, config.prior, load_modes(*model, config));
   const double prior_s = seconds_since(prior_start);
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));

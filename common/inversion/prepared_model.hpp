@@ -5,7 +5,6 @@
 // Not thread-safe: solves share the factor's workspace. One PreparedModel serves one thread at a time.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 
@@ -57,13 +56,7 @@ class PreparedModel {
   PrepareTimings timings_;
 };
 
-// Gravity modes of the prior, 3n x (3 levels): buoyancy of a fluid plane at each level of the case, along
-// gravity (what drainage leaves open) and along the two directions across it (what pose leaves open), times the
-// case's standard deviations.
-Eigen::MatrixXd gravity_modes(const BrainModel& model, const CaseConfig& config);
-
-// The case's prior with the standard deviations of its parts multiplied by `scales` (PriorScales): buoyancy along
-// gravity, across it, all other forces.
-prior::ForcePrior scaled_prior(const PreparedModel& model, const std::array<double, 3>& scales);
+// The case's prior with the standard deviations of its parts multiplied by `scales` (PriorScales).
+prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales);
 
 }  // namespace brainshift::inversion

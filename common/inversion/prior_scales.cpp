@@ -17,14 +17,15 @@ constexpr double kConverged = 0.02;
 constexpr int kMaxSteps = 12;
 // Scoring assumes that the data are as the scales say; far from that its steps are cut to a factor e in s.
 constexpr double kLongestStep = 2.0;
-// The case's standard deviations are upper bounds: buoyancy is at most the weight of the tissue, and with other forces
-// many times stronger than the case says the contact set does not settle (docs/decisions/0012).
-constexpr double kLargest = 1.0;
+// Upper bounds of s. Buoyancy along gravity is at most the weight of the tissue. Pose and swelling of a single surgery
+// may lie well beyond what is usual. With other forces many times stronger than the case says the contact set does not
+// settle (docs/decisions/0012).
+constexpr PriorScaleValues kLargest = {1.0, 3.0, 4.0, 1.0};
 
 }  // namespace
 
-PriorScales::PriorScales(int gravity_modes, ModeWindow window, int max_common)
-    : gravity_modes_(gravity_modes), window_(window) {
+PriorScales::PriorScales(LoadModeCounts counts, ModeWindow window, int max_common)
+    : counts_(counts), window_(window) {
   const Eigen::Index most = max_common + window.count;
   factor_storage_.resize(most * most);
   inverse_storage_.resize(most * most);
@@ -75,7 +76,7 @@ bool PriorScales::slope(const blas::In<double>& gram, const Eigen::Ref<const Vec
 }
 
 bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
-  const std::array<double, 3> before = scales_;
+  const PriorScaleValues before = scales_;
   Slope at;
   for (int k = 0; k < kMaxSteps; ++k) {
     if (!slope(gram, right, at)) {
@@ -84,7 +85,8 @@ bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>
     }
     // A part at its bound that would grow stays there.
     for (int g = 0; g < kParts; ++g) {
-      if (kLargest > scales_[static_cast<std::size_t>(g)] || at.gradient[g] < 0.0) continue;
+      const auto bound = static_cast<std::size_t>(g);
+      if (kLargest[bound] > scales_[bound] || at.gradient[g] < 0.0) continue;
       at.gradient[g] = 0.0;
       at.information.row(g).setZero();
       at.information.col(g).setZero();
@@ -95,7 +97,7 @@ bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>
     const double shorter = std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
     for (int g = 0; g < kParts; ++g) {
       double& scale = scales_[static_cast<std::size_t>(g)];
-      scale = std::min(kLargest, scale * std::exp(0.5 * shorter * step[g]));
+      scale = std::min(kLargest[static_cast<std::size_t>(g)], scale * std::exp(0.5 * shorter * step[g]));
     }
   }
   return true;

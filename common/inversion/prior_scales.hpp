@@ -2,7 +2,7 @@
 // PriorScales: how strong each part of the force prior is, estimated from the data of an update (empirical Bayes).
 //
 // The case says what forces may act and roughly how strongly; how strongly they do act differs from surgery to
-// surgery. Parts g: buoyancy along gravity, buoyancy across it, everything else. Modes of part g are
+// surgery. Parts g (PriorPart): buoyancy along gravity, buoyancy across it, swelling, everything else. Modes of part g are
 // z ~ N(0, s_g^2 I) with
 //
 //   theta_g = ln s_g^2 ~ N(0, kLogVarianceSd^2)      s_g = 1: as the case says
@@ -16,10 +16,9 @@
 // with it. Allocates nothing after construction.
 #pragma once
 
-#include <array>
-
 #include "common/core/types.hpp"
 #include "common/fem/blas.hpp"
+#include "common/inversion/load_modes.hpp"
 #include "common/inversion/mode_window.hpp"
 
 namespace brainshift::inversion {
@@ -27,22 +26,15 @@ namespace brainshift::inversion {
 // A standard deviation of ln s of ln 3: two of them are an order of magnitude.
 inline constexpr double kLogVarianceSd = 2.1972245773362196;  // 2 ln 3
 
-// The part that a column of CondensedOperators::modes belongs to, or of the prior's gravity modes: along, across, other.
-inline int prior_part(int column, int gravity_modes) {
-  if (column >= gravity_modes) return 2;
-  return column % 3 == 0 ? 0 : 1;
-}
-
 class PriorScales {
  public:
-  // gravity_modes: as in CondensedOperators; their columns come in triples (along, across, across).
-  PriorScales(int gravity_modes, ModeWindow window, int max_common);
+  // counts: of CondensedOperators, whose columns begin with the load modes.
+  PriorScales(LoadModeCounts counts, ModeWindow window, int max_common);
 
-  // s of (along, across, other).
-  const std::array<double, 3>& scales() const { return scales_; }
+  const PriorScaleValues& scales() const { return scales_; }
   double of_mode(int mode) const { return scales_[static_cast<std::size_t>(part(mode))]; }
-  double of_other() const { return scales_[2]; }
-  void reset() { scales_ = {1.0, 1.0, 1.0}; }
+  double of_other() const { return scales_[static_cast<std::size_t>(PriorPart::kOther)]; }
+  void reset() { scales_.fill(1.0); }
 
   // Maximises from the present scales. gram: J^T R^-1 J of [common errors | modes], lower triangle, without the
   // prior; right: J^T R^-1 (d - ...). False when nothing better was found: the scales stay, because what is left to
@@ -50,18 +42,20 @@ class PriorScales {
   bool fit(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
 
  private:
-  static constexpr int kParts = 3;
+  static constexpr int kParts = kPriorParts;
   using Parts = Eigen::Matrix<double, kParts, 1>;
   struct Slope {
     Parts gradient;
     Eigen::Matrix<double, kParts, kParts> information;
   };
-  int part(int mode) const { return prior_part(window_.first + mode, gravity_modes_); }
+  int part(int mode) const {
+    return static_cast<int>(prior_part(window_.first + mode, counts_));
+  }
   bool slope(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right, Slope& out);
 
-  int gravity_modes_;
+  LoadModeCounts counts_;
   ModeWindow window_;
-  std::array<double, 3> scales_{1.0, 1.0, 1.0};
+  PriorScaleValues scales_{1.0, 1.0, 1.0, 1.0};
   VecX factor_storage_, inverse_storage_, mean_;
 };
 

@@ -29,6 +29,7 @@ void SetSearch::begin() {
   best_ = current_;
   best_violation_mm_ = std::numeric_limits<double>::infinity();
   iteration_ = 0;
+  without_gain_ = 0;
   cycled_ = false;
 }
 
@@ -41,34 +42,55 @@ bool SetSearch::seen_before() {
   return false;
 }
 
+double SetSearch::violation(std::size_t slave, const VecX& forces, const VecX& penetration,
+                            const VecX& compliance_diagonal) const {
+  const auto row = static_cast<Eigen::Index>(slave);
+  return current_[slave] ? -forces[row] * compliance_diagonal[row] : penetration[row];
+}
+
+void SetSearch::pivot(const VecX& forces, const VecX& penetration,
+                      const VecX& compliance_diagonal) {
+  for (std::size_t i = 0; i < current_.size(); ++i) {
+    if (!(violation(i, forces, penetration, compliance_diagonal) > tolerance_mm_)) continue;
+    current_[i] = static_cast<char>(!current_[i]);
+    return;
+  }
+}
+
 SetSearch::Step SetSearch::next(const VecX& forces, const VecX& penetration,
                                 const VecX& compliance_diagonal) {
   ++iteration_;
   double violation = 0.0;
-  std::size_t first = current_.size();
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const double here = current_[i] ? -forces[row] * compliance_diagonal[row] : penetration[row];
-    if (!(here > 0.0)) continue;
-    violation = std::max(violation, here);
-    if (here > tolerance_mm_) first = std::min(first, i);  // smaller ones do no harm
+    violation = std::max(violation, this->violation(i, forces, penetration, compliance_diagonal));
   }
-  if (violation <= tolerance_mm_) return Step::kSolved;
+  solved_ = violation <= tolerance_mm_;
+  if (solved_) return Step::kSolved;
+  ++without_gain_;
   if (violation < best_violation_mm_) {
+    without_gain_ = 0;
     best_violation_mm_ = violation;
     best_ = current_;
   }
   if (iteration_ >= max_iterations_) return Step::kExhausted;
   if (!cycled_ && seen_before()) cycled_ = true;
   if (cycled_) {
-    current_[first] = static_cast<char>(!current_[first]);
-    return Step::kContinue;
+    const bool enough = without_gain_ >= kPatience && best_violation_mm_ <= kHolds_mm;
+    return enough ? Step::kExhausted : Step::kCycling;
   }
+  follow(forces, penetration);
+  return Step::kContinue;
+}
+
+bool SetSearch::follow(const VecX& forces, const VecX& penetration) {
+  bool changed = false;
   for (std::size_t i = 0; i < current_.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    current_[i] = static_cast<char>(current_[i] ? forces[row] >= 0.0 : penetration[row] > 0.0);
+    const bool next = current_[i] ? forces[row] >= 0.0 : penetration[row] > 0.0;
+    changed = changed || next != (current_[i] != 0);
+    current_[i] = static_cast<char>(next);
   }
-  return Step::kContinue;
+  return changed;
 }
 
 }  // namespace brainshift::inversion

@@ -138,6 +138,8 @@ void write_estimation(const CaseConfig& config, Writer& out) {
   out.number("  gravity_mode_sd", config.prior.gravity_mode_sd);
   out.number("  gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   out.list("  gravity_levels_mm", config.prior.gravity_levels_mm);
+  out.number("  swelling_strain_sd", config.prior.swelling_strain_sd);
+  out.list("  swelling_radii_mm", config.prior.swelling_radii_mm);
   out.text("  scales", config.prior.estimate_scales ? "estimated" : "fixed");
   out.section("inversion");
   out.number("  sigma_mm", config.inversion.sigma_mm);

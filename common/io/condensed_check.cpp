@@ -128,6 +128,9 @@ std::optional<std::string> misfit_of(const CondensedOperators& operators, const 
   check.that(operators.gravity_modes >= 0 && operators.gravity_modes <= r, "gravity_modes",
              "= " + std::to_string(operators.gravity_modes) + ": must be from 0 to the " +
                  std::to_string(r) + " modes");
+  check.that(operators.swelling_modes >= 0 && operators.load_modes() <= r, "swelling_modes",
+             "= " + std::to_string(operators.swelling_modes) + ": must be from 0 to the " +
+                 std::to_string(r) + " modes less those of gravity");
   check.matrix("contact_columns", operators.contact_columns, 3 * n, s);
   check.matrix("compliance", operators.compliance, s, s);
   if (!check.found()) {

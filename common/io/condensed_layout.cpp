@@ -54,6 +54,7 @@ void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
   out.group(group);
   out.attribute(group, "model_id", operators.model_id);
   out.number(group, "gravity_modes", operators.gravity_modes);
+  out.number(group, "swelling_modes", operators.swelling_modes);
   out.number(group, "prepare_s", operators.prepare_s);
   out.matrix(in_group + "modes", operators.modes);
   out.matrix(in_group + "contact_columns", operators.contact_columns);
@@ -76,6 +77,7 @@ CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
   operators.boundary = boundary;
   operators.model_id = in.attribute_text(group, "model_id");
   operators.gravity_modes = in.number<int>(group, "gravity_modes");
+  operators.swelling_modes = in.number<int>(group, "swelling_modes");
   operators.prepare_s = in.number<double>(group, "prepare_s");
   in.matrix(in_group + "modes", operators.modes);
   in.matrix(in_group + "contact_columns", operators.contact_columns);

@@ -137,6 +137,8 @@ void read_estimation(YamlSection& root, CaseConfig& config) {
   prior.number("gravity_mode_sd", config.prior.gravity_mode_sd);
   prior.number("gravity_direction_sd_deg", config.prior.gravity_direction_sd_deg);
   prior.numbers("gravity_levels_mm", config.prior.gravity_levels_mm);
+  prior.number("swelling_strain_sd", config.prior.swelling_strain_sd);
+  prior.numbers("swelling_radii_mm", config.prior.swelling_radii_mm);
   std::string scales = config.prior.estimate_scales ? "estimated" : "fixed";
   prior.choice("scales", scales, {"estimated", "fixed"});
   config.prior.estimate_scales = scales == "estimated";

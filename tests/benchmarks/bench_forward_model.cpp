@@ -8,6 +8,7 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/fem/blas_threads.hpp"
+#include "common/inversion/load_modes.hpp"
 #include "common/inversion/prepared_model.hpp"
 #include "common/io/config_file.hpp"
 #include "common/scene/brain_model_builder.hpp"
@@ -91,7 +92,7 @@ BENCHMARK(SolveInBlocksOf64)->Unit(benchmark::kMillisecond);
 void ApplyPrior(benchmark::State& state) {
   const prior::ForcePrior prior(head().model.mesh.nodes, fem::nodal_volumes(head().model.mesh),
                                 head().config.prior.correlation_length_mm, 1e-6,
-                                inversion::gravity_modes(head().model, head().config));
+                                inversion::load_modes(head().model, head().config));
   const Points w = Points::Random(3, head().model.mesh.num_nodes());
   Points f;
   for (auto _ : state) {

@@ -59,6 +59,9 @@ Result<std::map<std::string, Errors>> play(const bench::Head& head, twin::Scenar
     std::printf("    %-10s %.3f %.3f %.3f | %s\n", surgery->observations[i].source.c_str(),
                 run->error_mm.cross->mean, run->error_mm.craniotomy->mean,
                 run->error_mm.craniotomy_displacement->mean, update->estimate.reason.c_str());
+    std::printf("       active %d pen %.4f scales %.3f %.3f %.3f %.3f misfit %.3f\n", update->estimate.contact.active, update->estimate.contact.max_penetration_mm, update->estimate.prior_scales[0], update->estimate.prior_scales[1], update->estimate.prior_scales[2], update->estimate.prior_scales[3], update->estimate.misfit_mm.mean);
+    for (const auto& h : update->estimate.history) std::printf(" %.3f/%d", h.max_penetration_mm, h.penetrating);
+    std::printf("\n");
     for (const auto& source : update->estimate.sources) {
       std::printf("        %s: %d data, %d outliers, chi2 %.1f / %.1f p %.2g\n",
                   source.source.c_str(), source.data, source.outliers, source.chi_square,
@@ -69,20 +72,23 @@ Result<std::map<std::string, Errors>> play(const bench::Head& head, twin::Scenar
   return sums;
 }
 
-int run() {
+int run(int argc, char** argv) {
   const char* size = std::getenv("SENSING_THOUSAND_NODES");
   const auto head = make_default_head(size != nullptr ? std::atof(size) : 18.0);
   if (!head) {
     std::fprintf(stderr, "sensing_joint: %s\n", head.error().message.c_str());
     return 1;
   }
-  for (const char* name : kScenarios) {
+  std::vector<const char*> names(std::begin(kScenarios), std::end(kScenarios));
+  if (argc > 1) names.assign(argv + 1, argv + argc);
+  for (const char* name : names) {
     const auto errors = play(*head, *twin::find_scenario(name));
     if (!errors) {
       std::fprintf(stderr, "sensing_joint: %s: %s\n", name, errors.error().message.c_str());
       return 1;
     }
     for (const char* source : {"ius", "stereopsis", "tracks"}) {
+      if (errors->count(source) == 0) continue;
       const Errors& one = errors->at(source);
       std::printf("%-18s %-12s tumour %.4f  craniotomy %.4f  vector %.4f field %.4f coverage %.3f  %.1f ms\n", name,
                   source, one.tumour, one.craniotomy, one.cortex_vector, one.field, one.coverage,
@@ -95,4 +101,4 @@ int run() {
 }  // namespace
 }  // namespace brainshift::sensing
 
-int main() { return brainshift::sensing::run(); }
+int main(int argc, char** argv) { return brainshift::sensing::run(argc, argv); }

@@ -7,6 +7,7 @@
 
 #include "common/fem/sampling.hpp"
 #include "common/inversion/data_check.hpp"
+#include "common/inversion/load_modes.hpp"
 
 namespace brainshift::stability {
 namespace {
@@ -203,10 +204,12 @@ bool reference_posterior(Reference& reference, const inversion::PreparedModel& m
   const MatrixR adjoints = reference.solve(loads);  // K_p^-1 T^T A^T
   const auto& scales = estimate.prior_scales;
   MatrixR kernel = Eigen::MatrixXd(model.prior().kernel()).cast<Real>();
-  kernel *= static_cast<Real>(scales[2]) * static_cast<Real>(scales[2]);
+  const auto other = static_cast<Real>(scales[static_cast<std::size_t>(PriorPart::kOther)]);
+  kernel *= other * other;
   MatrixR modes = model.prior().modes().cast<Real>();
   for (Eigen::Index j = 0; j < modes.cols(); ++j) {
-    modes.col(j) *= static_cast<Real>(scales[j % 3 == 0 ? 0 : 1]);
+    const PriorPart part = inversion::prior_part(static_cast<int>(j), inversion::load_mode_counts(model.config().prior));
+    modes.col(j) *= static_cast<Real>(scales[static_cast<std::size_t>(part)]);
   }
   MatrixR forces(dofs.num_unknowns(), 3 * m);  // T^T Sigma T K_p^-1 T^T A^T
   for (Eigen::Index j = 0; j < 3 * m; ++j) {

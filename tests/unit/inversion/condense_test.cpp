@@ -123,7 +123,7 @@ TEST_F(Condensed, ProgressRunsFromZeroToOneInEveryStage) {
     entry->second.second = fraction;
   };
   ASSERT_TRUE(condense(prepared(Boundary::kContact), options));
-  for (const char* stage : {"contact columns", "prior modes", "gravity modes", "uncertainty"}) {
+  for (const char* stage : {"contact columns", "prior modes", "load modes", "uncertainty"}) {
     ASSERT_TRUE(stages.count(stage)) << stage;
     EXPECT_EQ(stages[stage].first, 0.0);
     EXPECT_EQ(stages[stage].second, 1.0);

@@ -13,7 +13,8 @@ namespace {
 
 using Eigen::MatrixXd;
 
-constexpr int kGravity = 6, kModes = 40, kCommon = 2, kData = 300;
+constexpr LoadModeCounts kLoads{6, 8};
+constexpr int kModes = 48, kCommon = 2, kData = 300;
 constexpr ModeWindow kWindow{0, kModes};
 
 struct Problem {
@@ -23,10 +24,14 @@ struct Problem {
   VecX right() const { return jacobian.transpose() * data; }
 };
 
-int part(int mode) { return mode >= kGravity ? 2 : mode % 3 == 0 ? 0 : 1; }
+int part(int mode) {
+  if (mode >= 14) return 3;
+  if (mode >= 6) return 2;
+  return mode % 3 == 0 ? 0 : 1;
+}
 
 // Data drawn from the model whose parts have the given scales.
-Problem drawn(const std::array<double, 3>& scales, std::uint64_t seed) {
+Problem drawn(const PriorScaleValues& scales, std::uint64_t seed) {
   Random random(seed);
   Problem problem{MatrixXd(kData, kCommon + kModes), VecX(kData)};
   for (Eigen::Index i = 0; i < problem.jacobian.size(); ++i) {
@@ -43,7 +48,7 @@ Problem drawn(const std::array<double, 3>& scales, std::uint64_t seed) {
 }
 
 // ln p(d | s) p(s) by the covariance of the data, up to a constant.
-double log_posterior(const Problem& problem, const std::array<double, 3>& scales) {
+double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
   VecX variance = VecX::Ones(kCommon + kModes);
   double log_prior = 0.0;
   for (int i = 0; i < kModes; ++i) {
@@ -62,16 +67,16 @@ double log_posterior(const Problem& problem, const std::array<double, 3>& scales
 }
 
 PriorScales fitted(const Problem& problem) {
-  PriorScales scales(kGravity, kWindow, kCommon);
+  PriorScales scales(kLoads, kWindow, kCommon);
   scales.fit(problem.gram(), problem.right());
   return scales;
 }
 
 TEST(PriorScales, MaximiseTheEvidence) {
-  const Problem problem = drawn({0.5, 0.05, 0.2}, 3);
+  const Problem problem = drawn({0.5, 0.05, 0.3, 0.2}, 3);
   const auto best = fitted(problem).scales();
   const double at_best = log_posterior(problem, best);
-  EXPECT_GT(at_best, log_posterior(problem, {1, 1, 1}) + 5.0) << "the test shows nothing";
+  EXPECT_GT(at_best, log_posterior(problem, {1, 1, 1, 1}) + 5.0) << "the test shows nothing";
   for (std::size_t g = 0; g < best.size(); ++g) {
     for (const double factor : {0.7, 1.4}) {
       auto other = best;
@@ -85,18 +90,18 @@ TEST(PriorScales, MaximiseTheEvidence) {
 TEST(PriorScales, FindTheStrengthThatTheDataWereDrawnWith) {
   // 34 amplitudes are known to 1 / sqrt(2 * 34) of their standard deviation.
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    EXPECT_NEAR(std::log(fitted(drawn({0.5, 0.5, 0.1}, seed)).of_other() / 0.1), 0.0, 0.4) << seed;
+    EXPECT_NEAR(std::log(fitted(drawn({0.5, 0.5, 0.5, 0.1}, seed)).of_other() / 0.1), 0.0, 0.4) << seed;
   }
 }
 
 TEST(PriorScales, DoNotGrowBeyondTheCase) {
-  const auto scales = fitted(drawn({30.0, 30.0, 30.0}, 4)).scales();
+  const auto scales = fitted(drawn({30.0, 30.0, 30.0, 30.0}, 4)).scales();
   for (const double scale : scales) EXPECT_EQ(scale, 1.0);
 }
 
 TEST(PriorScales, StayWhereNothingIsToGain) {
-  const Problem problem = drawn({0.5, 0.05, 0.2}, 3);
-  PriorScales scales(kGravity, kWindow, kCommon);
+  const Problem problem = drawn({0.5, 0.05, 0.3, 0.2}, 3);
+  PriorScales scales(kLoads, kWindow, kCommon);
   ASSERT_TRUE(scales.fit(problem.gram(), problem.right()));
   const auto first = scales.scales();
   EXPECT_FALSE(scales.fit(problem.gram(), problem.right()));
@@ -106,15 +111,15 @@ TEST(PriorScales, StayWhereNothingIsToGain) {
 }
 
 TEST(PriorScales, StayWhenTheNormalEquationsAreNotPositiveDefinite) {
-  const Problem problem = drawn({0.5, 0.05, 0.2}, 3);
-  PriorScales scales(kGravity, kWindow, kCommon);
+  const Problem problem = drawn({0.5, 0.05, 0.3, 0.2}, 3);
+  PriorScales scales(kLoads, kWindow, kCommon);
   EXPECT_FALSE(scales.fit(-problem.gram(), problem.right()));
   EXPECT_EQ(scales.of_other(), 1.0);
 }
 
-TEST(PriorScales, WithoutGravityModesEveryModeIsOther) {
-  PriorScales scales(kGravity, {kGravity, kModes}, kCommon);
-  const Problem problem = drawn({0.1, 0.1, 0.1}, 5);
+TEST(PriorScales, WithoutLoadModesEveryModeIsOther) {
+  PriorScales scales(kLoads, {kLoads.all(), kModes}, kCommon);
+  const Problem problem = drawn({0.1, 0.1, 0.1, 0.1}, 5);
   ASSERT_TRUE(scales.fit(problem.gram(), problem.right()));
   EXPECT_EQ(scales.of_mode(0), scales.of_other());
   EXPECT_EQ(scales.of_mode(1), scales.of_other());

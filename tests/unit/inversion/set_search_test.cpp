@@ -35,26 +35,53 @@ TEST(SetSearch, ViolationsWithinTheToleranceAreNone) {
             SetSearch::Step::kContinue);
 }
 
-// Slaves 0 and 1 chase each other for ever when both change at once.
-TEST(SetSearch, CycleEndsInSingleChangesAndKeepsTheBestSet) {
-  SetSearch search(2, 12);
-  search.begin();
-  SetSearch::Step step = SetSearch::Step::kContinue;
-  int calls = 0;
-  while (step == SetSearch::Step::kContinue) {
-    ASSERT_LE(++calls, 12);
-    const auto& set = search.current();
-    // Violated in every set but {0}, where only slave 1 is, and least.
-    VecX forces = VecX::Zero(2), penetration = VecX::Zero(2);
+// Violated in every set but {0}, where only slave 1 is, and least: slaves 0 and 1 chase each other for ever when both
+// change at once.
+struct Chase {
+  VecX forces = VecX::Zero(2), penetration = VecX::Zero(2);
+  explicit Chase(const contact::ActiveSet& set, double least) {
     if (!set[0] && !set[1]) penetration << 1.0, 1.0;
     if (set[0] && set[1]) forces << -1.0, -1.0;
-    if (set[0] && !set[1]) penetration << 0.0, 0.1;
+    if (set[0] && !set[1]) penetration << 0.0, least;
     if (!set[0] && set[1]) penetration << 0.5, 0.0;
-    step = search.next(forces, penetration, VecX::Ones(2));
   }
-  EXPECT_EQ(step, SetSearch::Step::kExhausted);
+};
+
+SetSearch::Step run_chase(SetSearch& search, double least) {
+  search.begin();
+  SetSearch::Step step = SetSearch::Step::kContinue;
+  for (int calls = 0; calls < 40; ++calls) {
+    const Chase now(search.current(), least);
+    step = search.next(now.forces, now.penetration, VecX::Ones(2));
+    if (step == SetSearch::Step::kCycling) search.pivot(now.forces, now.penetration, VecX::Ones(2));
+    if (step == SetSearch::Step::kExhausted) break;
+  }
+  return step;
+}
+
+TEST(SetSearch, ACycleIsSaidAndTheBestSetKept) {
+  SetSearch search(2, 12);
+  EXPECT_EQ(run_chase(search, 0.1), SetSearch::Step::kExhausted);
+  EXPECT_EQ(search.iteration(), 12);
   EXPECT_TRUE(search.cycled());
   EXPECT_EQ(search.best(), (contact::ActiveSet{1, 0}));
+  EXPECT_EQ(search.violation_mm(), 0.1);
+}
+
+TEST(SetSearch, ACycleWhoseBestSetHoldsEndsEarly) {
+  SetSearch search(2, 30);
+  EXPECT_EQ(run_chase(search, 0.9 * kHolds_mm), SetSearch::Step::kExhausted);
+  EXPECT_LT(search.iteration(), 15);
+  EXPECT_EQ(search.best(), (contact::ActiveSet{1, 0}));
+}
+
+TEST(SetSearch, FollowSaysWhetherTheSetIsAnother) {
+  SetSearch search(2, 30);
+  search.begin();
+  const Chase now(search.current(), 0.1);
+  EXPECT_TRUE(search.follow(now.forces, now.penetration));
+  EXPECT_EQ(search.current(), (contact::ActiveSet{1, 1}));
+  EXPECT_FALSE(search.follow(VecX::Zero(2), VecX::Zero(2)));
 }
 
 // A linear complementarity problem with a symmetric positive definite matrix has one solution, and it is found.
