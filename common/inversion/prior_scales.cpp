@@ -17,10 +17,6 @@ constexpr double kConverged = 0.02;
 constexpr int kMaxSteps = 12;
 // Scoring assumes that the data are as the scales say; far from that its steps are cut to a factor e in s.
 constexpr double kLongestStep = 2.0;
-// Upper bounds of s. Buoyancy along gravity is at most the weight of the tissue. Pose and swelling of a single surgery
-// may lie well beyond what is usual. With other forces many times stronger than the case says the contact set does not
-// settle (docs/decisions/0012).
-constexpr PriorScaleValues kLargest = {1.0, 3.0, 4.0, 1.0};
 
 }  // namespace
 
@@ -86,7 +82,7 @@ bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>
     // A part at its bound that would grow stays there.
     for (int g = 0; g < kParts; ++g) {
       const auto bound = static_cast<std::size_t>(g);
-      if (kLargest[bound] > scales_[bound] || at.gradient[g] < 0.0) continue;
+      if (kLargestScales[bound] > scales_[bound] || at.gradient[g] < 0.0) continue;
       at.gradient[g] = 0.0;
       at.information.row(g).setZero();
       at.information.col(g).setZero();
@@ -97,7 +93,7 @@ bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>
     const double shorter = std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
     for (int g = 0; g < kParts; ++g) {
       double& scale = scales_[static_cast<std::size_t>(g)];
-      scale = std::min(kLargest[static_cast<std::size_t>(g)], scale * std::exp(0.5 * shorter * step[g]));
+      scale = std::min(kLargestScales[static_cast<std::size_t>(g)], scale * std::exp(0.5 * shorter * step[g]));
     }
   }
   return true;

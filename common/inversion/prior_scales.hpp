@@ -12,7 +12,7 @@
 // and Q = I - S:
 //   gradient_g = 1/2 (|m_g|^2 - tr Q_gg) - theta_g / sd^2      information_gh = 1/2 |Q_gh|_F^2 + [g = h] / sd^2
 //
-// with s_g <= 1: the case says how strong a part can be. A part that the data do not need fades, and the error bars
+// with s_g <= kLargestScales. A part that the data do not need fades, and the error bars
 // with it. Allocates nothing after construction.
 #pragma once
 
@@ -25,6 +25,11 @@ namespace brainshift::inversion {
 
 // A standard deviation of ln s of ln 3: two of them are an order of magnitude.
 inline constexpr double kLogVarianceSd = 2.1972245773362196;  // 2 ln 3
+
+// Buoyancy along gravity is at most the weight of the tissue. Pose and swelling of a single surgery may lie well beyond
+// what is usual: turned by 28 degrees where 10 are usual. With other forces many times stronger than the case says the
+// contact set does not settle (docs/decisions/0012).
+inline constexpr PriorScaleValues kLargestScales = {1.0, 3.0, 4.0, 1.0};
 
 class PriorScales {
  public:

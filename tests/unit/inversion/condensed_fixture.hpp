@@ -108,18 +108,28 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     const VecX shift = inverse * Eigen::Map<const VecX>(gaps.data(), n3);
     const auto weights =
         fem::sampling_matrix(model.locator(), static_cast<int>(n3 / 3), data.positions, 1e-6);
+    // A datum along n has the row n^T A; rows of zeros with d = 0 and any variance say nothing.
     Eigen::MatrixXd a = Eigen::MatrixXd::Zero(3 * data.size(), n3);
-    VecX noise(3 * data.size());
+    VecX noise(3 * data.size()), d = VecX::Zero(3 * data.size());
     for (int i = 0; i < data.size(); ++i) {
+      Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3, n3);
       for (fem::SamplingMatrix::InnerIterator it(*weights, i); it; ++it) {
-        for (int axis = 0; axis < 3; ++axis) a(3 * i + axis, 3 * it.col() + axis) = it.value();
+        for (int axis = 0; axis < 3; ++axis) rows(axis, 3 * it.col() + axis) = it.value();
       }
+      Vec3 measured = data.displacements.col(i);
+      if (data.along_direction(i)) {
+        const Vec3 n = data.directions.col(i);
+        rows.row(0) = (n.transpose() * rows).eval();
+        rows.bottomRows(2).setZero();
+        measured = Vec3(n.dot(measured), 0.0, 0.0);
+      }
+      a.middleRows(3 * i, 3) = rows;
+      d.segment<3>(3 * i) = measured;
       noise.segment<3>(3 * i).setConstant(data.sd_mm[i] * data.sd_mm[i]);
     }
     Eigen::MatrixXd innovation = a * prior * a.transpose();
     innovation.diagonal() += noise;
     const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
-    const VecX d = Eigen::Map<const VecX>(data.displacements.data(), noise.size());
     DirectPosterior posterior;
     posterior.mean = shift + prior * (a.transpose() * solver.solve(d - a * shift));
     posterior.covariance = prior - prior * a.transpose() * solver.solve(a * prior);

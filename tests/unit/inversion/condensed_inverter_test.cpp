@@ -37,6 +37,112 @@ TEST_P(Condensed, EstimateEqualsTheDirectPosteriorOfThePenalisedSystem) {
   EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(), kFloatTolerance * largest_mm);
 }
 
+TEST_P(Condensed, DataAlongDirectionsEqualTheDirectPosteriorOfTheirProjections) {
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.directions = Points::Zero(3, data.size());
+  Random random(8);
+  for (int i = 0; i < data.size(); i += 2) {
+    const Vec3 n = random.direction();
+    data.directions.col(i) = n;
+    data.displacements.col(i) = n.dot(data.displacements.col(i)) * n;
+  }
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(),
+            kFloatTolerance * direct.mean.cwiseAbs().maxCoeff());
+  // Whole displacements would have said more.
+  SparseData whole = data;
+  whole.directions.setZero();
+  Estimate other;
+  ASSERT_TRUE(inverter.update(whole, other));
+  EXPECT_GT((other.displacement - estimate.displacement).cwiseAbs().maxCoeff(), 0.05);
+}
+
+TEST_P(Condensed, GrossErrorsLoseTheirInfluence) {
+  const SparseData clean = sagging_data(GetParam(), 0.3);
+  Estimate expected, robust, kept;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(clean, expected));
+  SparseData spoilt = clean;
+  for (int i = 0; i < spoilt.size(); i += 5) spoilt.displacements.col(i) += Vec3(5.0, -4.0, 3.0);
+  spoilt.sources = {{"ius", 0, spoilt.size()}};
+  ASSERT_TRUE(inverter.update(spoilt, robust));
+  CaseConfig with = config();
+  with.sensing.robust_weights = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), {}, with).update(spoilt, kept));
+  const auto error = [&](const Estimate& estimate) {
+    return (estimate.displacement - expected.displacement).colwise().norm().maxCoeff();
+  };
+  EXPECT_LT(error(robust), 0.1 * error(kept));
+  ASSERT_EQ(robust.sources.size(), 1u);
+  EXPECT_EQ(robust.sources[0].outliers, (clean.size() + 4) / 5);
+  EXPECT_THAT(robust.reason, HasSubstr("count less as outliers"));
+}
+
+TEST_P(Condensed, ASourceThatContradictsTheOthersIsSaid) {
+  SparseData data = sagging_data(GetParam(), 0.2);
+  const int half = data.size() / 2;
+  data.sources = {{"ius", 0, half}, {"pointer", half, data.size() - half}};
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  ASSERT_EQ(estimate.sources.size(), 2u);
+  for (const SourceSummary& source : estimate.sources) {
+    EXPECT_TRUE(source.consistent) << source.source << ": " << source.p_value;
+    EXPECT_GT(source.degrees_of_freedom, 3.0);
+  }
+  data.displacements.rightCols(data.size() - half).colwise() += Vec3(2.0, 0.0, 2.0);
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_FALSE(estimate.sources[1].consistent);
+  EXPECT_THAT(estimate.reason, HasSubstr("\"pointer\" contradicts the other sources"));
+}
+
+// Data given as a function of the displacement converge to the fixed point; here the place of each datum shifts by a
+// tenth of the displacement at one node.
+TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
+  const SparseData start = sagging_data(GetParam(), 0.2);
+  const NodeIndex node = operators(GetParam())->region.front();
+  int calls = 0;
+  Points last;
+  MovingData moving;
+  moving.nodes = {node};
+  moving.relocate = [&](const Points& u, SparseData& data) {
+    ++calls;
+    const bool moved = last.cols() == 0 || (u - last).norm() > 1e-3;
+    last = u;
+    if (moved) data.displacements = start.displacements.colwise() + Vec3(0.1 * u.col(0));
+    return moved;
+  };
+  Estimate estimate;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(start, estimate, &moving));
+  EXPECT_GE(calls, 2);
+  EXPECT_LT((last.col(0) - estimate.displacement.col(node)).norm(), 2e-3);
+  // What a still inverter makes of the data where they ended.
+  SparseData end = start;
+  end.displacements = start.displacements.colwise() + Vec3(0.1 * last.col(0));
+  Estimate still;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(end, still));
+  EXPECT_LT((still.displacement - estimate.displacement).cwiseAbs().maxCoeff(), 2e-3);
+}
+
+TEST_P(Condensed, MovingDataThatBecomeUselessAreRefused) {
+  const SparseData start = sagging_data(GetParam(), 0.2);
+  MovingData moving;
+  moving.nodes = {0};
+  moving.relocate = [](const Points&, SparseData& data) {
+    data.positions(0, 0) = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  };
+  Estimate estimate;
+  const Status status = Condensed::inverter(GetParam()).update(start, estimate, &moving);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
+}
+
 TEST_P(Condensed, EstimateWithEstimatedScalesEqualsTheDirectPosteriorOfTheScaledPrior) {
   SparseData data = sagging_data(GetParam(), 0.3);
   data.displacements *= 0.01;  // less than the case's prior expects
@@ -48,7 +154,6 @@ TEST_P(Condensed, EstimateWithEstimatedScalesEqualsTheDirectPosteriorOfTheScaled
   EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
   const auto& scales = estimate.prior_scales;
   EXPECT_LT(*std::min_element(scales.begin(), scales.end()), 0.8) << "the test shows nothing";
-  EXPECT_LE(*std::max_element(scales.begin(), scales.end()), 1.0);
   const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves, scales);
   const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
   EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(),

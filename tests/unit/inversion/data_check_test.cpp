@@ -45,6 +45,39 @@ TEST(CheckData, RefusesNeighboursThatContradictEachOther) {
   expect_refused(data, ErrorCode::kInvalidArgument, "points 0 and 1 contradict each other");
 }
 
+TEST(CheckData, RefusesDirectionsThatAreNotUnitVectors) {
+  SparseData data = good_data();
+  data.directions = Points::Zero(3, 4);
+  data.directions.col(2) = Vec3::UnitX();
+  EXPECT_TRUE(check_data(data).has_value());
+  data.directions.col(2) = Vec3(1, 1, 0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "direction 2 has length 1.41");
+  data.directions(0, 2) = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(data, ErrorCode::kNotFinite, "direction 2");
+  data.directions.conservativeResize(3, 3);
+  expect_refused(data, ErrorCode::kInvalidArgument, "3 directions for 4 data");
+}
+
+TEST(CheckData, RefusesSourcesThatDoNotCoverTheData) {
+  SparseData data = good_data();
+  data.sources = {{"ius", 0, 3}, {"pointer", 3, 1}};
+  EXPECT_TRUE(check_data(data).has_value());
+  data.sources[1].first = 2;
+  expect_refused(data, ErrorCode::kInvalidArgument, "\"pointer\" begins at datum 2, must begin at 3");
+  data.sources.pop_back();
+  expect_refused(data, ErrorCode::kInvalidArgument, "hold 3 of 4 data");
+}
+
+TEST(CheckData, MethodsThatTakeWholeDisplacementsRefuseDistances) {
+  SparseData data = good_data();
+  EXPECT_TRUE(check_whole(data).has_value());
+  data.directions = Points::Zero(3, 4);
+  data.directions.col(3) = Vec3::UnitZ();
+  const Status status = check_whole(data);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_NE(status.error().message.find("datum 3"), std::string::npos);
+}
+
 TEST(CheckData, RefusesFewerThanThreePoints) {
   SparseData data = good_data();
   data.positions.conservativeResize(3, 2);
