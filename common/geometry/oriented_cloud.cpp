@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nanoflann.hpp>
 #include <utility>
@@ -18,6 +19,8 @@ constexpr double kReachOverSpacing = 5.0;
 constexpr double kOnALine = 0.01;
 // Closer than this (mm), the direction from one point to another is rounding.
 constexpr double kTouching = 1e-9;
+// Planes that are blended; with one, alignment stalls where the closest points change.
+constexpr std::size_t kBlended = 8;
 
 // What nanoflann asks of a set of points.
 struct Columns {
@@ -155,13 +158,29 @@ int OrientedCloud::closest(const Vec3& x, double& distance_mm) const {
 }
 
 DistanceSample OrientedCloud::at(const Vec3& x) const {
-  double distance = 0.0;
-  const int id = closest(x, distance);
-  const Vec3 n = impl_->normals.col(id);
-  const Vec3 away = x - impl_->points.col(id);
-  if (distance <= kTouching) return {0.0, n};
-  if (distance <= impl_->reach_mm && !n.isZero()) return {n.dot(away), n};
-  return {distance, away / distance};
+  std::array<std::uint32_t, kBlended> ids;
+  std::array<double, kBlended> squared;
+  nanoflann::KNNResultSet<double, std::uint32_t> found(kBlended);
+  found.init(ids.data(), squared.data());
+  impl_->tree.findNeighbors(found, x.data(), nanoflann::SearchParams());
+  const Vec3 away = x - impl_->points.col(ids[0]);
+  const Vec3 first = impl_->normals.col(ids[0]);
+  const double distance = std::sqrt(squared[0]);
+  if (distance <= kTouching) return {0.0, first};
+  if (distance > impl_->reach_mm || first.isZero()) return {distance, away / distance};
+  const double per_reach = 1.0 / (impl_->reach_mm * impl_->reach_mm);
+  double weights = 0.0, sum = 0.0;
+  Vec3 direction = Vec3::Zero();
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const double part = std::max(0.0, 1.0 - per_reach * squared[k]);
+    const Vec3 n = impl_->normals.col(ids[k]);
+    const double weight = part * part * (n.dot(first) < 0.0 ? -1.0 : 1.0);
+    weights += n.isZero() ? 0.0 : part * part;
+    sum += weight * n.dot(x - impl_->points.col(ids[k]));
+    direction += weight * n;
+  }
+  if (!(weights > 0.0)) return {first.dot(away), first};
+  return {sum / weights, direction / weights};
 }
 
 const Points& OrientedCloud::points() const { return impl_->points; }

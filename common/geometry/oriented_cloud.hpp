@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A measured surface without triangles: points with unit normals, searched by a k-d tree. Queries are thread-safe.
 //
-//   q = the cloud's point closest to x, n its normal
-//   within reach of q:  d(x) = n . (x - q), g = n           (the cloud taken for a plane there)
+//   q = the cloud's point closest to x
+//   within reach of q:  d(x) = sum_k w_k n_k . (x - q_k) / sum_k w_k,   g = sum_k w_k n_k / sum_k w_k
+//                       over the eight closest points, w_k = (1 - |x - q_k|^2 / reach^2)^2 or 0 beyond reach: the planes
+//                       of the neighbours blended, so that d hardly jumps where the closest point changes
+//                       (implicit moving least squares; Kolluri 2008)
 //   beyond:             d(x) = |x - q|,     g = (x - q)/d   (so that points beside what was measured count as far)
 //
+// Normals that point the other way than that of q count with the opposite sign. g neglects how the w_k change.
 // Normals that are not given are those of the plane through the nearest neighbours (least principal component;
 // Hoppe et al. 1992). Where the neighbours lie on a line there is no plane: such a point has a zero normal, and
 // counts as beyond reach at any distance.
