@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Distance to a closed surface and its gradient anywhere, by trilinear interpolation of a DistanceGrid: some ten
-// nanoseconds a point, where a search for the closest triangle takes some twenty microseconds.
+// nanoseconds a point, where a search for the closest triangle takes about a microsecond.
 //
 //   d(x) = sum over the 8 nodes of x's cell of their value times the product of (1 - |x - node|_axis / h)
 //   g(x) = the gradient of that same interpolant, of length close to 1; not continuous from cell to cell

@@ -3,8 +3,8 @@
 //
 //   q = the cloud's point closest to x
 //   within reach of q:  d(x) = sum_k w_k n_k . (x - q_k) / sum_k w_k,   g = sum_k w_k n_k / sum_k w_k
-//                       over the eight closest points, w_k = (1 - |x - q_k|^2 / reach^2)^2 or 0 beyond reach: the planes
-//                       of the neighbours blended, so that d hardly jumps where the closest point changes
+//                       over the eight closest points, w_k = (1 - |x - q_k|^2 / reach^2)^2 or 0 beyond reach: the
+//                       planes of the neighbours blended, so that d hardly jumps where the closest point changes
 //                       (implicit moving least squares; Kolluri 2008)
 //   beyond:             d(x) = |x - q|,     g = (x - q)/d   (so that points beside what was measured count as far)
 //

@@ -3,8 +3,8 @@
 //
 // Within three spacings of the surface every node is measured against all triangles near it: exact but for single
 // precision. Farther nodes take over the closest triangle of a neighbour (vector distance transform, Danielsson
-// 1980) and then walk over adjacent triangles as long as that brings them closer. That gives a distance to a point of the
-// surface, so it is never too small; what it is too large by was below 0.03 spacings wherever it was measured.
+// 1980) and then walk over adjacent triangles as long as that brings them closer. That gives a distance to a point of
+// the surface, so it is never too small; what it is too large by was below 0.03 spacings wherever it was measured.
 // The sign is that of the pseudo-normal at the closest point (Baerentzen & Aanaes 2005), handed on outwards.
 //
 // The same surface gives the same bits, whatever the number of threads.

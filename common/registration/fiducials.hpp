@@ -44,8 +44,8 @@ struct MatchOptions {
   double ambiguity_mm = 1.0;
 };
 
-// The same where nothing is known of the order: every assignment of the measured fiducials to as many of the image's (which
-// may be more) that keeps all distances is tried. At most 10 measured and 16 in the image.
+// The same where nothing is known of the order: every assignment of the measured fiducials to as many of the image's
+// (which may be more) that keeps all distances is tried. At most 10 measured and 16 in the image.
 // The errors of register_fiducials; kNotConverged when none fits ("no correspondence ..."), kInvalidArgument when
 // two fit nearly alike (mirror-like or regular arrangements), naming both residuals.
 Result<FiducialRegistration> match_fiducials(const Points& measured, const Points& image,

@@ -6,12 +6,13 @@
 //   rho(r) = 2 s^2 (1 - exp(-r^2 / 2 s^2)),  weight w(r) = rho'(r) / 2r = exp(-r^2 / 2 s^2)
 //   r_i = distance of T p_i from the surface, n_i its gradient:
 //     triangles  q_i closest surface point, n_i the direction from q_i to T p_i: the triangle's normal (up to sign),
-//                and at an edge or vertex the one of its normals that points there; exact, some 20 us a point
-//     volume     interpolated (geometry/distance_volume.hpp): off by hundredths of a millimetre, some 20 ns a point
+//                and at an edge or vertex the one of its normals that points there; exact, about 1 us a point
+//     volume     interpolated (geometry/distance_volume.hpp): off by hundredths of a millimetre, some 10 ns a point
 //     cloud      along the normal of the closest measured point (geometry/oriented_cloud.hpp)
 //
-// As n_i is the gradient of r_i, each Gauss-Newton step can be checked against the objective: it is halved until the objective goes down. The scale s starts at twice the median distance and
-// shrinks to welsch_scale_mm, which widens the basin of convergence.
+// As n_i is the gradient of r_i, each Gauss-Newton step can be checked against the objective: it is halved until the
+// objective goes down. The scale s starts at twice the median distance and shrinks to welsch_scale_mm, which widens
+// the basin of convergence.
 // Rotation is about the centroid of the points, so that rotation and translation decouple.
 //
 // Axes that the data do not show (a sphere has no rotation) take no step from the data at all: there the

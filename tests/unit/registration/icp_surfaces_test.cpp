@@ -168,6 +168,16 @@ TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(errors(k, k) / stated(k, k), 1.0, 0.3) << k;
 }
 
+TEST(IcpOnDistances, StaysFiniteFarFromTheGrid) {
+  const TriangleSurface surface = bumpy();
+  const Points points = geometry::sample_surface(surface, 50, 1).colwise() + Vec3(0, 0, 5000);
+  const auto result = align(points, volume_of(surface), RigidTransform::Identity());
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->T_surface_points.matrix().allFinite());
+  EXPECT_TRUE(result->pose_covariance.allFinite());
+  EXPECT_LT((result->T_surface_points * points.col(0) - kCentre).norm(), 100.0);
+}
+
 TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
   const TriangleSurface surface = bumpy();
   const auto cloud = geometry::OrientedCloud::build(geometry::sample_surface(surface, 4000, 7));
