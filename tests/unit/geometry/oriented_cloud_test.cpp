@@ -71,6 +71,44 @@ TEST(OrientedCloud, IsAPlaneWithinReachAndAPointBeyond) {
   EXPECT_EQ(cloud->at(Vec3(2, 3, 0)).distance_mm, 0.0);
 }
 
+TEST(OrientedCloud, NormalsOfEitherSignMakeTheSamePlane) {
+  Points points(3, 121), normals(3, 121);
+  for (int i = 0; i < 121; ++i) {
+    points.col(i) = Vec3(i % 11 - 5, i / 11 - 5, 0.0);
+    normals.col(i) = (i % 2 == 0 ? 1.0 : -1.0) * Vec3::UnitZ();
+  }
+  const auto cloud = OrientedCloud::build(points, normals);
+  ASSERT_TRUE(cloud);
+  for (const double x : {0.1, 0.4, 0.6, 0.9}) {
+    const DistanceSample sample = cloud->at(Vec3(x, 0.2, 1.5));
+    EXPECT_NEAR(std::abs(sample.distance_mm), 1.5, 1e-12);
+    EXPECT_NEAR(std::abs(sample.gradient.z()), 1.0, 1e-12);
+  }
+}
+
+// Across the bisector of two points of a sphere the closest point changes; the distance hardly does.
+TEST(OrientedCloud, DistanceHardlyJumpsWhereTheClosestPointChanges) {
+  const Points points = sphere(2000, 20);
+  const auto cloud = OrientedCloud::build(points, points.colwise() - kCentre);
+  ASSERT_TRUE(cloud);
+  Random random(9);
+  double blended = 0.0, single = 0.0;
+  for (int repetition = 0; repetition < 2000; ++repetition) {
+    const Vec3 x = kCentre + 21.0 * random.direction();
+    const Vec3 beside = kCentre + 21.0 * (x - kCentre + 0.05 * random.direction()).normalized();
+    double distance = 0.0;
+    const int a = cloud->closest(x, distance), b = cloud->closest(beside, distance);
+    if (a == b) continue;
+    const auto plane = [&](int id, const Vec3& at) {
+      return Vec3(cloud->normals().col(id)).dot(at - points.col(id));
+    };
+    blended = std::max(blended, std::abs(cloud->at(x).distance_mm - cloud->at(beside).distance_mm));
+    single = std::max(single, std::abs(plane(a, x) - plane(b, beside)));
+  }
+  EXPECT_GT(single, 0.02);
+  EXPECT_LT(blended, 0.5 * single);
+}
+
 TEST(OrientedCloud, DefaultReachIsFiveSpacings) {
   Points points(3, 121);
   for (int i = 0; i < 121; ++i) points.col(i) = 0.7 * Vec3(i % 11, i / 11, 0.0);
