@@ -86,9 +86,11 @@ TEST(OrientedCloud, NormalsOfEitherSignMakeTheSamePlane) {
   }
 }
 
-// Across the bisector of two points of a sphere the closest point changes; the distance hardly does.
+// Points with 0.1 mm of noise: from one to the next, the distance to its plane jumps; the blended one does less.
 TEST(OrientedCloud, DistanceHardlyJumpsWhereTheClosestPointChanges) {
-  const Points points = sphere(2000, 20);
+  Points points = sphere(2000, 20);
+  Random noise(8);
+  for (auto x : points.colwise()) x += 0.1 * noise.normal() * (x - kCentre).normalized();
   const auto cloud = OrientedCloud::build(points, points.colwise() - kCentre);
   ASSERT_TRUE(cloud);
   Random random(9);
@@ -105,7 +107,7 @@ TEST(OrientedCloud, DistanceHardlyJumpsWhereTheClosestPointChanges) {
     blended = std::max(blended, std::abs(cloud->at(x).distance_mm - cloud->at(beside).distance_mm));
     single = std::max(single, std::abs(plane(a, x) - plane(b, beside)));
   }
-  EXPECT_GT(single, 0.02);
+  EXPECT_GT(single, 0.2);
   EXPECT_LT(blended, 0.5 * single);
 }
 
