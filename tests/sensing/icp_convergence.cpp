@@ -61,8 +61,9 @@ void study_icp_convergence() {
     std::printf("icp: start %.1f mm and %.1f deg: %d of %d found, %d settled, %.1f iterations\n",
                 scale * kTranslation_mm, scale * kRotation_deg, trials.found, trials.count,
                 trials.converged, trials.mean_iterations);
-    record({"icp_convergence", "10 % outliers; 1000 points of eight sections", "start error mm",
-            "poses found %", scale * kTranslation_mm, trials.percent()});
+    record({"icp_convergence", "10 % outliers; 1000 points of eight sections",
+            "start error mm; 1.5 deg with each mm", "poses found %", scale * kTranslation_mm,
+            trials.percent()});
     if (scale == 1.0)
       record_check("icp_convergence",
                    "poses found from 10 mm and 15 deg with 10 % outliers: largest error < 1 mm (%)",

@@ -2,6 +2,9 @@
 // A tumour whose rotation shows, and points on it as ultrasound would give them.
 #pragma once
 
+#include <cmath>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include "common/core/random.hpp"
