@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/distance_grid.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 
@@ -29,6 +30,8 @@ struct BrainModel {
   TriangleSurface skull;
   // Undeformed tumour surface.
   TriangleSurface tumour;
+  // Signed distance to it, for fast alignment; derived from `tumour`, so no part of model_id. May be empty.
+  DistanceGrid tumour_distance;
 
   std::vector<NodeIndex> craniotomy;
   std::vector<NodeIndex> brainstem;

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kHeaderSize = 512;  // the smallest user block that HDF5 knows
 constexpr std::string_view kMagic = "brainshift model file\n";
-constexpr std::string_view kFormat = "format 2\n";
+constexpr std::string_view kFormat = "format 3\n";
 
 // The file's first block; see model_file.hpp.
 std::string header_text(const FileChecksum& body) {
@@ -57,7 +57,7 @@ Status check_header(const fs::path& path) {
   }
   if (std::string_view(header).substr(kMagic.size(), kFormat.size()) != kFormat) {
     return refuse("is a model file of " + quoted_line(header, kMagic.size()) +
-                  ": must be 'format 2', run brainshiftd prepare again");
+                  ": must be 'format 3', run brainshiftd prepare again");
   }
   FileChecksum written;
   unsigned long long bytes = 0;
@@ -98,6 +98,8 @@ Status check_content(const fs::path& path, const ModelFile& file) {
     return refuse("model_id '" + file.model.model_id + "' is not the hash of the model");
   }
   if (Status valid = validate(file.config); !valid) return refuse(valid.error().message);
+  if (Status valid = validate(file.model.tumour_distance); !valid)
+    return refuse("tumour_distance: " + valid.error().message);
   for (std::size_t i = 0; i < file.condensed.size(); ++i) {
     if (const auto misfit = misfit_of(file.condensed[i], file.model)) return refuse(*misfit);
     for (std::size_t j = 0; j < i; ++j) {

@@ -3,7 +3,7 @@
 // name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
-//   brainshift model file\nformat 2\nbytes N\ncrc32 XXXXXXXX\n
+//   brainshift model file\nformat 3\nbytes N\ncrc32 XXXXXXXX\n
 // N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is checked first,
 // because the HDF5 library itself is not safe against damaged files.
 //
@@ -15,6 +15,8 @@
 //   /inputs/KEY         one group per input, attributes path, bytes (uint64), crc32 (uint32); model_inputs.hpp
 //   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles}, /tumour/{vertices,triangles},
 //   /sets/{craniotomy,brainstem,slaves,fixed}
+//   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); absent when the model has none
+//     values_mm               dims 1*2*3  float32  signed distance to /tumour, common/core/distance_grid.hpp
 //   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes (int32),
 //                                         prepare_s (float64, s)
 //     modes                   r x 3n      float32  mm     U, one mode per row
@@ -52,8 +54,8 @@ struct ModelFile {
   std::vector<InputFile> inputs = {};              // record_inputs, sorted by key
 };
 
-// kWriteFailed; kInvalidArgument when model.model_id is not content_hash(model), the case is not valid, or
-// operators do not fit the model or are not finite (the sentence names the array).
+// kWriteFailed; kInvalidArgument when model.model_id is not content_hash(model), the case or the distance grid is not
+// valid, or operators do not fit the model or are not finite (the sentence names the array).
 Status write_model(const std::filesystem::path& path, const ModelFile& file);
 // kNotFound; kUnreadable, with the reason, for a file that is no model file, of another format, truncated, altered,
 // whose content does not hash to its model_id or whose operators do not fit the model.

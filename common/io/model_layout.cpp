@@ -5,6 +5,36 @@
 #include "common/io/config_file.hpp"
 
 namespace brainshift::io {
+namespace {
+
+constexpr const char* kDistanceGroup = "tumour_distance";
+
+void write_distance_grid(Hdf5Writer& out, const DistanceGrid& grid) {
+  if (grid.empty()) return;
+  out.group(kDistanceGroup);
+  out.attribute(kDistanceGroup, "origin_mm", grid.origin_mm);
+  out.number(kDistanceGroup, "spacing_mm", grid.spacing_mm);
+  out.attribute(kDistanceGroup, "dims", grid.dims);
+  out.list(std::string(kDistanceGroup) + "/values_mm", grid.values);
+}
+
+DistanceGrid read_distance_grid(const Hdf5Reader& in) {
+  DistanceGrid grid;
+  if (!in.has(kDistanceGroup)) return grid;
+  const std::vector<double> origin = in.attribute<double>(kDistanceGroup, "origin_mm");
+  const std::vector<int> dims = in.attribute<int>(kDistanceGroup, "dims");
+  if (origin.size() != 3 || dims.size() != 3)
+    throw Hdf5Problem{"attributes of tumour_distance are not three numbers each"};
+  grid.origin_mm = Vec3(origin[0], origin[1], origin[2]);
+  grid.spacing_mm = in.number<double>(kDistanceGroup, "spacing_mm");
+  grid.dims = {dims[0], dims[1], dims[2]};
+  grid.values = in.list<float>(std::string(kDistanceGroup) + "/values_mm");
+  if (Status valid = validate(grid); !valid)
+    throw Hdf5Problem{"tumour_distance: " + valid.error().message};
+  return grid;
+}
+
+}  // namespace
 
 void write_brain_model(Hdf5Writer& out, const BrainModel& model) {
   out.attribute("/", "case_id", model.case_id);
@@ -25,6 +55,7 @@ void write_brain_model(Hdf5Writer& out, const BrainModel& model) {
   out.list("sets/brainstem", model.brainstem);
   out.list("sets/slaves", model.slaves);
   out.list("sets/fixed", model.fixed);
+  write_distance_grid(out, model.tumour_distance);
 }
 
 BrainModel read_brain_model(const Hdf5Reader& in) {
@@ -48,6 +79,7 @@ BrainModel read_brain_model(const Hdf5Reader& in) {
   model.brainstem = in.list<int>("sets/brainstem");
   model.slaves = in.list<int>("sets/slaves");
   model.fixed = in.list<int>("sets/fixed");
+  model.tumour_distance = read_distance_grid(in);
   if (content_hash(model) != model.model_id) {
     throw Hdf5Problem{"content does not match its model_id (" + model.model_id +
                       "): the file was altered"};

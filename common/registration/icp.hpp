@@ -4,12 +4,15 @@
 //
 //   min over T   sum_i rho(r_i) / sd^2  +  |rotation angle(T T_initial^-1)|^2 / rotation_sd^2
 //   rho(r) = 2 s^2 (1 - exp(-r^2 / 2 s^2)),  weight w(r) = rho'(r) / 2r = exp(-r^2 / 2 s^2)
-//   r_i = n_i . (T p_i - q_i),  q_i closest surface point to T p_i, n_i the direction from q_i to T p_i: the
-//         triangle's normal (up to sign), and at an edge or vertex the one of its normals that points there
+//   r_i = distance of T p_i from the surface, n_i its gradient:
+//     triangles  q_i closest surface point, n_i the direction from q_i to T p_i: the triangle's normal (up to sign),
+//                and at an edge or vertex the one of its normals that points there; exact, about 1 us a point
+//     volume     interpolated (geometry/distance_volume.hpp): off by hundredths of a millimetre, some 10 ns a point
+//     cloud      along the normal of the closest measured point (geometry/oriented_cloud.hpp)
 //
-// so r_i is the distance and n_i its gradient, and each Gauss-Newton step can be checked against the
-// objective: it is halved until the objective goes down. The scale s starts at twice the median distance and
-// shrinks to welsch_scale_mm, which widens the basin of convergence.
+// As n_i is the gradient of r_i, each Gauss-Newton step can be checked against the objective: it is halved until the
+// objective goes down. The scale s starts at twice the median distance and shrinks to welsch_scale_mm, which widens
+// the basin of convergence.
 // Rotation is about the centroid of the points, so that rotation and translation decouple.
 //
 // Axes that the data do not show (a sphere has no rotation) take no step from the data at all: there the
@@ -24,6 +27,10 @@
 #include "common/core/sparse_data.hpp"
 #include "common/core/types.hpp"
 #include "common/geometry/closest_point.hpp"
+#include "common/geometry/distance_volume.hpp"
+#include "common/geometry/oriented_cloud.hpp"
+#include "common/registration/observability.hpp"
+#include "common/registration/rigid_increment.hpp"
 
 namespace brainshift::registration {
 
@@ -55,12 +62,26 @@ struct IcpResult {
   // standard deviations of the rotation about those axes, given data and prior, at the farthest point.
   // 0 when every axis was estimated; infinite without data and prior.
   double left_out_rotation_mm = 0.0;
+  // Posterior covariance of the pose: rotation vector (radians) about `centre`, then translation (mm), both in
+  // the surface's frame: true T = rigid_increment(xi, centre) * T_surface_points, xi ~ N(0, pose_covariance).
+  // Given sd_mm and the prior; axes that the points do not show have the prior's variance, or where there is
+  // none that of pi rad and 1000 mm (pose_information.hpp).
+  Mat6 pose_covariance = Mat6::Zero();
+  Vec3 centre = Vec3::Zero();   // of the aligned points
+  Observability observability;  // in words: not_shown()
+  VecX weights;                 // w of each point at the end: near 0 for outliers
 };
 
 // points: 3 x m, m >= 3 and not collinear, finite; else kInvalidArgument / kNotFinite naming the count.
 // kInvalidArgument also for an option out of range (named) and an initial pose that is no rigid motion.
 // An alignment that runs out of iterations is a result with converged == false.
 Result<IcpResult> align(const Points& points, const geometry::ClosestPointIndex& surface,
+                        const RigidTransform& T_surface_points_initial,
+                        const IcpOptions& options = {});
+Result<IcpResult> align(const Points& points, const geometry::DistanceVolume& surface,
+                        const RigidTransform& T_surface_points_initial,
+                        const IcpOptions& options = {});
+Result<IcpResult> align(const Points& points, const geometry::OrientedCloud& surface,
                         const RigidTransform& T_surface_points_initial,
                         const IcpOptions& options = {});
 

@@ -8,6 +8,7 @@
 
 #include "common/core/model_id.hpp"
 #include "common/geometry/closest_point.hpp"
+#include "common/geometry/signed_distance_grid.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/scene/brain_mesh.hpp"
 #include "common/scene/node_sets.hpp"
@@ -43,6 +44,15 @@ Result<TriangleSurface> make_skull(const CaseInputs& inputs, const Boundary& bra
   return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
 }
 
+// Distances that aligning boundary points reads instead of searching triangles. None for a segmentation whose
+// parts touch along an edge: such a surface is not closed in the strict sense, and its triangles are searched.
+Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
+  if (!geometry::is_closed(tumour)) return DistanceGrid{};
+  const auto index = geometry::ClosestPointIndex::build(tumour);
+  if (!index) return tl::unexpected(index.error());
+  return geometry::signed_distance_grid(*index);
+}
+
 }  // namespace
 
 Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress) {
@@ -65,12 +75,17 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   auto skull = make_skull(inputs, boundary);
   if (!skull) return tl::unexpected(skull.error());
 
+  report(progress, "tumour distances", 0.0);
+  auto distances = tumour_distances(*tumour);
+  if (!distances) return fail(distances.error().code, "tumour: " + distances.error().message);
+
   BrainModel model;
   model.case_id = config.case_id;
   model.boundary_triangles = geometry::boundary_triangles(*mesh);
   model.mesh = std::move(*mesh);
   model.skull = std::move(*skull);
   model.tumour = std::move(*tumour);
+  model.tumour_distance = std::move(*distances);
   model.craniotomy = std::move(sets->craniotomy);
   model.brainstem = std::move(sets->brainstem);
   model.slaves = std::move(sets->slaves);

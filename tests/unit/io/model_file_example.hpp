@@ -49,6 +49,11 @@ material: {poisson_ratio: 0.41}
   model.gravity_direction = Vec3(0.6, 0, -0.8);
   model.fluid_plane_depth_mm = -12.25;
   model.slave_plane_depth_mm = 7.75;
+  model.tumour_distance.origin_mm = Vec3(-1.5, 2.25, 3.125);
+  model.tumour_distance.spacing_mm = 0.75;
+  model.tumour_distance.dims = {2, 3, 4};
+  for (int i = 0; i < 24; ++i)
+    model.tumour_distance.values.push_back(0.5f * static_cast<float>(i) - 3.0f);
   model.model_id = content_hash(model);
   return file;
 }
@@ -100,7 +105,7 @@ inline std::string with_header(const std::string& bytes) {
   const auto crc =
       crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
   std::ostringstream header;
-  header << "brainshift model file\nformat 2\nbytes " << bytes.size() << "\ncrc32 " << std::hex
+  header << "brainshift model file\nformat 3\nbytes " << bytes.size() << "\ncrc32 " << std::hex
          << std::setw(8) << std::setfill('0') << crc << "\n";
   std::string block = header.str();
   block.resize(512, '\0');

@@ -62,6 +62,10 @@ TEST_F(ModelFileTest, ModelAndCaseAreReadBackBitForBit) {
   EXPECT_EQ(model.skull.triangles, original.model.skull.triangles);
   EXPECT_EQ(model.tumour.vertices, original.model.tumour.vertices);
   EXPECT_EQ(model.tumour.triangles, original.model.tumour.triangles);
+  EXPECT_EQ(model.tumour_distance.values, original.model.tumour_distance.values);
+  EXPECT_EQ(model.tumour_distance.dims, (std::array<int, 3>{2, 3, 4}));
+  EXPECT_EQ(model.tumour_distance.origin_mm, Vec3(-1.5, 2.25, 3.125));
+  EXPECT_EQ(model.tumour_distance.spacing_mm, 0.75);
   EXPECT_EQ(model.craniotomy, original.model.craniotomy);
   EXPECT_EQ(model.brainstem, original.model.brainstem);
   EXPECT_EQ(model.slaves, original.model.slaves);
@@ -82,6 +86,34 @@ TEST_F(ModelFileTest, ModelWithoutLabelsOrSkullIsReadBack) {
   const auto read = read_model(folder_ / "m.h5");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->model.skull.num_vertices(), 0);
+}
+
+TEST_F(ModelFileTest, DistanceGridMayBeMissingAndMustFit) {
+  ModelFile file = test_example::model_file();
+  file.model.tumour_distance = {};
+  ASSERT_TRUE(write_model(folder_ / "m.h5", file));
+  const auto read = read_model(folder_ / "m.h5");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_TRUE(read->model.tumour_distance.empty());
+
+  file = test_example::model_file();
+  file.model.tumour_distance.values.pop_back();
+  const Status refused = write_model(folder_ / "n.h5", file);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("23 values for 2 x 3 x 4 nodes"));
+}
+
+TEST_F(ModelFileTest, DistanceGridAlteredBehindTheChecksumIsRefused) {
+  std::string bytes = content_of(written());
+  const std::vector<float> stored = test_example::model_file().model.tumour_distance.values;
+  const std::size_t at =
+      bytes.find(std::string(reinterpret_cast<const char*>(stored.data()), 4 * stored.size()));
+  ASSERT_NE(at, std::string::npos);
+  for (int byte = 0; byte < 4; ++byte) bytes[at + 20 + static_cast<std::size_t>(byte)] = '\xff';
+  const auto read = read_bytes(with_header(bytes));
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("tumour_distance: distance grid: value 5 is not"));
 }
 
 TEST_F(ModelFileTest, OnlyTheFinalFileIsLeftAndAnOldOneIsReplaced) {
@@ -157,12 +189,12 @@ TEST_F(ModelFileTest, HeaderWithoutHdf5IsRefused) {
 
 TEST_F(ModelFileTest, OtherFormatIsNamedWithTheWayOut) {
   std::string bytes = content_of(written());
-  bytes.replace(bytes.find("format 2"), 8, "format 1");
+  bytes.replace(bytes.find("format 3"), 8, "format 2");
   const auto read = read_bytes(bytes);
   ASSERT_FALSE(read);
   EXPECT_THAT(
       read.error().message,
-      HasSubstr("is a model file of 'format 1': must be 'format 2', run brainshiftd prepare "
+      HasSubstr("is a model file of 'format 2': must be 'format 3', run brainshiftd prepare "
                 "again"));
 }
 

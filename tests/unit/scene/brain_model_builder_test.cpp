@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/core/model_id.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/unit/scene/ball_case.hpp"
@@ -145,6 +146,10 @@ TEST(BrainModelBuilder, TumourIsTheEllipsoid) {
   const BrainModel& model = ball_model();
   EXPECT_TRUE(geometry::is_closed(model.tumour));
   EXPECT_NEAR(geometry::enclosed_volume(model.tumour), 4.0 / 3.0 * M_PI * 480.0, 20.0);
+  const auto volume = geometry::DistanceVolume::create(model.tumour_distance);
+  ASSERT_TRUE(volume);
+  for (const Vec3 x : model.tumour.vertices.colwise())
+    EXPECT_NEAR(volume->at(x).distance_mm, 0.0, 0.05);
 }
 
 TEST(BrainModelBuilder, TumourOfThePaperHasAboutItsNumberOfPoints) {

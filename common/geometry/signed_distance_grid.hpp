@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Signed distance to a closed surface at the nodes of a grid, from the surface's closest-point index.
+//
+// Within three spacings of the surface every node is measured against all triangles near it: exact but for single
+// precision. Farther nodes take over the closest triangle of a neighbour (vector distance transform, Danielsson
+// 1980) and then walk over adjacent triangles as long as that brings them closer. That gives a distance to a point of
+// the surface, so it is never too small; what it is too large by was below 0.03 spacings wherever it was measured.
+// The sign is that of the pseudo-normal at the closest point (Baerentzen & Aanaes 2005), handed on outwards.
+//
+// The same surface gives the same bits, whatever the number of threads.
+#pragma once
+
+#include "common/core/distance_grid.hpp"
+#include "common/core/error.hpp"
+#include "common/geometry/closest_point.hpp"
+
+namespace brainshift::geometry {
+
+struct DistanceGridOptions {
+  // Trilinear interpolation of the distance to a smooth surface errs by up to h^2 / (4 R), R its radius of
+  // curvature, h the spacing: 0.006 mm for 0.5 mm and 10 mm.
+  double spacing_mm = 0.5;
+  // The grid reaches this far beyond the surface's bounding box.
+  double margin_mm = 12.0;
+  // Where spacing_mm would take more nodes than this, the spacing grows until it does not. 4 bytes each.
+  double max_nodes = 4e6;
+  int threads = 0;  // 0: as many as the machine has cores
+};
+
+// kInvalidArgument: surface not closed, or an option out of range (named, with its value).
+Result<DistanceGrid> signed_distance_grid(const ClosestPointIndex& surface,
+                                          const DistanceGridOptions& options = {});
+
+}  // namespace brainshift::geometry

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Closest point of one triangle.
+#pragma once
+
+#include "common/core/types.hpp"
+
+namespace brainshift::geometry {
+
+// Corner a and edges of a triangle with an area, and the products that every query needs.
+struct TriangleFrame {
+  Vec3 a, ab, ac;
+  double ab_ab, ab_ac, ac_ac, determinant;
+
+  TriangleFrame(const Vec3& a_, const Vec3& b, const Vec3& c);
+};
+
+// The point of the triangle closest to x: the foot of the perpendicular on its plane if that lies inside, otherwise
+// the nearest of the points closest on the three edges.
+Vec3 closest_on_triangle(const TriangleFrame& triangle, const Vec3& x);
+
+}  // namespace brainshift::geometry

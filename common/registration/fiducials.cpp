@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/fiducials.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+namespace brainshift::registration {
+namespace {
+
+// Points whose second principal spread is below this fraction of the first lie on a line: a rotation about it would
+// be known ten times worse than the others.
+constexpr double kCollinear = 0.01;
+// Fiducials nearer to one another than this fraction of their extent are the same one, given twice.
+constexpr double kSamePlace = 1e-3;
+// Extents (largest distance between two) of one arrangement measured twice.
+constexpr double kExtentRatio = 1.5;
+
+double extent_mm(const Points& points) {
+  double extent = 0.0;
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    for (Eigen::Index j = 0; j < i; ++j)
+      extent = std::max(extent, (points.col(i) - points.col(j)).norm());
+  return extent;
+}
+
+Vec3 principal_spread(const Points& points) {
+  const Points centred = points.colwise() - Vec3(points.rowwise().mean());
+  return Eigen::SelfAdjointEigenSolver<Mat3>(centred * centred.transpose(), Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
+Status check_set(const char* name, const Points& points) {
+  const auto refuse = [](std::string text) {
+    return fail(ErrorCode::kInvalidArgument, std::move(text));
+  };
+  if (points.cols() < 3)
+    return refuse(fmt::format("fiducials: {} {}: at least 3 needed", points.cols(), name));
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    if (!points.col(i).allFinite())
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("fiducials: {} one {} is not finite", name, i));
+  const double extent = extent_mm(points);
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    for (Eigen::Index j = 0; j < i; ++j)
+      if (!((points.col(i) - points.col(j)).norm() > kSamePlace * extent))
+        return refuse(
+            fmt::format("fiducials: {} ones {} and {} are at the same place", name, j, i));
+  const Vec3 spread = principal_spread(points);
+  if (!(spread[1] > kCollinear * kCollinear * spread[2]))
+    return refuse(fmt::format("fiducials: all {} {} ones lie on one line", points.cols(), name));
+  return {};
+}
+
+Status check_extents(double measured_mm, double image_mm) {
+  const double ratio = image_mm / measured_mm;
+  const auto near = [ratio](double factor) {
+    return ratio < factor * kExtentRatio && ratio > factor / kExtentRatio;
+  };
+  const char* guess = near(1000.0)  ? ": metres?"
+                      : near(10.0)  ? ": centimetres?"
+                      : near(0.001) ? ": image in metres?"
+                      : near(0.1)   ? ": image in centimetres?"
+                                    : ": not the same arrangement";
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("fiducials: the measured ones span {:.3g} and the image's {:.3g} mm{}",
+                          measured_mm, image_mm, guess));
+}
+
+RigidTransform least_squares(const Points& measured, const Points& image) {
+  const Vec3 from = measured.rowwise().mean(), to = image.rowwise().mean();
+  const Mat3 covariance = (image.colwise() - to) * (measured.colwise() - from).transpose();
+  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  // The best orthogonal matrix may be a reflection (always possible for fiducials in a plane); the weakest direction
+  // is then turned round.
+  const double handedness = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  const Vec3 signs(1.0, 1.0, handedness < 0.0 ? -1.0 : 1.0);
+  RigidTransform T = RigidTransform::Identity();
+  T.linear() = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  T.translation() = to - T.linear() * from;
+  return T;
+}
+
+FiducialRegistration fit(const Points& measured, const Points& image) {
+  FiducialRegistration result;
+  result.T_image_measured = least_squares(measured, image);
+  const Points off = (result.T_image_measured * measured) - image;
+  const auto count = static_cast<double>(measured.cols());
+  result.residuals_mm = off.colwise().norm().transpose();
+  result.fre_mm = std::sqrt(result.residuals_mm.squaredNorm() / count);
+  result.fle_mm = result.fre_mm / std::sqrt(1.0 - 2.0 / count);
+  for (int i = 0; i < measured.cols(); ++i) result.of_image.push_back(i);
+  result.image = image;
+  return result;
+}
+
+// Depth-first over assignments; a branch ends where a distance to a fiducial already assigned does not fit.
+class Matcher {
+ public:
+  Matcher(const Points& measured, const Points& image, double tolerance_mm)
+      : measured_(measured), image_(image), tolerance_mm_(tolerance_mm) {}
+
+  void search() {
+    chosen_.clear();
+    extend();
+  }
+  const std::optional<FiducialRegistration>& best() const { return best_; }
+  double second_fre_mm() const { return second_fre_mm_; }
+
+ private:
+  bool fits(int candidate) const {
+    const auto i = static_cast<Eigen::Index>(chosen_.size());
+    for (Eigen::Index j = 0; j < i; ++j) {
+      const int other = chosen_[static_cast<std::size_t>(j)];
+      if (other == candidate) return false;
+      const double there = (image_.col(candidate) - image_.col(other)).norm();
+      const double here = (measured_.col(i) - measured_.col(j)).norm();
+      if (std::abs(there - here) > tolerance_mm_) return false;
+    }
+    return true;
+  }
+  void extend() {
+    if (static_cast<Eigen::Index>(chosen_.size()) == measured_.cols()) return judge();
+    for (int candidate = 0; candidate < image_.cols(); ++candidate) {
+      if (!fits(candidate)) continue;
+      chosen_.push_back(candidate);
+      extend();
+      chosen_.pop_back();
+    }
+  }
+  void judge() {
+    FiducialRegistration result = fit(measured_, image_(Eigen::all, chosen_));
+    result.of_image = chosen_;
+    if (result.fre_mm > tolerance_mm_) return;
+    if (best_ && result.fre_mm >= best_->fre_mm) {
+      second_fre_mm_ = std::min(second_fre_mm_, result.fre_mm);
+      return;
+    }
+    if (best_) second_fre_mm_ = best_->fre_mm;
+    best_ = std::move(result);
+  }
+
+  const Points& measured_;
+  const Points& image_;
+  double tolerance_mm_;
+  std::vector<int> chosen_;
+  std::optional<FiducialRegistration> best_;
+  double second_fre_mm_ = std::numeric_limits<double>::infinity();
+};
+
+Status check_match(const Points& measured, const Points& image, const MatchOptions& options) {
+  const auto refuse = [](std::string text) {
+    return fail(ErrorCode::kInvalidArgument, std::move(text));
+  };
+  if (!(std::isfinite(options.tolerance_mm) && options.tolerance_mm > 0.0))
+    return refuse(fmt::format("fiducials: tolerance_mm = {}: must be > 0", options.tolerance_mm));
+  if (!(options.ambiguity_factor >= 1.0))
+    return refuse(
+        fmt::format("fiducials: ambiguity_factor = {}: must be >= 1", options.ambiguity_factor));
+  if (!(options.ambiguity_mm >= 0.0))
+    return refuse(fmt::format("fiducials: ambiguity_mm = {}: must be >= 0", options.ambiguity_mm));
+  if (measured.cols() > 10 || image.cols() > 16 || measured.cols() > image.cols())
+    return refuse(
+        fmt::format("fiducials: {} measured and {} in the image: at most 10 and 16, and no more "
+                    "measured than in the image",
+                    measured.cols(), image.cols()));
+  if (Status good = check_set("measured", measured); !good) return good;
+  return check_set("image", image);
+}
+
+}  // namespace
+
+Result<FiducialRegistration> register_fiducials(const Points& measured, const Points& image) {
+  if (measured.cols() != image.cols())
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("fiducials: {} measured but {} in the image", measured.cols(), image.cols()));
+  if (Status good = check_set("measured", measured); !good) return tl::unexpected(good.error());
+  if (Status good = check_set("image", image); !good) return tl::unexpected(good.error());
+  const double here = extent_mm(measured), there = extent_mm(image);
+  if (std::max(here, there) > kExtentRatio * std::min(here, there))
+    return tl::unexpected(check_extents(here, there).error());
+  return fit(measured, image);
+}
+
+Result<FiducialRegistration> match_fiducials(const Points& measured, const Points& image,
+                                             const MatchOptions& options) {
+  if (Status good = check_match(measured, image, options); !good)
+    return tl::unexpected(good.error());
+  const double here = extent_mm(measured), there = extent_mm(image);
+  // Some of the image's may not have been measured, so only the measured ones may span less; a unit's factor is more.
+  if (here > kExtentRatio * there || there > 8.0 * here)
+    return tl::unexpected(check_extents(here, there).error());
+  Matcher matcher(measured, image, options.tolerance_mm);
+  matcher.search();
+  if (!matcher.best())
+    return fail(
+        ErrorCode::kNotConverged,
+        fmt::format(
+            "fiducials: no correspondence of {} measured to {} in the image keeps all distances "
+            "within {} mm",
+            measured.cols(), image.cols(), options.tolerance_mm));
+  const double best = matcher.best()->fre_mm, second = matcher.second_fre_mm();
+  if (second < options.ambiguity_factor * best || second < best + options.ambiguity_mm)
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format(
+            "fiducials: two correspondences fit nearly alike (residuals {:.2f} and {:.2f} mm rms): "
+            "give their order",
+            best, second));
+  return *matcher.best();
+}
+
+double expected_tre_mm(const Points& image_fiducials, double fle_mm, const Vec3& target) {
+  const Vec3 centre = image_fiducials.rowwise().mean();
+  const Points arms = image_fiducials.colwise() - centre;
+  const auto count = static_cast<double>(arms.cols());
+  const Eigen::SelfAdjointEigenSolver<Mat3> principal(arms * arms.transpose());
+  const Vec3 spread = principal.eigenvalues().cwiseMax(0.0) / count;
+  const Vec3 along = principal.eigenvectors().transpose() * (target - centre);
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const int a = (k + 1) % 3, b = (k + 2) % 3;
+    sum += (along[a] * along[a] + along[b] * along[b]) / (spread[a] + spread[b]);
+  }
+  return fle_mm * std::sqrt((1.0 + sum / 3.0) / count);
+}
+
+}  // namespace brainshift::registration

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/sensing/icp_study.hpp"
+
+int main() {
+  brainshift::sensing::study_icp_speed();
+  brainshift::sensing::study_icp_convergence();
+  brainshift::sensing::study_icp_sphere();
+}

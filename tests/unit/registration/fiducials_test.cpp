@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/fiducials.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <string>
+
+#include "common/core/random.hpp"
+#include "common/registration/rigid_increment.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+using testing::HasSubstr;
+
+// Markers on a head, none of whose distances repeats.
+Points markers() {
+  Points points(3, 6);
+  points << 70, -68, 10, 45, -40, 5,  //
+      20, 25, 95, -60, -75, -88,      //
+      30, 22, 40, 85, 60, -10;
+  return points;
+}
+
+RigidTransform some_motion(Random& random) {
+  Vec6 xi;
+  xi << 1.5 * random.direction(), 80.0 * random.direction();
+  return rigid_increment(xi, Vec3(10, -20, 5));
+}
+
+// Noise of the given rms length per point.
+Points localised(const Points& points, double fle_mm, Random& random) {
+  Points noisy = points;
+  for (double& value : noisy.reshaped()) value += fle_mm / std::numbers::sqrt3 * random.normal();
+  return noisy;
+}
+
+Points moved(const RigidTransform& T, const Points& points) {
+  return (T.linear() * points).colwise() + Vec3(T.translation());
+}
+
+TEST(Fiducials, RecoverAKnownMotion) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    const RigidTransform T_image_measured = some_motion(random);
+    const Points image = markers().leftCols(3 + static_cast<Eigen::Index>(seed % 4));
+    const auto result = register_fiducials(moved(T_image_measured.inverse(), image), image);
+    ASSERT_TRUE(result);
+    EXPECT_TRUE(result->T_image_measured.isApprox(T_image_measured, 1e-10));
+    EXPECT_LT(result->fre_mm, 1e-10);
+    EXPECT_EQ(result->residuals_mm.size(), image.cols());
+  }
+}
+
+// Three fiducials lie in a plane; so do these four. A mirror image is no motion.
+TEST(Fiducials, NeverReflect) {
+  Points image = markers().leftCols(4);
+  image.row(2).setZero();
+  Points measured = image;
+  measured.row(0) *= -1.0;  // within the plane: a half turn about y does it
+  const auto flat = register_fiducials(measured, image);
+  ASSERT_TRUE(flat);
+  EXPECT_NEAR(flat->T_image_measured.linear().determinant(), 1.0, 1e-12);
+  EXPECT_LT(flat->fre_mm, 1e-9);
+  measured = markers();
+  measured.row(0) *= -1.0;
+  const auto mirrored = register_fiducials(measured, markers());
+  ASSERT_TRUE(mirrored);
+  EXPECT_NEAR(mirrored->T_image_measured.linear().determinant(), 1.0, 1e-12);
+  EXPECT_GT(mirrored->fre_mm, 10.0);
+}
+
+TEST(Fiducials, LeastSquaresIsAMinimum) {
+  Random random(3);
+  const Points image = markers();
+  const Points measured = localised(image, 3.0, random);
+  const auto result = register_fiducials(measured, image);
+  ASSERT_TRUE(result);
+  const auto sum = [&](const RigidTransform& T) {
+    return (moved(T, measured) - image).squaredNorm();
+  };
+  const double least = sum(result->T_image_measured);
+  EXPECT_NEAR(std::sqrt(least / 6.0), result->fre_mm, 1e-12);
+  for (int k = 0; k < 6; ++k)
+    for (const double step : {-1e-3, 1e-3})
+      EXPECT_GT(sum(rigid_increment(step * Vec6::Unit(k), Vec3::Zero()) * result->T_image_measured),
+                least);
+}
+
+// Fitzpatrick, West & Maurer (1998) against repeated registrations; FLE is recovered from FRE.
+TEST(Fiducials, ExpectedTargetErrorIsThatOfManyRegistrations) {
+  const double fle = 1.2;
+  const int runs = 4000;
+  for (const Eigen::Index count : {3, 4, 6}) {
+    const Points image = markers().leftCols(count);
+    Random random(10 + static_cast<std::uint64_t>(count));
+    const RigidTransform T_measured_image = some_motion(random);
+    const Points exact = moved(T_measured_image, image);
+    const Vec3 targets[] = {Vec3(0, 0, 20), Vec3(46, -47, 9), Vec3(-60, 10, -40)};
+    double squared[3] = {0, 0, 0}, fle_squared = 0.0;
+    for (int run = 0; run < runs; ++run) {
+      const auto result = register_fiducials(localised(exact, fle, random), image);
+      ASSERT_TRUE(result);
+      fle_squared += result->fle_mm * result->fle_mm / runs;
+      for (int t = 0; t < 3; ++t)
+        squared[t] += (result->T_image_measured * (T_measured_image * targets[t]) - targets[t])
+                          .squaredNorm() /
+                      runs;
+    }
+    EXPECT_NEAR(std::sqrt(fle_squared), fle, 0.03 * fle) << count;
+    for (int t = 0; t < 3; ++t) {
+      const double expected = expected_tre_mm(image, fle, targets[t]);
+      EXPECT_NEAR(std::sqrt(squared[t]) / expected, 1.0, 0.03) << count << ' ' << t;
+    }
+  }
+}
+
+TEST(Fiducials, AreMatchedWithoutKnowingTheirOrder) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    const Points image = markers();
+    const auto count = static_cast<Eigen::Index>(4 + seed % 3);
+    const std::vector<int> order = random.choose(static_cast<int>(count), 6);
+    const RigidTransform T_image_measured = some_motion(random);
+    const Points measured =
+        localised(moved(T_image_measured.inverse(), image(Eigen::all, order)), 0.5, random);
+    const auto result = match_fiducials(measured, image);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(result->of_image, order);
+    EXPECT_EQ(result->image, Points(image(Eigen::all, order)));
+    EXPECT_LT(result->fre_mm, 1.5);
+    EXPECT_LT((result->T_image_measured * measured.col(0) - image.col(order[0])).norm(), 2.0);
+  }
+}
+
+TEST(Fiducials, TenOfSixteenAreMatchedInTime) {
+  Random random(5);
+  Points image(3, 16);
+  for (auto x : image.colwise()) x = 90.0 * random.direction();
+  const std::vector<int> order = random.choose(10, 16);
+  const auto result = match_fiducials(
+      moved(some_motion(random), localised(image(Eigen::all, order), 0.5, random)), image);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->of_image, order);
+}
+
+TEST(Fiducials, AmbiguousOrNoCorrespondenceIsRefused) {
+  Points square(3, 4);
+  square << 0, 100, 100, 0, 0, 0, 100, 100, 0, 0, 0, 0;
+  const auto ambiguous = match_fiducials(square, square);
+  ASSERT_FALSE(ambiguous);
+  EXPECT_EQ(ambiguous.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(ambiguous.error().message, HasSubstr("two correspondences fit nearly alike"));
+  // A nearly isosceles triangle, told apart by less than a pointer's error.
+  Points triangle(3, 3);
+  triangle << 0, 100, 50, 0, 0, 90, 0, 0, 0;
+  Points other = triangle;
+  other(0, 2) = 50.4;
+  EXPECT_FALSE(match_fiducials(triangle, other));
+  other(0, 2) = 30.0;
+  EXPECT_TRUE(match_fiducials(other, other).has_value());
+  Points stretched = markers();
+  stretched.col(2) += Vec3(0, 30, 0);
+  const auto none = match_fiducials(stretched, markers());
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kNotConverged);
+  EXPECT_THAT(none.error().message, HasSubstr("no correspondence of 6 measured to 6"));
+}
+
+void expect_refused(const Points& measured, const Points& image, ErrorCode code,
+                    const std::string& naming) {
+  const auto result = register_fiducials(measured, image);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, code);
+  EXPECT_THAT(result.error().message, HasSubstr(naming));
+  EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
+}
+
+TEST(Fiducials, RefuseWhatFixesNoPose) {
+  const Points image = markers();
+  const auto code = ErrorCode::kInvalidArgument;
+  expect_refused(image.leftCols(5), image, code, "5 measured but 6 in the image");
+  expect_refused(image.leftCols(2), image.leftCols(2), code, "2 measured: at least 3");
+  Points line(3, 4);
+  for (int i = 0; i < 4; ++i) line.col(i) = Vec3(1, 2, 3) + 30.0 * i * Vec3(0.3, 0.5, -0.2);
+  expect_refused(line, image.leftCols(4), code, "all 4 measured ones lie on one line");
+  expect_refused(image.leftCols(4), line, code, "all 4 image ones lie on one line");
+  Points twice = image;
+  twice.col(4) = twice.col(1);
+  expect_refused(twice, image, code, "measured ones 1 and 4 are at the same place");
+  Points bad = image;
+  bad(2, 3) = std::nan("");
+  expect_refused(bad, image, ErrorCode::kNotFinite, "measured one 3 is not finite");
+  expect_refused(image, bad, ErrorCode::kNotFinite, "image one 3 is not finite");
+}
+
+TEST(Fiducials, MixedUpUnitsAreNamed) {
+  const Points image = markers();
+  const auto code = ErrorCode::kInvalidArgument;
+  expect_refused(0.001 * image, image, code,
+                 "the measured ones span 0.19 and the image's 190 mm: metres?");
+  expect_refused(0.1 * image, image, code, "span 19 and the image's 190 mm: centimetres?");
+  expect_refused(image, 0.001 * image, code, ": image in metres?");
+  expect_refused(image, 0.1 * image, code, ": image in centimetres?");
+  expect_refused(image, 2.0 * image, code, ": not the same arrangement");
+  const auto matched = match_fiducials(0.001 * image, image);
+  ASSERT_FALSE(matched);
+  EXPECT_THAT(matched.error().message, HasSubstr("metres?"));
+}
+
+TEST(Fiducials, MatchingRefusesNumbersAndOptionsOutOfRange) {
+  const auto refused = [](const Points& measured, const Points& image, const MatchOptions& options,
+                          const std::string& naming) {
+    const auto result = match_fiducials(measured, image, options);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(result.error().message, HasSubstr(naming));
+  };
+  refused(markers(), markers().leftCols(5), {}, "6 measured and 5 in the image");
+  refused(Points::Random(3, 11), Points::Random(3, 12), {}, "11 measured and 12 in the image");
+  MatchOptions options;
+  options.tolerance_mm = 0.0;
+  refused(markers(), markers(), options, "tolerance_mm = 0");
+  options = {};
+  options.ambiguity_factor = 0.5;
+  refused(markers(), markers(), options, "ambiguity_factor = 0.5");
+  options = {};
+  options.ambiguity_mm = std::nan("");
+  refused(markers(), markers(), options, "ambiguity_mm = nan");
+}
+
+}  // namespace
+}  // namespace brainshift::registration

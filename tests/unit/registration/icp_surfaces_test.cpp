@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Alignment to interpolated distances and to measured clouds; covariance, weights and words of the result.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/core/random.hpp"
+#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/registration/icp.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+const Vec3 kCentre(35, -45, 20);
+
+TriangleSurface bumpy() {
+  TriangleSurface surface = geometry::ellipsoid_surface(Vec3::Zero(), Vec3(17, 13, 10), 1.2);
+  for (auto x : surface.vertices.colwise()) {
+    const double bump = std::exp(-(x.normalized() - Vec3(0.6, 0.64, 0.48)).squaredNorm() / 0.3);
+    x *= 1.0 + 0.25 * bump;
+  }
+  surface.vertices.colwise() += kCentre;
+  return surface;
+}
+
+geometry::DistanceVolume volume_of(const TriangleSurface& surface) {
+  const auto index = geometry::ClosestPointIndex::build(surface).value();
+  return geometry::DistanceVolume::create(geometry::signed_distance_grid(index).value()).value();
+}
+
+RigidTransform motion(Random& random, double translation_mm, double rotation_deg) {
+  Vec6 xi;
+  xi << rotation_deg * kDegree * random.direction(), translation_mm * random.direction();
+  return rigid_increment(xi, kCentre);
+}
+
+Points traced(const Points& on_surface, const RigidTransform& T, double noise_mm, Random& random) {
+  Points points = (T.linear() * on_surface).colwise() + Vec3(T.translation());
+  for (double& value : points.reshaped()) value += noise_mm * random.normal();
+  return points;
+}
+
+double placement_error(const RigidTransform& a, const RigidTransform& b, const Points& points) {
+  double worst = 0.0;
+  for (const Vec3 x : points.colwise()) worst = std::max(worst, (a * x - b * x).norm());
+  return worst;
+}
+
+IcpOptions without_prior(double sd_mm) {
+  IcpOptions options;
+  options.sd_mm = sd_mm;
+  options.rotation_sd_deg = 0.0;
+  return options;
+}
+
+TEST(IcpOnDistances, EndsWhereSearchedTrianglesEnd) {
+  const TriangleSurface surface = bumpy();
+  const auto index = geometry::ClosestPointIndex::build(surface).value();
+  const auto volume = volume_of(surface);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    const Points points =
+        traced(geometry::sample_surface(surface, 500, seed), motion(random, 5.0, 8.0), 0.3, random);
+    const auto exact = align(points, index, RigidTransform::Identity(), without_prior(0.3));
+    const auto fast = align(points, volume, RigidTransform::Identity(), without_prior(0.3));
+    ASSERT_TRUE(exact && fast);
+    EXPECT_TRUE(fast->converged);
+    // Below what 500 points with 0.3 mm leave open: 0.3 sqrt(6 / 500) = 0.033 mm rms, more at the ends.
+    EXPECT_LT(placement_error(exact->T_surface_points, fast->T_surface_points, points), 0.04);
+    EXPECT_NEAR(fast->rms_mm, exact->rms_mm, 1e-3);
+    EXPECT_NEAR(fast->pose_covariance.trace(), exact->pose_covariance.trace(),
+                0.02 * exact->pose_covariance.trace());
+  }
+}
+
+TEST(IcpOnDistances, RepeatsBitForBit) {
+  const TriangleSurface surface = bumpy();
+  Random random(12);
+  const Points points =
+      traced(geometry::sample_surface(surface, 203, 12), motion(random, 4.0, 6.0), 0.3, random);
+  const auto first = align(points, volume_of(surface), RigidTransform::Identity());
+  const auto second = align(points, volume_of(surface), RigidTransform::Identity());
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->T_surface_points.matrix(), second->T_surface_points.matrix());
+  EXPECT_EQ(first->weights, second->weights);
+}
+
+TEST(IcpOnDistances, SphereShowsNoRotationAndKeepsTheOrientation) {
+  const auto volume = volume_of(geometry::ellipsoid_surface(kCentre, Vec3::Constant(14.0), 1.0));
+  Random random(3);
+  Points points(3, 400);
+  for (auto x : points.colwise()) x = kCentre + Vec3(3, -1, 2) + 14.0 * random.direction();
+  const auto result = align(points, volume, RigidTransform::Identity(), without_prior(0.3));
+  ASSERT_TRUE(result);
+  EXPECT_FALSE(result->rotation_observable);
+  EXPECT_EQ(result->observable_axes, 3);
+  EXPECT_TRUE(result->T_surface_points.linear().isIdentity(1e-9));
+  EXPECT_THAT(not_shown(result->observability),
+              testing::ElementsAre("no rotation is shown by the points"));
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(std::sqrt(result->pose_covariance(k, k)), std::numbers::pi, 1e-3);
+}
+
+TEST(IcpOnDistances, NamesTheAxisOfASpheroid) {
+  const auto surface = geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 18), 1.2);
+  Random random(4);
+  const Points points =
+      traced(geometry::sample_surface(surface, 600, 4), motion(random, 1.0, 0.0), 0.0, random);
+  const auto result =
+      align(points, volume_of(surface), RigidTransform::Identity(), without_prior(0.3));
+  ASSERT_TRUE(result);
+  const auto sentences = not_shown(result->observability);
+  ASSERT_EQ(sentences.size(), 1u);
+  EXPECT_THAT(sentences[0], testing::HasSubstr("rotation about ("));
+  EXPECT_GT(std::abs(result->observability.rotation_axes(2, 0)), 0.999);
+}
+
+TEST(IcpOnDistances, OutliersEndWithoutWeight) {
+  const TriangleSurface surface = bumpy();
+  Random random(5);
+  const RigidTransform T = motion(random, 8.0, 12.0);
+  Points points = traced(geometry::sample_surface(surface, 500, 5), T, 0.2, random);
+  for (int i = 0; i < 500; i += 10)
+    points.col(i) += 15.0 * (points.col(i) - T * kCentre).normalized();
+  IcpOptions options = without_prior(0.2);
+  options.welsch_scale_mm = 1.0;
+  const auto result = align(points, volume_of(surface), RigidTransform::Identity(), options);
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->weights.size(), 500);
+  for (int i = 0; i < 500; ++i) {
+    if (i % 10 == 0) {
+      EXPECT_LT(result->weights[i], 1e-6);
+    } else {
+      EXPECT_GT(result->weights[i], 0.5);
+    }
+  }
+  EXPECT_LT(placement_error(result->T_surface_points, T.inverse(), T * surface.vertices), 0.2);
+}
+
+// Errors of many repetitions against the covariance that each of them stated: the mean of xi^T C^-1 xi is 6.
+TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
+  const TriangleSurface surface = bumpy();
+  const auto volume = volume_of(surface);
+  const double noise = 0.4;
+  const int runs = 300;
+  Mat6 errors = Mat6::Zero(), stated = Mat6::Zero();
+  double mahalanobis = 0.0;
+  Random random(6);
+  const Points on_surface = geometry::sample_surface(surface, 250, 6);
+  const RigidTransform T = motion(random, 1.0, 2.0);
+  for (int run = 0; run < runs; ++run) {
+    const Points points = traced(on_surface, T, noise, random);
+    IcpOptions options = without_prior(noise);
+    options.welsch_scale_mm = 10.0;  // as good as least squares, of which the covariance is that
+    const auto result = align(points, volume, RigidTransform::Identity(), options);
+    ASSERT_TRUE(result);
+    const RigidTransform off = T.inverse() * result->T_surface_points.inverse();
+    Vec6 xi;
+    xi << rotation_vector(off.linear()), off * result->centre - result->centre;
+    errors += xi * xi.transpose() / runs;
+    stated += result->pose_covariance / runs;
+    mahalanobis += xi.dot(result->pose_covariance.ldlt().solve(xi)) / runs;
+  }
+  EXPECT_NEAR(mahalanobis, 6.0, 0.7);  // standard deviation of the mean: sqrt(12 / 300) = 0.2
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(errors(k, k) / stated(k, k), 1.0, 0.3) << k;
+}
+
+TEST(IcpOnDistances, StaysFiniteFarFromTheGrid) {
+  const TriangleSurface surface = bumpy();
+  const Points points = geometry::sample_surface(surface, 50, 1).colwise() + Vec3(0, 0, 5000);
+  const auto result = align(points, volume_of(surface), RigidTransform::Identity());
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->T_surface_points.matrix().allFinite());
+  EXPECT_TRUE(result->pose_covariance.allFinite());
+  EXPECT_LT((result->T_surface_points * points.col(0) - kCentre).norm(), 100.0);
+}
+
+TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
+  const TriangleSurface surface = bumpy();
+  const auto cloud = geometry::OrientedCloud::build(geometry::sample_surface(surface, 4000, 7));
+  ASSERT_TRUE(cloud);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    const RigidTransform T = motion(random, 4.0, 6.0);
+    const Points points = traced(geometry::sample_surface(surface, 600, 70 + seed), T, 0.2, random);
+    const auto result = align(points, *cloud, RigidTransform::Identity(), without_prior(0.2));
+    ASSERT_TRUE(result);
+    EXPECT_TRUE(result->converged);
+    // Planes over neighbourhoods of 1 mm miss a surface of 10 mm radius by some hundredths; noise adds to it.
+    EXPECT_LT(placement_error(result->T_surface_points, T.inverse(), points), 0.3);
+  }
+}
+
+TEST(IcpOnDistances, RefusesTheSameInputs) {
+  const TriangleSurface surface = bumpy();
+  const auto volume = volume_of(surface);
+  const auto few = align(surface.vertices.leftCols(2), volume, RigidTransform::Identity());
+  ASSERT_FALSE(few);
+  EXPECT_THAT(few.error().message, testing::HasSubstr("2 given"));
+  IcpOptions options;
+  options.sd_mm = -1.0;
+  const auto cloud = geometry::OrientedCloud::build(surface.vertices);
+  ASSERT_TRUE(cloud);
+  const auto refused = align(surface.vertices, *cloud, RigidTransform::Identity(), options);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("icp.sd_mm = -1"));
+}
+
+}  // namespace
+}  // namespace brainshift::registration

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/pose_information.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/core/random.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+// Every number of points, so that each remainder of four is met.
+TEST(PoseInformation, IsTheSumOfOuterProducts) {
+  Random random(1);
+  for (int count = 1; count <= 13; ++count) {
+    geometry::PointRows points(count, 3), gradients(count, 3);
+    VecX residuals(count), weights(count);
+    const Vec3 centre(1, -2, 3);
+    const double sd = 0.4, radius = 2.5;
+    Mat6 hessian = Mat6::Zero();
+    Vec6 gradient = Vec6::Zero();
+    for (int i = 0; i < count; ++i) {
+      points.row(i) = 5.0 * random.direction();
+      gradients.row(i) = random.direction();
+      residuals[i] = random.normal();
+      weights[i] = random.uniform();
+      Vec6 row = direction_gradient(points.row(i), gradients.row(i), centre);
+      row.head<3>() /= radius;
+      hessian += weights[i] / (sd * sd) * row * row.transpose();
+      gradient += weights[i] / (sd * sd) * residuals[i] * row;
+    }
+    const PoseInformation information =
+        pose_information(points, gradients, residuals, weights, sd, centre, radius);
+    EXPECT_LT((information.hessian - hessian).norm(), 1e-11 * hessian.norm());
+    EXPECT_LT((information.gradient - gradient).norm(), 1e-11 * gradient.norm());
+  }
+}
+
+PoseInformation diagonal(const Vec6& known, double radius_mm) {
+  PoseInformation information;
+  information.hessian = known.asDiagonal();
+  information.radius_mm = radius_mm;
+  return information;
+}
+
+TEST(PoseCovariance, IsTheInverseOfDataAndPriorInRadiansAndMillimetres) {
+  const double radius = 10.0, prior = 50.0;
+  Vec6 known;
+  known << 4, 8, 16, 30, 60, 90;
+  const PoseInformation information = diagonal(known, radius);
+  const Mat6 covariance =
+      pose_covariance(information, observability(information, 1e-2), true, prior);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(covariance(k, k), 1.0 / (known[k] * radius * radius + prior), 1e-9);
+    EXPECT_NEAR(covariance(3 + k, 3 + k), 1.0 / known[3 + k], 1e-6);
+  }
+  EXPECT_LT((covariance - Mat6(covariance.diagonal().asDiagonal())).norm(), 1e-12);
+}
+
+TEST(PoseCovariance, AxesThatAreNotShownAreAtThePrior) {
+  Vec6 known;
+  known << 4, 0.01, 16, 30, 60, 0.02;
+  const PoseInformation information = diagonal(known, 10.0);
+  const Observability seen = observability(information, 1e-2);
+  const Mat6 with_prior = pose_covariance(information, seen, true, 50.0);
+  EXPECT_NEAR(with_prior(1, 1), 1.0 / 50.0, 1e-9);
+  EXPECT_NEAR(with_prior(5, 5), 1e6, 1.0);
+  EXPECT_NEAR(with_prior(4, 4), 1.0 / 60.0, 1e-6);
+  const Mat6 without = pose_covariance(information, seen, true, 0.0);
+  EXPECT_NEAR(std::sqrt(without(1, 1)), kUnknownRotationSd_rad, 1e-6);
+  const Mat6 held = pose_covariance(information, seen, false, 50.0);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(held(k, k), 1.0 / 50.0, 1e-9);
+}
+
+// Rotation about z traded against translation along x, as for half of a sphere: the translation takes part in what
+// is not known of the rotation.
+TEST(PoseCovariance, KeepsWhatAnUnknownRotationLeavesOpenInTheTranslation) {
+  Vec6 known;
+  known << 4, 8, 16, 30, 60, 90;
+  PoseInformation information = diagonal(known, 10.0);
+  information.hessian(2, 2) = 16.0 * 16.0 / 30.0 + 1e-4;
+  information.hessian(2, 3) = information.hessian(3, 2) = 16.0;
+  const Observability seen = observability(information, 1e-2);
+  ASSERT_FALSE(seen.rotation_shown(0));
+  ASSERT_TRUE(seen.rotation_shown(1));
+  const double prior = 50.0;
+  const Mat6 covariance = pose_covariance(information, seen, true, prior);
+  EXPECT_NEAR(covariance(2, 2), 1.0 / prior, 1e-7);
+  // t_x = -(16 / 30) * radius * w_z + noise.
+  const double slope = 16.0 / 30.0 * 10.0;
+  EXPECT_NEAR(covariance(3, 3), 1.0 / 30.0 + slope * slope / prior, 1e-5);
+  EXPECT_NEAR(covariance(2, 3), -slope / prior, 1e-6);
+}
+
+TEST(Observability, OfNothingIsNothing) {
+  const Observability seen = observability(diagonal(Vec6::Zero(), 1.0), 0.0);
+  EXPECT_FALSE(seen.rotation_shown(2));
+  EXPECT_FALSE(seen.translation_shown(2));
+}
+
+}  // namespace
+}  // namespace brainshift::registration
