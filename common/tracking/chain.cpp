@@ -35,6 +35,34 @@ Status check_options(const ChainOptions& options) {
   return check("max extrapolation", options.time.max_extrapolation_s, 0.0, 1.0);
 }
 
+struct FramePose {
+  std::optional<AffineTransform> T;
+  std::string why_not;
+};
+
+FramePose pose_of_frame(const Recording& recording, const std::vector<ConstantLink>& constants,
+                        const std::vector<FramePair>& links, const std::vector<ChainStep>& steps,
+                        int frame, const ChainOptions& options) {
+  const auto at = static_cast<std::size_t>(frame);
+  if (!recording.image_ok[at]) return {std::nullopt, "the image is invalid"};
+  const double t_s = recording.time_s[at] - options.latency_s;
+  AffineTransform T = AffineTransform::Identity();
+  for (const ChainStep& step : steps) {
+    PoseAtTime pose;
+    if (step.link < constants.size()) {
+      pose = {PoseOutcome::kOk, constants[step.link].T_to_from};
+    } else {
+      const LinkSeries& series = recording.links[step.link - constants.size()];
+      pose = pose_at(recording.time_s, series.samples, t_s, options.time);
+    }
+    if (pose.outcome != PoseOutcome::kOk) {
+      return {std::nullopt, reason_of(links[step.link], pose.outcome)};
+    }
+    T = (step.inverted ? pose.T_to_from.inverse() : pose.T_to_from) * T;
+  }
+  return {T, {}};
+}
+
 }  // namespace
 
 void count_dropped(std::vector<Dropped>& dropped, const std::string& reason, int frame) {
@@ -59,36 +87,15 @@ Result<Chain> evaluate_chain(const Recording& recording, const std::vector<Const
 
   Chain chain;
   for (const ChainStep& step : *steps) chain.links.push_back(links[step.link].name());
-  chain.T_target_source.resize(static_cast<std::size_t>(recording.num_frames()));
   for (int i = 0; i < recording.num_frames(); ++i) {
-    const auto frame = static_cast<std::size_t>(i);
-    if (!recording.image_ok[frame]) {
-      count_dropped(chain.dropped, "the image is invalid", i);
-      continue;
+    FramePose pose = pose_of_frame(recording, constants, links, *steps, i, options);
+    if (pose.T) {
+      ++chain.used;
+    } else {
+      count_dropped(chain.dropped, pose.why_not, i);
     }
-    const double t_s = recording.time_s[frame] - options.latency_s;
-    AffineTransform T = AffineTransform::Identity();
-    std::string reason;
-    for (const ChainStep& step : *steps) {
-      PoseAtTime pose;
-      if (step.link < constants.size()) {
-        pose = {PoseOutcome::kOk, constants[step.link].T_to_from};
-      } else {
-        const LinkSeries& series = recording.links[step.link - constants.size()];
-        pose = pose_at(recording.time_s, series.samples, t_s, options.time);
-      }
-      if (pose.outcome != PoseOutcome::kOk) {
-        reason = reason_of(links[step.link], pose.outcome);
-        break;
-      }
-      T = (step.inverted ? pose.T_to_from.inverse() : pose.T_to_from) * T;
-    }
-    if (!reason.empty()) {
-      count_dropped(chain.dropped, reason, i);
-      continue;
-    }
-    chain.T_target_source[frame] = T;
-    ++chain.used;
+    chain.T_target_source.push_back(pose.T);
+    chain.why_not.push_back(std::move(pose.why_not));
   }
   return chain;
 }

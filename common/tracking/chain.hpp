@@ -36,7 +36,8 @@ struct Dropped {
 
 struct Chain {
   std::vector<std::optional<AffineTransform>> T_target_source;  // per frame of the recording
-  std::vector<std::string> links;                               // names, in walking order
+  std::vector<std::string> why_not;  // per frame, why it has none; else empty
+  std::vector<std::string> links;    // names, in walking order
   int used = 0;
   std::vector<Dropped> dropped;
 };
