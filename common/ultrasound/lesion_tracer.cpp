@@ -35,7 +35,7 @@ Status check_options(const TracerOptions& options) {
         check("edge_width_px", options.edge_width_px, 1.0, 100.0),
         check("stiffness", options.stiffness, 0.0, 100.0),
         check("radius_change", options.radius_change, 0.05, 1.0),
-        check("min_contrast", options.min_contrast, 0.0, 100.0),
+        check("min_significance", options.min_significance, 0.0, 100.0),
         check("min_confidence", options.min_confidence, 0.0, 1.0)}) {
     if (!ok) return ok;
   }
@@ -53,16 +53,35 @@ struct Moments {
   double variance() const { return count > 1.0 ? squares / count - mean() * mean() : 0.0; }
 };
 
-// What the path encloses on one ray, and the ring around it of the same depth.
-void add_sides(const PolarImage& polar, Eigen::Index ray, int radius, Moments& inside,
-               Moments& ring) {
-  const int ring_end = std::min<int>(static_cast<int>(polar.cols()) - 1,
-                                     radius + std::max(2 * kBlur + 2, radius / 2));
-  for (int r = 0; r < radius - kBlur; ++r) inside.add(polar(ray, r));
-  for (int r = radius + kBlur + 1; r <= ring_end; ++r) ring.add(polar(ray, r));
+// Where the ring around a lesion ends on a ray: half as far out again.
+int ring_end(const PolarImage& polar, int radius) {
+  return std::min<int>(static_cast<int>(polar.cols()) - 1,
+                       radius + std::max(2 * kBlur + 2, radius / 2));
 }
 
-void judge(const PolarImage& polar, const std::vector<int>& path, TracedContour& traced) {
+// What the path encloses on one ray, and the ring around it.
+void add_sides(const PolarImage& polar, Eigen::Index ray, int radius, Moments& inside,
+               Moments& ring) {
+  for (int r = 0; r < radius - kBlur; ++r) inside.add(polar(ray, r));
+  for (int r = radius + kBlur + 1; r <= ring_end(polar, radius); ++r) ring.add(polar(ray, r));
+}
+
+// 1 / n_inside + 1 / n_ring, n being areas in smoothed speckles: 4 pi sd^2 is the correlation area of white noise behind
+// a Gaussian, and a pixel more for the speckle's own size.
+double inverse_speckles(const PolarImage& polar, const std::vector<int>& path,
+                        double smoothing_px) {
+  double inside_px2 = 0.0, ring_px2 = 0.0;
+  for (const int radius : path) {
+    const double r = radius, end = ring_end(polar, radius);
+    inside_px2 += std::numbers::pi * r * r / static_cast<double>(path.size());
+    ring_px2 += std::numbers::pi * (end * end - r * r) / static_cast<double>(path.size());
+  }
+  const double speckle_px2 = 4.0 * std::numbers::pi * (smoothing_px * smoothing_px + 1.0);
+  return speckle_px2 / inside_px2 + speckle_px2 / ring_px2;
+}
+
+void judge(const PolarImage& polar, const std::vector<int>& path, double smoothing_px,
+           TracedContour& traced) {
   Moments inside, ring;
   for (std::size_t j = 0; j < path.size(); ++j) {
     add_sides(polar, static_cast<Eigen::Index>(j), path[j], inside, ring);
@@ -70,7 +89,7 @@ void judge(const PolarImage& polar, const std::vector<int>& path, TracedContour&
   const double sign = traced.bright ? 1.0 : -1.0;
   const double difference = sign * (inside.mean() - ring.mean());
   const double sd = std::sqrt(std::max(1e-12, 0.5 * (inside.variance() + ring.variance())));
-  traced.contrast = difference / sd;
+  traced.significance = difference / sd / std::sqrt(inverse_speckles(polar, path, smoothing_px));
   int agreeing = 0;
   for (std::size_t j = 0; j < path.size(); ++j) {
     Moments own_inside, own_ring;
@@ -120,7 +139,7 @@ TracedContour search_once(const Eigen::MatrixXf& image, const Search& search,
     traced.contour.points_px.col(static_cast<Eigen::Index>(j)) =
         on_ray(search.centre_px, j, path.size(), path[j]);
   }
-  judge(polar, path, traced);
+  judge(polar, path, options.smoothing_px, traced);
   return traced;
 }
 
@@ -163,14 +182,15 @@ TracedContour search_twice(const Eigen::MatrixXf& image, Search search,
 }
 
 Status accept(const TracedContour& traced, const TracerOptions& options) {
-  if (traced.contrast >= options.min_contrast && traced.confidence >= options.min_confidence)
+  if (traced.significance >= options.min_significance &&
+      traced.confidence >= options.min_confidence)
     return {};
   return fail(
       ErrorCode::kEmptySet,
-      fmt::format("no boundary found on frame {}: contrast {:.2f} (at least {}), confidence "
+      fmt::format("no boundary found on frame {}: significance {:.2f} (at least {}), confidence "
                   "{:.2f} (at least {})",
-                  traced.contour.frame, traced.contrast, options.min_contrast, traced.confidence,
-                  options.min_confidence));
+                  traced.contour.frame, traced.significance, options.min_significance,
+                  traced.confidence, options.min_confidence));
 }
 
 Status check_seed(const tracking::Recording& recording, const Seed& seed) {
@@ -226,7 +246,7 @@ Result<TracedContour> trace_lesion(const tracking::Recording& recording, const S
     if (options.echogenicity == (bright ? Echogenicity::kDark : Echogenicity::kBright)) continue;
     TracedContour traced = search_twice(image, {seed.at_px, whole_range(options), bright}, options);
     traced.contour.frame = seed.frame;
-    if (!best || traced.contrast > best->contrast) best = std::move(traced);
+    if (!best || traced.significance > best->significance) best = std::move(traced);
   }
   if (Status ok = accept(*best, options); !ok) return tl::unexpected(ok.error());
   return *best;

@@ -8,9 +8,10 @@
 // The next image starts from the last contour: its centroid is the seed, and radii may differ by `radius_change` at most.
 //
 // An edge is always found somewhere; whether it bounds anything is decided by numbers that the search does not optimise:
-//   contrast    |mean of the whole inside - mean of a ring outside| / standard deviation within both
-//   confidence  fraction of rays whose own inside differs from their outside in the lesion's direction by at least half
-//               of that contrast
+//   significance  |mean of the whole inside - mean of a ring outside|, in standard errors: their standard deviation over the
+//                 square root of the number of smoothed speckles in each
+//   confidence    fraction of rays whose own inside differs from their outside in the lesion's direction by at least half
+//                 of that difference
 // Below the limits there is no contour: a contour is refused rather than invented. Not a segmentation of any lesion: it
 // needs one that is roughly star-shaped seen from the seed, and brighter or darker than what is around it.
 // Source of the search: Amini, Weymouth & Jain, "Using dynamic programming for solving variational problems in vision",
@@ -38,14 +39,16 @@ struct TracerOptions {
   double edge_width_px = 6.0;
   double stiffness = 0.3;       // of the image's sd, per pixel of radius from ray to ray
   double radius_change = 0.35;  // from image to image, of the radius
-  double min_contrast = 0.6;    // noise alone reaches 0.4 (lesion_tracer_test.cpp)
+  // The best path through noise alone reaches 5.4 in 180 images of fine speckle (lesion_tracer_test.cpp). Speckles much
+  // larger than smoothing_px are fewer than counted: smooth them more.
+  double min_significance = 8.0;
   double min_confidence = 0.7;
 };
 
 struct TracedContour {
   Contour contour;  // closed, one point per ray
   bool bright = true;
-  double contrast = 0.0;
+  double significance = 0.0;
   double confidence = 0.0;
 };
 
@@ -55,7 +58,7 @@ struct Seed {
 };
 
 // One image. kInvalidArgument: a seed outside the image or a frame that does not exist, options out of range;
-// kEmptySet: no boundary found, with contrast and confidence. Sentences name the frame.
+// kEmptySet: no boundary found, with significance and confidence. Sentences name the frame.
 Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed,
                                    const TracerOptions& options = {});
 
