@@ -128,8 +128,9 @@ SequenceContent VirtualSweep::content() const {
         content.pixels += static_cast<char>(std::lround(std::clamp(grey, 0.0, 255.0)));
       }
     }
+    const double part = static_cast<double>(frame) / std::max(1, frames - 1);
     const RigidTransform T_tracker_reference =
-        motion(Vec3(1, 0, 1), 0.5 + 0.01 * frame, Vec3(-200 + frame, 90, -1500 + 0.5 * frame));
+        motion(Vec3(1, 0, 1), 0.5 + 0.2 * part, Vec3(-200 + 20 * part, 90, -1500 + 10 * part));
     const AffineTransform T_tracker_probe =
         T_tracker_reference * T_ras_reference().inverse() * T * T_probe_image().inverse();
     content.frames.push_back(
