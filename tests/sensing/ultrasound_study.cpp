@@ -11,12 +11,11 @@
 #include <filesystem>
 #include <numbers>
 
-#include "common/io/file_access.hpp"
 #include "common/io/plus_config.hpp"
 #include "common/io/sequence_file.hpp"
-#include "common/io/sequence_header.hpp"
 #include "common/tracking/chain.hpp"
 #include "common/ultrasound/compound.hpp"
+#include "tests/sensing/answer_volume.hpp"
 #include "tests/sensing/volume_picture.hpp"
 #include "tests/support/study_record.hpp"
 
@@ -24,6 +23,9 @@ namespace brainshift {
 namespace {
 
 namespace fs = std::filesystem;
+using test_support::Agreement;
+using test_support::AnswerVolume;
+using test_support::compare;
 using test_support::record;
 using test_support::record_check;
 using test_support::record_left_out;
@@ -43,74 +45,6 @@ bool check(const std::string& name, double value, const std::string& bound, bool
            const std::string& source) {
   fmt::print("{}  {} = {:.6g} ({})\n", pass ? "ok  " : "FAIL", name, value, bound);
   return record_check(kStudy, name, value, bound, pass, source);
-}
-
-// A volume as PLUS stores its results: header as of a sequence, with Offset and ElementSpacing in the Reference frame.
-struct AnswerVolume {
-  ultrasound::VolumeGrid grid;
-  std::vector<float> values;
-};
-
-Vec3 three_numbers(const io::SequenceHeader& header, const char* key) {
-  Vec3 value = Vec3::Zero();
-  const std::string& text = header.fields.at(key);
-  char* rest = nullptr;
-  const char* at = text.c_str();
-  for (int axis = 0; axis < 3; ++axis, at = rest) value[axis] = std::strtod(at, &rest);
-  return value;
-}
-
-AnswerVolume read_answer(const fs::path& path) {
-  const std::string content = value_or_exit(io::read_file(path));
-  const io::SequenceHeader header = value_or_exit(io::parse_meta_header(content));
-  const std::string bytes = value_or_exit(io::sequence_values(header, 1));
-  AnswerVolume volume;
-  volume.grid.origin_mm = three_numbers(header, "Offset");
-  volume.grid.spacing_mm = three_numbers(header, "ElementSpacing");
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    volume.grid.dims[axis] = static_cast<int>(header.sizes[axis]);
-  }
-  for (const char byte : bytes) {
-    volume.values.push_back(static_cast<float>(static_cast<unsigned char>(byte)));
-  }
-  return volume;
-}
-
-// Agreement over the voxels that we filled, our volume moved by whole voxels against PLUS's, which marks empty voxels with 0
-// (as black ones) and holds no weights.
-struct Agreement {
-  double correlation = 0.0;
-  double mean_difference = 0.0;  // absolute, grey values, where PLUS's is not 0
-  long voxels = 0;
-};
-
-Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& answer,
-                  const std::array<int, 3>& shift = {0, 0, 0}) {
-  const std::array<int, 3>& dims = answer.grid.dims;
-  double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, difference = 0, bright = 0;
-  for (std::size_t i = 0; i < answer.values.size(); ++i) {
-    if (ours.weight[i] <= 0.0F) continue;
-    const int at = static_cast<int>(i);
-    const std::array<int, 3> moved{at % dims[0] + shift[0], at / dims[0] % dims[1] + shift[1],
-                                   at / dims[0] / dims[1] + shift[2]};
-    bool inside = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      inside = inside && moved[axis] >= 0 && moved[axis] < dims[axis];
-    }
-    if (!inside) continue;
-    const double x = ours.image.values[i];
-    const double y =
-        answer
-            .values[static_cast<std::size_t>(moved[0] + dims[0] * (moved[1] + dims[1] * moved[2]))];
-    n += 1, sx += x, sy += y, sxx += x * x, syy += y * y, sxy += x * y;
-    if (y > 0.0) difference += std::abs(x - y), bright += 1;
-  }
-  Agreement result;
-  const double vx = sxx / n - sx * sx / n / n, vy = syy / n - sy * sy / n / n;
-  result.correlation = (sxy / n - sx * sy / n / n) / std::sqrt(std::max(1e-300, vx * vy));
-  result.mean_difference = difference / std::max(1.0, bright);
-  result.voxels = std::lround(n);
-  return result;
 }
 
 // The correlation unmoved and, as points, moved along each axis; the length of the best move within one voxel of each axis.
@@ -189,7 +123,8 @@ void study_spine(const fs::path& folder) {
       read_sweep(folder / "SpinePhantomFreehand.igs.mha",
                  folder / "PlusDeviceSet_SpinePhantomFreehandReconstructionOnly.xml", "Image");
   check_counts("spine", sweep, 21);
-  const AnswerVolume answer = read_answer(folder / "SpinePhantomFreehandReconstructed.mha");
+  const AnswerVolume answer =
+      value_or_exit(test_support::read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
   const auto grid = value_or_exit(ultrasound::enclosing_grid(
       sweep.recording, sweep.chain.T_target_source, window, *sweep.config.output_spacing_mm));
@@ -217,7 +152,8 @@ void study_nwire(const fs::path& folder) {
                  folder / "PlusDeviceSet_NwirePhantomFreehand_vtkVolumeReconstructorTest2.xml",
                  "CroppedImage");
   check_counts("nwire", sweep, 20);
-  const AnswerVolume answer = read_answer(folder / "NwirePhantomFreehandReconstructed.mha");
+  const AnswerVolume answer =
+      value_or_exit(test_support::read_answer(folder / "NwirePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
   const auto ours = value_or_exit(
       ultrasound::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
@@ -279,14 +215,10 @@ void study_interpolation(const fs::path& folder) {
   const double turn = rms(between.rotation_deg) / rms(before.rotation_deg);
   check("withheld poses: rotation error over that of the sample before", turn, "< 1", turn < 1.0,
         "TransformInterpolationTest.igs.mha");
-  check("invalid samples of the recording",
-        static_cast<double>(std::count_if(
-            series->samples.begin(), series->samples.end(),
-            [](const auto& link) { return link.status == tracking::LinkStatus::kInvalid; })),
-        "= 1",
-        std::count_if(
-            series->samples.begin(), series->samples.end(),
-            [](const auto& link) { return link.status == tracking::LinkStatus::kInvalid; }) == 1,
+  const auto invalid =
+      std::count_if(series->samples.begin(), series->samples.end(),
+                    [](const auto& link) { return link.status == tracking::LinkStatus::kInvalid; });
+  check("invalid samples of the recording", static_cast<double>(invalid), "= 1", invalid == 1,
         "status fields of the recording");
 }
 
