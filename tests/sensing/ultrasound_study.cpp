@@ -177,6 +177,11 @@ double rms(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, values.size())));
 }
 
+double percentile(std::vector<double> values, int percent) {
+  std::sort(values.begin(), values.end());
+  return values[(values.size() - 1) * static_cast<std::size_t>(percent) / 100];
+}
+
 // Every other sample of a tracked probe is withheld and asked for: between its neighbours, and as the neighbour before it
 // (what a system without interpolation shows).
 void study_interpolation(const fs::path& folder) {
@@ -199,11 +204,17 @@ void study_interpolation(const fs::path& folder) {
     const AffineTransform& truth = series->samples[i].T_to_from;
     between.add(pose.T_to_from, truth);
     before.add(kept[i - 1].T_to_from, truth);
-    record({kStudy, "interpolated", "time s", "error of a withheld pose mm",
-            recording.time_s[i] - recording.time_s[0], between.translation_mm.back()});
-    record({kStudy, "sample before", "time s", "error of a withheld pose mm",
-            recording.time_s[i] - recording.time_s[0], before.translation_mm.back()});
   }
+  for (int percent = 5; percent <= 100; percent += 5) {
+    const char* x = "percentile of withheld poses";
+    const char* y = "translation error mm";
+    record({"ultrasound_poses", "interpolated", x, y, double(percent),
+            percentile(between.translation_mm, percent)});
+    record({"ultrasound_poses", "sample before", x, y, double(percent),
+            percentile(before.translation_mm, percent)});
+  }
+  fmt::print("medians: {:.4f} mm interpolated; {:.4f} mm the sample before\n",
+             percentile(between.translation_mm, 50), percentile(before.translation_mm, 50));
   fmt::print(
       "withheld poses: {} interpolated, {} refused; rms {:.4f} mm {:.4f} deg; sample before {:.4f} "
       "mm {:.4f} deg\n",
