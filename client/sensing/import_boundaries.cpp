@@ -48,13 +48,25 @@ std::string summary(const std::vector<tracking::Dropped>& dropped) {
   return text;
 }
 
-Status check_frames(const tracking::Recording& recording,
-                    const std::vector<ultrasound::Contour>& contours) {
+// Contours belong to images of this size; half a pixel beyond the outermost centres is still the image.
+Status check_contours(const tracking::Recording& recording,
+                      const std::vector<ultrasound::Contour>& contours) {
   for (const ultrasound::Contour& contour : contours) {
-    if (contour.frame >= 0 && contour.frame < recording.num_frames()) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("contour on frame {}: the recording has frames 0 to {}", contour.frame,
-                            recording.num_frames() - 1));
+    if (contour.frame < 0 || contour.frame >= recording.num_frames()) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("contour on frame {}: the recording has frames 0 to {}",
+                              contour.frame, recording.num_frames() - 1));
+    }
+    for (Eigen::Index i = 0; i < contour.points_px.cols(); ++i) {
+      const double u = contour.points_px(0, i), v = contour.points_px(1, i);
+      if (u >= -0.5 && u <= recording.width - 0.5 && v >= -0.5 && v <= recording.height - 0.5) {
+        continue;
+      }
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("contour on frame {}: {} {} px lies outside the image of {} x {} pixels",
+                      contour.frame, u, v, recording.width, recording.height));
+    }
   }
   return {};
 }
@@ -75,7 +87,7 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("gap between sweeps = {} s: must be >= 0", options.sweep_gap_s));
   }
-  if (Status ok = check_frames(recording, contours); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_contours(recording, contours); !ok) return tl::unexpected(ok.error());
   auto chain = tracking::evaluate_chain(recording, constants, options.image_frame,
                                         options.ras_frame, options.chain);
   if (!chain) return tl::unexpected(chain.error());

@@ -34,7 +34,8 @@ struct Boundaries {
   std::vector<tracking::Dropped> lost_contours;  // contours on frames without a chain
 };
 
-// kInvalidArgument: no chain from the image frame to RAS, a contour on a frame that does not exist, options out of range;
+// kInvalidArgument: no chain from the image frame to RAS, a contour on a frame that does not exist or outside
+// its image, options out of range;
 // a pixel that is not 0.005 to 2 mm wide (metres taken for mm), a boundary that does not span 1 to 300 mm.
 // kEmptySet: no contour lies on a frame with a valid chain; the sentence says why the frames were dropped.
 Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,

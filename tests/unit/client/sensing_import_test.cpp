@@ -287,6 +287,10 @@ TEST_F(Import, NamesWhatIsMissing) {
   EXPECT_THAT(with([](O& o) { o.model = o.device; }), HasSubstr("device.xml"));
   options.contours = write("beyond.csv", "21,1,1\n21,2,1\n21,2,2\n");
   EXPECT_THAT(refusal(), HasSubstr("contour on frame 21: the recording has frames 0 to 20"));
+  options.contours = write("outside.csv", "10,1,1\n10,180,1\n10,1,3\n");
+  EXPECT_THAT(
+      refusal(),
+      HasSubstr("contour on frame 10: 180 1 px lies outside the image of 180 x 160 pixels"));
   options.contours = write("tiny.csv", "10,1,1\n10,3,1\n10,1,3\n");
   EXPECT_THAT(refusal(), HasSubstr("the boundary of frames 10 to 10 spans 0."));
   options.contours.clear();
