@@ -11,7 +11,9 @@ int main(int argc, char** argv) {
   CLI::App app{
       "brainshift: simulate surgeries with known truth, replay recorded ones to brainshiftd, and "
       "report how "
-      "well the deformation was recovered; solve single forward problems on any mesh.\n"
+      "well the deformation was recovered; solve single forward problems on any mesh; import "
+      "recordings "
+      "of tracked ultrasound.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
   app.set_version_flag("--version", "brainshift " BRAINSHIFT_VERSION);
@@ -31,12 +33,14 @@ int main(int argc, char** argv) {
   client::add_replay(app, status);
   client::add_report(app, status);
   client::add_solve(app, status);
+  client::add_import(app, status);
   // CLI11 would only say that a subcommand is required.
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error("unknown command \"" + std::string(argv[1]) +
-                        "\": must be simulate, replay, report or solve (see brainshift --help)");
+    client::print_error(
+        "unknown command \"" + std::string(argv[1]) +
+        "\": must be simulate, replay, report, solve or import (see brainshift --help)");
     return 2;
   }
   try {

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A surgery file of observations, as `brainshift replay` plays it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/observation.hpp"
+
+namespace brainshift::sensing {
+
+// Now, UTC, as ISO 8601 to the second.
+std::string utc_now();
+
+// A new file; nothing is left behind on failure. kWriteFailed, also when the file exists already. meta: surgery_file.hpp.
+Status write_surgery(const std::filesystem::path& path,
+                     const std::map<std::string, std::string>& meta,
+                     const std::vector<Observation>& observations);
+
+}  // namespace brainshift::sensing

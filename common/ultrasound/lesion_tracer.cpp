@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/ultrasound/lesion_tracer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/ultrasound/lesion_polar.hpp"
+
+namespace brainshift::ultrasound {
+namespace {
+
+// Samples this close to the contour belong to neither side: smoothing mixes them.
+constexpr int kBlur = 2;
+
+struct Search {
+  Eigen::Vector2d centre_px;
+  std::vector<RadiusRange> range;
+  bool bright;
+};
+
+Status check_options(const TracerOptions& options) {
+  const auto check = [](const char* name, double value, double least, double most) -> Status {
+    if (value >= least && value <= most) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("tracer {} = {}: must be {} to {}", name, value, least, most));
+  };
+  for (const Status& ok :
+       {check("smoothing_px", options.smoothing_px, 0.0, 50.0),
+        check("rays", options.rays, 16, 720),
+        check("min_radius_px", options.min_radius_px, 1.0, 1e4),
+        check("max_radius_px", options.max_radius_px, 2.0 * options.min_radius_px, 4096.0),
+        check("edge_width_px", options.edge_width_px, 1.0, 100.0),
+        check("stiffness", options.stiffness, 0.0, 100.0),
+        check("radius_change", options.radius_change, 0.05, 1.0),
+        check("min_significance", options.min_significance, 0.0, 100.0),
+        check("min_confidence", options.min_confidence, 0.0, 1.0)}) {
+    if (!ok) return ok;
+  }
+  return {};
+}
+
+// Sum, sum of squares and count.
+struct Moments {
+  double sum = 0.0, squares = 0.0, count = 0.0;
+  void add(float value) {
+    if (std::isnan(value)) return;
+    sum += value, squares += static_cast<double>(value) * value, count += 1.0;
+  }
+  double mean() const { return count > 0.0 ? sum / count : 0.0; }
+  double variance() const { return count > 1.0 ? squares / count - mean() * mean() : 0.0; }
+};
+
+// Where the ring around a lesion ends on a ray: half as far out again.
+int ring_end(const PolarImage& polar, int radius) {
+  return std::min<int>(static_cast<int>(polar.cols()) - 1,
+                       radius + std::max(2 * kBlur + 2, radius / 2));
+}
+
+// What the path encloses on one ray, and the ring around it.
+void add_sides(const PolarImage& polar, Eigen::Index ray, int radius, Moments& inside,
+               Moments& ring) {
+  for (int r = 0; r < radius - kBlur; ++r) inside.add(polar(ray, r));
+  for (int r = radius + kBlur + 1; r <= ring_end(polar, radius); ++r) ring.add(polar(ray, r));
+}
+
+// 1 / n_inside + 1 / n_ring, n being areas in smoothed speckles: 4 pi sd^2 is the correlation area of white noise behind
+// a Gaussian, and a pixel more for the speckle's own size.
+double inverse_speckles(const PolarImage& polar, const std::vector<int>& path,
+                        double smoothing_px) {
+  double inside_px2 = 0.0, ring_px2 = 0.0;
+  for (const int radius : path) {
+    const double r = radius, end = ring_end(polar, radius);
+    inside_px2 += std::numbers::pi * r * r / static_cast<double>(path.size());
+    ring_px2 += std::numbers::pi * (end * end - r * r) / static_cast<double>(path.size());
+  }
+  const double speckle_px2 = 4.0 * std::numbers::pi * (smoothing_px * smoothing_px + 1.0);
+  return speckle_px2 / inside_px2 + speckle_px2 / ring_px2;
+}
+
+void judge(const PolarImage& polar, const std::vector<int>& path, double smoothing_px,
+           TracedContour& traced) {
+  Moments inside, ring;
+  for (std::size_t j = 0; j < path.size(); ++j) {
+    add_sides(polar, static_cast<Eigen::Index>(j), path[j], inside, ring);
+  }
+  const double sign = traced.bright ? 1.0 : -1.0;
+  const double difference = sign * (inside.mean() - ring.mean());
+  const double sd = std::sqrt(std::max(1e-12, 0.5 * (inside.variance() + ring.variance())));
+  traced.significance = difference / sd / std::sqrt(inverse_speckles(polar, path, smoothing_px));
+  int agreeing = 0;
+  for (std::size_t j = 0; j < path.size(); ++j) {
+    Moments own_inside, own_ring;
+    add_sides(polar, static_cast<Eigen::Index>(j), path[j], own_inside, own_ring);
+    if (own_inside.count < 1.0 || own_ring.count < 1.0) continue;  // at the image's border
+    if (sign * (own_inside.mean() - own_ring.mean()) >= 0.5 * difference) ++agreeing;
+  }
+  traced.confidence = static_cast<double>(agreeing) / static_cast<double>(path.size());
+}
+
+// Where the path's radius from `centre` lies on ray j.
+Eigen::Vector2d on_ray(const Eigen::Vector2d& centre, std::size_t j, std::size_t rays,
+                       double radius) {
+  const double angle = 2.0 * std::numbers::pi * static_cast<double>(j) / static_cast<double>(rays);
+  return centre + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+}
+
+// Of the polygon's area.
+Eigen::Vector2d centroid(const Eigen::Matrix2Xd& polygon) {
+  double area = 0.0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  const Eigen::Vector2d origin = polygon.col(0);
+  for (Eigen::Index i = 0; i < polygon.cols(); ++i) {
+    const Eigen::Vector2d a = polygon.col(i) - origin;
+    const Eigen::Vector2d b = polygon.col((i + 1) % polygon.cols()) - origin;
+    const double cross = a.x() * b.y() - a.y() * b.x();
+    area += cross;
+    sum += cross * (a + b) / 3.0;
+  }
+  return area == 0.0 ? origin : Eigen::Vector2d(origin + sum / area);
+}
+
+TracedContour search_once(const Eigen::MatrixXf& image, const Search& search,
+                          const TracerOptions& options) {
+  const int radii = static_cast<int>(std::ceil(options.max_radius_px)) +
+                    static_cast<int>(std::ceil(options.edge_width_px)) + 2;
+  const PolarImage polar = polar_image(image, search.centre_px, options.rays, radii);
+  Eigen::MatrixXf gain = edge_strength(polar, static_cast<int>(std::round(options.edge_width_px)));
+  if (!search.bright) gain = -gain;
+  const double mean = image.mean();
+  const double sd = std::sqrt((image.array() - static_cast<float>(mean)).square().mean());
+  const std::vector<int> path = best_closed_path(gain, search.range, options.stiffness * sd);
+  TracedContour traced;
+  traced.bright = search.bright;
+  traced.contour.points_px.resize(2, options.rays);
+  for (std::size_t j = 0; j < path.size(); ++j) {
+    traced.contour.points_px.col(static_cast<Eigen::Index>(j)) =
+        on_ray(search.centre_px, j, path.size(), path[j]);
+  }
+  judge(polar, path, options.smoothing_px, traced);
+  return traced;
+}
+
+std::vector<RadiusRange> whole_range(const TracerOptions& options) {
+  return std::vector<RadiusRange>(static_cast<std::size_t>(options.rays),
+                                  {static_cast<int>(std::ceil(options.min_radius_px)),
+                                   static_cast<int>(options.max_radius_px)});
+}
+
+// Radii that a contour allows around its centroid: those of the former contour along each ray, give or take.
+std::vector<RadiusRange> range_around(const Eigen::Matrix2Xd& contour,
+                                      const Eigen::Vector2d& centre, const TracerOptions& options) {
+  std::vector<RadiusRange> range = whole_range(options);
+  const RadiusRange limits = range.front();
+  const auto rays = static_cast<double>(range.size());
+  for (std::size_t j = 0; j < range.size(); ++j) {
+    const double angle = 2.0 * std::numbers::pi * static_cast<double>(j) / rays;
+    double nearest = std::numbers::pi, radius = 0.0;
+    for (Eigen::Index i = 0; i < contour.cols(); ++i) {
+      const Eigen::Vector2d d = contour.col(i) - centre;
+      const double gap =
+          std::abs(std::remainder(std::atan2(d.y(), d.x()) - angle, 2.0 * std::numbers::pi));
+      if (gap < nearest) nearest = gap, radius = d.norm();
+    }
+    const double play = std::max(3.0, options.radius_change * radius);
+    range[j].first = std::clamp(static_cast<int>(radius - play), limits.first, limits.last);
+    range[j].last =
+        std::clamp(static_cast<int>(std::ceil(radius + play)), limits.first, limits.last);
+  }
+  return range;
+}
+
+// Searches, moves to the centroid of what was found and searches again nearby.
+TracedContour search_twice(const Eigen::MatrixXf& image, Search search,
+                           const TracerOptions& options) {
+  const TracedContour first = search_once(image, search, options);
+  search.centre_px = centroid(first.contour.points_px);
+  search.range = range_around(first.contour.points_px, search.centre_px, options);
+  return search_once(image, search, options);
+}
+
+Status accept(const TracedContour& traced, const TracerOptions& options) {
+  if (traced.significance >= options.min_significance &&
+      traced.confidence >= options.min_confidence)
+    return {};
+  return fail(
+      ErrorCode::kEmptySet,
+      fmt::format("no boundary found on frame {}: significance {:.2f} (at least {}), confidence "
+                  "{:.2f} (at least {})",
+                  traced.contour.frame, traced.significance, options.min_significance,
+                  traced.confidence, options.min_confidence));
+}
+
+Status check_seed(const tracking::Recording& recording, const Seed& seed) {
+  if (seed.frame < 0 || seed.frame >= recording.num_frames()) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("seed on frame {}: the recording has frames 0 to {}", seed.frame,
+                            recording.num_frames() - 1));
+  }
+  const bool inside = seed.at_px.x() >= 0.0 && seed.at_px.x() <= recording.width - 1 &&
+                      seed.at_px.y() >= 0.0 && seed.at_px.y() <= recording.height - 1;
+  if (!inside) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("seed at {} {} px on frame {}: the image has {} x {} pixels", seed.at_px.x(),
+                    seed.at_px.y(), seed.frame, recording.width, recording.height));
+  }
+  if (!recording.image_ok[static_cast<std::size_t>(seed.frame)]) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("seed on frame {}: its image is invalid", seed.frame));
+  }
+  return {};
+}
+
+// The images from the seed's on in one direction; returns why it ended.
+std::string follow(const tracking::Recording& recording, const TracedContour& start, int direction,
+                   const TracerOptions& options, std::vector<TracedContour>& contours) {
+  TracedContour last = start;
+  const int end = direction > 0 ? recording.num_frames() : -1;
+  for (int frame = start.contour.frame + direction; frame != end; frame += direction) {
+    if (!recording.image_ok[static_cast<std::size_t>(frame)]) continue;
+    const Eigen::Vector2d centre = centroid(last.contour.points_px);
+    const Search search{centre, range_around(last.contour.points_px, centre, options),
+                        start.bright};
+    TracedContour traced =
+        search_twice(smoothed_frame(recording, frame, options.smoothing_px), search, options);
+    traced.contour.frame = frame;
+    if (Status found = accept(traced, options); !found) return found.error().message;
+    contours.push_back(traced);
+    last = std::move(traced);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed,
+                                   const TracerOptions& options) {
+  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_seed(recording, seed); !ok) return tl::unexpected(ok.error());
+  const Eigen::MatrixXf image = smoothed_frame(recording, seed.frame, options.smoothing_px);
+  std::optional<TracedContour> best;
+  for (const bool bright : {true, false}) {
+    if (options.echogenicity == (bright ? Echogenicity::kDark : Echogenicity::kBright)) continue;
+    TracedContour traced = search_twice(image, {seed.at_px, whole_range(options), bright}, options);
+    traced.contour.frame = seed.frame;
+    if (!best || traced.significance > best->significance) best = std::move(traced);
+  }
+  if (Status ok = accept(*best, options); !ok) return tl::unexpected(ok.error());
+  return *best;
+}
+
+Result<LesionSweep> trace_sweep(const tracking::Recording& recording, const Seed& seed,
+                                const TracerOptions& options) {
+  const auto start = trace_lesion(recording, seed, options);
+  if (!start) return tl::unexpected(start.error());
+  LesionSweep sweep;
+  sweep.stopped_before = follow(recording, *start, -1, options, sweep.contours);
+  std::reverse(sweep.contours.begin(), sweep.contours.end());
+  sweep.contours.push_back(*start);
+  sweep.stopped_after = follow(recording, *start, 1, options, sweep.contours);
+  return sweep;
+}
+
+}  // namespace brainshift::ultrasound

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Recorded tracked ultrasound, read and used: every frame of two phantom sweeps, volumes compounded from them against those
+// that PLUS made of the same data, and poses between samples against samples that were withheld.
+//
+// Needs the folder tracked_ultrasound_plus of BRAINSHIFT_EXTERNAL_DATA (PlusLibData, BSD-3); without it all is left out.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <numbers>
+
+#include "common/io/plus_config.hpp"
+#include "common/io/sequence_file.hpp"
+#include "common/tracking/chain.hpp"
+#include "common/ultrasound/compound.hpp"
+#include "tests/sensing/answer_volume.hpp"
+#include "tests/sensing/volume_picture.hpp"
+#include "tests/support/study_record.hpp"
+
+namespace brainshift {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::Agreement;
+using test_support::AnswerVolume;
+using test_support::compare;
+using test_support::record;
+using test_support::record_check;
+using test_support::record_left_out;
+
+constexpr const char* kStudy = "ultrasound";
+
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (!result) {
+    fmt::print(stderr, "sensing_ultrasound: {}\n", result.error().message);
+    std::exit(1);
+  }
+  return std::move(*result);
+}
+
+bool check(const std::string& name, double value, const std::string& bound, bool pass,
+           const std::string& source) {
+  fmt::print("{}  {} = {:.6g} ({})\n", pass ? "ok  " : "FAIL", name, value, bound);
+  return record_check(kStudy, name, value, bound, pass, source);
+}
+
+// The correlation unmoved and, as points, moved along each axis; the length of the best move within one voxel of each axis.
+double best_move(const std::string& series, const ultrasound::CompoundedVolume& ours,
+                 const AnswerVolume& answer) {
+  for (int move = -3; move <= 3; ++move) {
+    record({kStudy, series, "move along x in voxels", "correlation with PLUS", double(move),
+            compare(ours, answer, {move, 0, 0}).correlation});
+  }
+  double best = -1.0, length = 0.0;
+  for (int code = 0; code < 27; ++code) {
+    const std::array<int, 3> move{code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1};
+    const double correlation = compare(ours, answer, move).correlation;
+    if (correlation <= best) continue;
+    best = correlation;
+    length = std::sqrt(double(move[0] * move[0] + move[1] * move[1] + move[2] * move[2]));
+  }
+  return length;
+}
+
+struct Sweep {
+  tracking::Recording recording;
+  io::PlusConfig config;
+  tracking::Chain chain;
+};
+
+Sweep read_sweep(const fs::path& recording, const fs::path& config,
+                 const std::string& image_frame) {
+  Sweep sweep{
+      value_or_exit(io::read_sequence(recording)), value_or_exit(io::read_plus_config(config)), {}};
+  std::vector<tracking::ConstantLink> constants;
+  for (const io::PlusTransform& transform : sweep.config.transforms) {
+    constants.push_back(transform.link);
+  }
+  sweep.chain =
+      value_or_exit(tracking::evaluate_chain(sweep.recording, constants, image_frame, "Reference"));
+  std::string links;
+  for (const std::string& link : sweep.chain.links) links += " " + link;
+  fmt::print("{}: {} frames of {} x {} px, {} used, chain{}\n", recording.filename().string(),
+             sweep.recording.num_frames(), sweep.recording.width, sweep.recording.height,
+             sweep.chain.used, links);
+  return sweep;
+}
+
+void check_counts(const std::string& name, const Sweep& sweep, int frames) {
+  const int read = sweep.recording.num_frames();
+  check(name + " frames read", read, fmt::format("= {}", frames), read == frames,
+        "DimSize of the recording");
+  check(name + " frames with a valid chain", sweep.chain.used, fmt::format("= {}", frames),
+        sweep.chain.used == frames, "status fields of the recording");
+}
+
+void write_slices(const std::string& name, const ultrasound::CompoundedVolume& ours,
+                  const AnswerVolume& answer) {
+  const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
+  if (folder == nullptr) return;
+  const int slice = test_support::fullest_slice(ours.weight, answer.grid.dims);
+  test_support::write_slice_pair(fs::path(folder) / ("ultrasound_" + name + ".png"),
+                                 ours.image.values, answer.values, answer.grid, slice);
+}
+
+void check_volume(const std::string& what, const ultrasound::CompoundedVolume& ours,
+                  const AnswerVolume& answer) {
+  const Agreement agreement = compare(ours, answer);
+  fmt::print("{}: {} voxels filled, mean |difference| {:.2f} grey values\n", what, agreement.voxels,
+             agreement.mean_difference);
+  check(what + " volume: correlation with PLUS's over filled voxels", agreement.correlation,
+        ">= 0.9", agreement.correlation >= 0.9, "volume made by PLUS (PlusLibData)");
+  const double move = best_move(what, ours, answer);
+  check(what + " volume: best of 27 moves by one voxel (length in voxels)", move, "= 0",
+        move == 0.0, "volume made by PLUS (PlusLibData)");
+}
+
+void study_spine(const fs::path& folder) {
+  const Sweep sweep =
+      read_sweep(folder / "SpinePhantomFreehand.igs.mha",
+                 folder / "PlusDeviceSet_SpinePhantomFreehandReconstructionOnly.xml", "Image");
+  check_counts("spine", sweep, 21);
+  const AnswerVolume answer =
+      value_or_exit(test_support::read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
+  const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
+  const auto grid = value_or_exit(ultrasound::enclosing_grid(
+      sweep.recording, sweep.chain.T_target_source, window, *sweep.config.output_spacing_mm));
+  const double origin_mm = (grid.origin_mm - answer.grid.origin_mm).cwiseAbs().maxCoeff();
+  check("spine origin of the enclosing grid against PLUS's mm", origin_mm, "<= 0.001",
+        origin_mm <= 0.001, "Offset in PLUS's volume (6 digits)");
+  const bool same = grid.dims == answer.grid.dims;
+  check("spine voxels along each axis as PLUS's", same ? 1 : 0, "= 1", same,
+        "DimSize in PLUS's volume");
+  for (const auto& [paste, label] : {std::pair{ultrasound::Paste::kLinear, "linear"},
+                                     std::pair{ultrasound::Paste::kNearest, "nearest"}}) {
+    const auto ours = value_or_exit(ultrasound::compound(
+        sweep.recording, sweep.chain.T_target_source, window, answer.grid, paste));
+    const std::string what = std::string("spine ") + label;
+    check_volume(what, ours, answer);
+    if (paste == ultrasound::Paste::kLinear) write_slices("spine", ours, answer);
+  }
+}
+
+// PLUS's volume was made of the whole recording, of which this one is 20 frames, cropped: other frames have a share in its
+// voxels.
+void study_nwire(const fs::path& folder) {
+  const Sweep sweep =
+      read_sweep(folder / "NwirePhantomFreehandCropped.igs.mha",
+                 folder / "PlusDeviceSet_NwirePhantomFreehand_vtkVolumeReconstructorTest2.xml",
+                 "CroppedImage");
+  check_counts("nwire", sweep, 20);
+  const AnswerVolume answer =
+      value_or_exit(test_support::read_answer(folder / "NwirePhantomFreehandReconstructed.mha"));
+  const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
+  const auto ours = value_or_exit(
+      ultrasound::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
+  check_volume("nwire", ours, answer);
+  write_slices("nwire", ours, answer);
+}
+
+struct PoseErrors {
+  std::vector<double> translation_mm, rotation_deg;
+
+  void add(const AffineTransform& T, const AffineTransform& truth) {
+    translation_mm.push_back((T.translation() - truth.translation()).norm());
+    const Mat3 R = T.linear() * truth.linear().transpose();
+    rotation_deg.push_back(Eigen::AngleAxisd(R).angle() * 180.0 / std::numbers::pi);
+  }
+};
+
+double rms(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, values.size())));
+}
+
+double percentile(std::vector<double> values, int percent) {
+  std::sort(values.begin(), values.end());
+  return values[(values.size() - 1) * static_cast<std::size_t>(percent) / 100];
+}
+
+// Every other sample of a tracked probe is withheld and asked for: between its neighbours, and as the neighbour before it
+// (what a system without interpolation shows).
+void study_interpolation(const fs::path& folder) {
+  const auto recording =
+      value_or_exit(io::read_sequence(folder / "TransformInterpolationTest.igs.mha"));
+  const auto series =
+      std::find_if(recording.links.begin(), recording.links.end(),
+                   [](const auto& link) { return link.frames.name() == "ProbeToTracker"; });
+  std::vector<tracking::Link> kept = series->samples;
+  for (std::size_t i = 1; i < kept.size(); i += 2) kept[i].status = tracking::LinkStatus::kMissing;
+  PoseErrors between, before;
+  int refused = 0;
+  for (std::size_t i = 1; i + 1 < kept.size(); i += 2) {
+    if (series->samples[i].status != tracking::LinkStatus::kOk) continue;
+    const auto pose = tracking::pose_at(recording.time_s, kept, recording.time_s[i]);
+    if (pose.outcome != tracking::PoseOutcome::kOk) {
+      ++refused;
+      continue;
+    }
+    const AffineTransform& truth = series->samples[i].T_to_from;
+    between.add(pose.T_to_from, truth);
+    before.add(kept[i - 1].T_to_from, truth);
+  }
+  for (int percent = 5; percent <= 100; percent += 5) {
+    const char* x = "percentile of withheld poses";
+    const char* y = "translation error mm";
+    record({"ultrasound_poses", "interpolated", x, y, double(percent),
+            percentile(between.translation_mm, percent)});
+    record({"ultrasound_poses", "sample before", x, y, double(percent),
+            percentile(before.translation_mm, percent)});
+  }
+  fmt::print("medians: {:.4f} mm interpolated; {:.4f} mm the sample before\n",
+             percentile(between.translation_mm, 50), percentile(before.translation_mm, 50));
+  fmt::print(
+      "withheld poses: {} interpolated, {} refused; rms {:.4f} mm {:.4f} deg; sample before {:.4f} "
+      "mm {:.4f} deg\n",
+      between.translation_mm.size(), refused, rms(between.translation_mm),
+      rms(between.rotation_deg), rms(before.translation_mm), rms(before.rotation_deg));
+  const double ratio = rms(between.translation_mm) / rms(before.translation_mm);
+  check("withheld poses: translation error over that of the sample before", ratio, "< 1",
+        ratio < 1.0, "TransformInterpolationTest.igs.mha");
+  const double turn = rms(between.rotation_deg) / rms(before.rotation_deg);
+  check("withheld poses: rotation error over that of the sample before", turn, "< 1", turn < 1.0,
+        "TransformInterpolationTest.igs.mha");
+  const auto invalid =
+      std::count_if(series->samples.begin(), series->samples.end(),
+                    [](const auto& link) { return link.status == tracking::LinkStatus::kInvalid; });
+  check("invalid samples of the recording", static_cast<double>(invalid), "= 1", invalid == 1,
+        "status fields of the recording");
+}
+
+void study_refusals(const fs::path& folder) {
+  const auto sample = io::read_sequence(folder / "NrrdSample.igs.nrrd");
+  const bool named =
+      !sample && sample.error().message.find("Seq_Frame0000_Timestamp") != std::string::npos;
+  fmt::print("{}\n", sample ? "NrrdSample was accepted" : sample.error().message);
+  check("NRRD sample without times refused naming frame and field", named ? 1 : 0, "= 1", named,
+        "NrrdSample.igs.nrrd has no Timestamp");
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main() {
+  using namespace brainshift;
+  const char* data = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
+  if (data == nullptr) {
+    fmt::print("BRAINSHIFT_EXTERNAL_DATA is not set: left out\n");
+    record_left_out(kStudy, "recorded tracked ultrasound: BRAINSHIFT_EXTERNAL_DATA is not set");
+    return 0;
+  }
+  const std::filesystem::path folder = std::filesystem::path(data) / "tracked_ultrasound_plus";
+  study_spine(folder);
+  study_nwire(folder);
+  study_interpolation(folder);
+  study_refusals(folder);
+  return 0;
+}
