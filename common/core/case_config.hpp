@@ -100,8 +100,9 @@ struct PriorConfig {
   std::vector<double> gravity_levels_mm = {0.0, 20.0,
                                            40.0};  // fluid planes below the reference plane
   // Volume strain of swelling or shrinking tissue around the tumour, standard deviation at its centre; 0 switches the
-  // modes off. Vasogenic oedema raises the water content of white matter from 0.7 to 0.8, its volume by up to a half.
-  double swelling_strain_sd = 0.2;
+  // modes off. What is usual; a single surgery may have four times as much (kLargestScales): vasogenic oedema that raises
+  // the water content of white matter from 0.70 to 0.75 adds 0.2.
+  double swelling_strain_sd = 0.05;
   std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};  // standard deviations of the Gaussians
   // Method condensed: the strength of the prior's parts is estimated from the data, starting from the standard
   // deviations above, known to a factor of 9 (two standard deviations of ln).
