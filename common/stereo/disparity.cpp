@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/stereo/cv_image.hpp"
+#include "common/stereo/parts.hpp"
 
 namespace brainshift::stereo {
 namespace {
@@ -109,7 +110,7 @@ DisparityMap combine(const RectifiedPair& pair, const cv::Mat& from_left, const 
                      const cv::Mat& bound, const MatchOptions& options) {
   const int width = pair.left.width, height = pair.left.height;
   DisparityMap map{{width, height, kNone}, {width, height, kNone}, 0.0};
-  std::size_t visible = 0, valid = 0;
+  std::size_t visible = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       if (!seen(pair.left_seen, x, y)) continue;
@@ -125,9 +126,12 @@ DisparityMap combine(const RectifiedPair& pair, const cv::Mat& from_left, const 
       map.sd_px.at(x, y) =
           static_cast<float>(std::sqrt(options.floor_px * options.floor_px + shift_sd * shift_sd +
                                        0.5 * difference * difference));
-      ++valid;
     }
   }
+  const auto least = static_cast<int>(options.min_part_fraction * static_cast<double>(visible));
+  const int valid = drop_small_parts(map.disparity_px, options.max_step_px, least).left;
+  for (std::size_t i = 0; i < map.sd_px.pixels.size(); ++i)
+    if (std::isnan(map.disparity_px.pixels[i])) map.sd_px.pixels[i] = kNone;
   if (visible > 0) map.valid_fraction = static_cast<double>(valid) / static_cast<double>(visible);
   return map;
 }

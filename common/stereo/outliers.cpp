@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/stereo/outliers.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>
 
@@ -21,6 +22,9 @@ struct PointCloud {
 };
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>,
                                                    PointCloud, 3, std::size_t>;
+
+// The corner of a regular grid has 1.5 times the mean distance of its inside.
+constexpr double kAlwaysInside = 2.0;
 
 }  // namespace
 
@@ -46,8 +50,9 @@ std::vector<bool> distance_outliers(const Points& points, double sds, int neighb
   const double mean = mean_distance.mean();
   const double sd =
       std::sqrt((mean_distance.array() - mean).square().sum() / static_cast<double>(n - 1));
+  const double most = std::max(mean + sds * sd, kAlwaysInside * mean);
   for (Eigen::Index i = 0; i < n; ++i)
-    outlier[static_cast<std::size_t>(i)] = mean_distance[i] > mean + sds * sd;
+    outlier[static_cast<std::size_t>(i)] = mean_distance[i] > most;
   return outlier;
 }
 

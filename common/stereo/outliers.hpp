@@ -9,8 +9,9 @@
 
 namespace brainshift::stereo {
 
-// True where the mean distance to the `neighbours` nearest points exceeds its mean by `sds` standard deviations. Nobody
-// is one when there are no more points than neighbours.
+// True where the mean distance to the `neighbours` nearest points exceeds its mean by `sds` standard deviations, and is
+// more than twice the mean: the rim of a regular grid is no outlier. Nobody is one when there are no more points than
+// neighbours.
 std::vector<bool> distance_outliers(const Points& points, double sds, int neighbours = 8);
 
 }  // namespace brainshift::stereo

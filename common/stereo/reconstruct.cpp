@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -12,6 +13,7 @@
 
 #include "common/core/stereo_calibration.hpp"
 #include "common/stereo/outliers.hpp"
+#include "common/stereo/parts.hpp"
 
 namespace brainshift::stereo {
 namespace {
@@ -32,65 +34,10 @@ Status check(const ReconstructOptions& options, const RigidTransform& T_ras_came
   return check_rigid("T_ras_camera", T_ras_camera.matrix());
 }
 
-// Labels of parts that hang together, -1 where the map is not valid; and the size of each.
-struct Parts {
-  PixelMap<int> label;
-  std::vector<int> sizes;
-};
-
-Parts parts_of(const PixelMap<float>& disparity, double max_step_px) {
-  Parts parts{{disparity.width, disparity.height, -1}, {}};
-  std::vector<std::pair<int, int>> open;
-  for (int y0 = 0; y0 < disparity.height; ++y0) {
-    for (int x0 = 0; x0 < disparity.width; ++x0) {
-      if (std::isnan(disparity.at(x0, y0)) || parts.label.at(x0, y0) >= 0) continue;
-      const int label = static_cast<int>(parts.sizes.size());
-      parts.sizes.push_back(0);
-      parts.label.at(x0, y0) = label;
-      open.emplace_back(x0, y0);
-      while (!open.empty()) {
-        const auto [x, y] = open.back();
-        open.pop_back();
-        ++parts.sizes.back();
-        for (const auto& [dx, dy] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-          const int u = x + dx, v = y + dy;
-          if (u < 0 || v < 0 || u >= disparity.width || v >= disparity.height) continue;
-          // A comparison with NaN is false.
-          if (parts.label.at(u, v) >= 0 ||
-              !(std::abs(disparity.at(u, v) - disparity.at(x, y)) <= max_step_px))
-            continue;
-          parts.label.at(u, v) = label;
-          open.emplace_back(u, v);
-        }
-      }
-    }
-  }
-  return parts;
-}
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-// Pixels that are used; the others are NaN.
-PixelMap<float> without_small_parts(const DisparityMap& map, const ReconstructOptions& options,
-                                    ReconstructedSurface& result) {
-  PixelMap<float> kept = map.disparity_px;
-  const Parts parts = parts_of(map.disparity_px, options.max_step_px);
-  if (parts.sizes.empty()) return kept;
-  const int largest = *std::max_element(parts.sizes.begin(), parts.sizes.end());
-  for (std::size_t i = 0; i < kept.pixels.size(); ++i) {
-    const int label = parts.label.pixels[i];
-    if (label < 0) continue;
-    ++result.valid_pixels;
-    if (parts.sizes[static_cast<std::size_t>(label)] >= options.min_part_fraction * largest)
-      continue;
-    ++result.pixels_in_small_parts;
-    kept.pixels[i] = std::numeric_limits<float>::quiet_NaN();
-  }
-  return kept;
 }
 
 struct Grid {
@@ -253,7 +200,10 @@ Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const Rectifie
                                          const ReconstructOptions& options) {
   if (Status ok = check(options, T_ras_camera); !ok) return tl::unexpected(ok.error());
   ReconstructedSurface result;
-  const PixelMap<float> kept = without_small_parts(map, options, result);
+  PixelMap<float> kept = map.disparity_px;
+  const PartSizes parts = drop_minor_parts(kept, options.max_step_px, options.min_part_fraction);
+  result.valid_pixels = parts.left + parts.dropped;
+  result.pixels_in_small_parts = parts.dropped;
   std::vector<double> depths;
   for (const float d : kept.pixels)
     if (!std::isnan(d)) depths.push_back(depth_at(geometry, static_cast<double>(d)));
