@@ -31,6 +31,13 @@ CvCorners to_cv(const Eigen::Matrix2Xd& corners) {
   return points;
 }
 
+Eigen::Matrix2Xd from_cv(const CvCorners& points) {
+  Eigen::Matrix2Xd corners(2, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    corners.col(static_cast<Eigen::Index>(i)) << points[i].x, points[i].y;
+  return corners;
+}
+
 CameraIntrinsics intrinsics_of(const cv::Mat& K, const cv::Mat& distortion) {
   CameraIntrinsics camera;
   camera.focal_x_px = K.at<double>(0, 0);
@@ -69,31 +76,23 @@ Fit minimise(const Views& views, const cv::Size& size) {
   return fit;
 }
 
-double epipolar_rms(const Views& views, const Fit& fit) {
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (std::size_t v = 0; v < views.left.size(); ++v) {
-    CvCorners left, right;
-    cv::undistortPoints(views.left[v], left, fit.K_left, fit.D_left, cv::noArray(), fit.K_left);
-    cv::undistortPoints(views.right[v], right, fit.K_right, fit.D_right, cv::noArray(),
-                        fit.K_right);
-    std::vector<cv::Vec3f> lines_right, lines_left;
-    cv::computeCorrespondEpilines(left, 1, fit.F, lines_right);
-    cv::computeCorrespondEpilines(right, 2, fit.F, lines_left);
-    const auto distance = [](const cv::Point2f& p, const cv::Vec3f& line) {  // a^2 + b^2 = 1
-      return static_cast<double>(p.x * line[0] + p.y * line[1] + line[2]);
-    };
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      sum += std::pow(distance(left[i], lines_left[i]), 2) +
-             std::pow(distance(right[i], lines_right[i]), 2);
-      count += 2;
-    }
-  }
-  return std::sqrt(sum / static_cast<double>(count));
+// Undistorted, in pixels.
+Eigen::Matrix2Xd undistorted(const Eigen::Matrix2Xd& corners, const CameraIntrinsics& camera) {
+  CvCorners points;
+  cv::undistortPoints(to_cv(corners), points, camera_matrix(camera), distortion_of(camera),
+                      cv::noArray(), camera_matrix(camera));
+  return from_cv(points);
 }
 
-StereoCalibration calibration_of(const std::vector<BoardCorners>& corners, const Views& views,
-                                 const Fit& fit, const cv::Size& size) {
+// Sum of squared distances of points from lines a x + b y + c = 0.
+double squared_distances(const Eigen::Matrix2Xd& points, const Eigen::Matrix3Xd& lines) {
+  const Eigen::ArrayXd along =
+      (points.colwise().homogeneous().array() * lines.array()).colwise().sum();
+  return (along.square() / lines.topRows<2>().colwise().squaredNorm().transpose().array()).sum();
+}
+
+StereoCalibration calibration_of(const std::vector<BoardCorners>& corners, const Fit& fit,
+                                 const cv::Size& size) {
   StereoCalibration calibration;
   calibration.width_px = size.width;
   calibration.height_px = size.height;
@@ -106,7 +105,7 @@ StereoCalibration calibration_of(const std::vector<BoardCorners>& corners, const
   }
   calibration.T_right_left = nearest_rigid(T);
   calibration.rms_px = fit.rms_px;
-  calibration.epipolar_rms_px = epipolar_rms(views, fit);
+  calibration.epipolar_rms_px = epipolar_rms(calibration, corners);
   for (std::size_t v = 0; v < corners.size(); ++v) {
     const auto row = static_cast<int>(v);
     const double left = fit.per_view.at<double>(row, 0), right = fit.per_view.at<double>(row, 1);
@@ -147,6 +146,28 @@ Status validate(const ChessBoard& board) {
   return {};
 }
 
+double epipolar_rms(const StereoCalibration& calibration,
+                    const std::vector<BoardCorners>& corners) {
+  const auto K = [](const CameraIntrinsics& c) {
+    return (Mat3() << c.focal_x_px, 0, c.centre_x_px, 0, c.focal_y_px, c.centre_y_px, 0, 0, 1)
+        .finished();
+  };
+  const Vec3 t = calibration.T_right_left.translation();
+  const Mat3 cross = (Mat3() << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0).finished();
+  // x_right^T F x_left = 0
+  const Mat3 F = K(calibration.right).inverse().transpose() * cross *
+                 calibration.T_right_left.linear() * K(calibration.left).inverse();
+  double sum = 0.0, count = 0.0;
+  for (const BoardCorners& pair : corners) {
+    const Eigen::Matrix2Xd left = undistorted(pair.left, calibration.left);
+    const Eigen::Matrix2Xd right = undistorted(pair.right, calibration.right);
+    sum += squared_distances(right, F * left.colwise().homogeneous());
+    sum += squared_distances(left, F.transpose() * right.colwise().homogeneous());
+    count += 2.0 * static_cast<double>(left.cols());
+  }
+  return std::sqrt(sum / count);
+}
+
 Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board) {
   if (picture.empty()) return {};
   const cv::Mat view = view_of(picture);
@@ -162,10 +183,7 @@ Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board)
   const int half = std::clamp(static_cast<int>(nearest / 2.0) - 1, 2, 11);
   cv::cornerSubPix(view, found, {half, half}, {-1, -1},
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-3});
-  Eigen::Matrix2Xd corners(2, static_cast<Eigen::Index>(found.size()));
-  for (std::size_t i = 0; i < found.size(); ++i)
-    corners.col(static_cast<Eigen::Index>(i)) << found[i].x, found[i].y;
-  return corners;
+  return from_cv(found);
 }
 
 Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
@@ -182,7 +200,7 @@ Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
   }
   StereoCalibration calibration;
   try {
-    calibration = calibration_of(corners, views, minimise(views, size), size);
+    calibration = calibration_of(corners, minimise(views, size), size);
   } catch (const cv::Exception& problem) {
     return fail(ErrorCode::kNotConverged, "the calibration cannot be computed: " + problem.err);
   }

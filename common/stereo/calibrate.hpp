@@ -47,6 +47,10 @@ struct PicturePair {
   GrayImage left, right;
 };
 
+// Distance of a corner, undistorted, from the epipolar line of its partner, rms over both pictures, px; also for corners
+// that took no part in the calibration. Precondition: as many corners left as right, at least one.
+double epipolar_rms(const StereoCalibration& calibration, const std::vector<BoardCorners>& corners);
+
 // Inner corners of the board in a picture, refined to sub-pixel; empty when it is not seen whole.
 Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board);
 

@@ -33,7 +33,7 @@ Vec3 ray(const CameraIntrinsics& c, double u, double v) {
   const Eigen::Vector2d target((u - c.centre_x_px) / c.focal_x_px,
                                (v - c.centre_y_px) / c.focal_y_px);
   Eigen::Vector2d p = target;
-  for (int i = 0; i < 20; ++i) p += target - distorted(c, p);
+  for (int i = 0; i < 10; ++i) p += target - distorted(c, p);
   return {p.x(), p.y(), 1.0};
 }
 
@@ -97,6 +97,12 @@ Eigen::Vector2d project(const StereoCalibration& rig, Eye eye, const Vec3& x_lef
   return {c.focal_x_px * p.x() + c.centre_x_px, c.focal_y_px * p.y() + c.centre_y_px};
 }
 
+Ray ray_through(const StereoCalibration& rig, Eye eye, const Eigen::Vector2d& pixel) {
+  const RigidTransform T_left_camera = T_camera_left(rig, eye).inverse();
+  return {T_left_camera.translation(),
+          T_left_camera.linear() * ray(camera_of(rig, eye), pixel.x(), pixel.y())};
+}
+
 double patch_depth(const Patch& patch, double x, double y) {
   const double cap = (x * x + y * y) / (2.0 * kCurvatureMm);
   const double gyri = std::sin(2.0 * std::numbers::pi * x / 14.0 + 0.5) *
@@ -125,7 +131,7 @@ stereo::GrayImage render(const StereoCalibration& rig, Eye eye, const Patch& pat
       // The patch is nearly across the rays: walking to its depth at the last place settles quickly.
       double t = patch.depth_mm / direction.z();
       Vec3 x = origin;
-      for (int i = 0; i < 30; ++i) {
+      for (int i = 0; i < 12; ++i) {
         x = origin + t * direction;
         t = (patch_depth(patch, x.x(), x.y()) - origin.z()) / direction.z();
       }

@@ -22,6 +22,12 @@ StereoCalibration operating_rig(double meet_mm = 250.0);
 // Pixel of a point in the left camera's frame; Brown's lens.
 Eigen::Vector2d project(const StereoCalibration& rig, Eye eye, const Vec3& x_left);
 
+// Where a pixel looks, left camera's frame: from the camera's centre along a direction.
+struct Ray {
+  Vec3 origin, direction;
+};
+Ray ray_through(const StereoCalibration& rig, Eye eye, const Eigen::Vector2d& pixel);
+
 // z(x, y) in the left camera's frame, mm: a tilted cap (radius of curvature 80 mm) with gyri.
 struct Patch {
   double depth_mm = 250.0;
