@@ -22,6 +22,7 @@ void add_simulate(CLI::App& app, Status& status);
 void add_replay(CLI::App& app, Status& status);
 void add_report(CLI::App& app, Status& status);
 void add_solve(CLI::App& app, Status& status);
+void add_stereo(CLI::App& app, Status& status);
 
 // 2 for what the user can mend in arguments or files, else 1.
 int exit_status(ErrorCode code);
