@@ -8,3 +8,6 @@ brainshift_test(geometry_closest_point_test
 brainshift_test(geometry_tet_locator_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/tet_locator_test.cpp
   LINKS brainshift::geometry)
+brainshift_test(geometry_surface_check_test
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/surface_check_test.cpp
+  LINKS brainshift::geometry)
