@@ -9,9 +9,9 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "common/core/model_id.hpp"
 #include "common/core/observation.hpp"
 #include "common/io/calibration_file.hpp"
 #include "common/io/mesh_file.hpp"
@@ -57,25 +57,43 @@ void write_pair(const Workspace& files) {
 }
 
 std::vector<std::string> reconstruct_command(const Workspace& files) {
-  return {brainshift(), "stereo", "reconstruct", "--left", files.path("left.pgm"), "--right",
-          files.path("right.pgm"), "--calibration", files.path("calibration.yaml"), "--pose",
-          files.path("pose.txt"), "--out", files.path("out/cortex.ply")};
+  return {brainshift(),
+          "stereo",
+          "reconstruct",
+          "--left",
+          files.path("left.pgm"),
+          "--right",
+          files.path("right.pgm"),
+          "--calibration",
+          files.path("calibration.yaml"),
+          "--pose",
+          files.path("pose.txt"),
+          "--out",
+          files.path("out/cortex.ply")};
 }
 
 std::string write_model(const Workspace& files, const std::string& name, int cells = 5) {
-  BrainModel model = test_support::toy_patient(cells);
+  const BrainModel model = test_support::toy_patient(cells);
   CaseConfig config = test_support::toy_config();
-  config.case_id = model.case_id;
   config.file = files.path("case.yaml");
-  model.model_id = content_hash(model);
+  config.brain = files.path("mask.nii");  // a case names one; nobody reads it here
   const Status written = io::write_model(files.path(name), {config, model});
   EXPECT_TRUE(written) << written.error().message;
   return files.path(name);
 }
 
 std::vector<std::string> observe_command(const Workspace& files, const std::string& surface) {
-  return {brainshift(), "stereo", "observe", "--surface", surface, "--model",
-          files.path("model.h5"), "--sd-mm", "0.5", "--out", files.path("out/case.surgery")};
+  return {brainshift(),
+          "stereo",
+          "observe",
+          "--surface",
+          surface,
+          "--model",
+          files.path("model.h5"),
+          "--sd-mm",
+          "0.5",
+          "--out",
+          files.path("out/case.surgery")};
 }
 
 void expect_refused(const Finished& finished, const std::string& says) {
@@ -91,10 +109,12 @@ std::vector<Observation> observations_of(const std::string& path) {
   EXPECT_TRUE(file) << file.error().message;
   std::vector<Observation> observations;
   if (!file) return observations;
-  for (const io::SurgeryRecord& record : file->records("observation").value()) {
-    const auto decoded = wire::decode_observation(record.payload);
+  const auto records = file->records("observation");
+  EXPECT_TRUE(records);
+  for (const io::SurgeryRecord& record : *records) {
+    auto decoded = wire::decode_observation(record.payload);
     EXPECT_TRUE(decoded) << decoded.error().message;
-    observations.push_back(decoded.value());
+    observations.push_back(std::move(*decoded));
     EXPECT_EQ(record.sequence, observations.back().sequence);
     EXPECT_EQ(record.recorded_ns, observations.back().acquired_ns);
   }
@@ -168,9 +188,9 @@ TEST(Stereo, BoardsBecomeACalibration) {
   }
   const auto command = [&](const std::string& left, const std::string& right,
                            const std::string& corners) {
-    return std::vector<std::string>{brainshift(), "stereo", "calibrate", "--left", left,
-                                    "--right", right, "--board", corners, "--square-mm", "8",
-                                    "--out", files.path("c.yaml")};
+    return std::vector<std::string>{
+        brainshift(), "stereo", "calibrate",   "--left", left,    "--right",           right,
+        "--board",    corners,  "--square-mm", "8",      "--out", files.path("c.yaml")};
   };
   expect_refused(run(command(files.path("r*.pgm"), files.path("l*.pgm"), "9x6")),
                  "left and right are swapped");
