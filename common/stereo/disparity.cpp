@@ -22,6 +22,8 @@ constexpr int kDisparityScale = 16;  // StereoSGBM counts sixteenths of a pixel
 // OpenCV's manual scales them).
 constexpr int kSmallStep = 8, kLargeStep = 32;
 constexpr int kPreFilterCap = 31;
+// SGBM guesses the right picture's disparities from the left one's costs and takes -1 for 1 px; here both are matched.
+constexpr int kNoOwnCheck = 10000;
 // Sobel's 3 x 3 derivative, over 8: white noise of variance 1 gives one of this variance.
 constexpr double kSobelNoise = 12.0 / 64.0;
 constexpr int kMaxDisparities = 2048;
@@ -62,7 +64,7 @@ cv::Mat match_one_way(const cv::Mat& first, const cv::Mat& second, const MatchOp
   const int area = options.block_px * options.block_px;
   const auto sgbm = cv::StereoSGBM::create(
       options.min_disparity_px, searched, options.block_px, kSmallStep * area, kLargeStep * area,
-      -1, kPreFilterCap, options.uniqueness_percent, 0, 0, cv::StereoSGBM::MODE_SGBM);
+      kNoOwnCheck, kPreFilterCap, options.uniqueness_percent, 0, 0, cv::StereoSGBM::MODE_SGBM);
   sgbm->compute(wide_first, wide_second, sixteenths);
   cv::Mat disparity(first.size(), CV_32FC1);
   for (int y = 0; y < first.rows; ++y) {

@@ -61,6 +61,34 @@ TEST(Match, AShiftedPictureHasThatDisparity) {
   }
 }
 
+// A near plate (disparity 24) before a far wall (4): a strip of the wall beside it is seen by the left camera only.
+TEST(Match, WhatOneCameraAloneSeesIsNotValid) {
+  RectifiedPair pair{dots(220, 80, 0.0, 11), dots(220, 80, 4.0, 11), {}, {}};
+  const GrayImage plate_left = dots(220, 80, 0.0, 12), plate_right = dots(220, 80, 24.0, 12);
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 100; x < 160; ++x) {
+      pair.left.at(x, y) = plate_left.at(x, y);
+      pair.right.at(x - 24, y) = plate_right.at(x - 24, y);
+    }
+  }
+  const auto valid_between = [&](const DisparityMap& map, int from, int to) {
+    int valid = 0;
+    for (int y = 5; y < 75; ++y)
+      for (int x = from; x < to; ++x) valid += !std::isnan(map.disparity_px.at(x, y));
+    return static_cast<double>(valid) / (70.0 * (to - from));
+  };
+  MatchOptions options = options_for(0, 32);
+  options.uniqueness_percent = 0;   // the two other tests of a match
+  options.min_part_fraction = 0.0;  // shall not help
+  const auto map = match(pair, options);
+  ASSERT_TRUE(map);
+  EXPECT_GT(valid_between(*map, 40, 75), 0.9) << "the wall";
+  EXPECT_GT(valid_between(*map, 106, 154), 0.9) << "the plate";
+  EXPECT_LT(valid_between(*map, 84, 96), 0.1) << "hidden from the right camera";
+  options.max_left_right_px = 1e9;
+  EXPECT_GT(valid_between(*match(pair, options), 84, 96), 0.3) << "else the test shows nothing";
+}
+
 TEST(Match, AWhiteWallHasNoDisparity) {
   Random random(9);
   RectifiedPair pair{GrayImage(160, 120), GrayImage(160, 120), {}, {}};
