@@ -43,12 +43,12 @@ struct StereoCalibration {
 // Position of the right camera in the left camera's frame, mm; to the right (x > 0) for cameras in order.
 Vec3 right_camera_in_left(const StereoCalibration& calibration);
 
-// Ok, or kInvalidArgument naming key, value and constraint. Left and right swapped (the right camera stands on the left)
-// and cameras one above the other are refused.
+// Ok, or kInvalidArgument naming key, value and constraint. Left and right swapped (the right camera stands on the
+// left) and cameras one above the other are refused.
 Status validate(const StereoCalibration& calibration);
 
-// Ok, or kInvalidArgument: `name` is no rigid motion (deviation of R^T R from 1, or a mirror image) within 1e-4, what four
-// decimals in a file leave; kNotFinite.
+// Ok, or kInvalidArgument: `name` is no rigid motion (deviation of R^T R from 1, or a mirror image) within 1e-4, what
+// four decimals in a file leave; kNotFinite.
 Status check_rigid(const std::string& name, const Eigen::Matrix4d& matrix);
 
 // The rigid motion nearest to a matrix that passes check_rigid: its rotation made orthonormal.

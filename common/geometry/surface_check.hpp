@@ -32,8 +32,8 @@ struct CorticalSite {
   double size_mm = 45.0;         // long axis of the craniotomy
 };
 
-// Of a model's craniotomy: mean of its nodes, area-weighted mean of the boundary's normals between them, and the largest
-// distance of two of its nodes. kEmptySet when the model has no craniotomy with a boundary triangle.
+// Of a model's craniotomy: mean of its nodes, area-weighted mean of the boundary's normals between them, and the
+// largest distance of two of its nodes. kEmptySet when the model has no craniotomy with a boundary triangle.
 Result<CorticalSite> craniotomy_site(const BrainModel& model);
 
 struct SurfaceCheckOptions {

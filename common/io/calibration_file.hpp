@@ -27,7 +27,8 @@ namespace brainshift::io {
 // kNotFound, kUnreadable, or kInvalidArgument: one line with file, line, key and constraint; the calibration is valid.
 Result<StereoCalibration> read_calibration(const std::filesystem::path& path);
 
-// Numbers with all their digits: what is read back is equal up to the rounding of an orthonormal rotation. kWriteFailed.
+// Numbers with all their digits: what is read back is equal up to the rounding of an orthonormal rotation.
+// kWriteFailed.
 Status write_calibration(const std::filesystem::path& path, const StereoCalibration& calibration);
 std::string calibration_text(const StereoCalibration& calibration);
 

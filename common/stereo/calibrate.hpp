@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A stereo calibration from pictures of a chessboard taken by both cameras at once.
 //
-// The board's inner corners lie at (i, j, 0) x square_mm. Intrinsics, distortion, T_right_left and the pose of every board
-// minimise the sum of squared distances between seen and projected corners over both pictures:
+// The board's inner corners lie at (i, j, 0) x square_mm. Intrinsics, distortion, T_right_left and the pose of every
+// board minimise the sum of squared distances between seen and projected corners over both pictures:
 //   rms_px = sqrt(sum |seen - projected|^2 / number of corners)
 // First each camera alone (Zhang 2000), then all together (OpenCV 4.6, calib3d). Three radial terms need corners at the
 // picture's rim; k3 is kept at 0, because boards seldom reach it.
-// Independent of that minimisation, the epipolar error: the distance of a corner, undistorted, from the line on which its
-// partner in the other picture says that it must lie (Hartley & Zisserman 2004, section 11.4.3), rms over both pictures.
+// Independent of that minimisation, the epipolar error: the distance of a corner, undistorted, from the line on which
+// its partner in the other picture says that it must lie (Hartley & Zisserman 2004, section 11.4.3), rms over both
+// pictures.
 //
 // Assumption: corners are found with independent errors of equal size; the board is flat and moved between pairs.
 #pragma once
@@ -47,8 +48,8 @@ struct PicturePair {
   GrayImage left, right;
 };
 
-// Distance of a corner, undistorted, from the epipolar line of its partner, rms over both pictures, px; also for corners
-// that took no part in the calibration. Precondition: as many corners left as right, at least one.
+// Distance of a corner, undistorted, from the epipolar line of its partner, rms over both pictures, px; also for
+// corners that took no part in the calibration. Precondition: as many corners left as right, at least one.
 double epipolar_rms(const StereoCalibration& calibration, const std::vector<BoardCorners>& corners);
 
 // Inner corners of the board in a picture, refined to sub-pixel; empty when it is not seen whole.

@@ -52,8 +52,8 @@ Status check(const RectifiedPair& pair, const MatchOptions& options) {
   return {};
 }
 
-// Disparities of the first picture in px, NaN where there is none. Pictures are widened on the left, because SGBM leaves
-// a strip without result where the search would leave the second picture.
+// Disparities of the first picture in px, NaN where there is none. Pictures are widened on the left, because SGBM
+// leaves a strip without result where the search would leave the second picture.
 cv::Mat match_one_way(const cv::Mat& first, const cv::Mat& second, const MatchOptions& options) {
   const int searched = (options.disparities + 15) / 16 * 16;
   const int widen_left = std::max(0, options.min_disparity_px + searched);

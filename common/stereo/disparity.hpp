@@ -64,9 +64,9 @@ struct MeasuredDisparity {
   RectifiedGeometry geometry;
 };
 
-// A pair of pictures and the calibration of their cameras -> disparities (min_disparity_px and disparities of the options
-// are replaced by the depth range). kInvalidArgument: as rectify, a range that is none, and left and right pictures
-// swapped: the pair hardly matches, and matches well the other way round. kEmptySet: too little matches.
+// A pair of pictures and the calibration of their cameras -> disparities (min_disparity_px and disparities of the
+// options are replaced by the depth range). kInvalidArgument: as rectify, a range that is none, and left and right
+// pictures swapped: the pair hardly matches, and matches well the other way round. kEmptySet: too little matches.
 Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayImage& right,
                                             const StereoCalibration& calibration,
                                             const DepthRange& range,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points that stand apart from the others (Rusu, Marton, Blodow, Dolha & Beetz 2008): the mean distance of a point to its
-// nearest neighbours is compared with the mean of that figure over all points.
+// Points that stand apart from the others (Rusu, Marton, Blodow, Dolha & Beetz 2008): the mean distance of a point to
+// its nearest neighbours is compared with the mean of that figure over all points.
 #pragma once
 
 #include <vector>

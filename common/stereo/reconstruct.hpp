@@ -4,7 +4,8 @@
 // 1. Parts of the map: neighbouring pixels whose disparities differ by at most max_step_px hang together; parts smaller
 //    than min_part_fraction of the largest are dropped (instruments, specks).
 // 2. Blocks of step x step pixels become one vertex: the mean position and mean disparity of the block's pixels within
-//    max_step_px of their median, where at least half of the block is valid. step follows from spacing_mm and max_points.
+//    max_step_px of their median, where at least half of the block is valid. step follows from spacing_mm and
+//    max_points.
 // 3. Vertices whose mean distance to their 8 nearest neighbours exceeds the mean of that figure by outlier_sds standard
 //    deviations are dropped (Rusu et al. 2008).
 // 4. Blocks that are neighbours in the picture become triangles, counter-clockwise seen from the camera, so that their

@@ -2,7 +2,8 @@
 // Both pictures of a pair resampled as two parallel cameras would have taken them, so that a point lies in the same row
 // of both (Fusiello, Trucco & Verri 2000; OpenCV 4.6, stereoRectify).
 //
-// With f, c_l, c_r (columns), c_y (row) of the geometry and the disparity d = x_left - x_right at the left pixel (x, y):
+// With f, c_l, c_r (columns), c_y (row) of the geometry and the disparity d = x_left - x_right at the left pixel (x,
+// y):
 //   Z = f b / (d - c_l + c_r),   X = (x - c_l) Z / f,   Y = (y - c_y) Z / f       mm, rectified left frame
 //   left camera frame:  T_left_rectified (X, Y, Z), a rotation
 // c_l and c_r differ, so that cameras turned towards each other keep what both see: d may be negative.

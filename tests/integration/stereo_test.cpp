@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brainshift stereo as a user runs it: boards and a patch drawn by known cameras, over the toy patient's craniotomy; and
-// every bad input refused with one line.
+// brainshift stereo as a user runs it: boards and a patch drawn by known cameras, over the toy patient's craniotomy;
+// and every bad input refused with one line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

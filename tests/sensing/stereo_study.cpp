@@ -106,7 +106,7 @@ void photographs() {
     std::printf("  sd %.2f px: %8.0f px with rms error %.3f px\n", said, s.in_class[c], rms);
     record({kStudy, "aloe: rms of errors below 3 px", "sd that a pixel is given px", "error px",
             said, rms});
-    record({kStudy, "as it should be", "sd that a pixel is given px", "error px", said, said});
+    record({kStudy, "errors of that sd", "sd that a pixel is given px", "error px", said, said});
   }
   check("aloe: mean confidence less fraction within 1 px", s.confidence / n - s.within_1 / n,
         "-0.15 to 0.15", std::abs(s.confidence / n - s.within_1 / n) <= 0.15, source);

@@ -18,8 +18,8 @@ using testing::HasSubstr;
 
 const CorticalSite kSite{Vec3(10, 20, 30), Vec3(0, 0, 1), 45.0};
 
-// A shallow cap of n x n points, 40 mm wide, `above_mm` over the site's centre; looks along +z. Cells for which `leave_out`
-// is true have no triangles.
+// A shallow cap of n x n points, 40 mm wide, `above_mm` over the site's centre; looks along +z. Cells for which
+// `leave_out` is true have no triangles.
 TriangleSurface cap(int n = 21, double above_mm = -4.0,
                     const std::function<bool(int, int)>& leave_out = {}) {
   TriangleSurface surface;
