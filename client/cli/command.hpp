@@ -23,6 +23,7 @@ void add_replay(CLI::App& app, Status& status);
 void add_report(CLI::App& app, Status& status);
 void add_solve(CLI::App& app, Status& status);
 void add_import(CLI::App& app, Status& status);
+void add_stereo(CLI::App& app, Status& status);
 
 // 2 for what the user can mend in arguments or files, else 1.
 int exit_status(ErrorCode code);

@@ -34,13 +34,14 @@ int main(int argc, char** argv) {
   client::add_report(app, status);
   client::add_solve(app, status);
   client::add_import(app, status);
+  client::add_stereo(app, status);
   // CLI11 would only say that a subcommand is required.
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
     client::print_error(
         "unknown command \"" + std::string(argv[1]) +
-        "\": must be simulate, replay, report, solve or import (see brainshift --help)");
+        "\": must be simulate, replay, report, solve, import or stereo (see brainshift --help)");
     return 2;
   }
   try {

@@ -158,6 +158,11 @@ cv::Scalar magnitude_colour(double t) {
 
 void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std::string& label,
                      const cv::Scalar& ink) {
+  draw_colour_bar(image, bar, ColourScale{0.0, max}, label, ink);
+}
+
+void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& scale,
+                     const std::string& label, const cv::Scalar& ink) {
   for (int y = 0; y < bar.height; ++y) {
     const double t = 1.0 - static_cast<double>(y) / std::max(1, bar.height - 1);
     cv::line(image, {bar.x, bar.y + y}, {bar.x + bar.width - 1, bar.y + y}, magnitude_colour(t));
@@ -165,12 +170,12 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std:
   cv::rectangle(image, bar, ink, 2);
   TextStyle style{
       .cap_px = 20.0, .colour = ink, .align = Align::kLeft, .bold = false, .halo = false};
-  const std::vector<double> ticks = nice_ticks(0.0, max, 6);
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : max;
+  const std::vector<double> ticks = nice_ticks(scale.min, scale.max, 6);
+  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : scale.max - scale.min;
   int widest = 0;
   for (const double tick : ticks) {
-    const int y =
-        bar.y + bar.height - 1 - static_cast<int>(std::lround(tick / max * (bar.height - 1)));
+    const double t = (tick - scale.min) / (scale.max - scale.min);
+    const int y = bar.y + bar.height - 1 - static_cast<int>(std::lround(t * (bar.height - 1)));
     const int right = bar.x + bar.width;
     cv::line(image, {right, y}, {right + 8, y}, ink, 2);
     const std::string text = tick_label(tick, step);

@@ -66,7 +66,13 @@ void draw_marker(cv::Mat& image, cv::Point2d at, Marker marker, const cv::Scalar
 // Viridis without its darkest quarter, which would vanish on an MRI; t is clamped to [0, 1].
 cv::Scalar magnitude_colour(double t);
 
-// Vertical bar from 0 (bottom) to max (top) with ticks on its right and a vertical label beyond them.
+// Vertical bar from min (bottom) to max (top) with ticks on its right and a vertical label beyond them.
+struct ColourScale {
+  double min = 0.0, max = 1.0;  // min < max
+};
+void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& scale,
+                     const std::string& label, const cv::Scalar& ink);
+// From 0 to max.
 void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std::string& label,
                      const cv::Scalar& ink);
 

@@ -12,11 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+bool is_point_format(const std::string& extension) {
+  return extension == ".xyz" || extension == ".txt" || extension == ".csv" || extension == ".pts";
 }
 
 // Indices inside the node list and finite coordinates: what every later stage takes for granted.
@@ -103,6 +100,33 @@ Result<GroupedMesh> load_grouped(const fs::path& path) {
   return without_unreferenced_nodes(*read);
 }
 
+Result<TriangleSurface> checked(Result<TriangleSurface> surface, const fs::path& path) {
+  if (!surface) return file_error(surface.error().code, path, surface.error().message);
+  if (Status ok = check_indices(surface->vertices, surface->triangles, "triangle"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return surface;
+}
+
+Result<TriangleSurface> load_points(const fs::path& path) {
+  const Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  return checked(parse_xyz(*content), path);
+}
+
+// Possibly without triangles.
+Result<TriangleSurface> load_surface(const fs::path& path) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const std::string extension = lower_extension(path);
+  if (extension == ".stl") return checked(parse_stl(*content), path);
+  if (extension == ".ply") return checked(parse_ply(*content), path);
+  if (extension == ".obj") return checked(parse_obj(*content), path);
+  if (extension == ".vtp") return checked(parse_vtp(std::move(*content)), path);
+  return file_error(ErrorCode::kUnreadable, path,
+                    "unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
+}
+
 }  // namespace
 
 Result<TetMesh> read_tet_mesh(const fs::path& path) {
@@ -113,30 +137,24 @@ Result<GroupedMesh> read_grouped_mesh(const fs::path& path) { return load_groupe
 
 Result<MeshWithFields> read_vtu(const fs::path& path) { return load_vtu(path, true); }
 
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+Result<TriangleSurface> read_surface_or_points(const fs::path& path) {
+  auto surface = is_point_format(lower_extension(path)) ? load_points(path) : load_surface(path);
+  if (surface && surface->num_vertices() == 0)
+    return file_error(ErrorCode::kUnreadable, path, "has no point");
+  return surface;
+}
+
 Result<TriangleSurface> read_surface(const fs::path& path) {
-  Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  const std::string extension = lower_extension(path);
-  Result<TriangleSurface> surface;
-  if (extension == ".stl") {
-    surface = parse_stl(*content);
-  } else if (extension == ".ply") {
-    surface = parse_ply(*content);
-  } else if (extension == ".obj") {
-    surface = parse_obj(*content);
-  } else if (extension == ".vtp") {
-    surface = parse_vtp(std::move(*content));
-  } else {
-    surface = fail(ErrorCode::kUnreadable,
-                   "unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
-  }
-  if (!surface) return file_error(surface.error().code, path, surface.error().message);
-  if (surface->num_triangles() == 0) {
+  auto surface = load_surface(path);
+  if (surface && surface->num_triangles() == 0)
     return file_error(ErrorCode::kUnreadable, path, "has no triangle");
-  }
-  if (Status ok = check_indices(surface->vertices, surface->triangles, "triangle"); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
-  }
   return surface;
 }
 

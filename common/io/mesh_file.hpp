@@ -27,6 +27,11 @@ Result<GroupedMesh> read_grouped_mesh(const std::filesystem::path& path);
 // vertices are merged.
 Result<TriangleSurface> read_surface(const std::filesystem::path& path);
 
+// The same, and points without triangles: a .ply without faces, or .xyz, .txt, .csv, .pts with the three coordinates
+// of a point at the start of each line (further columns, e.g. colours, are ignored; a first line of words is a
+// heading). Triangles are then empty.
+Result<TriangleSurface> read_surface_or_points(const std::filesystem::path& path);
+
 // A named field on the nodes: `values` is 1 x n or 3 x n.
 struct NodeField {
   std::string name;
@@ -46,6 +51,11 @@ struct ElementGrid {
 Status write_vtu(const std::filesystem::path& path, const ElementGrid& grid,
                  const std::vector<NodeField>& node_fields,
                  const std::vector<NodeField>& cell_fields);
+
+// A surface with fields on its vertices, as .ply (binary, little-endian, float64; only fields of one row) or .vtp.
+// kUnreadable for another extension, kWriteFailed, kInvalidArgument for a field that does not fit.
+Status write_surface(const std::filesystem::path& path, const TriangleSurface& surface,
+                     const std::vector<NodeField>& vertex_fields = {});
 
 // A VTU's mesh with all of its point arrays that are float or double, in file order. Keeps unreferenced
 // nodes, so that node i is the file's point i.

@@ -3,6 +3,7 @@
 // mesh_file.cpp puts it in front. All fail with kUnreadable.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "common/core/error.hpp"
@@ -22,5 +23,10 @@ Result<TriangleSurface> parse_vtp(std::string content);
 Result<TriangleSurface> parse_stl(const std::string& content);
 Result<TriangleSurface> parse_ply(const std::string& content);
 Result<TriangleSurface> parse_obj(const std::string& content);
+// Points only: three coordinates at the start of each line.
+Result<TriangleSurface> parse_xyz(const std::string& content);
+
+// Lower-case, with its dot.
+std::string lower_extension(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

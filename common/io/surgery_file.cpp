@@ -301,6 +301,33 @@ Result<SurgeryFile> SurgeryFile::open(const fs::path& path) {
   return SurgeryFile(std::move(impl));
 }
 
+Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
+  // SQLite opens a file that it may not write for reading only, without a word.
+  if (Status status = check_regular_file(path); !status) return tl::unexpected(status.error());
+  if (::access(path.c_str(), W_OK) != 0) {
+    return file_error(ErrorCode::kWriteFailed, path,
+                      std::string("cannot be written: ") + std::strerror(errno));
+  }
+  // What is no surgery is told before anything of it is touched.
+  {
+    auto readable = open(path);
+    if (!readable) return tl::unexpected(readable.error());
+    if (Status status = readable->close(); !status) return tl::unexpected(status.error());
+  }
+  auto impl = std::make_unique<Impl>();
+  impl->path = path;
+  if (Status status = impl->connect(SQLITE_OPEN_READWRITE); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (impl->query("PRAGMA journal_mode = WAL") != "wal" ||
+      !impl->execute("PRAGMA synchronous = FULL")) {
+    return impl->write_failure("surgery file");
+  }
+  if (Status status = impl->verify(); !status) return tl::unexpected(status.error());
+  impl->writable = true;
+  return SurgeryFile(std::move(impl));
+}
+
 Status SurgeryFile::append(const SurgeryRecord& record) {
   if (Status status = impl_->check_writable("record"); !status) return status;
   if (!is_record_kind(record.kind) || !fits(record.sequence)) {

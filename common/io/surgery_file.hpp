@@ -55,6 +55,9 @@ class SurgeryFile {
                                     const std::map<std::string, std::string>& meta);
   // An existing file, read-only; kNotFound, or kUnreadable if it is not a surgery file of this version.
   static Result<SurgeryFile> open(const std::filesystem::path& path);
+  // An existing file to add to, with the same promises as one that create() made. As open; kWriteFailed when it
+  // cannot be written. Truth that is there stays as it is.
+  static Result<SurgeryFile> open_to_append(const std::filesystem::path& path);
   SurgeryFile(SurgeryFile&&) noexcept;
   SurgeryFile& operator=(SurgeryFile&&) noexcept;
   ~SurgeryFile();

@@ -14,3 +14,6 @@ brainshift_test(geometry_distance_volume_test
 brainshift_test(geometry_oriented_cloud_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/oriented_cloud_test.cpp
   LINKS brainshift::geometry)
+brainshift_test(geometry_surface_check_test
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/surface_check_test.cpp
+  LINKS brainshift::geometry)

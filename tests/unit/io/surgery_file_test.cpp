@@ -248,6 +248,36 @@ TEST_F(SurgeryFileTest, EveryTruncationIsRefused) {
   }
 }
 
+TEST_F(SurgeryFileTest, AFileIsAddedToAndKeepsWhatItHas) {
+  make_complete();
+  {
+    auto file = SurgeryFile::open_to_append(path);
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_EQ(file->meta(), kMeta);
+    ASSERT_TRUE(file->append(record(21)));
+    EXPECT_TRUE(fs::exists(fs::path(path) += "-wal")) << "an acknowledged record survives a kill";
+    ASSERT_TRUE(file->close());
+  }
+  const auto file = SurgeryFile::open(path);
+  ASSERT_TRUE(file) << file.error().message;
+  const auto records = file->records("observation");
+  ASSERT_TRUE(records);
+  ASSERT_EQ(records->size(), 21U);
+  EXPECT_EQ(records->front().payload, record(1).payload);
+  EXPECT_EQ(records->back().payload, record(21).payload);
+  EXPECT_TRUE(file->read_truth(1));
+}
+
+TEST_F(SurgeryFileTest, NothingIsAddedToWhatIsNoSurgeryFile) {
+  EXPECT_EQ(SurgeryFile::open_to_append(path).error().code, ErrorCode::kNotFound);
+  const std::string other(4096, 'x');
+  std::ofstream(path, std::ios::binary) << other;
+  EXPECT_EQ(SurgeryFile::open_to_append(path).error().code, ErrorCode::kUnreadable);
+  std::ifstream stream(path, std::ios::binary);
+  const std::string after{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_EQ(after, other) << "it was touched";
+}
+
 TEST_F(SurgeryFileTest, AFileOpenedForReadingOrClosedRefusesWrites) {
   make_complete();
   auto file = SurgeryFile::open(path);

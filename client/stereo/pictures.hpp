@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pictures from files.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/stereo/gray_image.hpp"
+
+namespace brainshift::client {
+
+// Grey levels of a PNG, JPEG, TIFF, BMP or PGM file; colours become their luminance. 16 bits are divided by 256. The
+// file may be compressed with gzip. kNotFound, or kUnreadable naming the file.
+Result<stereo::GrayImage> read_picture(const std::filesystem::path& path);
+
+// Files that names and shell patterns ("left*.jpg") stand for, each pattern's in alphabetical order. kNotFound names
+// the pattern that no file matches.
+Result<std::vector<std::filesystem::path>> expand_patterns(const std::vector<std::string>& names);
+
+}  // namespace brainshift::client

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/geometry/surface_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/geometry/surface_rims.hpp"
+
+namespace brainshift::geometry {
+namespace {
+
+Vec3 area_vector(const Points& vertices, const Eigen::Vector3i& t) {
+  const Vec3 a = vertices.col(t[0]);
+  return (vertices.col(t[1]) - a).cross(vertices.col(t[2]) - a);
+}
+
+Status check_points(const Points& points, const SurfaceCheckOptions& options) {
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (points.col(i).allFinite()) continue;
+    return fail(ErrorCode::kNotFinite, fmt::format("surface point {} is not finite", i));
+  }
+  if (points.cols() >= options.min_points) return {};
+  return fail(ErrorCode::kEmptySet, fmt::format("the surface has {} points: must be at least {}",
+                                                points.cols(), options.min_points));
+}
+
+Status check_extent(double extent_mm, const CorticalSite& site,
+                    const SurfaceCheckOptions& options) {
+  const double least = options.min_extent * site.size_mm;
+  const double most = options.max_extent * site.size_mm;
+  if (extent_mm >= least && extent_mm <= most) return {};
+  const auto fits = [&](double factor) {
+    return factor * extent_mm >= least && factor * extent_mm <= most;
+  };
+  std::string unit;
+  if (fits(1000.0)) {
+    unit = "; metres?";
+  } else if (fits(10.0)) {
+    unit = "; centimetres?";
+  } else if (fits(0.001)) {
+    unit = "; micrometres?";
+  }
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("the surface spans {:.3g} mm: must be {:.3g} to {:.3g} mm for a "
+                          "craniotomy of {:.3g} mm{}",
+                          extent_mm, least, most, site.size_mm, unit));
+}
+
+// Turns the triangles outwards; says so in `checked`.
+Status orient(CheckedSurface& checked, const CorticalSite& site,
+              const SurfaceCheckOptions& options) {
+  TriangleSurface& surface = checked.surface;
+  double along = 0.0, area = 0.0;
+  for (int t = 0; t < surface.num_triangles(); ++t) {
+    const Vec3 n = area_vector(surface.vertices, surface.triangles.col(t));
+    along += n.dot(site.outward);
+    area += n.norm();
+  }
+  const double cosine = area > 0.0 ? along / area : 0.0;
+  if (std::abs(cosine) < options.min_cosine) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
+                            "mean cosine {:.2f}, must be at least {:g} either way",
+                            cosine, options.min_cosine));
+  }
+  if (cosine > 0.0) return {};
+  surface.triangles.row(1).swap(surface.triangles.row(2));
+  checked.turned = true;
+  checked.notes.push_back("the triangles looked into the head and were turned round");
+  return {};
+}
+
+void count_holes(CheckedSurface& checked, const SurfaceRims& rims) {
+  checked.parts = rims.parts;
+  std::vector<double> outer(static_cast<std::size_t>(rims.parts), 0.0);
+  std::vector<int> outer_rim(static_cast<std::size_t>(rims.parts), -1);
+  for (std::size_t i = 0; i < rims.rim_mm.size(); ++i) {
+    const auto part = static_cast<std::size_t>(rims.part_of_rim[i]);
+    if (rims.rim_mm[i] <= outer[part]) continue;
+    outer[part] = rims.rim_mm[i];
+    outer_rim[part] = static_cast<int>(i);
+  }
+  for (std::size_t i = 0; i < rims.rim_mm.size(); ++i) {
+    if (outer_rim[static_cast<std::size_t>(rims.part_of_rim[i])] == static_cast<int>(i)) continue;
+    ++checked.holes;
+    checked.longest_hole_rim_mm = std::max(checked.longest_hole_rim_mm, rims.rim_mm[i]);
+  }
+  if (checked.parts > 1)
+    checked.notes.push_back(fmt::format("the surface has {} separate parts", checked.parts));
+  if (checked.holes > 0)
+    checked.notes.push_back(fmt::format("the surface has {} holes, the longest rim {:.1f} mm",
+                                        checked.holes, checked.longest_hole_rim_mm));
+}
+
+}  // namespace
+
+Result<CorticalSite> craniotomy_site(const BrainModel& model) {
+  const std::vector<NodeIndex>& nodes = model.craniotomy;
+  std::vector<bool> open(static_cast<std::size_t>(model.mesh.num_nodes()), false);
+  CorticalSite site;
+  site.size_mm = 0.0;
+  for (const NodeIndex a : nodes) {
+    open[static_cast<std::size_t>(a)] = true;
+    site.centre += model.mesh.nodes.col(a) / static_cast<double>(nodes.size());
+    for (const NodeIndex b : nodes)
+      site.size_mm =
+          std::max(site.size_mm, (model.mesh.nodes.col(a) - model.mesh.nodes.col(b)).norm());
+  }
+  Vec3 normal = Vec3::Zero();
+  for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
+    const Eigen::Vector3i corners = model.boundary_triangles.col(t);
+    const bool inside = std::all_of(corners.begin(), corners.end(), [&](int node) {
+      return static_cast<bool>(open[static_cast<std::size_t>(node)]);
+    });
+    if (inside) normal += area_vector(model.mesh.nodes, corners);
+  }
+  if (!(normal.norm() > 0.0)) {
+    return fail(ErrorCode::kEmptySet,
+                "the model's craniotomy has no boundary triangle: nowhere to see the cortex");
+  }
+  site.outward = normal.normalized();
+  return site;
+}
+
+Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const CorticalSite& site,
+                                              const SurfaceCheckOptions& options) {
+  if (Status ok = check_points(surface.vertices, options); !ok) return tl::unexpected(ok.error());
+  CheckedSurface checked;
+  checked.surface = std::move(surface);
+  const Points& points = checked.surface.vertices;
+  checked.extent_mm = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
+  if (Status ok = check_extent(checked.extent_mm, site, options); !ok)
+    return tl::unexpected(ok.error());
+  checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
+  if (checked.distance_mm > options.max_distance_mm) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's "
+                            "centre: must be within {:g} mm; is its pose right?",
+                            checked.distance_mm, options.max_distance_mm));
+  }
+  if (checked.surface.num_triangles() == 0) return checked;
+  const auto rims = surface_rims(checked.surface);
+  if (!rims) return tl::unexpected(rims.error());
+  count_holes(checked, *rims);
+  if (Status ok = orient(checked, site, options); !ok) return tl::unexpected(ok.error());
+  return checked;
+}
+
+}  // namespace brainshift::geometry

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/stereo/disparity.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "common/stereo/cv_image.hpp"
+#include "common/stereo/parts.hpp"
+
+namespace brainshift::stereo {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr int kDisparityScale = 16;  // StereoSGBM counts sixteenths of a pixel
+// Penalties of a disparity that changes by one pixel, and by more, per pixel of the block (Hirschmueller's P1 and P2 as
+// OpenCV's manual scales them).
+constexpr int kSmallStep = 8, kLargeStep = 32;
+constexpr int kPreFilterCap = 31;
+// SGBM guesses the right picture's disparities from the left one's costs and takes -1 for 1 px; here both are matched.
+constexpr int kNoOwnCheck = 10000;
+// Sobel's 3 x 3 derivative, over 8: white noise of variance 1 gives one of this variance.
+constexpr double kSobelNoise = 12.0 / 64.0;
+constexpr int kMaxDisparities = 2048;
+// Turned round, a swapped pair matches much better than as it was given.
+constexpr double kSwappedGain = 2.0;
+
+Status check(const RectifiedPair& pair, const MatchOptions& options) {
+  const auto refuse = [](const char* name, double value, const char* must) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be {}", name, value, must));
+  };
+  if (options.disparities < 1 || options.disparities > kMaxDisparities)
+    return refuse("disparities", options.disparities, "between 1 and 2048");
+  if (options.block_px < 1 || options.block_px > 21 || options.block_px % 2 == 0)
+    return refuse("block_px", options.block_px, "odd and between 1 and 21");
+  if (!(options.noise_grey > 0.0)) return refuse("noise_grey", options.noise_grey, "> 0");
+  if (!(options.max_left_right_px > 0.0))
+    return refuse("max_left_right_px", options.max_left_right_px, "> 0");
+  if (pair.left.empty() || pair.left.width != pair.right.width ||
+      pair.left.height != pair.right.height) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("the left picture has {} x {} px, the right one {} x {} px: must be "
+                    "equal and not empty",
+                    pair.left.width, pair.left.height, pair.right.width, pair.right.height));
+  }
+  return {};
+}
+
+// Disparities of the first picture in px, NaN where there is none. Pictures are widened on the left, because SGBM
+// leaves a strip without result where the search would leave the second picture.
+cv::Mat match_one_way(const cv::Mat& first, const cv::Mat& second, const MatchOptions& options) {
+  const int searched = (options.disparities + 15) / 16 * 16;
+  const int widen_left = std::max(0, options.min_disparity_px + searched);
+  const int widen_right = std::max(0, -options.min_disparity_px);
+  cv::Mat wide_first, wide_second, sixteenths;
+  for (auto [from, to] : {std::pair(&first, &wide_first), std::pair(&second, &wide_second)})
+    cv::copyMakeBorder(*from, *to, 0, 0, widen_left, widen_right, cv::BORDER_REPLICATE);
+  const int area = options.block_px * options.block_px;
+  const auto sgbm = cv::StereoSGBM::create(
+      options.min_disparity_px, searched, options.block_px, kSmallStep * area, kLargeStep * area,
+      kNoOwnCheck, kPreFilterCap, options.uniqueness_percent, 0, 0, cv::StereoSGBM::MODE_SGBM);
+  sgbm->compute(wide_first, wide_second, sixteenths);
+  cv::Mat disparity(first.size(), CV_32FC1);
+  for (int y = 0; y < first.rows; ++y) {
+    for (int x = 0; x < first.cols; ++x) {
+      const short value = sixteenths.at<short>(y, x + widen_left);
+      disparity.at<float>(y, x) = value < options.min_disparity_px * kDisparityScale
+                                      ? kNone
+                                      : static_cast<float>(value) / kDisparityScale;
+    }
+  }
+  return disparity;
+}
+
+// The right picture's disparities: the pair in a mirror, where right becomes left.
+cv::Mat match_from_right(const cv::Mat& left, const cv::Mat& right, const MatchOptions& options) {
+  cv::Mat mirrored_left, mirrored_right, disparity;
+  cv::flip(left, mirrored_left, 1);
+  cv::flip(right, mirrored_right, 1);
+  cv::flip(match_one_way(mirrored_right, mirrored_left, options), disparity, 1);
+  return disparity;
+}
+
+// Cramer-Rao bound of the shift at every pixel, px; infinite without texture.
+cv::Mat texture_sd(const cv::Mat& left, const MatchOptions& options) {
+  cv::Mat slope, energy;
+  cv::Sobel(left, slope, CV_64F, 1, 0, 3, 1.0 / 8.0);
+  cv::boxFilter(slope.mul(slope), energy, CV_64F, {options.block_px, options.block_px}, {-1, -1},
+                false, cv::BORDER_REPLICATE);
+  const double noise = options.noise_grey * options.noise_grey;
+  const double noise_energy = options.block_px * options.block_px * kSobelNoise * noise;
+  cv::Mat sd(left.size(), CV_64FC1);
+  for (int y = 0; y < left.rows; ++y) {
+    for (int x = 0; x < left.cols; ++x) {
+      const double e = energy.at<double>(y, x) - noise_energy;
+      sd.at<double>(y, x) =
+          e > 0.0 ? std::sqrt(2.0 * noise / e) : std::numeric_limits<double>::infinity();
+    }
+  }
+  return sd;
+}
+
+bool seen(const GrayImage& mask, int x, int y) { return mask.empty() || mask.at(x, y) != 0; }
+
+DisparityMap combine(const RectifiedPair& pair, const cv::Mat& from_left, const cv::Mat& from_right,
+                     const cv::Mat& bound, const MatchOptions& options) {
+  const int width = pair.left.width, height = pair.left.height;
+  DisparityMap map{{width, height, kNone}, {width, height, kNone}, 0.0};
+  std::size_t visible = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (!seen(pair.left_seen, x, y)) continue;
+      ++visible;
+      const float d = from_left.at<float>(y, x);
+      const double shift_sd = bound.at<double>(y, x);
+      if (std::isnan(d) || !(shift_sd <= options.max_texture_sd_px)) continue;
+      const int partner = static_cast<int>(std::lround(static_cast<double>(x) - d));
+      if (partner < 0 || partner >= width || !seen(pair.right_seen, partner, y)) continue;
+      const double difference = static_cast<double>(d) - from_right.at<float>(y, partner);
+      if (!(std::abs(difference) <= options.max_left_right_px)) continue;
+      map.disparity_px.at(x, y) = d;
+      map.sd_px.at(x, y) =
+          static_cast<float>(std::sqrt(options.floor_px * options.floor_px + shift_sd * shift_sd +
+                                       0.5 * difference * difference));
+    }
+  }
+  const auto least = static_cast<int>(options.min_part_fraction * static_cast<double>(visible));
+  const int valid = drop_small_parts(map.disparity_px, options.max_step_px, least).left;
+  for (std::size_t i = 0; i < map.sd_px.pixels.size(); ++i)
+    if (std::isnan(map.disparity_px.pixels[i])) map.sd_px.pixels[i] = kNone;
+  if (visible > 0) map.valid_fraction = static_cast<double>(valid) / static_cast<double>(visible);
+  return map;
+}
+
+Result<MatchOptions> within(const DepthRange& range, const RectifiedGeometry& geometry, int width,
+                            MatchOptions options) {
+  if (!(range.near_mm > 0.0) || !(range.far_mm > range.near_mm) || !std::isfinite(range.far_mm)) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("depth range = {} to {} mm: must be 0 < near < far", range.near_mm,
+                            range.far_mm));
+  }
+  // A point nearer than this lies in one picture only.
+  const double most = std::min(disparity_at(geometry, range.near_mm), static_cast<double>(width));
+  const double least = std::max(disparity_at(geometry, range.far_mm), -static_cast<double>(width));
+  if (!(most > least)) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("depth range = {} to {} mm: no point so near lies in both pictures",
+                            range.near_mm, range.far_mm));
+  }
+  options.min_disparity_px = static_cast<int>(std::floor(least)) - 1;
+  options.disparities = static_cast<int>(std::ceil(most)) + 2 - options.min_disparity_px;
+  return options;
+}
+
+Result<MeasuredDisparity> measure(const GrayImage& left, const GrayImage& right,
+                                  const StereoCalibration& calibration, const DepthRange& range,
+                                  const MatchOptions& options) {
+  auto rectified = rectify(left, right, calibration);
+  if (!rectified) return tl::unexpected(rectified.error());
+  const auto bounded = within(range, rectified->geometry, left.width, options);
+  if (!bounded) return tl::unexpected(bounded.error());
+  auto map = match(rectified->pair, *bounded);
+  if (!map) return tl::unexpected(map.error());
+  return MeasuredDisparity{std::move(*map), std::move(rectified->pair), rectified->geometry};
+}
+
+}  // namespace
+
+double confidence(double sd_px) { return std::erf(1.0 / (std::numbers::sqrt2 * sd_px)); }
+
+Result<DisparityMap> match(const RectifiedPair& pair, const MatchOptions& options) {
+  if (Status ok = check(pair, options); !ok) return tl::unexpected(ok.error());
+  const cv::Mat left = view_of(pair.left), right = view_of(pair.right);
+  const cv::Mat from_left = match_one_way(left, right, options);
+  const cv::Mat from_right = match_from_right(left, right, options);
+  return combine(pair, from_left, from_right, texture_sd(left, options), options);
+}
+
+Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayImage& right,
+                                            const StereoCalibration& calibration,
+                                            const DepthRange& range, const MatchOptions& options) {
+  auto measured = measure(left, right, calibration, range, options);
+  if (!measured || measured->map.valid_fraction >= options.min_valid_fraction) return measured;
+  const double found = measured->map.valid_fraction;
+  const auto turned = measure(right, left, calibration, range, options);
+  if (turned && turned->map.valid_fraction >= options.min_valid_fraction &&
+      turned->map.valid_fraction >= kSwappedGain * found) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("left and right pictures are swapped: {:.1f} % of the pixels match as "
+                            "given and {:.1f} % the other way round",
+                            100.0 * found, 100.0 * turned->map.valid_fraction));
+  }
+  return fail(
+      ErrorCode::kEmptySet,
+      fmt::format("{:.1f} % of the pixels have a consistent match between {:g} and {:g} "
+                  "mm: must be at least {:g} %; too little texture, another depth, or "
+                  "another calibration?",
+                  100.0 * found, range.near_mm, range.far_mm, 100.0 * options.min_valid_fraction));
+}
+
+}  // namespace brainshift::stereo

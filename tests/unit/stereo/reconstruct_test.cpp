@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From pictures of a known patch to its surface: as near as the disparity's error allows, turned the right way.
+#include "common/stereo/reconstruct.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "common/geometry/surface.hpp"
+#include "common/geometry/surface_rims.hpp"
+#include "tests/support/stereo_scene.hpp"
+
+namespace brainshift::stereo {
+namespace {
+
+using test_support::Eye;
+using test_support::operating_rig;
+using test_support::Patch;
+using testing::HasSubstr;
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+RigidTransform some_pose() {
+  RigidTransform T = RigidTransform::Identity();
+  T.linear() =
+      (Eigen::AngleAxisd(0.7, Vec3(1, 2, -1).normalized()) * Eigen::AngleAxisd(3.0, Vec3::UnitX()))
+          .toRotationMatrix();
+  T.translation() = Vec3(20.0, -35.0, 110.0);
+  return T;
+}
+
+// A map of one disparity, f = 1000 px, b = 30 mm: a plane at 250 mm.
+const RectifiedGeometry kGeometry{1000.0, 100.0, 100.0, 80.0, 30.0, Mat3::Identity()};
+DisparityMap plane(float disparity = 120.0F) {
+  return {{200, 160, disparity}, {200, 160, 0.25F}, 1.0};
+}
+
+struct Errors {
+  double rms_mm = 0.0;       // across the patch's surface
+  double within_2_sd = 0.0;  // fraction of vertices whose error in depth is below twice their sd
+};
+
+Errors errors_of(const ReconstructedSurface& result, const Patch& patch,
+                 const RigidTransform& T_ras_camera) {
+  Errors errors;
+  const Eigen::Index n = result.surface.vertices.cols();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vec3 x = T_ras_camera.inverse() * Vec3(result.surface.vertices.col(i));
+    const double depth_error = x.z() - test_support::patch_depth(patch, x.x(), x.y());
+    const Vec3 normal = test_support::patch_normal(patch, x.x(), x.y());
+    errors.rms_mm += std::pow(depth_error * normal.z(), 2) / static_cast<double>(n);
+    if (std::abs(depth_error) <= 2.0 * result.sd_mm[i])
+      errors.within_2_sd += 1.0 / static_cast<double>(n);
+  }
+  errors.rms_mm = std::sqrt(errors.rms_mm);
+  return errors;
+}
+
+TEST(Reconstruct, APatchIsFoundAsWellAsItsDisparityAllows) {
+  const StereoCalibration rig = operating_rig();
+  const Patch patch;
+  const auto measured = measure_disparity(render(rig, Eye::kLeft, patch, 1),
+                                          render(rig, Eye::kRight, patch, 2), rig, {150.0, 400.0});
+  ASSERT_TRUE(measured) << measured.error().message;
+  EXPECT_GT(measured->map.valid_fraction, 0.6);
+  const auto result = reconstruct(measured->map, measured->geometry, some_pose());
+  ASSERT_TRUE(result) << result.error().message;
+  const Errors errors = errors_of(*result, patch, some_pose());
+  EXPECT_GT(result->surface.num_vertices(), 5000);
+  // Z^2 / (f b) is 1.9 mm per px here.
+  EXPECT_LT(errors.rms_mm, result->median_sd_mm);
+  EXPECT_GT(errors.rms_mm, 1e-3) << "not exact by accident";
+  EXPECT_GT(errors.within_2_sd, 0.95);
+  // The cap falls away by 50 mm towards the corners.
+  EXPECT_GT(result->median_depth_mm, 250.0);
+  EXPECT_LT(result->median_depth_mm, 290.0);
+}
+
+TEST(Reconstruct, NormalsLookTowardsTheCamera) {
+  const auto result = reconstruct(plane(), kGeometry, some_pose());
+  ASSERT_TRUE(result) << result.error().message;
+  const Points normals = geometry::vertex_normals(result->surface);
+  const Vec3 camera = some_pose().translation();
+  for (Eigen::Index i = 0; i < normals.cols(); ++i)
+    EXPECT_GT(normals.col(i).dot(camera - result->surface.vertices.col(i)), 200.0);
+  const auto rims = geometry::surface_rims(result->surface);
+  ASSERT_TRUE(rims) << rims.error().message;
+  EXPECT_EQ(rims->parts, 1);
+  EXPECT_EQ(rims->rim_mm.size(), 1U);
+}
+
+TEST(Reconstruct, APlaneHasItsDepthSpacingAndStandardDeviation) {
+  ReconstructOptions options;
+  options.spacing_mm = 1.0;  // 4 px at 250 mm
+  const auto result = reconstruct(plane(), kGeometry, RigidTransform::Identity(), options);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->surface.num_vertices(), 50 * 40);
+  EXPECT_EQ(result->surface.num_triangles(), 2 * 49 * 39);
+  for (const double z : result->surface.vertices.row(2)) EXPECT_NEAR(z, 250.0, 1e-6);
+  EXPECT_NEAR(result->sd_mm.maxCoeff(), 250.0 * 250.0 / 30000.0 * 0.25, 1e-6);
+  EXPECT_NEAR(result->confidence.minCoeff(), confidence(0.25), 1e-6);
+  // The first block's four columns have their mean at 1.5 px.
+  EXPECT_NEAR(result->surface.vertices(0, 0), (1.5 - 100.0) * 250.0 / 1000.0, 1e-9);
+  EXPECT_NEAR(result->surface.vertices(1, 0), (1.5 - 80.0) * 250.0 / 1000.0, 1e-9);
+  options.max_points = 500;
+  EXPECT_LE(
+      reconstruct(plane(), kGeometry, RigidTransform::Identity(), options)->surface.num_vertices(),
+      500);
+}
+
+TEST(Reconstruct, SpecksAndStepsAreNotBridged) {
+  DisparityMap map = plane();
+  for (int y = 0; y < 160; ++y)
+    for (int x = 100; x < 200; ++x) map.disparity_px.at(x, y) = 150.0F;  // 200 mm: a step of 50 mm
+  for (int y = 20; y < 30; ++y)
+    for (int x = 20; x < 30; ++x) map.disparity_px.at(x, y) = 170.0F;  // a speck of 100 px
+  const auto result = reconstruct(map, kGeometry, RigidTransform::Identity());
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->pixels_in_small_parts, 100);
+  const auto rims = geometry::surface_rims(result->surface);
+  ASSERT_TRUE(rims) << rims.error().message;
+  EXPECT_EQ(rims->parts, 2) << "the step's two sides";
+  EXPECT_EQ(rims->rim_mm.size(), 3U) << "and the hole that the speck leaves";
+  for (const double z : result->surface.vertices.row(2))
+    EXPECT_TRUE(std::abs(z - 250.0) < 1.0 || std::abs(z - 200.0) < 1.0) << z;
+}
+
+TEST(Reconstruct, BadPosesOptionsAndMapsAreRefused) {
+  const auto refusal = [](const DisparityMap& map, const RigidTransform& T,
+                          const ReconstructOptions& options = {}) {
+    const auto result = reconstruct(map, kGeometry, T, options);
+    return result ? "no refusal" : result.error().message;
+  };
+  RigidTransform skewed = some_pose();
+  skewed.linear()(0, 1) += 0.05;
+  EXPECT_THAT(refusal(plane(), skewed), HasSubstr("T_ras_camera is no rigid motion"));
+  ReconstructOptions options;
+  options.spacing_mm = 0.0;
+  EXPECT_EQ(refusal(plane(), some_pose(), options), "spacing_mm = 0: must be finite and > 0");
+  options = {};
+  options.max_points = 10;
+  EXPECT_EQ(refusal(plane(), some_pose(), options), "max_points = 10: must be at least min_points");
+  options = {};
+  options.max_view_angle_deg = 90.0;
+  EXPECT_THAT(refusal(plane(), some_pose(), options), HasSubstr("max_view_angle_deg = 90"));
+  EXPECT_EQ(refusal(plane(kNone), some_pose()), "the surface has 0 points: must be at least 50");
+  EXPECT_EQ(refusal(plane(-5.0F), some_pose()), "the surface has 0 points: must be at least 50")
+      << "beyond infinity";
+}
+
+}  // namespace
+}  // namespace brainshift::stereo
