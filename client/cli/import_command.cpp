@@ -33,6 +33,9 @@ void add_import(CLI::App& app, Status& status) {
                       "instead of contours: a point inside the tumour, .csv frame,u_px,v_px");
   command->add_option("--registration", options->registration,
                       "T_ras_reference: 16 numbers row by row (text, JSON or YAML)");
+  command->add_option("--fiducials", options->fiducials,
+                      "instead of --registration: .csv of paired points (reference x,y,z, RAS "
+                      "x,y,z), or of reference,x,y,z and ras,x,y,z rows in any order");
   command->add_option("--case", options->case_file, "case file (YAML); its model is built again");
   command->add_option("--model", options->model, "instead of --case: prepared model (.h5)");
   command->add_option("--out", options->out, "surgery file to make; must not exist yet");

@@ -68,6 +68,10 @@ void add_replay(CLI::App& app, Status& status) {
       ->check(CLI::IsMember(method_names()))
       ->capture_default_str();
   command
+      ->add_option("--sources", options.sources,
+                   "play the observations of these sources only, e.g. ius,stereopsis")
+      ->delimiter(',');
+  command
       ->add_option("--repeat", options.repeat,
                    "play the observations so many times in a cycle, to measure latency; needs "
                    "--speed max")

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/replay/replay.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <limits>
+#include <set>
 
 #include "client/lib/client.hpp"
 #include "client/replay/score.hpp"
@@ -65,7 +67,26 @@ Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile
   return observations;
 }
 
-Result<Surgery> open_surgery(const fs::path& path) {
+Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted,
+                    std::vector<RecordedObservation>& observations) {
+  if (wanted.empty()) return {};
+  std::set<std::string> recorded;
+  for (const auto& one : observations) recorded.insert(one.observation.source);
+  for (const std::string& source : wanted) {
+    if (recorded.count(source)) continue;
+    std::string known;
+    for (const std::string& one : recorded) known += (known.empty() ? "" : ", ") + one;
+    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation of source \"" +
+                                          source + "\"; it has: " + known);
+  }
+  std::erase_if(observations, [&](const RecordedObservation& one) {
+    return std::find(wanted.begin(), wanted.end(), one.observation.source) == wanted.end();
+  });
+  return {};
+}
+
+Result<Surgery> open_surgery(const ReplayOptions& options) {
+  const fs::path& path = options.surgery;
   auto file = io::SurgeryFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   auto case_id = meta_value(*file, path, "case_id");
@@ -74,6 +95,9 @@ Result<Surgery> open_surgery(const fs::path& path) {
   if (!model_id) return tl::unexpected<Error>(model_id.error());
   auto observations = read_observations(*file, path);
   if (!observations) return tl::unexpected<Error>(observations.error());
+  if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
 
   Surgery surgery{std::move(*file), *case_id, *model_id, {}, {}, {}, {}};
   surgery.case_file = optional_meta(surgery.file, "case_file");
@@ -174,6 +198,7 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
   if (!truth) return tl::unexpected<Error>(truth.error());
   describe(model, update.estimate, run);
   run.left_out = update.left_out;
+  run.sources = update.estimate.sources;
   if (*truth) {
     if (Status ok = score(model, **truth, update.estimate, run); !ok) return ok;
   }
@@ -251,7 +276,7 @@ Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
 }  // namespace
 
 Status replay(const ReplayOptions& options, const Progress& progress) {
-  const auto surgery = open_surgery(options.surgery);
+  const auto surgery = open_surgery(options);
   if (!surgery) return tl::unexpected<Error>(surgery.error());
   if (Status ok = check_repeat(options, *surgery); !ok) return ok;
   std::vector<RunReport> runs;

@@ -22,6 +22,8 @@ struct ReplayOptions {
   Speed speed = Speed::kMax;
   std::vector<Boundary> boundaries = {Boundary::kContact, Boundary::kFixed};
   Method method = Method::kCondensed;
+  // Only observations of these sources are played; empty: all.
+  std::vector<std::string> sources;
   // Each observation is played so many times, in a cycle; above 1 only at Speed::kMax. Iterates are asked for
   // only when it is 1: they would weigh on the latencies that repeating is there to measure.
   int repeat = 1;
@@ -39,6 +41,7 @@ struct ReplayOptions {
 // Scored is the last answered observation, in the last cycle when repeated, against the truth of the recorded
 // observation that was sent.
 //
+// kEmptySet when no observation is left, naming the sources that the surgery has;
 // kNotFound / kUnreadable name the surgery file; kInvalidArgument: the daemon holds another case or model
 // than the surgery was recorded for, or `repeat` does not fit; kUnavailable: no daemon; kModelNotReady: no model loaded there. The
 // report is still written when observations fail; the status is then kNotConverged if some run received no

@@ -57,6 +57,13 @@ void visit(A& a, Omission& v) {
   a("part", v.part), a("reason", v.reason), a("estimated_error", v.estimated_error);
 }
 template <typename A>
+void visit(A& a, SourceSummary& v) {
+  a("source", v.source), a("observation_sequence", v.observation_sequence), a("age_s", v.age_s);
+  a("data", v.data), a("outliers", v.outliers), a("chi_square", v.chi_square);
+  a("degrees_of_freedom", v.degrees_of_freedom), a("p_value", v.p_value);
+  a("consistent", v.consistent);
+}
+template <typename A>
 void visit(A& a, RunFailure& v) {
   a("observation_sequence", v.observation_sequence), a("code", v.code), a("message", v.message);
 }
@@ -86,7 +93,7 @@ void visit(A& a, RunReport& v) {
   a("principal_direction_deg", v.principal_direction_deg);
   a("principal_direction_true_deg", v.principal_direction_true_deg);
   a("truth_scalars", v.truth_scalars), a("left_out", v.left_out), a("failures", v.failures);
-  a("trace", v.trace);
+  a("sources", v.sources), a("trace", v.trace);
 }
 
 struct Writer {
@@ -99,6 +106,7 @@ struct Writer {
 
   static Json encode(double value) { return value; }  // dumped as null when not finite
   static Json encode(std::string& value) { return value; }
+  static Json encode(bool value) { return value; }
   template <typename T>
   requires std::is_integral_v<T>
   static Json encode(T value) { return value; }
@@ -159,6 +167,10 @@ struct Reader {
   void decode(const Json& json, const std::string& here, double& value) const {
     if (!json.is_number()) return complain(here + " must be a number");
     value = json.get<double>();
+  }
+  void decode(const Json& json, const std::string& here, bool& value) const {
+    if (!json.is_boolean()) return complain(here + " must be true or false");
+    value = json.get<bool>();
   }
   void decode(const Json& json, const std::string& here, std::string& value) const {
     if (!json.is_string()) return complain(here + " must be a string");

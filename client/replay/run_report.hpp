@@ -118,6 +118,7 @@ struct RunReport {
 
   std::map<std::string, double> truth_scalars;
   std::vector<Omission> left_out;
+  std::vector<SourceSummary> sources;  // of the last final update
   std::vector<RunFailure> failures;
   std::vector<TracePoint> trace;
 };

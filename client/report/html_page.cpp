@@ -105,6 +105,15 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
   std::string figures;
   for (const PagePicture& p : pictures) figures += picture(p);
   html += section("Pictures", figures);
+  const std::string sources = source_table(runs);
+  if (!sources.empty()) {
+    html += section(
+        "Instruments",
+        sources +
+            "<p class=\"soft\">Of each run's last update. Chi-square: how far an instrument "
+            "lies from what the others and the prior predict for it, beside its expectation; "
+            "p: probability of more by chance.</p>\n");
+  }
   html += section("Left out of the model", left_out_list(runs));
   return html + "</body></html>\n";
 }

@@ -24,6 +24,8 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
 std::string error_table(const std::vector<ReportedRun>& runs);
 std::string timing_table(const std::vector<ReportedRun>& runs);
 std::string left_out_list(const std::vector<ReportedRun>& runs);
+// One row per instrument of each run's last update; empty when no update had named sources.
+std::string source_table(const std::vector<ReportedRun>& runs);
 std::string failure_list(const std::vector<ReportedRun>& runs);
 
 // &, <, >, " and ' replaced by their entities.

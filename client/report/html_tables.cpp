@@ -189,6 +189,29 @@ std::string timing_table(const std::vector<ReportedRun>& runs) {
   return table.finish();
 }
 
+std::string source_table(const std::vector<ReportedRun>& runs) {
+  std::string rows;
+  for (const ReportedRun& run : runs) {
+    for (const SourceSummary& source : run.report.sources) {
+      const auto cell = [](const std::string& text) { return "<td>" + text + "</td>"; };
+      const bool compared = !std::isnan(source.p_value);
+      rows += "<tr>" + cell(escape_html(run.report.scenario + ", " + run.report.boundary)) +
+              cell(escape_html(source.source)) + cell(std::to_string(source.observation_sequence)) +
+              cell(number(source.age_s, 0)) + cell(std::to_string(source.data)) +
+              cell(std::to_string(source.outliers)) +
+              cell(compared
+                       ? number(source.chi_square, 1) + " / " + number(source.degrees_of_freedom, 1)
+                       : kNothing) +
+              cell(number(source.p_value, 4)) +
+              cell(source.consistent ? "yes" : "<strong>no</strong>") + "</tr>\n";
+    }
+  }
+  if (rows.empty()) return "";
+  return "<table>\n<tr><th>run</th><th>instrument</th><th>observation</th><th>age (s)</th>"
+         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr>\n" +
+         rows + "</table>\n";
+}
+
 std::string left_out_list(const std::vector<ReportedRun>& runs) {
   std::vector<std::string> items;
   for (const ReportedRun& run : runs) {

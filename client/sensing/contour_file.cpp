@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
+#include "client/sensing/csv_numbers.hpp"
 #include "common/io/file_access.hpp"
 
 namespace brainshift::sensing {
@@ -24,18 +24,6 @@ struct Row {
   int frame = 0;
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
 };
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-bool parse_number(std::string_view text, double& number) {
-  text = trimmed(text);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
-}
 
 bool parse_row(std::string_view text, Row& row) {
   double frame = 0.0;

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "client/sensing/contour_file.hpp"
+#include "client/sensing/fiducial_file.hpp"
 #include "client/sensing/registration_file.hpp"
 #include "client/sensing/surgery_writer.hpp"
 #include "common/core/observation.hpp"
@@ -41,12 +42,16 @@ Status check_options(const ImportOptions& options) {
                                                          names, first ? "both" : "none"));
   };
   for (const auto& [name, path] :
-       {std::pair{"--recording", options.recording},
-        std::pair{"--registration", options.registration}, std::pair{"--out", options.out}}) {
+       {std::pair{"--recording", options.recording}, std::pair{"--out", options.out}}) {
     if (path.empty()) return fail(ErrorCode::kInvalidArgument, std::string(name) + " is required");
   }
   if (Status ok =
           one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
+      !ok) {
+    return ok;
+  }
+  if (Status ok = one_of(!options.registration.empty(), !options.fiducials.empty(),
+                         "--registration and --fiducials");
       !ok) {
     return ok;
   }
@@ -90,15 +95,37 @@ Result<Patient> load_patient(const ImportOptions& options, const Progress& progr
   return patient_of(*model, options.case_file);
 }
 
-// Device transforms and the patient registration. A registration by fiducials would come in here, in place of the file's.
-Result<std::vector<tracking::ConstantLink>> constant_links(const ImportOptions& options) {
+// T_ras_reference, from the file or from fiducials.
+Result<RigidTransform> patient_registration(const ImportOptions& options,
+                                            std::optional<FiducialFile>& fiducials) {
+  if (options.fiducials.empty()) return read_registration(options.registration);
+  auto file = read_fiducials(options.fiducials);
+  if (!file) return tl::unexpected(file.error());
+  fiducials = std::move(*file);
+  return fiducials->fit.T_image_measured;
+}
+
+FiducialReport describe(const FiducialFile& file, const Patient& patient) {
+  FiducialReport report;
+  report.count = static_cast<int>(file.fit.residuals_mm.size());
+  report.matched = file.matched;
+  report.fre_mm = file.fit.fre_mm;
+  report.worst_mm = file.fit.residuals_mm.maxCoeff();
+  report.tre_mm =
+      registration::expected_tre_mm(file.fit.image, file.fit.fle_mm, patient.tumour_centroid);
+  return report;
+}
+
+// Device transforms and the patient registration.
+Result<std::vector<tracking::ConstantLink>> constant_links(const ImportOptions& options,
+                                                           std::optional<FiducialFile>& fiducials) {
   std::vector<tracking::ConstantLink> links;
   if (!options.device.empty()) {
     const auto config = io::read_plus_config(options.device);
     if (!config) return tl::unexpected(config.error());
     for (const io::PlusTransform& transform : config->transforms) links.push_back(transform.link);
   }
-  const auto T_ras_reference = read_registration(options.registration);
+  const auto T_ras_reference = patient_registration(options, fiducials);
   if (!T_ras_reference) return tl::unexpected(T_ras_reference.error());
   links.push_back({{options.reference_frame, kRas}, AffineTransform(*T_ras_reference)});
   return links;
@@ -195,7 +222,8 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
 
 Result<ImportReport> import_recording(const ImportOptions& options, const Progress& progress) {
   if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
-  const auto constants = constant_links(options);
+  std::optional<FiducialFile> fiducials;
+  const auto constants = constant_links(options, fiducials);
   if (!constants) return tl::unexpected(constants.error());
   const auto recording = io::read_sequence(options.recording, {options.orientation});
   if (!recording) return tl::unexpected(recording.error());
@@ -223,6 +251,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   told.lost_contours = boundaries->lost_contours;
   const auto patient = load_patient(options, progress);
   if (!patient) return tl::unexpected(patient.error());
+  if (fiducials) told.fiducials = describe(*fiducials, *patient);
   const auto observations = observations_of(*boundaries, *patient, options.sd_mm, told);
   if (!observations) {
     return fail(observations.error().code,
@@ -251,6 +280,13 @@ std::vector<std::string> report_lines(const ImportReport& report) {
                                   entry.reason, entry.first_frame));
     }
   };
+  if (report.fiducials) {
+    const FiducialReport& told = *report.fiducials;
+    lines.push_back(fmt::format(
+        "fiducials: {}{}, registration error {:.2f} mm rms, {:.2f} mm at worst; expected error at "
+        "the tumour {:.2f} mm rms",
+        told.count, told.matched ? ", order found" : "", told.fre_mm, told.worst_mm, told.tre_mm));
+  }
   tell("frames left out", report.dropped);
   tell("contours left out", report.lost_contours);
   for (const std::string& note : report.notes) lines.push_back("note: " + note);

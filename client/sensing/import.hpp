@@ -26,7 +26,8 @@ struct ImportOptions {
   std::filesystem::path device;        // PLUS device set; empty: the recording has every transform
   std::filesystem::path contours;      // either this
   std::filesystem::path seeds;         // or this
-  std::filesystem::path registration;  // T_ras_reference
+  std::filesystem::path registration;  // either T_ras_reference
+  std::filesystem::path fiducials;     // or the points it is computed from
   std::filesystem::path case_file;     // either this, the model being built again,
   std::filesystem::path model;         // or this
   std::filesystem::path out;
@@ -48,9 +49,18 @@ struct ImportedSweep {
   double tumour_distance_mm = 0.0;  // between centroids of boundary and undeformed tumour
 };
 
+// Of the patient registration by fiducials.
+struct FiducialReport {
+  int count = 0;
+  bool matched = false;  // the correspondence was found, not given
+  double fre_mm = 0.0, worst_mm = 0.0;
+  double tre_mm = 0.0;  // expected at the tumour, rms
+};
+
 struct ImportReport {
   int frames = 0, frames_used = 0;
   std::vector<std::string> links;  // the chain
+  std::optional<FiducialReport> fiducials;
   std::vector<tracking::Dropped> dropped;
   std::vector<tracking::Dropped> lost_contours;
   std::vector<ImportedSweep> sweeps;

@@ -49,8 +49,7 @@ LandmarkPairs measure_displacements(const Points& undeformed, const Points& disp
 
 CorticalSurface measure_cortex(const TriangleSurface& deformed, const CortexView& view,
                                Random& random) {
-  const auto count =
-      static_cast<int>(std::lround(view.points_per_mm2 * geometry::area(deformed)));
+  const auto count = static_cast<int>(std::lround(view.points_per_mm2 * geometry::area(deformed)));
   Points points = geometry::sample_surface(deformed, count, random.index(kSeeds));
   for (Eigen::Index i = 0; i < points.size(); ++i) {
     points.data()[i] += view.noise_sd_mm * random.normal();

@@ -74,6 +74,7 @@ Scenario joint(Scenario scenario, const char* name, const char* description) {
   scenario.measurement = Measurement::kProbeSections;
   scenario.sparse_points = 0;
   scenario.interval_s = 300.0;
+  scenario.stiffness_sd = 0.3;
   scenario.cortex = CortexView{};
   scenario.cortex->tracks = 20;
   return scenario;
@@ -112,7 +113,7 @@ Scenario joint_mixed() {
 
 const std::vector<Scenario>& all_scenarios() {
   static const std::vector<Scenario> scenarios = {
-      paper(),      paper_icp(), distension(),       sag_progress(),     no_contact(),
+      paper(),     paper_icp(),        distension(),       sag_progress(), no_contact(),
       joint_sag(), joint_distension(), joint_tangential(), joint_mixed()};
   return scenarios;
 }

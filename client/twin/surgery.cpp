@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/twin/measure.hpp"
+#include "client/twin/stiffness.hpp"
 #include "client/twin/truth.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/geometry/tet_locator.hpp"
@@ -166,20 +167,9 @@ Status keeps_promise(const Scenario& scenario, const Truth& truth) {
                   " slaves of this case touch the skull, it promises none");
 }
 
-}  // namespace
-
-Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const Scenario& scenario, std::uint64_t seed,
-                                       const Progress& progress) {
-  const auto forward = contact::ForwardModel::build(model, config, Boundary::kContact, progress);
-  if (!forward) return tl::unexpected(forward.error());
-  return play_scenario(model, config, *forward, scenario, seed, progress);
-}
-
-Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const contact::ForwardModel& forward,
-                                       const Scenario& scenario, std::uint64_t seed,
-                                       const Progress& progress) {
+Result<SimulatedSurgery> play(const BrainModel& model, const CaseConfig& config,
+                              const contact::ForwardModel& forward, const Scenario& scenario,
+                              std::uint64_t seed, const Progress& progress) {
   const std::vector<io::ScorePoint> pool = tumour_pool(model);
   const Points swelling = swelling_load(
       model.mesh, config.material, swelling_centre(model, scenario.swelling), scenario.swelling);
@@ -192,9 +182,9 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
     report(progress, "solve with contact", static_cast<double>(i) / static_cast<double>(moments));
     Moment moment;
     moment.fluid_level_mm = scenario.fluid_levels_mm[i];
-    const Points buoyancy = fem::buoyancy_load(
-        model.mesh, config.material, gravity.direction,
-        gravity.fluid_plane_depth_mm + moment.fluid_level_mm, gravity.direction);
+    const Points buoyancy =
+        fem::buoyancy_load(model.mesh, config.material, gravity.direction,
+                           gravity.fluid_plane_depth_mm + moment.fluid_level_mm, gravity.direction);
     auto truth = solver.solve(buoyancy + swelling);
     if (!truth) return tl::unexpected(truth.error());
     if (Status ok = keeps_promise(scenario, *truth); !ok) return tl::unexpected(ok.error());
@@ -215,6 +205,31 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   }
   report(progress, "solve with contact", 1.0);
   return surgery;
+}
+
+}  // namespace
+
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress) {
+  const auto play_on = [&](const BrainModel& brain,
+                           const CaseConfig& with) -> Result<SimulatedSurgery> {
+    const auto forward = contact::ForwardModel::build(brain, with, Boundary::kContact, progress);
+    if (!forward) return tl::unexpected(forward.error());
+    return play(brain, with, *forward, scenario, seed, progress);
+  };
+  if (scenario.stiffness_sd == 0.0) return play_on(model, config);
+  const VariedBrain varied =
+      vary_stiffness(model, config, scenario.stiffness_sd, scenario.stiffness_length_mm, seed);
+  return play_on(varied.model, varied.config);
+}
+
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const contact::ForwardModel& forward,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress) {
+  if (scenario.stiffness_sd > 0.0) return play_scenario(model, config, scenario, seed, progress);
+  return play(model, config, forward, scenario, seed, progress);
 }
 
 }  // namespace brainshift::twin

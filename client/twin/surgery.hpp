@@ -31,7 +31,8 @@ struct SimulatedSurgery {
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
-// The same with a forward model that is at hand: contact boundary, of this model and case.
+// The same with a forward model that is at hand: contact boundary, of this model and case. Where the scenario varies
+// the stiffness, another one is factorised for the truth.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const contact::ForwardModel& forward,
                                        const Scenario& scenario, std::uint64_t seed,

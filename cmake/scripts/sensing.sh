@@ -21,6 +21,22 @@ study() { step "$1" "$bin/sensing_$1" || status=1; }
 for program in "$bin"/sensing_*; do
   [ -x "$program" ] && study "${program##*/sensing_}"
 done
+
+# The same job as an operating room has it: through the daemon and the client, tumour alone and with the cortex.
+through_the_daemon() {
+  local surgery=$out/joint-mixed.surgery
+  rm -f "$surgery"
+  sed 's/swelling_strain_sd: 0.0$/swelling_strain_sd: 0.05/' config/cases/colin27.yaml >"$out/colin27-oedema.yaml"
+  "$bin/brainshiftd" prepare --case "$out/colin27-oedema.yaml" --out "$out/colin27.h5" >"$out/prepare.txt"
+  "$bin/brainshift" simulate --case "$out/colin27-oedema.yaml" --scenario joint-mixed --seed 1 --out "$surgery"
+  start_daemon "$out/colin27.h5"
+  "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact --sources ius \
+    --report "$out/tumour-alone.json"
+  "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact --report "$out/joint.json"
+  stop_daemon
+  "$bin/brainshift" report "$out/joint.json" --out "$out/report"
+}
+step "through the daemon: joint-mixed" through_the_daemon || status=1
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 current=summary
 "$bin/study_summary" --dir "$out" --commit "$commit" --command "make sensing" --title Sensing || status=1

@@ -99,11 +99,12 @@ struct PriorConfig {
   double gravity_direction_sd_deg = 10.0;
   std::vector<double> gravity_levels_mm = {0.0, 20.0,
                                            40.0};  // fluid planes below the reference plane
-  // Volume strain of swelling or shrinking tissue around the tumour, standard deviation at its centre; 0 switches the
-  // modes off. What is usual; a single surgery may have four times as much (kLargestScales): vasogenic oedema that raises
-  // the water content of white matter from 0.70 to 0.75 adds 0.2.
-  double swelling_strain_sd = 0.05;
-  std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};  // standard deviations of the Gaussians
+  // Volume strain of swelling or shrinking tissue around the tumour, standard deviation at its centre; 0: the modes are
+  // off. 0.05 is what is usual where oedema is to be expected; a single surgery may have four times as much
+  // (kLargestScales): vasogenic oedema that raises the water content of white matter from 0.70 to 0.75 adds 0.2.
+  double swelling_strain_sd = 0.0;
+  std::vector<double> swelling_radii_mm = {15.0, 30.0,
+                                           50.0};  // standard deviations of the Gaussians
   // Method condensed: the strength of the prior's parts is estimated from the data, starting from the standard
   // deviations above, known to a factor of 9 (two standard deviations of ln).
   bool estimate_scales = true;

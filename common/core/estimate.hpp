@@ -69,7 +69,8 @@ struct SourceSummary {
   std::uint64_t observation_sequence = 0;  // the observation they were taken from
   double age_s = 0.0;                      // behind the newest observation of the update
   int data = 0;
-  int outliers = 0;  // data whose robust weight fell below one half
+  int outliers =
+      0;  // data whose robust weight fell below one half, and points that their alignment left aside
   // Consistency with the other sources: Mahalanobis distance between what this source says and what the others predict
   // with the prior, squared; its expectation (degrees of freedom) and the probability of a larger one by chance. NaN
   // for a single source and for methods that do not compute it.
@@ -100,7 +101,8 @@ struct Estimate {
   // is no deformation of tissue. NaN before it was looked at.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
   int inverted_elements = 0;
-  std::vector<SourceSummary> sources;  // in the order of the data; empty for data without named sources
+  std::vector<SourceSummary>
+      sources;  // in the order of the data; empty for data without named sources
   double rebuild_ms =
       0.0;  // part of the inversion's time spent on field and sd; condensed methods only
 };

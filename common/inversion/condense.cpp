@@ -11,8 +11,8 @@
 #include "common/fem/blas.hpp"
 #include "common/inversion/block_runner.hpp"
 #include "common/inversion/control_nodes.hpp"
-#include "common/inversion/load_modes.hpp"
 #include "common/inversion/data_region.hpp"
+#include "common/inversion/load_modes.hpp"
 
 namespace brainshift::inversion {
 namespace {

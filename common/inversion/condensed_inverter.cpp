@@ -79,10 +79,11 @@ void append_sources(Estimate& estimate) {
       estimate.reason.append(text);
     }
     if (!source.consistent) {
-      std::snprintf(text, sizeof text,
-                    "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of "
-                    "freedom",
-                    source.source.c_str(), source.chi_square, source.degrees_of_freedom);
+      std::snprintf(
+          text, sizeof text,
+          "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of "
+          "freedom",
+          source.source.c_str(), source.chi_square, source.degrees_of_freedom);
       estimate.reason.append(text);
     }
   }
@@ -105,7 +106,8 @@ struct CondensedInverter::Impl {
         reduction(*operators, window, config.contact.penalty_n_per_mm, team),
         posterior(window),
         rebuild(*operators, window, options.region_of_interest),
-        scales({operators->gravity_modes, operators->swelling_modes}, window, SparseData::kMaxCommonErrors),
+        scales({operators->gravity_modes, operators->swelling_modes}, window,
+               SparseData::kMaxCommonErrors),
         estimate_scales(config.prior.estimate_scales),
         robust(config.sensing.robust_weights),
         search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
@@ -180,9 +182,9 @@ struct CondensedInverter::Impl {
 
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   int relaxations = 0;
-  VecX relaxed;                     // modes between those of the last sets, once they cycle
-  VecX norms;                       // of the residuals, per datum
-  SparseData moved;                 // the data where they are now, when they move
+  VecX relaxed;      // modes between those of the last sets, once they cycle
+  VecX norms;        // of the residuals, per datum
+  SparseData moved;  // the data where they are now, when they move
   Points moving_displacement;
   std::vector<IterationRecord> history;
   OmissionErrors errors;
@@ -262,7 +264,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData&
                         reduction.compliance_diagonal())) {
       case SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
       case SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
-      case SetSearch::Step::kContinue: 
+      case SetSearch::Step::kContinue:
         relaxed = posterior.z();
         relaxations = 0;
         break;
@@ -354,8 +356,7 @@ void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate
     summary.data = source.count;
     summary.outliers = weights.outliers(source.first, source.count);
     Consistency consistency;
-    if (data.sources.size() < 2 ||
-        !posterior.check_source(sampled, scales, source, consistency)) {
+    if (data.sources.size() < 2 || !posterior.check_source(sampled, scales, source, consistency)) {
       continue;
     }
     summary.chi_square = consistency.chi_square;

@@ -22,9 +22,8 @@ void fill_gravity(const BrainModel& model, const CaseConfig& config,
   for (Eigen::Index column = 0; column < modes.cols(); ++column) {
     const double level = config.prior.gravity_levels_mm[static_cast<std::size_t>(column / 3)];
     const double sd = column % 3 == 0 ? config.prior.gravity_mode_sd : across_sd;
-    const Points load = fem::buoyancy_load(model.mesh, config.material, g,
-                                           model.fluid_plane_depth_mm + level,
-                                           directions[column % 3]);
+    const Points load = fem::buoyancy_load(
+        model.mesh, config.material, g, model.fluid_plane_depth_mm + level, directions[column % 3]);
     modes.col(column) = sd * Eigen::Map<const VecX>(load.data(), load.size());
   }
 }

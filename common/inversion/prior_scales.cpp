@@ -93,7 +93,8 @@ bool PriorScales::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>
     const double shorter = std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
     for (int g = 0; g < kParts; ++g) {
       double& scale = scales_[static_cast<std::size_t>(g)];
-      scale = std::min(kLargestScales[static_cast<std::size_t>(g)], scale * std::exp(0.5 * shorter * step[g]));
+      scale = std::min(kLargestScales[static_cast<std::size_t>(g)],
+                       scale * std::exp(0.5 * shorter * step[g]));
     }
   }
   return true;

@@ -26,10 +26,9 @@ namespace brainshift::inversion {
 // A standard deviation of ln s of ln 3: two of them are an order of magnitude.
 inline constexpr double kLogVarianceSd = 2.1972245773362196;  // 2 ln 3
 
-// Buoyancy along gravity is at most the weight of the tissue. Pose and swelling of a single surgery may lie well beyond
-// what is usual: turned by 28 degrees where 10 are usual. With other forces many times stronger than the case says the
-// contact set does not settle (docs/decisions/0012).
-inline constexpr PriorScaleValues kLargestScales = {1.0, 3.0, 4.0, 1.0};
+// The case says how strong a part can be, but for swelling, of which it says what is usual (docs/decisions/0014). With
+// other forces many times stronger than the case says the contact set does not settle (docs/decisions/0012).
+inline constexpr PriorScaleValues kLargestScales = {1.0, 1.0, 4.0, 1.0};
 
 class PriorScales {
  public:
@@ -53,9 +52,7 @@ class PriorScales {
     Parts gradient;
     Eigen::Matrix<double, kParts, kParts> information;
   };
-  int part(int mode) const {
-    return static_cast<int>(prior_part(window_.first + mode, counts_));
-  }
+  int part(int mode) const { return static_cast<int>(prior_part(window_.first + mode, counts_)); }
   bool slope(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right, Slope& out);
 
   LoadModeCounts counts_;

@@ -37,8 +37,7 @@ bool RobustWeights::update(const SparseData& data, const Eigen::Ref<const VecX>&
     const double scale = source_scale(data, first, count);
     for (int i = first; i < first + count; ++i) {
       const double limit = scale * (data.along_direction(i) ? kOutlierAlong : kOutlierWhole);
-      const double weight =
-          residuals_[i] <= limit ? 1.0 : std::pow(limit / residuals_[i], 4);
+      const double weight = residuals_[i] <= limit ? 1.0 : std::pow(limit / residuals_[i], 4);
       changed = changed || std::abs(weight - weights_[i]) > kWeightTolerance;
       weights_[i] = weight;
     }

@@ -105,8 +105,7 @@ void SampledOperators::sample(const SparseData& data, double scale,
                               const Eigen::Ref<const VecX>& weights) {
   for (int i = 0; i < size_; ++i) {
     const double left_out = std::max(0.0, left_out_[i]);
-    sd_[i] =
-        std::sqrt((data.sd_mm[i] * data.sd_mm[i] + scale * scale * left_out) / weights[i]);
+    sd_[i] = std::sqrt((data.sd_mm[i] * data.sd_mm[i] + scale * scale * left_out) / weights[i]);
     weights_.col(i) = barycentric_.col(i) / sd_[i];
   }
   const Eigen::MatrixXf& modes = outside_region_ == 0 ? region_modes_ : operators_->modes;

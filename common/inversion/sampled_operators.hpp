@@ -44,12 +44,10 @@ class SampledOperators {
   int first_row(int datum) const { return first_row_[static_cast<std::size_t>(datum)]; }
   // Whether any datum's variance depends on `scale`.
   bool outside_region() const { return outside_region_ > 0; }
-  int common() const { return common_; }             // q
+  int common() const { return common_; }  // q
   // mm, with what the modes leave out and the robust weight.
   double sd(int datum) const { return sd_[datum]; }
-  auto free_body() const {
-    return free_body_.topLeftCorner(rows(), common_ + window_.count + 1);
-  }
+  auto free_body() const { return free_body_.topLeftCorner(rows(), common_ + window_.count + 1); }
   // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), rows x window.first.
   auto modes_before() const { return before_.topRows(rows()); }
   // Valid until the next call.
@@ -74,9 +72,9 @@ class SampledOperators {
   int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
   Eigen::Matrix<double, 4, Eigen::Dynamic> barycentric_, weights_;  // 4 x m; weights_: / sd
-  Points directions_;           // 3 x m, zero: whole
-  std::vector<int> first_row_;  // m + 1
-  VecX left_out_;               // of the prior's variance at unit scale, mm^2
+  Points directions_;                                               // 3 x m, zero: whole
+  std::vector<int> first_row_;                                      // m + 1
+  VecX left_out_;  // of the prior's variance at unit scale, mm^2
   VecX sd_;
   Eigen::MatrixXd free_body_, before_;
   std::unique_ptr<double[]> contact_storage_;

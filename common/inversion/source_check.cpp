@@ -44,8 +44,8 @@ bool SourceCheck::run(const blas::In<double>& gram, const Eigen::Ref<const VecX>
   blas::gram(inverse_, 0.0, whitened_);
   double squares = 0.0;  // |A|_F^2 from its lower triangle
   for (Eigen::Index j = 0; j < n; ++j) {
-    squares += whitened_(j, j) * whitened_(j, j) +
-               2.0 * whitened_.col(j).tail(n - j - 1).squaredNorm();
+    squares +=
+        whitened_(j, j) * whitened_(j, j) + 2.0 * whitened_.col(j).tail(n - j - 1).squaredNorm();
   }
   blas::solve_lower(score_covariance_, score_);
   const auto size = static_cast<double>(n);

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sparse data from an alignment, with the errors that all its points share.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <vector>
 
@@ -8,47 +11,68 @@
 namespace brainshift::registration {
 namespace {
 
-// Displacement of x from a homogeneous gradient about the centroid, one column per gradient.
-Eigen::MatrixXd linear_fields(const Points& positions, const std::vector<Mat3>& gradients) {
-  const Points arms = positions.colwise() - Vec3(positions.rowwise().mean());
-  Eigen::MatrixXd fields(positions.size(), static_cast<Eigen::Index>(gradients.size()));
-  for (std::size_t k = 0; k < gradients.size(); ++k) {
-    const Points field = gradients[k] * arms;
-    fields.col(static_cast<Eigen::Index>(k)) = Eigen::Map<const VecX>(field.data(), field.size());
-  }
-  return fields;
+// What a homogeneous gradient about the centroid, and a shift, do to all points alike.
+struct LinearField {
+  Mat3 gradient = Mat3::Zero();
+  Vec3 shift = Vec3::Zero();
+};
+
+Mat3 turning(const Vec3& w) {
+  Mat3 matrix;
+  matrix << 0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0;
+  return matrix;
 }
 
-std::vector<Mat3> alignment_errors(double rotation_sd_deg) {
-  std::vector<Mat3> gradients;
-  const double rotation_sd = rotation_sd_deg * std::numbers::pi / 180.0;
+// Square root of the pose's covariance.
+void add_pose(const IcpResult& icp, double rotation_sd_deg, std::vector<LinearField>& fields) {
+  Mat6 covariance = icp.pose_covariance;
+  if (rotation_sd_deg > 0.0) {
+    const double rotation_sd = rotation_sd_deg * std::numbers::pi / 180.0;
+    covariance.topLeftCorner<3, 3>() = rotation_sd * rotation_sd * Mat3::Identity();
+    covariance.topRightCorner<3, 3>().setZero();
+    covariance.bottomLeftCorner<3, 3>().setZero();
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(covariance);
+  for (int k = 0; k < 6; ++k) {
+    const double sd = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+    if (sd == 0.0) continue;
+    const Vec6 axis = sd * eigen.eigenvectors().col(k);
+    fields.push_back({turning(axis.head<3>()), axis.tail<3>()});
+  }
+}
+
+void add_strains(std::vector<LinearField>& fields) {
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
-    Mat3 unit = Mat3::Zero();
-    unit(i, i) = kAlignmentStrainSd;
-    gradients.push_back(unit);
-    unit.setZero();
-    unit(i, j) = unit(j, i) = kAlignmentStrainSd / std::numbers::sqrt2;  // isotropic: |unit| equal
-    gradients.push_back(unit);
-    if (rotation_sd_deg <= 0.0) continue;
-    unit.setZero();
-    unit(i, j) = rotation_sd;
-    unit(j, i) = -rotation_sd;
-    gradients.push_back(unit);
+    LinearField field;
+    field.gradient(i, i) = kAlignmentStrainSd;
+    fields.push_back(field);
+    field.gradient.setZero();
+    // isotropic: |gradient| equal
+    field.gradient(i, j) = field.gradient(j, i) = kAlignmentStrainSd / std::numbers::sqrt2;
+    fields.push_back(field);
   }
-  return gradients;
 }
 
 }  // namespace
 
-SparseData sparse_data_from_alignment(const Points& points, const RigidTransform& T_surface_points,
-                                      double sd_mm, double rotation_sd_deg) {
+SparseData sparse_data_from_alignment(const Points& points, const IcpResult& icp, double sd_mm,
+                                      double rotation_sd_deg) {
   SparseData data;
-  data.positions =
-      (T_surface_points.linear() * points).colwise() + Vec3(T_surface_points.translation());
+  const RigidTransform& T = icp.T_surface_points;
+  data.positions = (T.linear() * points).colwise() + Vec3(T.translation());
   data.displacements = points - data.positions;
   data.sd_mm = VecX::Constant(points.cols(), sd_mm);
-  data.common_error = linear_fields(data.positions, alignment_errors(rotation_sd_deg));
+  std::vector<LinearField> fields;
+  add_pose(icp, rotation_sd_deg, fields);
+  add_strains(fields);
+  const Points arms = data.positions.colwise() - Vec3(data.positions.rowwise().mean());
+  data.common_error.resize(data.positions.size(), static_cast<Eigen::Index>(fields.size()));
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const Points field = (fields[k].gradient * arms).colwise() + fields[k].shift;
+    data.common_error.col(static_cast<Eigen::Index>(k)) =
+        Eigen::Map<const VecX>(field.data(), field.size());
+  }
   return data;
 }
 

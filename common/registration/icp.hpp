@@ -85,16 +85,16 @@ Result<IcpResult> align(const Points& points, const geometry::OrientedCloud& sur
                         const RigidTransform& T_surface_points_initial,
                         const IcpOptions& options = {});
 
-// What a rigid alignment of a deformed boundary leaves in common to all its points: a rotation that a smooth
-// boundary hardly shows (the prior's standard deviation, however sure the points seem to be of it), and the strain
-// that it takes for none. Brain shifts by millimetres over some 100 mm: a few per cent.
+// What a rigid alignment of a deformed boundary leaves in common to all its points, beside the error of its pose: the
+// strain that it takes for none. Brain shifts by millimetres over some 100 mm: a few per cent.
 inline constexpr double kAlignmentStrainSd = 0.1;
 
 // Paper 2.7: displacement of each boundary point = its tracked (deformed) place minus its place after the
-// transform (undeformed). positions = T p, displacements = p - T p, each with standard deviation sd_mm;
-// common_error: three rotations of rotation_sd_deg (none if <= 0) and six strains about the points' centroid.
-SparseData sparse_data_from_alignment(const Points& points, const RigidTransform& T_surface_points,
-                                      double sd_mm,
+// transform (undeformed). positions = T p, displacements = p - T p, each with standard deviation sd_mm.
+// common_error, by column: the axes of pose_covariance, with rotations of rotation_sd_deg, the prior's, in place of what
+// independent points seem to know of them (a deformed, smooth boundary shows less), as they are if it is <= 0; and six
+// strains, all about the points' centroid.
+SparseData sparse_data_from_alignment(const Points& points, const IcpResult& icp, double sd_mm,
                                       double rotation_sd_deg = IcpOptions{}.rotation_sd_deg);
 
 }  // namespace brainshift::registration

@@ -77,7 +77,9 @@ SurfaceDistances::SurfaceDistances(SurfacePatch patch, const SurfaceDistanceOpti
     : patch_(std::move(patch)), options_(options) {
   std::map<std::pair<int, int>, int> uses;
   const auto& triangles = patch_.surface.triangles;
-  const auto edge = [&](int t, int k) { return std::minmax(triangles(k, t), triangles((k + 1) % 3, t)); };
+  const auto edge = [&](int t, int k) {
+    return std::minmax(triangles(k, t), triangles((k + 1) % 3, t));
+  };
   for (int t = 0; t < triangles.cols(); ++t) {
     for (int k = 0; k < 3; ++k) ++uses[edge(t, k)];
   }
@@ -94,7 +96,8 @@ Result<SurfaceDistances> SurfaceDistances::build(SurfacePatch patch, const Point
   }
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {
     if (!measured.col(i).allFinite()) {
-      return fail(ErrorCode::kNotFinite, fmt::format("cortical surface: point {} is not finite", i));
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("cortical surface: point {} is not finite", i));
     }
   }
   SurfaceDistances made(std::move(patch), options);
@@ -102,12 +105,12 @@ Result<SurfaceDistances> SurfaceDistances::build(SurfacePatch patch, const Point
   made.measure(Points::Zero(3, made.patch_.surface.num_vertices()), measured, &over);
   if (static_cast<int>(over.size()) < kFewestPoints) {
     const Vec3 centre = made.patch_.surface.vertices.rowwise().mean();
-    const double away =
-        measured.cols() > 0 ? (measured.rowwise().mean() - centre).norm() : 0.0;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("cortical surface: {} of {} points lie over the craniotomy within {} mm, "
-                            "at least {} are needed; their mean lies {:.1f} mm from its centre",
-                            over.size(), measured.cols(), options.farthest_mm, kFewestPoints, away));
+    const double away = measured.cols() > 0 ? (measured.rowwise().mean() - centre).norm() : 0.0;
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("cortical surface: {} of {} points lie over the craniotomy within {} mm, "
+                    "at least {} are needed; their mean lies {:.1f} mm from its centre",
+                    over.size(), measured.cols(), options.farthest_mm, kFewestPoints, away));
   }
   const int available = static_cast<int>(over.size());
   if (available > options.points) {
@@ -135,8 +138,9 @@ SparseData SurfaceDistances::measure(const Points& u, const Points& measured,
     const geometry::ClosestPoint closest = index->closest(p);
     if (!(closest.distance_mm <= options_.farthest_mm)) continue;
     const auto corners = patch_.surface.triangles.col(closest.triangle);
-    const Vec3 w = barycentric(closest.point, deformed.vertices.col(corners[0]),
-                               deformed.vertices.col(corners[1]), deformed.vertices.col(corners[2]));
+    const Vec3 w =
+        barycentric(closest.point, deformed.vertices.col(corners[0]),
+                    deformed.vertices.col(corners[1]), deformed.vertices.col(corners[2]));
     bool on_rim = false;  // edge k lies opposite to corner k + 2
     for (int k = 0; k < 3; ++k) {
       on_rim = on_rim || (rim_edge_[static_cast<std::size_t>(3 * closest.triangle + k)] != 0 &&
@@ -165,8 +169,8 @@ SparseData SurfaceDistances::at(const Points& u) const { return measure(u, guidi
 
 bool SurfaceDistances::moved(const SparseData& before, const SparseData& now) const {
   if (before.size() != now.size()) return true;
-  return now.size() > 0 && (now.positions - before.positions).colwise().norm().maxCoeff() >
-                               options_.settled_mm;
+  return now.size() > 0 &&
+         (now.positions - before.positions).colwise().norm().maxCoeff() > options_.settled_mm;
 }
 
 }  // namespace brainshift::registration

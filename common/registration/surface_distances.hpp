@@ -27,12 +27,12 @@ struct SurfacePatch {
 SurfacePatch craniotomy_patch(const BrainModel& model);
 
 struct SurfaceDistanceOptions {
-  int points = 300;             // chosen of those over the patch, always the same ones
-  double sd_mm = 0.5;           // of a point along the normal
-  double pose_sd_mm = 0.0;      // of the camera's place: three common errors (none if 0)
-  double pose_sd_deg = 0.0;     // of its direction, about the points' centroid: three more
-  double farthest_mm = 30.0;    // from the undeformed patch; what lies farther is not the cortex
-  double settled_mm = 0.5;      // the data are settled when no x has moved by more
+  int points = 300;           // chosen of those over the patch, always the same ones
+  double sd_mm = 0.5;         // of a point along the normal
+  double pose_sd_mm = 0.0;    // of the camera's place: three common errors (none if 0)
+  double pose_sd_deg = 0.0;   // of its direction, about the points' centroid: three more
+  double farthest_mm = 30.0;  // from the undeformed patch; what lies farther is not the cortex
+  double settled_mm = 0.5;    // the data are settled when no x has moved by more
 };
 
 class SurfaceDistances {
@@ -58,8 +58,9 @@ class SurfaceDistances {
 
   SurfacePatch patch_;
   SurfaceDistanceOptions options_;
-  std::vector<char> rim_edge_;  // 3 per triangle: edge k from corner k to k + 1 belongs to one triangle only
-  Points guiding_;              // measured points that are used
+  std::vector<char>
+      rim_edge_;    // 3 per triangle: edge k from corner k to k + 1 belongs to one triangle only
+  Points guiding_;  // measured points that are used
 };
 
 }  // namespace brainshift::registration

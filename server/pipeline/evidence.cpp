@@ -29,7 +29,7 @@ void Evidence::put(RegisteredObservation observation) {
 
 // A recording that begins again jumps back in time: as old as it is new.
 double Evidence::age_s(const RegisteredObservation& observation, std::int64_t now_ns) const {
-  return 1e-9 * std::abs(static_cast<double>(now_ns) - static_cast<double>(observation.acquired_ns));
+  return std::abs(static_cast<double>(now_ns) - static_cast<double>(observation.acquired_ns)) / 1e9;
 }
 
 std::vector<const RegisteredObservation*> Evidence::fresh(std::int64_t now_ns) const {
@@ -91,6 +91,7 @@ void CombinedData::describe(std::int64_t now_ns, std::vector<SourceSummary>& sou
     for (const RegisteredObservation* observation : observations_) {
       if (observation->source != summary.source) continue;
       summary.observation_sequence = observation->sequence;
+      summary.outliers += observation->outliers;
       summary.age_s = 1e-9 * static_cast<double>(now_ns - observation->acquired_ns);
     }
   }

@@ -14,6 +14,9 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
+// Welsch weight of a point more than two scales off: it lies on something else.
+constexpr double kLeastWeight = 0.1353;
+
 // Ascending, so that neighbouring data stay neighbours; the same for the same number of points.
 std::vector<int> guiding_points(int available, int wanted) {
   std::vector<int> chosen = Random(kSubsetSeed).choose(wanted, available);
@@ -46,9 +49,10 @@ double datum_sd_mm(double observed_mm, const InversionConfig& config, Method met
 }
 
 // Aligned rigidly from the tracked pose: the points arrive in patient RAS, so it is the identity.
+template <typename Surface>
 Result<RegisteredObservation> aligned(const Points& points, double observed_sd_mm,
-                                      const geometry::ClosestPointIndex& surface, int guiding,
-                                      const CaseConfig& config, Method method) {
+                                      const Surface& surface, int guiding, const CaseConfig& config,
+                                      Method method) {
   registration::IcpOptions options;
   options.rotation = config.scene.rotation != Carry::kOff;
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
@@ -56,16 +60,37 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
   auto icp = registration::align(points, surface, RigidTransform::Identity(), options);
   if (!icp) return tl::unexpected(icp.error());
   const SparseData all = registration::sparse_data_from_alignment(
-      points, icp->T_surface_points, datum_sd_mm(observed_sd_mm, config.inversion, method));
+      points, *icp, datum_sd_mm(observed_sd_mm, config.inversion, method));
+  std::vector<int> inliers;
+  for (int i = 0; i < all.size(); ++i) {
+    if (icp->weights[i] >= kLeastWeight) inliers.push_back(i);
+  }
+  if (inliers.size() < 3) {
+    return fail(
+        ErrorCode::kNotConverged,
+        fmt::format("alignment: {} of {} points lie on the surface after it, at least 3 are "
+                    "needed; residual {:.1f} mm",
+                    inliers.size(), points.cols(), icp->rms_mm));
+  }
+  std::vector<int> chosen = guiding_points(static_cast<int>(inliers.size()), guiding);
+  for (int& one : chosen) one = inliers[static_cast<std::size_t>(one)];
   RegisteredObservation registered;
-  registered.data = select(all, guiding_points(all.size(), guiding));
-  registered.icp = *icp;
+  registered.data = select(all, chosen);
+  registered.outliers = all.size() - static_cast<int>(inliers.size());
+  registered.icp = std::move(*icp);
   return registered;
 }
 
 Result<RegisteredObservation> from_surface(const CorticalSurface& body,
-                                           const registration::SurfacePatch& patch,
+                                           const RegistrationTargets& targets,
                                            const CaseConfig& config, Method method) {
+  if (!targets.site) {
+    return fail(ErrorCode::kEmptySet,
+                "cortical surface: the craniotomy of the model has no triangle to compare it with");
+  }
+  auto checked = geometry::check_cortical_surface(body.surface, *targets.site);
+  if (!checked) return tl::unexpected(checked.error());
+  const registration::SurfacePatch& patch = targets.craniotomy;
   const SensingConfig& sensing = config.sensing;
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
   if (sensing.surface == SurfaceGuidance::kRigid || method != Method::kCondensed) {
@@ -113,8 +138,11 @@ Result<RegisteredObservation> register_body(const Observation& observation,
                                             const RegistrationTargets& targets,
                                             const CaseConfig& config, Method method) {
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    return aligned(boundary->points, boundary->sd_mm, targets.tumour,
-                   config.inversion.sparse_points, config, method);
+    const auto to = [&](const auto& surface) {
+      return aligned(boundary->points, boundary->sd_mm, surface, config.inversion.sparse_points,
+                     config, method);
+    };
+    return targets.tumour_distance ? to(*targets.tumour_distance) : to(targets.tumour);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
     return from_landmarks(*pairs, config.inversion, method);
@@ -126,7 +154,7 @@ Result<RegisteredObservation> register_body(const Observation& observation,
           fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
                       observation.sequence));
     }
-    return from_surface(*surface, targets.craniotomy, config, method);
+    return from_surface(*surface, targets, config, method);
   }
   return fail(ErrorCode::kInvalidArgument,
               fmt::format("observation {}: a patient_pose is not assimilated in this version",
@@ -138,7 +166,13 @@ Result<RegisteredObservation> register_body(const Observation& observation,
 Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) {
   auto tumour = geometry::ClosestPointIndex::build(model.tumour);
   if (!tumour) return tl::unexpected(tumour.error());
-  return RegistrationTargets{std::move(*tumour), registration::craniotomy_patch(model)};
+  RegistrationTargets targets{std::move(*tumour), std::nullopt,
+                              registration::craniotomy_patch(model), std::nullopt};
+  if (auto distance = geometry::DistanceVolume::create(model.tumour_distance)) {
+    targets.tumour_distance = std::move(*distance);
+  }
+  if (const auto site = geometry::craniotomy_site(model)) targets.site = *site;
+  return targets;
 }
 
 Result<RegisteredObservation> register_observation(const Observation& observation,

@@ -10,12 +10,12 @@
 //                    distances  along the normal of the model's cortex, made anew for every estimate
 //                               (registration/surface_distances.hpp; method condensed)
 //                    rigid      ICP to the undeformed cortex under the craniotomy, as for the tumour (other methods)
-//                    scene.surface = off: refused
+//                    Refused: what check_cortical_surface refuses (units, place, orientation); scene.surface = off
 //   PatientPose      refused: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the observation's own
 // where that is larger; the paper's method and its variants take the former whatever the observation says.
-// Errors that aligned points have in common: registration::sparse_data_from_alignment.
+// Points that ICP takes for outliers guide nothing. Errors that aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once
 
 #include <optional>
@@ -27,6 +27,8 @@
 #include "common/core/observation.hpp"
 #include "common/core/sparse_data.hpp"
 #include "common/geometry/closest_point.hpp"
+#include "common/geometry/distance_volume.hpp"
+#include "common/geometry/surface_check.hpp"
 #include "common/registration/icp.hpp"
 #include "common/registration/surface_distances.hpp"
 
@@ -36,8 +38,9 @@ struct RegisteredObservation {
   std::string source;
   std::uint64_t sequence = 0;
   std::int64_t acquired_ns = 0;
-  SparseData data;                             // one named source; empty with `surface`
-  std::optional<registration::IcpResult> icp;  // when the observation had to be aligned
+  SparseData data;                                        // one named source; empty with `surface`
+  int outliers = 0;                                       // points that the alignment left aside
+  std::optional<registration::IcpResult> icp;             // when the observation had to be aligned
   std::optional<registration::SurfaceDistances> surface;  // data that follow the deformation
 };
 
@@ -47,7 +50,10 @@ struct RegistrationTargets {
   static Result<RegistrationTargets> build(const BrainModel& model);
 
   geometry::ClosestPointIndex tumour;
+  // The same by interpolation, some thirty times faster; models whose tumour is not closed have none.
+  std::optional<geometry::DistanceVolume> tumour_distance;
   registration::SurfacePatch craniotomy;
+  std::optional<geometry::CorticalSite> site;  // none: no cortical surface is taken
 };
 
 // kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3 points;

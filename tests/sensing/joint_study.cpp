@@ -1,104 +1,153 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tumour boundary and exposed cortex together: how much better than the tumour alone?
-//
 // Every joint scenario is measured several times with noise drawn anew. The first update of a measurement knows the
-// tumour's boundary only, the second the stereo camera's surface too, the third the tracked points.
+// tumour's boundary only, the second the stereo camera's surface too, the third the tracked points. The truth has a
+// stiffness that varies by 30 % and that no estimate knows.
 #include <cstdio>
 #include <cstdlib>
-#include <map>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
+#include "client/report/chart.hpp"
+#include "common/core/statistics.hpp"
+#include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift::sensing {
 namespace {
 
+using test_support::record_check;
+
 constexpr int kMeasurements = 6;
 const char* const kScenarios[] = {"joint-sag", "joint-distension", "joint-tangential",
                                   "joint-mixed"};
+const char* const kSources[] = {"ius", "stereopsis", "tracks"};
+constexpr int kStages = 3;
 
-struct Errors {
-  double tumour = 0.0, craniotomy = 0.0, cortex_vector = 0.0, field = 0.0, coverage = 0.0;
-  double milliseconds = 0.0;
-  int updates = 0;
+// Over the measurements, by stage: the newest source of the update.
+struct Stage {
+  std::vector<double> tumour_mm, craniotomy_mm, craniotomy_vector_mm, coverage, time_ms;
+  int contradictions = 0;
 };
+using Stages = std::array<Stage, kStages>;
 
-void add(const client::RunReport& run, const Update& update, Errors& errors) {
-  errors.tumour += run.error_mm.cross->mean;
-  errors.craniotomy += run.error_mm.craniotomy->mean;
-  errors.cortex_vector += run.error_mm.craniotomy_displacement->mean;
-  errors.field += 0.01 * run.field_error_pct->p50 * *run.largest_true_displacement_mm;
-  errors.coverage += *run.coverage_90;
-  errors.milliseconds += update.timings.invert_ms + update.timings.rebuild_ms;
-  ++errors.updates;
+double mean(const std::vector<double>& values) { return mean_std(values).mean; }
+
+void add(const client::RunReport& run, const Update& update, Stage& stage) {
+  stage.tumour_mm.push_back(run.error_mm.cross->mean);
+  stage.craniotomy_mm.push_back(run.error_mm.craniotomy->mean);
+  stage.craniotomy_vector_mm.push_back(run.error_mm.craniotomy_displacement->mean);
+  stage.coverage.push_back(*run.coverage_90);
+  stage.time_ms.push_back(update.timings.register_ms + update.timings.invert_ms +
+                          update.timings.rebuild_ms);
+  for (const SourceSummary& source : update.estimate.sources) {
+    stage.contradictions += source.consistent ? 0 : 1;
+  }
 }
 
-Errors mean(Errors sum) {
-  const double n = sum.updates;
-  return {sum.tumour / n,   sum.craniotomy / n,   sum.cortex_vector / n, sum.field / n,
-          sum.coverage / n, sum.milliseconds / n, sum.updates};
-}
-
-// By the newest source: "ius", "stereopsis", "tracks".
-Result<std::map<std::string, Errors>> play(const bench::Head& head, twin::Scenario scenario) {
+Result<Stages> play(const bench::Head& head, twin::Scenario scenario) {
   scenario.fluid_levels_mm.assign(kMeasurements, scenario.fluid_levels_mm.front());
   const auto surgery =
       twin::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
   if (!surgery) return tl::unexpected(surgery.error());
   auto session = Surgery::begin(head, head.config);
   if (!session) return tl::unexpected(session.error());
-  std::map<std::string, Errors> sums;
+  Stages stages;
   for (std::size_t i = 0; i < surgery->observations.size(); ++i) {
     const auto update = session->observe(surgery->observations[i]);
     if (!update) return tl::unexpected(update.error());
     const auto run = score_update(head, surgery->truths[i], *update);
     if (!run) return tl::unexpected(run.error());
-    add(*run, *update, sums[surgery->observations[i].source]);
-    std::printf("    %-10s %.3f %.3f %.3f | %s\n", surgery->observations[i].source.c_str(),
-                run->error_mm.cross->mean, run->error_mm.craniotomy->mean,
-                run->error_mm.craniotomy_displacement->mean, update->estimate.reason.c_str());
-    std::printf("       active %d pen %.4f scales %.3f %.3f %.3f %.3f misfit %.3f\n", update->estimate.contact.active, update->estimate.contact.max_penetration_mm, update->estimate.prior_scales[0], update->estimate.prior_scales[1], update->estimate.prior_scales[2], update->estimate.prior_scales[3], update->estimate.misfit_mm.mean);
-    for (const auto& h : update->estimate.history) std::printf(" %.3f/%d", h.max_penetration_mm, h.penetrating);
-    std::printf("\n");
-    for (const auto& source : update->estimate.sources) {
-      std::printf("        %s: %d data, %d outliers, chi2 %.1f / %.1f p %.2g\n",
-                  source.source.c_str(), source.data, source.outliers, source.chi_square,
-                  source.degrees_of_freedom, source.p_value);
-    }
+    add(*run, *update, stages[i % kStages]);
   }
-  for (auto& [source, errors] : sums) errors = mean(errors);
-  return sums;
+  return stages;
 }
 
-int run(int argc, char** argv) {
-  const char* size = std::getenv("SENSING_THOUSAND_NODES");
-  const auto head = make_default_head(size != nullptr ? std::atof(size) : 18.0);
-  if (!head) {
-    std::fprintf(stderr, "sensing_joint: %s\n", head.error().message.c_str());
-    return 1;
+void check(const std::string& study, const std::string& scenario, const Stages& stages, bool held) {
+  const Stage &alone = stages.front(), &all = stages.back();
+  const auto ratio = [&](const char* what, const std::vector<double> Stage::*errors, double bound) {
+    const double value = mean(all.*errors) / mean(alone.*errors);
+    char text[80];
+    char limit[20];
+    std::snprintf(limit, sizeof limit, "<= %g", bound);
+    std::snprintf(text, sizeof text, "%s (%.3f to %.3f mm)", held ? limit : "shown",
+                  mean(alone.*errors), mean(all.*errors));
+    record_check(study, scenario + ": " + what + " error over that of the tumour alone", value,
+                 text, !held || value <= bound, "twin; mean of 6 measurements");
+  };
+  ratio("craniotomy (closest point)", &Stage::craniotomy_mm, 0.5);
+  ratio("craniotomy (displacement)", &Stage::craniotomy_vector_mm, 0.5);
+  ratio("tumour", &Stage::tumour_mm, 1.0);
+}
+
+void draw(const std::vector<Stages>& results, const std::filesystem::path& file) {
+  client::BarSpec spec;
+  spec.title = "Tumour boundary and exposed cortex together";
+  spec.subtitle =
+      "mean error over 6 measurements; stiffness of the truth varies by 30 %; craniotomy by "
+      "displacement";
+  spec.y_label = "error (mm)";
+  spec.series = {{"tumour boundary", client::palette::kOrange, {}},
+                 {"and stereo surface", client::palette::kSkyBlue, {}},
+                 {"and 20 tracked points", client::palette::kBlue, {}}};
+  double largest = 0.0;
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    const auto add_group = [&](const char* place, const std::vector<double> Stage::*errors) {
+      spec.groups.push_back(std::string(kScenarios[k]).substr(6) + "\n" + place);
+      for (std::size_t s = 0; s < kStages; ++s) {
+        const double value = mean(results[k][s].*errors);
+        largest = std::max(largest, value);
+        spec.series[s].values.push_back(value);
+      }
+    };
+    add_group("tumour", &Stage::tumour_mm);
+    add_group("craniotomy", &Stage::craniotomy_vector_mm);
   }
-  std::vector<const char*> names(std::begin(kScenarios), std::end(kScenarios));
-  if (argc > 1) names.assign(argv + 1, argv + argc);
-  for (const char* name : names) {
-    const auto errors = play(*head, *twin::find_scenario(name));
-    if (!errors) {
-      std::fprintf(stderr, "sensing_joint: %s: %s\n", name, errors.error().message.c_str());
-      return 1;
+  spec.y_min = 0.0;
+  spec.y_max = 1.1 * largest;
+  cv::imwrite(file.string(), client::draw_bars(spec));
+}
+
+// `study`: file-name-like; `held`: to the bounds.
+Status measure(const bench::Head& head, const std::string& study, bool held) {
+  std::printf("%s: errors in mm, mean of %d measurements\n", study.c_str(), kMeasurements);
+  std::vector<Stages> results;
+  std::vector<double> joint_ms;
+  for (const char* name : kScenarios) {
+    auto stages = play(head, *twin::find_scenario(name));
+    if (!stages)
+      return fail(stages.error().code, std::string(name) + ": " + stages.error().message);
+    for (std::size_t s = 0; s < kStages; ++s) {
+      const Stage& stage = (*stages)[s];
+      std::printf(
+          "  %-17s %-11s tumour %.3f craniotomy %.3f by displacement %.3f coverage %.2f "
+          "contradictions %d time %.1f ms\n",
+          name, kSources[s], mean(stage.tumour_mm), mean(stage.craniotomy_mm),
+          mean(stage.craniotomy_vector_mm), mean(stage.coverage), stage.contradictions,
+          percentile(stage.time_ms, 50));
     }
-    for (const char* source : {"ius", "stereopsis", "tracks"}) {
-      if (errors->count(source) == 0) continue;
-      const Errors& one = errors->at(source);
-      std::printf("%-18s %-12s tumour %.4f  craniotomy %.4f  vector %.4f field %.4f coverage %.3f  %.1f ms\n", name,
-                  source, one.tumour, one.craniotomy, one.cortex_vector, one.field, one.coverage,
-                  one.milliseconds);
-    }
+    check(study, name, *stages, held);
+    const auto& times = stages->back().time_ms;
+    joint_ms.insert(joint_ms.end(), times.begin(), times.end());
+    results.push_back(std::move(*stages));
   }
-  return 0;
+  const double solve_ms = bench::solve_ms(*head.prepared);
+  record_check(study, "update with three sources over one solve: p50",
+               percentile(joint_ms, 50) / solve_ms, "shown", true, "t_solve of the same process");
+  if (const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR"); folder != nullptr) {
+    draw(results, std::filesystem::path(folder) / (study + ".png"));
+  }
+  return {};
 }
 
 }  // namespace
-}  // namespace brainshift::sensing
 
-int main(int argc, char** argv) { return brainshift::sensing::run(argc, argv); }
+Status joint_study(const bench::Head& head) { return measure(head, "joint", true); }
+
+Status joint_study_without_oedema(const bench::Head& head) {
+  return measure(head, "joint-without-oedema", false);
+}
+
+}  // namespace brainshift::sensing

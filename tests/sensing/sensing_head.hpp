@@ -12,8 +12,9 @@
 
 namespace brainshift::sensing {
 
-// Contact boundary. `thousand_nodes`: wanted size of the mesh. Prints how long it took.
-Result<bench::Head> make_default_head(double thousand_nodes);
+// Contact boundary. `thousand_nodes`: wanted size of the mesh. swelling_strain_sd: prior.swelling_strain_sd of the case.
+// Prints how long it took.
+Result<bench::Head> make_default_head(double thousand_nodes, double swelling_strain_sd);
 
 // Updates as a session makes them: warm, with the evidence of the other sources.
 class Surgery {

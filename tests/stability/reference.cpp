@@ -208,7 +208,8 @@ bool reference_posterior(Reference& reference, const inversion::PreparedModel& m
   kernel *= other * other;
   MatrixR modes = model.prior().modes().cast<Real>();
   for (Eigen::Index j = 0; j < modes.cols(); ++j) {
-    const PriorPart part = inversion::prior_part(static_cast<int>(j), inversion::load_mode_counts(model.config().prior));
+    const PriorPart part = inversion::prior_part(static_cast<int>(j),
+                                                 inversion::load_mode_counts(model.config().prior));
     modes.col(j) *= static_cast<Real>(scales[static_cast<std::size_t>(part)]);
   }
   MatrixR forces(dofs.num_unknowns(), 3 * m);  // T^T Sigma T K_p^-1 T^T A^T

@@ -226,6 +226,31 @@ TEST_F(Import, TimeGapsSplitSweeps) {
   EXPECT_EQ(report->sweeps[1].first_frame, 8);
 }
 
+// Fiducials on the head, touched without error: the same surgery as from the matrix they belong to.
+TEST_F(Import, FiducialsGiveTheRegistrationAndItsErrorAtTheTumour) {
+  ASSERT_TRUE(import_recording(options));
+  const Points from_matrix = std::get<TumourBoundary>(observations().front().body).points;
+  std::string text;
+  for (const Vec3& ras : {Vec3(0, 0, 0), Vec3(60, 5, 0), Vec3(0, 60, 10), Vec3(50, 55, 60)}) {
+    const Vec3 reference = sweep.T_ras_reference().inverse() * ras;
+    for (const double x : {reference.x(), reference.y(), reference.z(), ras.x(), ras.y()}) {
+      text += std::to_string(x) + ",";
+    }
+    text += std::to_string(ras.z()) + "\n";
+  }
+  options.fiducials = write("fiducials.csv", text);
+  options.registration.clear();
+  options.out = folder / "again.surgery";
+  const auto report = import_recording(options);
+  ASSERT_TRUE(report) << report.error().message;
+  const Points points = std::get<TumourBoundary>(observations().front().body).points;
+  EXPECT_LT((points - from_matrix).cwiseAbs().maxCoeff(), 1e-4);
+  ASSERT_TRUE(report->fiducials.has_value());
+  EXPECT_EQ(report->fiducials->count, 4);
+  EXPECT_LT(report->fiducials->tre_mm, 1e-4);
+  EXPECT_THAT(report_lines(*report), testing::Contains(HasSubstr("fiducials: 4, registration")));
+}
+
 TEST_F(Import, AFarBoundaryIsRefusedWithItsDistance) {
   RigidTransform far = sweep.T_ras_reference();
   far.translation().x() += 250.0;
@@ -272,7 +297,8 @@ TEST_F(Import, NamesWhatIsMissing) {
   };
   using O = ImportOptions;
   EXPECT_THAT(with([](O& o) { o.recording.clear(); }), HasSubstr("--recording is required"));
-  EXPECT_THAT(with([](O& o) { o.registration.clear(); }), HasSubstr("--registration is required"));
+  EXPECT_THAT(with([](O& o) { o.registration.clear(); }),
+              HasSubstr("--registration and --fiducials"));
   EXPECT_THAT(with([](O& o) { o.contours.clear(); }),
               HasSubstr("exactly one of --contours and --seeds"));
   EXPECT_THAT(with([](O& o) { o.seeds = o.contours; }), HasSubstr("both given"));

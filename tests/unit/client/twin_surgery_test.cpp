@@ -8,7 +8,10 @@
 #include <set>
 
 #include "client/twin/simulate.hpp"
+#include "client/twin/stiffness.hpp"
 #include "common/core/statistics.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/registration/surface_distances.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -44,7 +47,8 @@ TEST(Scenarios, AreNamedOnceAndDescribedInOneLine) {
     EXPECT_EQ(info.description.find('\n'), std::string::npos);
   }
   EXPECT_EQ(names, (std::set<std::string>{"paper", "paper-icp", "distension", "sag-progress",
-                                          "no-contact"}));
+                                          "no-contact", "joint-sag", "joint-distension",
+                                          "joint-tangential", "joint-mixed"}));
 }
 
 TEST(Distension, PressesAWideFrontAgainstTheSkullWithoutPenetratingIt) {
@@ -62,6 +66,91 @@ TEST(Distension, PressesAWideFrontAgainstTheSkullWithoutPenetratingIt) {
   EXPECT_GT(scalars.at("tumour_displacement_mm"), 0.5);
   EXPECT_LT(scalars.at("max_displacement_mm"), 10.0);
   EXPECT_GT(scalars.at("swelling_volume_strain"), 0.0);
+}
+
+Scenario joint_on_the_toy() {
+  Scenario scenario = *find_scenario("joint-sag");
+  scenario.fluid_levels_mm = {10.0, 20.0};
+  scenario.cortex->tracks = 5;
+  return scenario;
+}
+
+TEST(Joint, EveryMomentIsSeenByThreeInstrumentsWithTheSameTruth) {
+  const Scenario scenario = joint_on_the_toy();
+  const auto surgery = play_scenario(patient(), test_support::toy_config(), scenario, 1);
+  ASSERT_TRUE(surgery) << surgery.error().message;
+  ASSERT_EQ(surgery->observations.size(), 6u);
+  const char* const sources[] = {"ius", "stereopsis", "tracks"};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Observation& observation = surgery->observations[i];
+    EXPECT_EQ(observation.source, sources[i % 3]);
+    EXPECT_EQ(observation.sequence, i + 1);
+    if (i > 0) {
+      EXPECT_GT(observation.acquired_ns, surgery->observations[i - 1].acquired_ns);
+    }
+    EXPECT_EQ(surgery->truths[i].displacement, surgery->truths[3 * (i / 3)].displacement);
+  }
+  EXPECT_NE(surgery->truths[0].displacement, surgery->truths[3].displacement);
+  EXPECT_EQ(pairs_of(surgery->observations[2]).undeformed.cols(), 5);
+}
+
+// The measured cortex lies on the deformed one, up to noise and the camera's pose.
+TEST(Joint, TheCortexIsMeasuredWhereItIs) {
+  Scenario scenario = joint_on_the_toy();
+  scenario.cortex->noise_sd_mm = 0.0;
+  scenario.cortex->pose_sd_mm = 0.0;
+  scenario.cortex->pose_sd_deg = 0.0;
+  const auto exact = play_scenario(patient(), test_support::toy_config(), scenario, 1);
+  ASSERT_TRUE(exact);
+  const auto patch = registration::craniotomy_patch(patient());
+  const Points& truth = exact->truths[1].displacement;
+  const TriangleSurface deformed{patch.surface.vertices + truth(Eigen::all, patch.nodes),
+                                 patch.surface.triangles};
+  const auto index = *geometry::ClosestPointIndex::build(deformed);
+  const auto& measured = std::get<CorticalSurface>(exact->observations[1].body).surface.vertices;
+  ASSERT_GT(measured.cols(), 100);
+  for (Eigen::Index i = 0; i < measured.cols(); ++i) {
+    EXPECT_LT(index.closest(measured.col(i)).distance_mm, 1e-9);
+  }
+  scenario.cortex->pose_sd_mm = 1.0;
+  const auto shifted = play_scenario(patient(), test_support::toy_config(), scenario, 1);
+  const auto& moved = std::get<CorticalSurface>(shifted->observations[1].body).surface.vertices;
+  const Points shift = moved - measured;  // the same points, moved alike
+  EXPECT_LT((shift.colwise() - Vec3(shift.col(0))).colwise().norm().maxCoeff(), 1e-9);
+  EXPECT_GT(shift.col(0).norm(), 0.1);
+}
+
+TEST(Joint, GravityBesideItsKnownDirectionPullsTheBrainThere) {
+  Scenario scenario = joint_on_the_toy();
+  scenario.fluid_levels_mm = {20.0};
+  scenario.stiffness_sd = 0.0;
+  BrainModel lying = patient();  // else gravity runs along the axis of the craniotomy
+  lying.gravity_direction = Vec3(1, 0, -1).normalized();
+  const auto straight = play_scenario(lying, test_support::toy_config(), scenario, 1);
+  scenario.gravity_tilt_deg = 25.0;
+  const auto tilted = play_scenario(lying, test_support::toy_config(), scenario, 1);
+  ASSERT_TRUE(straight && tilted);
+  const Points change = tilted->truths[0].displacement - straight->truths[0].displacement;
+  EXPECT_GT(change.colwise().norm().maxCoeff(),
+            0.1 * straight->truths[0].displacement.colwise().norm().maxCoeff());
+}
+
+TEST(VariedStiffness, HasTheMeanAndSpreadAskedForAndTheSameBrainForASeed) {
+  const VariedBrain varied = vary_stiffness(patient(), test_support::toy_config(), 0.3, 8.0, 7);
+  EXPECT_EQ(varied.model.mesh.labels,
+            vary_stiffness(patient(), test_support::toy_config(), 0.3, 8.0, 7).model.mesh.labels);
+  EXPECT_NE(varied.model.mesh.labels,
+            vary_stiffness(patient(), test_support::toy_config(), 0.3, 8.0, 8).model.mesh.labels);
+  const double base = test_support::toy_config().material.shear_modulus_pa;
+  double sum = 0.0, squares = 0.0;
+  for (const int label : varied.model.mesh.labels) {
+    const double ln = std::log(varied.config.material.regions.at(label).shear_modulus_pa / base);
+    sum += ln;
+    squares += ln * ln;
+  }
+  const auto n = static_cast<double>(varied.model.mesh.num_tets());
+  EXPECT_NEAR(sum / n, 0.0, 0.15);
+  EXPECT_NEAR(std::sqrt(squares / n), 0.3, 0.1);
 }
 
 TEST(SagProgress, TheFluidFallsSteadilyFrom15To55InTwentyObservations) {

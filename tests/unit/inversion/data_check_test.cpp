@@ -63,7 +63,8 @@ TEST(CheckData, RefusesSourcesThatDoNotCoverTheData) {
   data.sources = {{"ius", 0, 3}, {"pointer", 3, 1}};
   EXPECT_TRUE(check_data(data).has_value());
   data.sources[1].first = 2;
-  expect_refused(data, ErrorCode::kInvalidArgument, "\"pointer\" begins at datum 2, must begin at 3");
+  expect_refused(data, ErrorCode::kInvalidArgument,
+                 "\"pointer\" begins at datum 2, must begin at 3");
   data.sources.pop_back();
   expect_refused(data, ErrorCode::kInvalidArgument, "hold 3 of 4 data");
 }

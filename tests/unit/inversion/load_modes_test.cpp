@@ -18,6 +18,7 @@ TEST(LoadModes, AreTriplesOfGravityThenFoursOfSwelling) {
   CaseConfig config = test_support::toy_config();
   config.prior.gravity_levels_mm = {0.0, 20.0};
   config.prior.swelling_radii_mm = {15.0};
+  config.prior.swelling_strain_sd = 0.05;
   const LoadModeCounts counts = load_mode_counts(config.prior);
   EXPECT_EQ(counts.gravity, 6);
   EXPECT_EQ(counts.swelling, 4);
@@ -34,7 +35,8 @@ TEST(LoadModes, AreTriplesOfGravityThenFoursOfSwelling) {
 
 TEST(LoadModes, SwellingBalancesItself) {
   const BrainModel patient = test_support::toy_patient();
-  const CaseConfig config = test_support::toy_config();
+  CaseConfig config = test_support::toy_config();
+  config.prior.swelling_strain_sd = 0.05;
   const LoadModeCounts counts = load_mode_counts(config.prior);
   const Eigen::MatrixXd modes = load_modes(patient, config);
   for (int j = counts.gravity; j < counts.all(); ++j) {
@@ -57,7 +59,8 @@ TEST(LoadModes, SwellingDoesTheWorkOfItsVolumeStrain) {
   config.prior.swelling_radii_mm = {12.0};
   config.prior.swelling_strain_sd = 0.3;
   const LoadModeCounts counts = load_mode_counts(config.prior);
-  const auto force = mode(load_modes(patient, config), counts.gravity);
+  const Eigen::MatrixXd modes = load_modes(patient, config);
+  const auto force = mode(modes, counts.gravity);
   const fem::Elasticity elasticity = fem::elasticity_from(config.material);
   const double bulk = elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
   const Vec3 centre = patient.tumour.vertices.rowwise().mean();

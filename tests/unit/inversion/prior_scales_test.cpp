@@ -90,7 +90,8 @@ TEST(PriorScales, MaximiseTheEvidence) {
 TEST(PriorScales, FindTheStrengthThatTheDataWereDrawnWith) {
   // 34 amplitudes are known to 1 / sqrt(2 * 34) of their standard deviation.
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    EXPECT_NEAR(std::log(fitted(drawn({0.5, 0.5, 0.5, 0.1}, seed)).of_other() / 0.1), 0.0, 0.4) << seed;
+    EXPECT_NEAR(std::log(fitted(drawn({0.5, 0.5, 0.5, 0.1}, seed)).of_other() / 0.1), 0.0, 0.4)
+        << seed;
   }
 }
 

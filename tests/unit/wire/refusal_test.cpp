@@ -113,6 +113,8 @@ TEST_P(NotFinite, InAnUpdateIsRefusedNamingTheField) {
   expect("displacement.xyz_mm: entry 11 ",
          [=](auto& m) { m.mutable_displacement()->set_xyz_mm(11, bad_float); });
   expect("update.sd_mm", [=](auto& m) { m.set_sd_mm(0, bad_float); });
+  expect("update.sources.age_s", [=](auto& m) { m.mutable_sources(0)->set_age_s(bad); });
+  expect("update.sources.p_value", [=](auto& m) { m.mutable_sources(0)->set_p_value(bad); });
   expect("contact.force_n", [=](auto& m) { m.mutable_contact()->set_force_n(1, bad_float); });
   expect("contact.max_penetration_mm",
          [=](auto& m) { m.mutable_contact()->set_max_penetration_mm(bad); });

@@ -157,6 +157,23 @@ inline void expect_same(const UpdateMessage& a, const UpdateMessage& b) {
   EXPECT_EQ(a.update.timings.journal_ms, b.update.timings.journal_ms);
   expect_same_matrix(a.update.T_undeformed_deformed.matrix(),
                      b.update.T_undeformed_deformed.matrix());
+  const auto& sources = a.update.estimate.sources;
+  ASSERT_EQ(sources.size(), b.update.estimate.sources.size());
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const SourceSummary& other = b.update.estimate.sources[i];
+    EXPECT_EQ(sources[i].source, other.source);
+    EXPECT_EQ(sources[i].observation_sequence, other.observation_sequence);
+    EXPECT_EQ(sources[i].age_s, other.age_s);
+    EXPECT_EQ(sources[i].data, other.data);
+    EXPECT_EQ(sources[i].outliers, other.outliers);
+    EXPECT_EQ(std::isnan(sources[i].p_value), std::isnan(other.p_value));
+    if (!std::isnan(other.p_value)) {
+      EXPECT_EQ(sources[i].chi_square, other.chi_square);
+      EXPECT_EQ(sources[i].degrees_of_freedom, other.degrees_of_freedom);
+      EXPECT_EQ(sources[i].p_value, other.p_value);
+    }
+    EXPECT_EQ(sources[i].consistent, other.consistent);
+  }
   ASSERT_EQ(a.update.left_out.size(), b.update.left_out.size());
   for (std::size_t i = 0; i < a.update.left_out.size(); ++i) {
     EXPECT_EQ(a.update.left_out[i].part, b.update.left_out[i].part);

@@ -118,6 +118,9 @@ inline UpdateMessage sample_update() {
   estimate.initial_misfit_mm = {3.1, 0.9};
   estimate.misfit_mm = {0.1, 1.0 / 3.0};
   estimate.history = {{1, {1.1, 0.3}, 40, 0.7, 100.1}, {2, {0.1, 1.0 / 3.0}, 0, 0.0, 200.2}};
+  estimate.sources = {{"ius", 41, 0.25, 200, 3, 31.5, 28.7, 0.1, true},
+                      {"stéréo", 40, -1.0 / 3.0, 300, 0}};
+  estimate.sources[1].consistent = false;
   update.timings = {0.1, 1e4, 1e-300, 0.0, 7.0};
   update.T_undeformed_deformed = Eigen::Translation3d(0.1, -2.0 / 3.0, 5.0) *
                                  Eigen::AngleAxisd(0.1, Vec3(1.0, 2.0, 3.0).normalized());

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// sensing_estimates [THOUSAND_NODES [STUDY...]]: the studies of estimate_studies.hpp; all on 18 thousand nodes.
+// Patients in whom oedema is to be expected have it in their prior; the others have the default case.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "tests/sensing/estimate_studies.hpp"
+#include "tests/sensing/sensing_head.hpp"
+
+namespace brainshift::sensing {
+namespace {
+
+struct Study {
+  const char* name;
+  Status (*run)(const bench::Head&);
+};
+struct Patient {
+  double swelling_strain_sd;
+  std::vector<Study> studies;
+};
+
+Status run(double thousand_nodes, const std::vector<std::string>& wanted) {
+  const Patient patients[] = {
+      {kExpectedSwelling, {{"joint", joint_study}, {"landmarks", landmark_study}}},
+      {0.0, {{"joint-without-oedema", joint_study_without_oedema}, {"outliers", outlier_study}}}};
+  for (const Patient& patient : patients) {
+    std::vector<Study> studies = patient.studies;
+    std::erase_if(studies, [&](const Study& study) {
+      return !wanted.empty() && std::find(wanted.begin(), wanted.end(), study.name) == wanted.end();
+    });
+    if (studies.empty()) continue;
+    const auto head = make_default_head(thousand_nodes, patient.swelling_strain_sd);
+    if (!head) return tl::unexpected(head.error());
+    for (const Study& study : studies) {
+      if (const Status ok = study.run(*head); !ok) {
+        return fail(ok.error().code, std::string(study.name) + ": " + ok.error().message);
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+}  // namespace brainshift::sensing
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
+  const auto ok = brainshift::sensing::run(argc > 1 ? std::atof(argv[1]) : 18.0, wanted);
+  if (ok) return 0;
+  std::fprintf(stderr, "sensing_estimates: %s\n", ok.error().message.c_str());
+  return 1;
+}

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The same measurements with and without gross errors in a fifth of the points, up to 20 mm in any direction.
+#include <cstdio>
+#include <string>
+
+#include "common/core/random.hpp"
+#include "tests/sensing/estimate_studies.hpp"
+#include "tests/sensing/sensing_head.hpp"
+#include "tests/support/study_record.hpp"
+
+namespace brainshift::sensing {
+namespace {
+
+constexpr int kMeasurements = 6;
+constexpr double kLeast_mm = 5.0, kMost_mm = 20.0;
+
+void spoil(Points& points, double fraction, Random& random) {
+  const auto count = static_cast<int>(fraction * static_cast<double>(points.cols()));
+  for (const int i : random.choose(count, static_cast<int>(points.cols()))) {
+    points.col(i) += (kLeast_mm + (kMost_mm - kLeast_mm) * random.uniform()) * random.direction();
+  }
+}
+
+Observation spoilt(Observation observation, double fraction, Random& random) {
+  if (auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
+    spoil(boundary->points, fraction, random);
+  } else if (auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
+    spoil(pairs->deformed, fraction, random);
+  }
+  return observation;
+}
+
+// Mean tumour error over the measurements.
+Result<double> tumour_error(const bench::Head& head, const CaseConfig& config,
+                            const twin::SimulatedSurgery& surgery, double fraction) {
+  auto session = Surgery::begin(head, config);
+  if (!session) return tl::unexpected(session.error());
+  Random random(5);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < surgery.observations.size(); ++i) {
+    const auto update = session->observe(spoilt(surgery.observations[i], fraction, random));
+    if (!update) return tl::unexpected(update.error());
+    const auto run = score_update(head, surgery.truths[i], *update);
+    if (!run) return tl::unexpected(run.error());
+    sum += run->error_mm.cross->mean;
+  }
+  return sum / static_cast<double>(surgery.observations.size());
+}
+
+}  // namespace
+
+Status outlier_study(const bench::Head& head) {
+  for (const auto& [name, what] :
+       {std::pair{"paper-icp", "boundary points"}, std::pair{"paper", "displacements"}}) {
+    twin::Scenario scenario = *twin::find_scenario(name);
+    scenario.fluid_levels_mm.assign(kMeasurements, scenario.fluid_levels_mm.front());
+    const auto surgery =
+        twin::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
+    if (!surgery) return tl::unexpected(surgery.error());
+    double clean = 0.0;
+    for (const double fraction : {0.0, 0.1, 0.2, 0.3}) {
+      const auto error = tumour_error(head, head.config, *surgery, fraction);
+      if (!error) return tl::unexpected(error.error());
+      if (fraction == 0.0) clean = *error;
+      std::printf("outliers: %-16s %2.0f %%: tumour error %.4f mm\n", what, 100.0 * fraction,
+                  *error);
+      test_support::record(
+          {"outliers", what, "gross outliers %", "tumour error mm", 100.0 * fraction, *error});
+      if (fraction != 0.2) continue;
+      char text[60];
+      std::snprintf(text, sizeof text, "<= 1.2 (%.4f to %.4f mm)", clean, *error);
+      test_support::record_check(
+          "outliers", std::string("tumour error with 20 % among ") + what + " over that without",
+          *error / clean, text, *error <= 1.2 * clean, "twin; mean of 6 measurements");
+    }
+  }
+  return {};
+}
+
+}  // namespace brainshift::sensing

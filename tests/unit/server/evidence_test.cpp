@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/pipeline/evidence.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/core/random.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "tests/support/toy_patient.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+std::shared_ptr<const BrainModel> patient() {
+  static const auto model = std::make_shared<const BrainModel>(test_support::toy_patient(8));
+  return model;
+}
+
+Observation observation(std::uint64_t sequence, const char* source, double time_s) {
+  Observation made;
+  made.case_id = patient()->case_id;
+  made.source = source;
+  made.sequence = sequence;
+  made.acquired_ns = static_cast<std::int64_t>(1e9 * time_s);
+  return made;
+}
+
+Observation landmarks(std::uint64_t sequence, const char* source, double time_s, double shift = 1) {
+  Observation made = observation(sequence, source, time_s);
+  LandmarkPairs pairs;
+  pairs.undeformed.resize(3, 4);
+  pairs.undeformed << 25, 35, 30, 30, 30, 30, 25, 35, 40, 41, 42, 38;
+  pairs.deformed = pairs.undeformed.colwise() + Vec3(shift, 0, 0);
+  made.body = pairs;
+  return made;
+}
+
+// The top of the toy brain, sunk by 2 mm.
+Observation cortex(std::uint64_t sequence, double time_s) {
+  Observation made = observation(sequence, "stereopsis", time_s);
+  CorticalSurface body;
+  Random random(3);
+  body.surface.vertices.resize(3, 200);
+  for (auto x : body.surface.vertices.colwise()) {
+    x = Vec3(22.0 + 16.0 * random.uniform(), 22.0 + 16.0 * random.uniform(), 58.0);
+  }
+  body.sd_mm = 0.3;
+  made.body = body;
+  return made;
+}
+
+// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers with it.
+struct FakeInversion {
+  std::shared_ptr<SparseData> seen = std::make_shared<SparseData>();
+  std::shared_ptr<bool> fails = std::make_shared<bool>(false);
+  Result<Estimate> operator()(const SparseData& data,
+                              const inversion::InversionOptions& options) const {
+    if (*fails) return fail(ErrorCode::kNotConverged, "no");
+    *seen = data;
+    Estimate estimate;
+    estimate.displacement = Points(Vec3(0, 0, -1).replicate(1, patient()->mesh.num_nodes()));
+    if (options.moving != nullptr) {
+      const Points u = estimate.displacement(Eigen::all, options.moving->nodes);
+      while (options.moving->relocate(u, *seen)) {
+      }
+    }
+    for (const DataSource& source : seen->sources) {
+      estimate.sources.emplace_back();
+      estimate.sources.back().source = source.name;
+    }
+    return estimate;
+  }
+};
+
+class Sources : public testing::Test {
+ protected:
+  Sources() : pipeline_(*Pipeline::build(patient(), config_, Boundary::kContact, inversion_)) {}
+
+  Result<Update> run(const Observation& one) {
+    RunOptions options;
+    options.method = Method::kCondensed;
+    return pipeline_.run(one, options, evidence_);
+  }
+  std::vector<std::string> used() const {
+    std::vector<std::string> names;
+    for (const DataSource& source : inversion_.seen->sources) names.push_back(source.name);
+    return names;
+  }
+
+  CaseConfig config_ = test_support::toy_config();
+  FakeInversion inversion_;
+  Evidence evidence_{config_.sensing.max_age_s};
+  Pipeline pipeline_;
+};
+
+TEST_F(Sources, AreUsedTogetherTheNewestOfEach) {
+  ASSERT_TRUE(run(landmarks(1, "ius", 0, 1.0)));
+  ASSERT_TRUE(run(landmarks(2, "pointer", 10, 2.0)));
+  EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer"}));
+  EXPECT_EQ(inversion_.seen->size(), 8);
+  const auto update = run(landmarks(3, "ius", 20, 3.0));
+  ASSERT_TRUE(update);
+  EXPECT_EQ(inversion_.seen->size(), 8);
+  EXPECT_EQ(inversion_.seen->displacements(0, 0), 3.0);  // the first one of "ius" is gone
+  EXPECT_EQ(inversion_.seen->displacements(0, 4), 2.0);
+  ASSERT_EQ(update->estimate.sources.size(), 2u);
+  EXPECT_EQ(update->estimate.sources[0].observation_sequence, 3u);
+  EXPECT_EQ(update->estimate.sources[1].observation_sequence, 2u);
+  EXPECT_DOUBLE_EQ(update->estimate.sources[1].age_s, 10.0);
+}
+
+TEST_F(Sources, OlderThanTheLimitAreLeftOutAndTheUpdateSaysSo) {
+  ASSERT_TRUE(run(landmarks(1, "pointer", 0)));
+  ASSERT_TRUE(run(landmarks(2, "ius", config_.sensing.max_age_s)));
+  EXPECT_EQ(inversion_.seen->size(), 8);
+  const auto update = run(landmarks(3, "ius", config_.sensing.max_age_s + 1.0));
+  ASSERT_TRUE(update);
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+  const auto& omissions = update->left_out;
+  const auto stale = std::find_if(omissions.begin(), omissions.end(),
+                                  [](const Omission& one) { return one.part == "source pointer"; });
+  ASSERT_NE(stale, omissions.end());
+  EXPECT_THAT(stale->reason, HasSubstr("observation 1 is 121 s old"));
+}
+
+// A replay in a cycle begins again at time 0.
+TEST_F(Sources, FromTheFutureAreAsOldAsTheyAreNew) {
+  ASSERT_TRUE(run(landmarks(1, "pointer", 500)));
+  ASSERT_TRUE(run(landmarks(2, "ius", 0)));
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+}
+
+TEST_F(Sources, AnObservationWithoutAnEstimateIsForgotten) {
+  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
+  *inversion_.fails = true;
+  EXPECT_FALSE(run(landmarks(2, "pointer", 1)));
+  *inversion_.fails = false;
+  ASSERT_TRUE(run(landmarks(3, "ius", 2)));
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+}
+
+TEST_F(Sources, OfAnEarlierSessionAreForgotten) {
+  ASSERT_TRUE(run(landmarks(1, "pointer", 0)));
+  evidence_.clear();
+  ASSERT_TRUE(run(landmarks(2, "ius", 1)));
+  EXPECT_EQ(inversion_.seen->size(), 4);
+}
+
+TEST_F(Sources, ASurfaceIsMeasuredAnewForTheEstimate) {
+  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
+  ASSERT_TRUE(run(cortex(2, 5)));
+  EXPECT_EQ(used(), (std::vector<std::string>{"ius", "stereopsis"}));
+  const SparseData& data = *inversion_.seen;
+  ASSERT_GT(data.size(), 100);
+  EXPECT_FALSE(data.along_direction(0));
+  for (int i = 4; i < data.size(); ++i) {
+    ASSERT_TRUE(data.along_direction(i));
+    EXPECT_NEAR(data.directions(2, i), 1.0, 1e-9);
+    EXPECT_NEAR(data.displacements(2, i), -2.0, 1e-9);
+    EXPECT_NEAR(data.positions(2, i), 60.0, 1e-9);
+  }
+  EXPECT_EQ(data.common_error.cols(), 6);  // the camera's pose
+}
+
+TEST_F(Sources, ASurfaceGuidesOtherMethodsByARigidAlignment) {
+  RunOptions options;
+  options.method = Method::kPaper;
+  ASSERT_TRUE(pipeline_.run(cortex(1, 0), options));
+  for (int i = 0; i < inversion_.seen->size(); ++i) {
+    EXPECT_FALSE(inversion_.seen->along_direction(i));
+    EXPECT_NEAR(inversion_.seen->displacements(2, i), -2.0, 0.01);
+  }
+}
+
+TEST_F(Sources, ASurfaceInMetresIsRefusedAndTheOthersGoOn) {
+  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
+  Observation metres = cortex(2, 1);
+  std::get<CorticalSurface>(metres.body).surface.vertices *= 1e-3;
+  const auto refused = run(metres);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("metres"));
+  ASSERT_TRUE(run(landmarks(3, "ius", 2)));
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+}
+
+TEST_F(Sources, PointsThatTheAlignmentLeavesAsideGuideNothing) {
+  Observation boundary = observation(1, "ius", 0);
+  TumourBoundary body;
+  body.points = patient()->tumour.vertices;
+  body.sd_mm = 0.3;
+  for (Eigen::Index i = 0; i < body.points.cols(); i += 10) body.points.col(i) += Vec3(0, 30, 25);
+  boundary.body = body;
+  const auto update = run(boundary);
+  ASSERT_TRUE(update) << update.error().message;
+  EXPECT_LT(inversion_.seen->displacements.colwise().norm().maxCoeff(), 0.6);
+  EXPECT_LT((inversion_.seen->positions.row(2).array() - 40.0).maxCoeff(), 11.0);
+  EXPECT_EQ(update->estimate.sources.at(0).outliers, (body.points.cols() + 9) / 10);
+}
+
+}  // namespace
+}  // namespace brainshift::server
