@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "common/core/random.hpp"
+#include "common/core/statistics.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -48,6 +50,18 @@ double datum_sd_mm(double observed_mm, const InversionConfig& config, Method met
   return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
 }
 
+// Of Welsch weights: four times the median residual, which is robust, and what the points' standard deviation allows.
+double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& options) {
+  std::vector<double> residuals;
+  for (const double weight : weights) {
+    residuals.push_back(options.welsch_scale_mm *
+                        std::sqrt(-2.0 * std::log(std::max(weight, 1e-12))));
+  }
+  const double median = percentile(residuals, 50.0);
+  return std::clamp(4.0 * median, std::min(3.0 * options.sd_mm, options.welsch_scale_mm),
+                    options.welsch_scale_mm);
+}
+
 // Aligned rigidly from the tracked pose: the points arrive in patient RAS, so it is the identity.
 template <typename Surface>
 Result<RegisteredObservation> aligned(const Points& points, double observed_sd_mm,
@@ -58,6 +72,10 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
   if (observed_sd_mm > 0.0) options.sd_mm = observed_sd_mm;
   auto icp = registration::align(points, surface, RigidTransform::Identity(), options);
+  if (!icp) return tl::unexpected(icp.error());
+  // Again with a scale that fits these points: gross errors of a few millimetres then count for nothing.
+  options.welsch_scale_mm = fitting_scale_mm(icp->weights, options);
+  icp = registration::align(points, surface, icp->T_surface_points, options);
   if (!icp) return tl::unexpected(icp.error());
   const SparseData all = registration::sparse_data_from_alignment(
       points, *icp, datum_sd_mm(observed_sd_mm, config.inversion, method));
