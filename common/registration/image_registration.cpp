@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/image_registration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "common/geometry/mask.hpp"
+#include "common/registration/image_similarity.hpp"
+#include "common/registration/pose_ascent.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+constexpr Eigen::Index kLeastSamples = 500;  // some thirty for each of as many bins at least
+constexpr double kPerDegree = std::numbers::pi / 180.0;
+// A pose beyond this fraction of the search's reach lies at its edge.
+constexpr double kEdge = 0.98;
+
+Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
+
+Status check_options(const ImageRegistrationOptions& options) {
+  if (options.levels.empty()) return refuse("image registration: levels: none given");
+  for (const ImageLevel& level : options.levels)
+    if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kLeastSamples)
+      return refuse(
+          fmt::format("image registration: level of smoothing_mm = {:g} and samples = {}: must be "
+                      "0 to 20 and at least {}",
+                      level.smoothing_mm, level.samples, kLeastSamples));
+  if (options.bins < 8 || options.bins > 256)
+    return refuse(fmt::format("image registration: bins = {}: must be 8 to 256", options.bins));
+  if (!(options.low_quantile >= 0.0 && options.low_quantile < options.high_quantile &&
+        options.high_quantile <= 1.0))
+    return refuse(
+        fmt::format("image registration: quantiles {:g} and {:g}: must be 0 <= low < "
+                    "high <= 1",
+                    options.low_quantile, options.high_quantile));
+  struct Bound {
+    const char* name;
+    double value, low, high;
+  };
+  for (const Bound& bound : {Bound{"start_offset_mm", options.start_offset_mm, 0.0, 50.0},
+                             Bound{"max_iterations", 1.0 * options.max_iterations, 1.0, 1e4},
+                             Bound{"max_translation_mm", options.max_translation_mm, 0.1, 200.0},
+                             Bound{"max_rotation_deg", options.max_rotation_deg, 0.1, 90.0},
+                             Bound{"min_overlap", options.min_overlap, 0.05, 1.0},
+                             Bound{"same_pose_mm", options.same_pose_mm, 1e-3, 50.0}})
+    if (!(bound.value >= bound.low && bound.value <= bound.high))
+      return refuse(fmt::format("image registration: {} = {:g}: must be {:g} to {:g}", bound.name,
+                                bound.value, bound.low, bound.high));
+  return {};
+}
+
+Status check_mri(const VoxelImage& mri) {
+  for (int length : mri.dims)
+    if (length < 2)
+      return refuse(
+          fmt::format("image registration: MRI of {} x {} x {} voxels: at least 2 needed "
+                      "along each axis",
+                      mri.dims[0], mri.dims[1], mri.dims[2]));
+  if (mri.values.size() != mri.num_voxels())
+    return refuse(fmt::format("image registration: MRI holds {} values for {} voxels",
+                              mri.values.size(), mri.num_voxels()));
+  const double volume = mri.T_ras_voxel.linear().determinant();
+  if (!mri.T_ras_voxel.matrix().allFinite() || !(std::abs(volume) > 1e-9))
+    return refuse(
+        fmt::format("image registration: MRI with voxels of {:g} mm3: no usable affine", volume));
+  for (std::size_t i = 0; i < mri.values.size(); ++i)
+    if (!std::isfinite(mri.values[i]))
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("image registration: MRI voxel {} is not finite", i));
+  return {};
+}
+
+Status check_samples(const IntensitySamples& samples) {
+  const Eigen::Index count = samples.positions.cols();
+  if (samples.intensities.size() != count)
+    return refuse(fmt::format("image registration: {} positions and {} intensities", count,
+                              samples.intensities.size()));
+  if (count < kLeastSamples)
+    return refuse(
+        fmt::format("image registration: {} samples: at least {} needed", count, kLeastSamples));
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (!samples.positions.col(i).allFinite() || !std::isfinite(samples.intensities[i]))
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("image registration: sample {} is not finite", i));
+  return {};
+}
+
+// The samples, how they lie, and the intensity scales, which no pose changes.
+struct Task {
+  const IntensitySamples& samples;
+  const ImageRegistrationOptions& options;
+  Vec3 centre = Vec3::Zero();
+  double radius_mm = 0.0;
+  BinScale sample_scale;
+
+  double shift_mm(const RigidTransform& T) const { return (T * centre - centre).norm(); }
+  double rotation_deg(const RigidTransform& T) const {
+    return rotation_vector(T.linear()).norm() / kPerDegree;
+  }
+  // Rms distance of the samples between two poses; their spread taken as alike in all directions.
+  double apart_mm(const RigidTransform& A, const RigidTransform& B) const {
+    const double turn = rotation_vector(A.linear() * B.linear().transpose()).norm();
+    return std::hypot((A * centre - B * centre).norm(), std::sqrt(2.0 / 3.0) * turn * radius_mm);
+  }
+  // 1: on the edge of the search.
+  double reach(const RigidTransform& T) const {
+    return std::max(shift_mm(T) / options.max_translation_mm,
+                    rotation_deg(T) / options.max_rotation_deg);
+  }
+};
+
+Result<Task> make_task(const IntensitySamples& samples, const ImageRegistrationOptions& options) {
+  Task task{samples, options, samples.positions.rowwise().mean(), 0.0,
+            quantile_scale(samples.intensities, options.low_quantile, options.high_quantile,
+                           options.bins)};
+  task.radius_mm = std::sqrt((samples.positions.colwise() - task.centre).squaredNorm() /
+                             static_cast<double>(samples.positions.cols()));
+  if (!(task.radius_mm > 0.0))
+    return fail(ErrorCode::kInvalidArgument, "image registration: all samples at one place");
+  if (!(task.sample_scale.high > task.sample_scale.low))
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("image registration: the samples' intensities are all {:g}",
+                            task.sample_scale.low));
+  return task;
+}
+
+// One level: the smoothed MRI seen through the samples.
+class Level {
+ public:
+  // The intensity scale is that of the MRI around the samples as they are placed now.
+  static Result<Level> create(const VoxelImage& image, const ImageLevel& level, const Task& task) {
+    const auto count = static_cast<int>(task.samples.positions.cols());
+    const int stride = std::max(1, static_cast<int>(std::lround(1.0 * count / level.samples)));
+    const GradientInterpolator interpolator(image);
+    std::vector<double> seen;
+    int asked = 0;
+    for (int i = 0; i < count; i += stride, ++asked)
+      if (const ImageValue value = interpolator(task.samples.positions.col(i)); value.inside)
+        seen.push_back(value.value);
+    const double overlap = static_cast<double>(seen.size()) / asked;
+    if (overlap < task.options.min_overlap)
+      return fail(ErrorCode::kEmptySet,
+                  fmt::format("image registration: {:.0f} % of the samples lie inside the MRI: at "
+                              "least {:.0f} % needed",
+                              100.0 * overlap, 100.0 * task.options.min_overlap));
+    const BinScale scale =
+        quantile_scale(Eigen::Map<const VecX>(seen.data(), static_cast<Eigen::Index>(seen.size())),
+                       task.options.low_quantile, task.options.high_quantile, task.options.bins);
+    if (!(scale.high > scale.low))
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
+    return Level(task, ImageSimilarity(image, scale, task.samples, task.sample_scale, stride));
+  }
+
+  Similarity similarity(const RigidTransform& T) { return similarity_.at(T, T * task_.centre); }
+
+  PoseAscent climb(const RigidTransform& T_initial, double resolution_mm) {
+    PoseAscentOptions options;
+    options.max_iterations = task_.options.max_iterations;
+    options.first_step_mm = std::max(0.5, 0.5 * resolution_mm);
+    options.largest_step_mm = std::max(1.0, resolution_mm);
+    const auto function = [this](const RigidTransform& T, const Vec3& centre) {
+      PoseValue value;
+      if (task_.reach(T) > 1.0) return value;
+      const Similarity found = similarity_.at(T, centre);
+      value.valid = found.overlap >= task_.options.min_overlap;
+      value.value = found.nmi;
+      value.gradient = found.gradient;
+      return value;
+    };
+    return ascend(function, T_initial, task_.centre, task_.radius_mm, options);
+  }
+
+ private:
+  Level(const Task& task, ImageSimilarity similarity)
+      : task_(task), similarity_(std::move(similarity)) {}
+  const Task& task_;
+  ImageSimilarity similarity_;
+};
+
+std::vector<RigidTransform> starting_poses(const ImageRegistrationOptions& options) {
+  std::vector<RigidTransform> poses = {RigidTransform::Identity()};
+  const double offset = std::min(options.start_offset_mm, 0.9 * kEdge * options.max_translation_mm);
+  if (!(offset > 0.0)) return poses;
+  for (int axis = 0; axis < 3; ++axis)
+    for (double sign : {-1.0, 1.0})
+      poses.emplace_back(Eigen::Translation3d(sign * offset * Vec3::Unit(axis)));
+  return poses;
+}
+
+// The coarsest level, from all starts. Fills agreement and evaluations.
+PoseAscent climb_from_all(Level& level, double resolution_mm, const Task& task,
+                          ImageRegistration& result) {
+  std::vector<PoseAscent> ends;
+  for (const RigidTransform& start : starting_poses(task.options)) {
+    ends.push_back(level.climb(start, resolution_mm));
+    result.evaluations += ends.back().evaluations;
+  }
+  // A start outside the MRI has value 0 and is never the best: the first one lies inside.
+  PoseAscent best = ends.front();
+  for (const PoseAscent& end : ends)
+    if (end.valid && end.value > best.value) best = end;
+  const auto agreeing = std::count_if(ends.begin(), ends.end(), [&](const PoseAscent& end) {
+    return end.valid && task.apart_mm(end.T, best.T) <= task.options.same_pose_mm;
+  });
+  result.agreement = static_cast<double>(agreeing) / static_cast<double>(ends.size());
+  return best;
+}
+
+Status check_end(const Task& task, const ImageRegistration& result) {
+  if (task.reach(result.T_ras_ras) < kEdge) return {};
+  return fail(
+      ErrorCode::kNotConverged,
+      fmt::format("image registration: the best pose, {:.1f} mm and {:.1f} deg away, lies at "
+                  "the edge of the search ({:g} mm, {:g} deg)",
+                  result.shift_mm, result.rotation_deg, task.options.max_translation_mm,
+                  task.options.max_rotation_deg));
+}
+
+}  // namespace
+
+Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri,
+                                              const ImageRegistrationOptions& options) {
+  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_mri(mri); !ok) return tl::unexpected(ok.error());
+  ImageRegistrar registrar;
+  registrar.options_ = options;
+  for (const ImageLevel& level : options.levels)
+    registrar.levels_.push_back(geometry::gaussian_smooth(mri, level.smoothing_mm));
+  return registrar;
+}
+
+Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples) const {
+  if (Status ok = check_samples(samples); !ok) return tl::unexpected(ok.error());
+  const auto task = make_task(samples, options_);
+  if (!task) return tl::unexpected(task.error());
+
+  ImageRegistration result;
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    auto level = Level::create(levels_[i], options_.levels[i], *task);
+    if (!level) return tl::unexpected(level.error());
+    const double resolution_mm = options_.levels[i].smoothing_mm;
+    const PoseAscent best = i == 0 ? climb_from_all(*level, resolution_mm, *task, result)
+                                   : level->climb(result.T_ras_ras, resolution_mm);
+    if (i > 0) result.evaluations += best.evaluations;
+    result.iterations += best.iterations;
+    result.T_ras_ras = best.T;
+    result.converged = best.converged;
+    if (i + 1 < levels_.size()) continue;
+    result.nmi_before = level->similarity(RigidTransform::Identity()).nmi;
+    const Similarity end = level->similarity(best.T);
+    result.nmi_after = end.nmi;
+    result.overlap = end.overlap;
+  }
+  result.shift_mm = task->shift_mm(result.T_ras_ras);
+  result.rotation_deg = task->rotation_deg(result.T_ras_ras);
+  if (Status ok = check_end(*task, result); !ok) return tl::unexpected(ok.error());
+  return result;
+}
+
+}  // namespace brainshift::registration
