@@ -134,14 +134,16 @@ Result<Task> make_task(const IntensitySamples& samples, const ImageRegistrationO
 class Level {
  public:
   // The intensity scale is that of the MRI around the samples as they are placed now.
-  static Result<Level> create(const VoxelImage& image, const ImageLevel& level, const Task& task) {
+  static Result<Level> create(const VoxelImage& image, const VoxelImage* region, const ImageLevel& level, const Task& task) {
     const auto count = static_cast<int>(task.samples.positions.cols());
     const int stride = std::max(1, static_cast<int>(std::lround(1.0 * count / level.samples)));
     const GradientInterpolator interpolator(image);
+    std::optional<GradientInterpolator> counts;
+    if (region) counts.emplace(*region);
     std::vector<double> seen;
     int asked = 0;
     for (int i = 0; i < count; i += stride, ++asked)
-      if (const ImageValue value = interpolator(task.samples.positions.col(i)); value.inside)
+      if (const ImageValue value = interpolator(task.samples.positions.col(i)); value.inside && (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5))
         seen.push_back(value.value);
     const double overlap = static_cast<double>(seen.size()) / asked;
     if (overlap < task.options.min_overlap)
@@ -155,7 +157,7 @@ class Level {
     if (!(scale.high > scale.low))
       return fail(ErrorCode::kInvalidArgument,
                   fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
-    return Level(task, ImageSimilarity(image, scale, task.samples, task.sample_scale, stride));
+    return Level(task, ImageSimilarity(image, region, scale, task.samples, task.sample_scale, stride));
   }
 
   Similarity similarity(const RigidTransform& T) { return similarity_.at(T, T * task_.centre); }
@@ -225,12 +227,12 @@ Status check_end(const Task& task, const ImageRegistration& result) {
 
 }  // namespace
 
-Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri,
-                                              const ImageRegistrationOptions& options) {
+Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region, const ImageRegistrationOptions& options) {
   if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
   if (Status ok = check_mri(mri); !ok) return tl::unexpected(ok.error());
   ImageRegistrar registrar;
   registrar.options_ = options;
+  if (region) registrar.region_ = *region;
   for (const ImageLevel& level : options.levels)
     registrar.levels_.push_back(geometry::gaussian_smooth(mri, level.smoothing_mm));
   return registrar;
@@ -243,7 +245,7 @@ Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples)
 
   ImageRegistration result;
   for (std::size_t i = 0; i < levels_.size(); ++i) {
-    auto level = Level::create(levels_[i], options_.levels[i], *task);
+    auto level = Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
     if (!level) return tl::unexpected(level.error());
     const double resolution_mm = options_.levels[i].smoothing_mm;
     const PoseAscent best = i == 0 ? climb_from_all(*level, resolution_mm, *task, result)

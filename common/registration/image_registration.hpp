@@ -13,6 +13,7 @@
 // Sources: Ji, Wu, Hartov, Roberts & Paulsen, Med. Phys. 35 (2008), re-registration before durotomy; Studholme et al. 1999.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -63,7 +64,7 @@ class ImageRegistrar {
  public:
   // kInvalidArgument: an option out of range (named), an MRI without voxels, fewer than 2 along an axis or an affine
   // that cannot be inverted; kNotFinite: a voxel.
-  static Result<ImageRegistrar> create(const VoxelImage& mri,
+  static Result<ImageRegistrar> create(const VoxelImage& mri, const VoxelImage* region,
                                        const ImageRegistrationOptions& options = {});
 
   // kInvalidArgument: fewer than 500 samples; numbers of positions and intensities differ; all intensities (of the samples,
@@ -77,6 +78,7 @@ class ImageRegistrar {
   ImageRegistrar() = default;
   ImageRegistrationOptions options_;
   std::vector<VoxelImage> levels_;
+  std::optional<VoxelImage> region_;
 };
 
 }  // namespace brainshift::registration

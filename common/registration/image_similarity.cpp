@@ -40,7 +40,7 @@ ImageValue GradientInterpolator::operator()(const Vec3& x_ras) const {
   return result;
 }
 
-ImageSimilarity::ImageSimilarity(const VoxelImage& image, const BinScale& image_scale,
+ImageSimilarity::ImageSimilarity(const VoxelImage& image, const VoxelImage* region, const BinScale& image_scale,
                                  const IntensitySamples& samples, const BinScale& sample_scale,
                                  int stride)
     : interpolator_(image),
@@ -49,6 +49,7 @@ ImageSimilarity::ImageSimilarity(const VoxelImage& image, const BinScale& image_
       samples_(samples),
       stride_(stride),
       histogram_(image_scale.bins) {
+  if (region) region_.emplace(*region);
   hits_.reserve(static_cast<std::size_t>(samples.positions.cols() / stride + 1));
 }
 
@@ -60,7 +61,7 @@ Similarity ImageSimilarity::at(const RigidTransform& T_ras_samples, const Vec3& 
   for (Eigen::Index i = 0; i < samples_.positions.cols(); i += stride_, ++asked) {
     const Vec3 x = T_ras_samples * samples_.positions.col(i);
     const ImageValue image = interpolator_(x);
-    if (!image.inside) continue;
+    if (!image.inside || (region_ && !((*region_)(x).value > 0.5))) continue;
     const bool clipped = image.value < image_scale_.low || image.value > image_scale_.high;
     hits_.push_back({sample_scale_.position(samples_.intensities[i]),
                      image_scale_.position(image.value), x,

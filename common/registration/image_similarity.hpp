@@ -6,6 +6,7 @@
 // for T replaced by rigid_increment(xi, c) T at xi = 0. Exact for the interpolated image while no sample enters or leaves it.
 #pragma once
 
+#include <optional>
 #include "common/core/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/registration/joint_histogram.hpp"
@@ -39,7 +40,8 @@ struct Similarity {
 // Every stride-th sample of the set. Keeps references to image and samples. Not for two threads at once.
 class ImageSimilarity {
  public:
-  ImageSimilarity(const VoxelImage& image, const BinScale& image_scale,
+  // region: where > 0.5 the image counts, on any voxels; nullptr: everywhere.
+  ImageSimilarity(const VoxelImage& image, const VoxelImage* region, const BinScale& image_scale,
                   const IntensitySamples& samples, const BinScale& sample_scale, int stride);
   Similarity at(const RigidTransform& T_ras_samples, const Vec3& centre_ras);
 
@@ -49,6 +51,7 @@ class ImageSimilarity {
     Vec3 x, gradient;  // gradient of m
   };
   GradientInterpolator interpolator_;
+  std::optional<GradientInterpolator> region_;
   BinScale image_scale_, sample_scale_;
   const IntensitySamples& samples_;
   int stride_;
