@@ -29,11 +29,12 @@ double mix(double a, double b, double t) { return a + (b - a) * t; }
 
 Status check_grids(const VoxelImage& mri, const VoxelImage& brain) {
   if (mri.dims == brain.dims && mri.T_ras_voxel.isApprox(brain.T_ras_voxel, 1e-4)) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("simulated ultrasound: MRI of {} x {} x {} and brain mask of {} x {} x {} "
-                          "voxels: must be the same ones",
-                          mri.dims[0], mri.dims[1], mri.dims[2], brain.dims[0], brain.dims[1],
-                          brain.dims[2]));
+  return fail(
+      ErrorCode::kInvalidArgument,
+      fmt::format("simulated ultrasound: MRI of {} x {} x {} and brain mask of {} x {} x {} "
+                  "voxels: must be the same ones",
+                  mri.dims[0], mri.dims[1], mri.dims[2], brain.dims[0], brain.dims[1],
+                  brain.dims[2]));
 }
 
 // What all maps are made from.
@@ -48,9 +49,10 @@ Result<Anatomy> anatomy(const VoxelImage& mri, const VoxelImage& brain,
   std::vector<float> inside;
   for (std::size_t i = 0; i < mri.values.size(); ++i)
     if (brain.values[i] > 0.0f) inside.push_back(mri.values[i]);
-  if (inside.empty()) return fail(ErrorCode::kEmptySet, "simulated ultrasound: no brain in the mask");
-  const auto rank = static_cast<std::ptrdiff_t>(kWhiteMatterQuantile *
-                                                static_cast<double>(inside.size() - 1));
+  if (inside.empty())
+    return fail(ErrorCode::kEmptySet, "simulated ultrasound: no brain in the mask");
+  const auto rank =
+      static_cast<std::ptrdiff_t>(kWhiteMatterQuantile * static_cast<double>(inside.size() - 1));
   std::nth_element(inside.begin(), inside.begin() + rank, inside.end());
   const auto index = geometry::ClosestPointIndex::build(tumour);
   if (!index) return tl::unexpected(index.error());
@@ -84,7 +86,7 @@ VoxelImage uneven(const VoxelImage& image, double grain_mm, std::uint64_t seed) 
   for (float& value : noise.values) value = static_cast<float>(random.normal());
   noise = geometry::gaussian_smooth(noise, grain_mm);
   Eigen::Map<Eigen::ArrayXf> all(noise.values.data(),
-                                       static_cast<Eigen::Index>(noise.values.size()));
+                                 static_cast<Eigen::Index>(noise.values.size()));
   const float sd = std::sqrt(all.square().mean());
   if (sd > 0.0f) all /= sd;
   return noise;
@@ -99,7 +101,8 @@ Echo healthy_echo(double f, double ventricle) {
   const double fluid = 1.0 - ramp(f, kFluid - 0.1, kFluid + 0.15);
   const double white = ramp(f, kCortex + 0.05, 0.98);
   const double of_fluid = mix(kSulcus, kVentricle, ramp(ventricle, 0.55, 0.8));
-  return {mix(mix(kCortexScatter, kWhiteScatter, white), of_fluid, fluid), mix(mix(0.5, 0.4, white), 0.0, fluid)};
+  return {mix(mix(kCortexScatter, kWhiteScatter, white), of_fluid, fluid),
+          mix(mix(0.5, 0.4, white), 0.0, fluid)};
 }
 
 }  // namespace
@@ -146,8 +149,7 @@ Result<VoxelImage> mri_with_tumour(const VoxelImage& mri, const VoxelImage& brai
     const double inner = ramp(depth, appearance.rim_mm - 0.5, appearance.rim_mm + 0.5);
     const double lesion = mix(appearance.rim, appearance.core, inner) * head->white;
     const double value = mix(mri.values[i], lesion, ramp(depth, -0.5, 0.5));
-    image.values[i] =
-        static_cast<float>(value + appearance.noise * head->white * random.normal());
+    image.values[i] = static_cast<float>(value + appearance.noise * head->white * random.normal());
   });
   return image;
 }

@@ -14,7 +14,8 @@ namespace brainshift::twin {
 namespace {
 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
-constexpr double kWindowReach = 30.0;  // mm, as far as the brain's surface may be from the given centre
+constexpr double kWindowReach =
+    30.0;  // mm, as far as the brain's surface may be from the given centre
 constexpr double kBoundaryEcho = 0.6;  // q, mm: of a unit of impedance per mm
 constexpr double kTransmissionLoss = 0.12;
 constexpr double kDuraEcho = 1.5, kBoneEcho = 3.0;
@@ -164,8 +165,7 @@ std::string scan_converted(const Eigen::MatrixXf& envelope, const UltrasoundProb
                            const PixelGrid& grid) {
   std::string pixels(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height),
                      '\0');
-  const double beams_per_rad =
-      (probe.beams - 1) / (2.0 * probe.half_angle_deg * kPerDegree);
+  const double beams_per_rad = (probe.beams - 1) / (2.0 * probe.half_angle_deg * kPerDegree);
   for (int v = 0; v < grid.height; ++v)
     for (int u = 0; u < grid.width; ++u) {
       const double across = grid.left_mm + u * probe.pixel_mm;

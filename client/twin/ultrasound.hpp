@@ -39,14 +39,14 @@ struct UltrasoundProbe {
   double depth_mm = 80.0;        // of the image, from the array; the paper's frames
   double pixel_mm = 0.5;
   int beams = 161;
-  double sample_mm = 0.25;        // along a beam
-  double range_sd_mm = 0.35;      // of the point spread: along ...
-  double lateral_sd_deg = 0.6;    // ... across ...
-  double slice_sd_mm = 1.0;       // ... and out of the image plane
+  double sample_mm = 0.25;         // along a beam
+  double range_sd_mm = 0.35;       // of the point spread: along ...
+  double lateral_sd_deg = 0.6;     // ... across ...
+  double slice_sd_mm = 1.0;        // ... and out of the image plane
   double attenuation_db_mm = 0.1;  // what gain by depth has not made up for
   double dynamic_range_db = 60.0;
   double brightest = 2.0;  // echo that is white; scatter: tissue_echo.hpp
-  double noise = 1e-3;  // floor of the receiver, echo of unit scatter = 1
+  double noise = 1e-3;     // floor of the receiver, echo of unit scatter = 1
 };
 
 // Two sweeps whose planes are at right angles, each a fan of tilted planes.

@@ -55,24 +55,25 @@ Status check_options(const ImageRegistrationOptions& options) {
   return {};
 }
 
-Status check_mri(const VoxelImage& mri) {
-  for (int length : mri.dims)
+// what: "MRI" or "region".
+Status check_image(const char* what, const VoxelImage& image) {
+  for (int length : image.dims)
     if (length < 2)
       return refuse(
-          fmt::format("image registration: MRI of {} x {} x {} voxels: at least 2 needed "
+          fmt::format("image registration: {} of {} x {} x {} voxels: at least 2 needed "
                       "along each axis",
-                      mri.dims[0], mri.dims[1], mri.dims[2]));
-  if (mri.values.size() != mri.num_voxels())
-    return refuse(fmt::format("image registration: MRI holds {} values for {} voxels",
-                              mri.values.size(), mri.num_voxels()));
-  const double volume = mri.T_ras_voxel.linear().determinant();
-  if (!mri.T_ras_voxel.matrix().allFinite() || !(std::abs(volume) > 1e-9))
-    return refuse(
-        fmt::format("image registration: MRI with voxels of {:g} mm3: no usable affine", volume));
-  for (std::size_t i = 0; i < mri.values.size(); ++i)
-    if (!std::isfinite(mri.values[i]))
+                      what, image.dims[0], image.dims[1], image.dims[2]));
+  if (image.values.size() != image.num_voxels())
+    return refuse(fmt::format("image registration: {} holds {} values for {} voxels", what,
+                              image.values.size(), image.num_voxels()));
+  const double volume = image.T_ras_voxel.linear().determinant();
+  if (!image.T_ras_voxel.matrix().allFinite() || !(std::abs(volume) > 1e-9))
+    return refuse(fmt::format("image registration: {} with voxels of {:g} mm3: no usable affine",
+                              what, volume));
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    if (!std::isfinite(image.values[i]))
       return fail(ErrorCode::kNotFinite,
-                  fmt::format("image registration: MRI voxel {} is not finite", i));
+                  fmt::format("image registration: {} voxel {} is not finite", what, i));
   return {};
 }
 
@@ -134,7 +135,8 @@ Result<Task> make_task(const IntensitySamples& samples, const ImageRegistrationO
 class Level {
  public:
   // The intensity scale is that of the MRI around the samples as they are placed now.
-  static Result<Level> create(const VoxelImage& image, const VoxelImage* region, const ImageLevel& level, const Task& task) {
+  static Result<Level> create(const VoxelImage& image, const VoxelImage* region,
+                              const ImageLevel& level, const Task& task) {
     const auto count = static_cast<int>(task.samples.positions.cols());
     const int stride = std::max(1, static_cast<int>(std::lround(1.0 * count / level.samples)));
     const GradientInterpolator interpolator(image);
@@ -143,7 +145,8 @@ class Level {
     std::vector<double> seen;
     int asked = 0;
     for (int i = 0; i < count; i += stride, ++asked)
-      if (const ImageValue value = interpolator(task.samples.positions.col(i)); value.inside && (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5))
+      if (const ImageValue value = interpolator(task.samples.positions.col(i));
+          value.inside && (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5))
         seen.push_back(value.value);
     const double overlap = static_cast<double>(seen.size()) / asked;
     if (overlap < task.options.min_overlap)
@@ -157,7 +160,8 @@ class Level {
     if (!(scale.high > scale.low))
       return fail(ErrorCode::kInvalidArgument,
                   fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
-    return Level(task, ImageSimilarity(image, region, scale, task.samples, task.sample_scale, stride));
+    return Level(task,
+                 ImageSimilarity(image, region, scale, task.samples, task.sample_scale, stride));
   }
 
   Similarity similarity(const RigidTransform& T) { return similarity_.at(T, T * task_.centre); }
@@ -196,23 +200,33 @@ std::vector<RigidTransform> starting_poses(const ImageRegistrationOptions& optio
   return poses;
 }
 
-// The coarsest level, from all starts. Fills agreement and evaluations.
-PoseAscent climb_from_all(Level& level, double resolution_mm, const Task& task,
-                          ImageRegistration& result) {
-  std::vector<PoseAscent> ends;
-  for (const RigidTransform& start : starting_poses(task.options)) {
-    ends.push_back(level.climb(start, resolution_mm));
-    result.evaluations += ends.back().evaluations;
+// A start and where it has come to.
+struct Path {
+  PoseAscent end;
+  int iterations = 0;
+};
+
+// Every start up the hills of one level.
+void climb_all(Level& level, double resolution_mm, std::vector<Path>& paths, int& evaluations) {
+  for (Path& path : paths) {
+    path.end = level.climb(path.end.T, resolution_mm);
+    path.iterations += path.end.iterations;
+    evaluations += path.end.evaluations;
   }
-  // A start outside the MRI has value 0 and is never the best: the first one lies inside.
-  PoseAscent best = ends.front();
-  for (const PoseAscent& end : ends)
-    if (end.valid && end.value > best.value) best = end;
-  const auto agreeing = std::count_if(ends.begin(), ends.end(), [&](const PoseAscent& end) {
-    return end.valid && task.apart_mm(end.T, best.T) <= task.options.same_pose_mm;
+}
+
+// Keeps the path that came highest; returns the fraction of all that came to the same pose.
+double keep_best(const Task& task, std::vector<Path>& paths) {
+  // A path that left the MRI has value 0 and is never the best: the first one began inside.
+  const Path best = *std::max_element(paths.begin(), paths.end(), [](const Path& a, const Path& b) {
+    return a.end.value < b.end.value;
   });
-  result.agreement = static_cast<double>(agreeing) / static_cast<double>(ends.size());
-  return best;
+  const auto agreeing = std::count_if(paths.begin(), paths.end(), [&](const Path& path) {
+    return path.end.valid && task.apart_mm(path.end.T, best.end.T) <= task.options.same_pose_mm;
+  });
+  const double agreement = static_cast<double>(agreeing) / static_cast<double>(paths.size());
+  paths = {best};
+  return agreement;
 }
 
 Status check_end(const Task& task, const ImageRegistration& result) {
@@ -227,9 +241,12 @@ Status check_end(const Task& task, const ImageRegistration& result) {
 
 }  // namespace
 
-Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region, const ImageRegistrationOptions& options) {
+Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region,
+                                              const ImageRegistrationOptions& options) {
   if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
-  if (Status ok = check_mri(mri); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_image("MRI", mri); !ok) return tl::unexpected(ok.error());
+  if (region)
+    if (Status ok = check_image("region", *region); !ok) return tl::unexpected(ok.error());
   ImageRegistrar registrar;
   registrar.options_ = options;
   if (region) registrar.region_ = *region;
@@ -244,21 +261,27 @@ Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples)
   if (!task) return tl::unexpected(task.error());
 
   ImageRegistration result;
+  std::vector<Path> paths;
+  for (const RigidTransform& start : starting_poses(options_)) {
+    paths.emplace_back();
+    paths.back().end.T = start;
+  }
   for (std::size_t i = 0; i < levels_.size(); ++i) {
-    auto level = Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
+    auto level =
+        Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
     if (!level) return tl::unexpected(level.error());
-    const double resolution_mm = options_.levels[i].smoothing_mm;
-    const PoseAscent best = i == 0 ? climb_from_all(*level, resolution_mm, *task, result)
-                                   : level->climb(result.T_ras_ras, resolution_mm);
-    if (i > 0) result.evaluations += best.evaluations;
-    result.iterations += best.iterations;
-    result.T_ras_ras = best.T;
-    result.converged = best.converged;
+    climb_all(*level, options_.levels[i].smoothing_mm, paths, result.evaluations);
+    // The finest level costs most: only the best goes there.
+    if (i + 2 == levels_.size() || levels_.size() == 1) result.agreement = keep_best(*task, paths);
     if (i + 1 < levels_.size()) continue;
+    const PoseAscent& end = paths.front().end;
+    result.T_ras_ras = end.T;
+    result.converged = end.converged;
+    result.iterations = paths.front().iterations;
     result.nmi_before = level->similarity(RigidTransform::Identity()).nmi;
-    const Similarity end = level->similarity(best.T);
-    result.nmi_after = end.nmi;
-    result.overlap = end.overlap;
+    const Similarity similarity = level->similarity(end.T);
+    result.nmi_after = similarity.nmi;
+    result.overlap = similarity.overlap;
   }
   result.shift_mm = task->shift_mm(result.T_ras_ras);
   result.rotation_deg = task->rotation_deg(result.T_ras_ras);

@@ -7,6 +7,7 @@
 // Coarse to fine: on each level M is smoothed by a Gaussian and every k-th sample is used. On the coarsest level the
 // search (pose_ascent.hpp) begins at the given pose and at six others, `start_offset_mm` from it along each axis; the best goes on.
 // Mutual information asks only that intensities go together, not how: sulci may be dark in one image and bright in the other.
+// Bins are of equal width, so intensities should not crowd at one end: ultrasound log-compressed, as displayed.
 //
 // Assumption: the tissue moved as a rigid body between the images, as it nearly does while the dura is closed.
 // The optimum says nothing about whether the images show the same thing; `agreement` and the refusals below do.
@@ -30,7 +31,7 @@ struct ImageLevel {
 
 struct ImageRegistrationOptions {
   // Coarse to fine. Of ultrasound samples 1 mm apart more than some ten thousand no longer change the pose.
-  std::vector<ImageLevel> levels = {{4.0, 4000}, {2.0, 12000}, {1.0, 40000}};
+  std::vector<ImageLevel> levels = {{3.0, 4000}, {2.0, 12000}, {1.0, 40000}};
   int bins = 32;  // of each intensity, 8 to 256
   // Intensities below and above these quantiles count as equal to them.
   double low_quantile = 0.005, high_quantile = 0.995;
@@ -62,7 +63,9 @@ struct ImageRegistration {
 // threads.
 class ImageRegistrar {
  public:
-  // kInvalidArgument: an option out of range (named), an MRI without voxels, fewer than 2 along an axis or an affine
+  // region: where the MRI counts (> 0.5), on any voxels, e.g. the brain mask; nullptr: everywhere. Skull and scalp, which
+  // ultrasound does not see, draw the pose away.
+  // kInvalidArgument: an option out of range (named), an image without voxels, fewer than 2 along an axis or an affine
   // that cannot be inverted; kNotFinite: a voxel.
   static Result<ImageRegistrar> create(const VoxelImage& mri, const VoxelImage* region,
                                        const ImageRegistrationOptions& options = {});

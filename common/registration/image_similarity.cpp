@@ -40,9 +40,9 @@ ImageValue GradientInterpolator::operator()(const Vec3& x_ras) const {
   return result;
 }
 
-ImageSimilarity::ImageSimilarity(const VoxelImage& image, const VoxelImage* region, const BinScale& image_scale,
-                                 const IntensitySamples& samples, const BinScale& sample_scale,
-                                 int stride)
+ImageSimilarity::ImageSimilarity(const VoxelImage& image, const VoxelImage* region,
+                                 const BinScale& image_scale, const IntensitySamples& samples,
+                                 const BinScale& sample_scale, int stride)
     : interpolator_(image),
       image_scale_(image_scale),
       sample_scale_(sample_scale),

@@ -44,9 +44,9 @@ Result<IntensitySamples> frame_samples(const tracking::Recording& recording,
     largest = largest.cwiseMax(recording.frame_values(used.back()));
   }
   if (used.empty())
-    return fail(ErrorCode::kEmptySet,
-                fmt::format("samples of frames: none of {} frames has a pose and a valid image",
-                            count));
+    return fail(
+        ErrorCode::kEmptySet,
+        fmt::format("samples of frames: none of {} frames has a pose and a valid image", count));
   const std::vector<Block> blocks = blocks_in_sector(largest, window, block_px);
   if (blocks.empty())
     return fail(ErrorCode::kEmptySet,
