@@ -20,6 +20,8 @@ constexpr Eigen::Index kLeastSamples = 500;  // some thirty for each of as many 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
 // A pose beyond this fraction of the search's reach lies at its edge.
 constexpr double kEdge = 0.98;
+// Of same_pose_mm: two searches nearer than this go on as one.
+constexpr double kMet = 0.25;
 
 Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
 
@@ -204,6 +206,7 @@ std::vector<RigidTransform> starting_poses(const ImageRegistrationOptions& optio
 struct Path {
   PoseAscent end;
   int iterations = 0;
+  int starts = 1;  // that have come there
 };
 
 // Every start up the hills of one level.
@@ -215,18 +218,35 @@ void climb_all(Level& level, double resolution_mm, std::vector<Path>& paths, int
   }
 }
 
-// Keeps the path that came highest; returns the fraction of all that came to the same pose.
+// Starts that have met need not be followed one by one.
+void merge(const Task& task, std::vector<Path>& paths) {
+  std::vector<Path> kept;
+  for (const Path& path : paths) {
+    const auto met = std::find_if(kept.begin(), kept.end(), [&](const Path& other) {
+      return task.apart_mm(path.end.T, other.end.T) < kMet * task.options.same_pose_mm;
+    });
+    if (met == kept.end())
+      kept.push_back(path);
+    else
+      met->starts += path.starts;
+  }
+  paths = std::move(kept);
+}
+
+// Keeps the path that came highest; returns the fraction of all starts that came to the same pose.
 double keep_best(const Task& task, std::vector<Path>& paths) {
   // A path that left the MRI has value 0 and is never the best: the first one began inside.
   const Path best = *std::max_element(paths.begin(), paths.end(), [](const Path& a, const Path& b) {
     return a.end.value < b.end.value;
   });
-  const auto agreeing = std::count_if(paths.begin(), paths.end(), [&](const Path& path) {
-    return path.end.valid && task.apart_mm(path.end.T, best.end.T) <= task.options.same_pose_mm;
-  });
-  const double agreement = static_cast<double>(agreeing) / static_cast<double>(paths.size());
+  int agreeing = 0, all = 0;
+  for (const Path& path : paths) {
+    all += path.starts;
+    if (path.end.valid && task.apart_mm(path.end.T, best.end.T) <= task.options.same_pose_mm)
+      agreeing += path.starts;
+  }
   paths = {best};
-  return agreement;
+  return static_cast<double>(agreeing) / all;
 }
 
 Status check_end(const Task& task, const ImageRegistration& result) {
@@ -271,6 +291,7 @@ Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples)
         Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
     if (!level) return tl::unexpected(level.error());
     climb_all(*level, options_.levels[i].smoothing_mm, paths, result.evaluations);
+    merge(*task, paths);
     // The finest level costs most: only the best goes there.
     if (i + 2 == levels_.size() || levels_.size() == 1) result.agreement = keep_best(*task, paths);
     if (i + 1 < levels_.size()) continue;
