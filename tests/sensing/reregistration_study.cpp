@@ -151,7 +151,7 @@ std::vector<TrialSummary> study(const Patient& patient, const Method& method,
 const std::vector<double> kErrors = {1.0, 2.5, 5.0, 7.5, 10.0};
 
 void check_own(const std::vector<TrialSummary>& own) {
-  record_check(kStudy, "mean error from 2.5 mm (mm)", own[1].mean_after_mm, "<= 1.0",
+  record_check(kStudy, "mean error left from 2.5 mm (mm)", own[1].mean_after_mm, "<= 1.0",
                own[1].mean_after_mm <= 1.0 && own[1].refused_percent == 0.0,
                "paper 2.7: 2.5 mm reduced to 1.0 mm; here simulated without error of tracking");
   record_check(kStudy, "found from 5 mm (%)", own[2].found_percent, ">= 95",
@@ -211,7 +211,7 @@ Status compare_with_itk(const Patient& patient) {
     if (!pose.ok) return {};
     return {false, from_itk(pose) * T_start.inverse(), 1.0};
   };
-  study(patient, method, {"ITK 5.2 Mattes mutual information; one start", {2.5, 5.0, 10.0}, 10, 1});
+  study(patient, method, {"ITK 5.2 Mattes mutual information; one start", {2.5, 5.0, 10.0}, 6, 1});
   return {};
 }
 #else
@@ -234,18 +234,18 @@ Status run() {
   single.start_offset_mm = 0.0;
   const auto one = Registered::create(*patient, patient->mri, patient->poses, single);
   if (!one) return tl::unexpected(one.error());
-  study(*patient, *one, {"tumour seen in MRI; one start", kErrors, 100});
+  study(*patient, *one, {"tumour seen in MRI; one start", kErrors, 50});
 
   const auto plain = Registered::create(*patient, patient->plain_mri, patient->poses);
   if (!plain) return tl::unexpected(plain.error());
-  study(*patient, *plain, {"tumour not seen in MRI; seven starts", kErrors, 40});
+  study(*patient, *plain, {"tumour not seen in MRI; seven starts", kErrors, 30});
 
   const auto tracked = Registered::create(*patient, patient->mri, measured_poses(*patient));
   if (!tracked) return tl::unexpected(tracked.error());
   const auto off =
       study(*patient, *tracked,
-            {"tumour seen; poses off by 0.3 mm 0.3 deg; depth by 1.5 %", {2.5, 5.0}, 40});
-  record_check(kStudy, "mean error from 2.5 mm with errors of tracking and calibration (mm)",
+            {"tumour seen; poses off by 0.3 mm 0.3 deg; depth by 1.5 %", {2.5, 5.0}, 30});
+  record_check(kStudy, "mean error left from 2.5 mm with errors of tracking and calibration (mm)",
                off[0].mean_after_mm, "<= 1.0", off[0].mean_after_mm <= 1.0, "paper 2.7");
   return compare_with_itk(*patient);
 }
