@@ -72,37 +72,34 @@ ItkRegistration::ItkRegistration(const ItkVolume& fixed, const ItkVolume& moving
 }
 ItkRegistration::~ItkRegistration() = default;
 
-ItkPose ItkRegistration::align(const ItkPose& initial) const {
-  using Metric = itk::MattesMutualInformationImageToImageMetricv4<Image, Image>;
-  using Optimizer = itk::RegularStepGradientDescentOptimizerv4<double>;
-  using Registration = itk::ImageRegistrationMethodv4<Image, Image, Transform>;
+namespace {
 
-  // About the middle of the fixed volume.
+using Metric = itk::MattesMutualInformationImageToImageMetricv4<Image, Image>;
+using Optimizer = itk::RegularStepGradientDescentOptimizerv4<double>;
+using Registration = itk::ImageRegistrationMethodv4<Image, Image, Transform>;
+
+// Turns about the middle of the fixed volume.
+Transform::Pointer to_transform(const ItkPose& pose, const Image& fixed) {
   auto transform = Transform::New();
   itk::ContinuousIndex<double, 3> middle;
-  const auto size = images_->fixed->GetLargestPossibleRegion().GetSize();
+  const auto size = fixed.GetLargestPossibleRegion().GetSize();
   for (unsigned i = 0; i < 3; ++i) middle[i] = 0.5 * static_cast<double>(size[i] - 1);
   Transform::CenterType centre;
-  images_->fixed->TransformContinuousIndexToPhysicalPoint(middle, centre);
+  fixed.TransformContinuousIndexToPhysicalPoint(middle, centre);
   Transform::MatrixType matrix;
   Transform::OffsetType offset;
   for (unsigned i = 0; i < 3; ++i) {
-    offset[i] = initial.t[i];
-    for (unsigned j = 0; j < 3; ++j) matrix[i][j] = initial.A[i][j];
+    offset[i] = pose.t[i];
+    for (unsigned j = 0; j < 3; ++j) matrix[i][j] = pose.A[i][j];
   }
   transform->SetCenter(centre);
   transform->SetMatrix(matrix);
   transform->SetOffset(offset);
+  return transform;
+}
 
-  auto metric = Metric::New();
-  metric->SetNumberOfHistogramBins(32);
-  metric->SetFixedImageMask(images_->fixed_mask);
-  metric->SetMovingImageMask(images_->moving_mask);
-  metric->SetUseMovingImageGradientFilter(false);
-  metric->SetUseFixedImageGradientFilter(false);
-
-  using Scales = itk::RegistrationParameterScalesFromPhysicalShift<Metric>;
-  auto scales = Scales::New();
+Optimizer::Pointer make_optimizer(const Metric::Pointer& metric) {
+  auto scales = itk::RegistrationParameterScalesFromPhysicalShift<Metric>::New();
   scales->SetMetric(metric);
   auto optimizer = Optimizer::New();
   optimizer->SetScalesEstimator(scales);
@@ -110,31 +107,47 @@ ItkPose ItkRegistration::align(const ItkPose& initial) const {
   optimizer->SetMinimumStepLength(0.01);
   optimizer->SetRelaxationFactor(0.6);
   optimizer->SetNumberOfIterations(100);
+  return optimizer;
+}
 
+// The levels of ImageRegistrationOptions, by and large.
+void set_levels(Registration& registration) {
+  constexpr double kSmoothing_mm[] = {3.0, 2.0, 1.0}, kSampled[] = {0.02, 0.06, 0.2};
+  Registration::ShrinkFactorsArrayType shrink(3);
+  Registration::SmoothingSigmasArrayType smoothing(3);
+  Registration::MetricSamplingPercentageArrayType sampled(3);
+  for (unsigned level = 0; level < 3; ++level) {
+    shrink[level] = 1;
+    smoothing[level] = kSmoothing_mm[level];
+    sampled[level] = kSampled[level];
+  }
+  registration.SetNumberOfLevels(3);
+  registration.SetShrinkFactorsPerLevel(shrink);
+  registration.SetSmoothingSigmasPerLevel(smoothing);
+  registration.SmoothingSigmasAreSpecifiedInPhysicalUnitsOn();
+  registration.SetMetricSamplingStrategy(Registration::MetricSamplingStrategyEnum::REGULAR);
+  registration.SetMetricSamplingPercentagePerLevel(sampled);
+}
+
+}  // namespace
+
+ItkPose ItkRegistration::align(const ItkPose& initial) const {
+  auto metric = Metric::New();
+  metric->SetNumberOfHistogramBins(32);
+  metric->SetFixedImageMask(images_->fixed_mask);
+  metric->SetMovingImageMask(images_->moving_mask);
+  metric->SetUseMovingImageGradientFilter(false);
+  metric->SetUseFixedImageGradientFilter(false);
+
+  const auto transform = to_transform(initial, *images_->fixed);
   auto registration = Registration::New();
   registration->SetMetric(metric);
-  registration->SetOptimizer(optimizer);
+  registration->SetOptimizer(make_optimizer(metric));
   registration->SetFixedImage(images_->fixed);
   registration->SetMovingImage(images_->moving);
   registration->SetInitialTransform(transform);
   registration->InPlaceOn();
-  registration->SetNumberOfLevels(3);
-  Registration::ShrinkFactorsArrayType shrink(3);
-  Registration::SmoothingSigmasArrayType smoothing(3);
-  const double sigmas[] = {3.0, 2.0, 1.0};
-  for (unsigned level = 0; level < 3; ++level) {
-    shrink[level] = 1;
-    smoothing[level] = sigmas[level];
-  }
-  registration->SetShrinkFactorsPerLevel(shrink);
-  registration->SetSmoothingSigmasPerLevel(smoothing);
-  registration->SmoothingSigmasAreSpecifiedInPhysicalUnitsOn();
-  registration->SetMetricSamplingStrategy(Registration::MetricSamplingStrategyEnum::REGULAR);
-  Registration::MetricSamplingPercentageArrayType percentage(3);
-  percentage[0] = 0.02;
-  percentage[1] = 0.06;
-  percentage[2] = 0.2;
-  registration->SetMetricSamplingPercentagePerLevel(percentage);
+  set_levels(*registration);
   ItkPose pose;
   try {
     registration->Update();
