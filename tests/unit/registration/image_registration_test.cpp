@@ -75,6 +75,23 @@ TEST(ImageRegistration, TakesOutAKnownError) {
   EXPECT_GT(result.evaluations, result.iterations);
 }
 
+// So far away that not all starts come to the same hill.
+TEST(ImageRegistration, TakesTheHighestOfSeveralHills) {
+  ImageRegistrationOptions options;
+  options.max_translation_mm = 40.0;
+  options.max_rotation_deg = 30.0;
+  options.min_overlap = 0.3;
+  const Vec3 error(16.0, 0.0, 0.0);
+  IntensitySamples displaced = samples();
+  displaced.positions.colwise() += error;
+  const RigidTransform T_error(Eigen::Translation3d{error});
+  options.start_offset_mm = 12.0;
+  const auto several = registrar(options).align(displaced);
+  ASSERT_TRUE(several);
+  EXPECT_LT(error_mm(several->T_ras_ras, T_error), 0.1);
+  EXPECT_LT(several->agreement, 0.9);
+}
+
 TEST(ImageRegistration, DoesNotCareHowIntensitiesGoTogether) {
   const auto increasing = [](double value) { return value * value; };
   const auto inverted = [](double value) { return 100.0 - 7.0 * value; };
