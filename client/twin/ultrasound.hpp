@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Simulated B-mode ultrasound of a head whose MRI is known, through the craniotomy, before the dura is opened.
 //
-// Along every beam, r from the array, c the coordinate across:
-//   echo(r) = t(r) | s(x) g(c, r) + q |d z(x) / dr| |,   t(r) = product over r' < r of (1 - kTransmissionLoss q |dz/dr|) at
-//                                                        boundaries, times 10^(-attenuation r / 20)
-//   s: scatter of the tissue at x, z: its impedance (tissue_echo.hpp); g: complex circular Gaussian noise of unit variance,
-//   smoothed by the point spread (Gaussian along and across): |s g| has the Rayleigh statistics of speckle
-//   pixel = 1 + 254 (1 + 20 log10(echo) / dynamic_range_db), clamped to 1 .. 255; 0 outside of the sector
-// A beam that enters the head beside the opening, or has left the brain, meets bone: behind it only the noise floor is seen.
-// Sources: Goodman, Speckle Phenomena in Optics (2007), ch. 3 (statistics); Wagner et al., IEEE Trans. Sonics Ultrason. 30
-// (1983) (speckle in B-scans). A simulation for judging registration, not of any machine: no refraction, no side lobes, no
-// reverberation.
+// Along every beam, r mm from the array:
+//   echo(r) = | t(r) (s(x) g(r) + q |dz/dr|) + noise |
+//   t(r)    = 10^(-attenuation r / 20) times the product of (1 - loss |step of z|) over all steps before r
+//   pixel   = 1 + 254 (1 + 20 log10(echo / brightest) / dynamic range), clamped to 1 .. 255; 0 outside of the sector
+// s: scatter of the tissue at x, z: its impedance (tissue_echo.hpp), both averaged over the thickness of the slice
+// g: complex circular Gaussian noise of unit variance, smoothed by the point spread (Gaussian along and across); |g|
+//    has the Rayleigh statistics of speckle
+// Where a beam enters the brain it meets dura; beside the opening, and where it leaves the brain, bone: a bright line,
+// behind it the noise of the receiver alone.
+//
+// For judging registration, after no particular machine: no refraction, no side lobes, no reverberation, and the
+// speed of sound is the same everywhere.
+// Sources: Goodman, Speckle Phenomena in Optics (2007), ch. 3; Wagner et al., IEEE Trans. Sonics Ultrason. 30 (1983).
 #pragma once
 
 #include "client/twin/tissue_echo.hpp"

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid registration of an image given as samples, e.g. tracked ultrasound before the dura is opened, to the patient's MRI by
-// normalised mutual information (paper 2.7): what is left of error after a registration by fiducials is taken out.
+// Rigid registration of an image given as samples, e.g. tracked ultrasound before the dura is opened, to the
+// patient's MRI by normalised mutual information (paper 2.7): what is left of error after a registration by
+// fiducials is taken out.
 //
 //   T_ras_ras = argmax over T  NMI(M(T x_i), I_i)                                       (image_similarity.hpp)
 //
 // Coarse to fine: on each level M is smoothed by a Gaussian and every k-th sample is used. On the coarsest level the
-// search (pose_ascent.hpp) begins at the given pose and at six others, `start_offset_mm` from it along each axis; they are
-// followed to the second finest level, and the best goes on to the finest.
-// Mutual information asks only that intensities go together, not how: sulci may be dark in one image and bright in the other.
-// Bins are of equal width, so intensities should not crowd at one end: ultrasound log-compressed, as displayed.
+// search (pose_ascent.hpp) begins at the given pose and at six others, `start_offset_mm` from it along each axis;
+// they are followed to the second finest level, and the best goes on to the finest.
+// Mutual information asks only that intensities go together, not how: sulci may be dark in one image and bright in
+// the other. Bins are of equal width, so intensities should not crowd at one end: ultrasound log-compressed, as
+// displayed.
 //
 // Assumption: the tissue moved as a rigid body between the images, as it nearly does while the dura is closed.
 // The optimum says nothing about whether the images show the same thing; `agreement` and the refusals below do.
-// Sources: Ji, Wu, Hartov, Roberts & Paulsen, Med. Phys. 35 (2008), re-registration before durotomy; Studholme et al. 1999.
+// Sources: Ji, Wu, Hartov, Roberts & Paulsen, Med. Phys. 35 (2008), re-registration before durotomy; Studholme et
+// al. 1999.
 #pragma once
 
 #include <optional>
@@ -56,25 +59,26 @@ struct ImageRegistration {
   int iterations = 0;   // of all levels, along the best start's path
   int evaluations = 0;  // of NMI, of all starts
   bool converged = false;
-  // Fraction of the starts that came to the pose taken. Low: the images have several ways to match. No pose that half of
-  // the starts came to was wrong in the study (tests/sensing/reregistration_study.cpp); with less, have it looked at.
+  // Fraction of the starts that came to the pose taken. Low: the images have several ways to match. No pose that
+  // half of the starts came to was wrong in the study (tests/sensing/reregistration_study.cpp); with less, have it
+  // looked at.
   double agreement = 0.0;
 };
 
-// The MRI, smoothed for each level; set up once, used for any number of registrations. const calls are safe from several
-// threads.
+// The MRI, smoothed for each level; set up once, used for any number of registrations. const calls are safe from
+// several threads.
 class ImageRegistrar {
  public:
-  // region: where the MRI counts (> 0.5), on any voxels, e.g. the brain mask; nullptr: everywhere. Skull and scalp, which
-  // ultrasound does not see, draw the pose away.
-  // kInvalidArgument: an option out of range (named), an image without voxels, fewer than 2 along an axis or an affine
-  // that cannot be inverted; kNotFinite: a voxel.
+  // region: where the MRI counts (> 0.5), on any voxels, e.g. the brain mask; nullptr: everywhere. Skull and scalp,
+  // which ultrasound does not see, draw the pose away.
+  // kInvalidArgument: an option out of range (named), an image without voxels, fewer than 2 along an axis or an
+  // affine that cannot be inverted; kNotFinite: a voxel.
   static Result<ImageRegistrar> create(const VoxelImage& mri, const VoxelImage* region,
                                        const ImageRegistrationOptions& options = {});
 
-  // kInvalidArgument: fewer than 500 samples; numbers of positions and intensities differ; all intensities (of the samples,
-  // of the MRI where they are) alike; kNotFinite: names the sample. kEmptySet: too few samples inside the MRI, before or
-  // after. kNotConverged: the best pose lies at the edge of the search.
+  // kInvalidArgument: fewer than 500 samples; numbers of positions and intensities differ; all intensities (of the
+  // samples, of the MRI where they are) alike; kNotFinite: names the sample. kEmptySet: too few samples inside the
+  // MRI. kNotConverged: the best pose lies at the edge of the search.
   Result<ImageRegistration> align(const IntensitySamples& samples) const;
 
   const ImageRegistrationOptions& options() const { return options_; }

@@ -3,7 +3,8 @@
 //
 //   m_i = M(T x_i), trilinear, over the samples with T x_i inside the image M;  NMI: joint_histogram.hpp
 //   d NMI / d xi = sum_i (d NMI / d m_i) ((T x_i - c) x g_i, g_i),   g_i the gradient of M at T x_i
-// for T replaced by rigid_increment(xi, c) T at xi = 0. Exact for the interpolated image while no sample enters or leaves it.
+// for T replaced by rigid_increment(xi, c) T at xi = 0. Exact for the interpolated image while no sample enters or
+// leaves it.
 #pragma once
 
 #include <optional>

@@ -4,7 +4,8 @@
 //   p(a, b) = 1/n sum_i L(a - s_i) B(b - m_i),   s_i, m_i: intensities of sample i in bins
 //   NMI = (H(A) + H(B)) / H(A, B),               H = - sum p log p
 // L: linear (two bins); B: cubic B-spline (four bins), so that p and NMI have continuous derivatives in m_i.
-// NMI is 1 for independent intensities and 2 where each determines the other. It does not depend on the units of either.
+// NMI is 1 for independent intensities and 2 where each determines the other. It does not depend on the units of
+// either.
 // Sources: Studholme, Hill & Hawkes, "An overlap invariant entropy measure of 3D medical image alignment", Pattern
 // Recognition 32 (1999); the B-spline window: Thevenaz & Unser, IEEE TIP 9 (2000).
 #pragma once
@@ -15,8 +16,8 @@
 
 namespace brainshift::registration {
 
-// Linear map of an intensity range to bin positions; values outside of it fall on its ends. One bin at the low and two
-// at the high end stay free for the windows' tails.
+// Linear map of an intensity range to bin positions; values outside of it fall on its ends. One bin at the low and
+// two at the high end stay free for the windows' tails.
 struct BinScale {
   double low = 0.0, high = 1.0;
   int bins = 32;

@@ -4,7 +4,8 @@
 //   z = (radius w, t), xi = (w, t): all six in mm;  T <- rigid_increment(xi, c) T,  c = T centre
 //   step p = H g, H the inverse-Hessian estimate (BFGS, H = scaled identity at first), halved until
 //   f(T(p)) >= f(T) + 1e-4 g . p                                                 (Armijo)
-// Gradients of successive poses are compared as if their tangent spaces were the same: they differ by half a step's angle.
+// Gradients of successive poses are compared as if their tangent spaces were the same: they differ by half a step's
+// angle.
 // Source: Nocedal & Wright, Numerical Optimization (2006), algorithm 6.1.
 #pragma once
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rigid registration of the Insight Toolkit, for comparison: Mattes mutual information, coarse to fine, on one thread.
+// The rigid registration of the Insight Toolkit, for comparison: Mattes mutual information, coarse to fine, on one
+// thread.
 //
-// ITK 5.2 brings an Eigen of its own, older and in the same namespace. Neither headers nor symbols of the two can be mixed:
-// this interface is of plain numbers, and a shared library with hidden symbols.
+// ITK 5.2 brings an Eigen of its own, older and in the same namespace. Neither headers nor symbols of the two can
+// be mixed: this interface is of plain numbers, and a shared library with hidden symbols.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Re-registration before the dura is opened, on simulated ultrasound of the default head: from which errors it recovers, what
-// it leaves, how long it takes.
+// Re-registration before the dura is opened, on simulated ultrasound of the default head: from which errors it
+// recovers, what it leaves, how long it takes.
 #include <cstdio>
 #include <string>
 
@@ -69,8 +69,8 @@ ultrasound::PixelWindow whole_image(const tracking::Recording& recording) {
   return {0, 0, recording.width, recording.height};
 }
 
-// Poses as a tracked and calibrated probe tells them: each frame off by 0.3 mm and 0.3 degrees per axis about its place, depth
-// too long by 1.5 % (speed of sound).
+// Poses as a tracked and calibrated probe tells them: each frame off by 0.3 mm and 0.3 degrees per axis about its
+// place, depth too long by 1.5 % (speed of sound).
 ultrasound::ImagePoses measured_poses(const Patient& patient) {
   Random random(22);
   const auto draw = [&random](double sd) {
