@@ -8,10 +8,10 @@
 //   scatter       0.8                        0.006                 0.08     0.12           0.5, uneven   0.01
 //   impedance     0                          0                     0.5      0.4            0.9           0
 //
-// Sulci and fissures, the falx among them, are bright for their vessels and membranes; ventricles are not, though both
-// are equally dark in MRI. Jumps of the impedance make the bright lines of boundaries. Fluid belongs to a ventricle where
-// most of what is within some millimetres is fluid. Relative amplitudes, set by eye once, after what is bright and what is
-// dark in Unsgaard et al., Acta Neurochir. 148 (2006).
+// Sulci and fissures, the falx among them, are bright for their vessels and membranes; ventricles are not, though
+// both are equally dark in MRI. Jumps of the impedance make the bright lines of boundaries. Fluid belongs to a
+// ventricle where most of what is within some millimetres is fluid. Relative amplitudes, set by eye once, after what
+// is bright and what is dark in Unsgaard et al., Acta Neurochir. 148 (2006).
 #pragma once
 
 #include "common/core/error.hpp"
