@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// IntensitySamples: an image as a set of places and what was seen there, e.g. of tracked ultrasound frames.
+#pragma once
+
+#include "common/core/types.hpp"
+
+namespace brainshift {
+
+struct IntensitySamples {
+  Points positions;  // 3 x n, mm
+  VecX intensities;  // n, any unit
+};
+
+}  // namespace brainshift

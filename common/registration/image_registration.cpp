@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/image_registration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "common/geometry/mask.hpp"
+#include "common/registration/image_registration_input.hpp"
+#include "common/registration/image_similarity.hpp"
+#include "common/registration/pose_ascent.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+constexpr double kPerDegree = std::numbers::pi / 180.0;
+// A pose beyond this fraction of the search's reach lies at its edge.
+constexpr double kEdge = 0.98;
+// Hills of mutual information are millimetres wide; steps of 3 mm jumped off them now and then.
+constexpr double kLargestStep_mm = 1.0;
+// Of same_pose_mm: two searches nearer than this go on as one.
+constexpr double kMet = 0.25;
+
+// The samples, how they lie, and the intensity scales, which no pose changes.
+struct Task {
+  const IntensitySamples& samples;
+  const ImageRegistrationOptions& options;
+  Vec3 centre = Vec3::Zero();
+  double radius_mm = 0.0;
+  BinScale sample_scale;
+
+  double shift_mm(const RigidTransform& T) const { return (T * centre - centre).norm(); }
+  double rotation_deg(const RigidTransform& T) const {
+    return rotation_vector(T.linear()).norm() / kPerDegree;
+  }
+  // Rms distance of the samples between two poses; their spread taken as alike in all directions.
+  double apart_mm(const RigidTransform& A, const RigidTransform& B) const {
+    const double turn = rotation_vector(A.linear() * B.linear().transpose()).norm();
+    return std::hypot((A * centre - B * centre).norm(), std::sqrt(2.0 / 3.0) * turn * radius_mm);
+  }
+  // 1: on the edge of the search.
+  double reach(const RigidTransform& T) const {
+    return std::max(shift_mm(T) / options.max_translation_mm,
+                    rotation_deg(T) / options.max_rotation_deg);
+  }
+};
+
+Result<Task> make_task(const IntensitySamples& samples, const ImageRegistrationOptions& options) {
+  Task task{samples, options, samples.positions.rowwise().mean(), 0.0,
+            quantile_scale(samples.intensities, options.low_quantile, options.high_quantile,
+                           options.bins)};
+  task.radius_mm = std::sqrt((samples.positions.colwise() - task.centre).squaredNorm() /
+                             static_cast<double>(samples.positions.cols()));
+  if (!(task.radius_mm > 0.0))
+    return fail(ErrorCode::kInvalidArgument, "image registration: all samples at one place");
+  if (!(task.sample_scale.high > task.sample_scale.low))
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("image registration: the samples' intensities are all {:g}",
+                            task.sample_scale.low));
+  return task;
+}
+
+// One level: the smoothed MRI seen through the samples.
+class Level {
+ public:
+  // The intensity scale is that of the MRI around the samples as they are placed now.
+  static Result<Level> create(const VoxelImage& image, const VoxelImage* region,
+                              const ImageLevel& level, const Task& task) {
+    const auto count = static_cast<int>(task.samples.positions.cols());
+    const int stride = std::max(1, static_cast<int>(std::lround(1.0 * count / level.samples)));
+    const GradientInterpolator interpolator(image);
+    std::optional<GradientInterpolator> counts;
+    if (region) counts.emplace(*region);
+    std::vector<double> seen;
+    int asked = 0;
+    for (int i = 0; i < count; i += stride, ++asked)
+      if (const ImageValue value = interpolator(task.samples.positions.col(i));
+          value.inside && (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5))
+        seen.push_back(value.value);
+    const double overlap = static_cast<double>(seen.size()) / asked;
+    if (overlap < task.options.min_overlap)
+      return fail(ErrorCode::kEmptySet,
+                  fmt::format("image registration: {:.0f} % of the samples lie inside the MRI: at "
+                              "least {:.0f} % needed",
+                              100.0 * overlap, 100.0 * task.options.min_overlap));
+    const BinScale scale =
+        quantile_scale(Eigen::Map<const VecX>(seen.data(), static_cast<Eigen::Index>(seen.size())),
+                       task.options.low_quantile, task.options.high_quantile, task.options.bins);
+    if (!(scale.high > scale.low))
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
+    return Level(task,
+                 ImageSimilarity(image, region, scale, task.samples, task.sample_scale, stride));
+  }
+
+  Similarity similarity(const RigidTransform& T) { return similarity_.at(T, T * task_.centre); }
+
+  PoseAscent climb(const RigidTransform& T_initial) {
+    PoseAscentOptions options;
+    options.max_iterations = task_.options.max_iterations;
+    options.first_step_mm = 0.5;
+    options.largest_step_mm = kLargestStep_mm;
+    const auto function = [this](const RigidTransform& T, const Vec3& centre) {
+      PoseValue value;
+      if (task_.reach(T) > 1.0) return value;
+      const Similarity found = similarity_.at(T, centre);
+      value.valid = found.overlap >= task_.options.min_overlap;
+      value.value = found.nmi;
+      value.gradient = found.gradient;
+      return value;
+    };
+    return ascend(function, T_initial, task_.centre, task_.radius_mm, options);
+  }
+
+ private:
+  Level(const Task& task, ImageSimilarity similarity)
+      : task_(task), similarity_(std::move(similarity)) {}
+  const Task& task_;
+  ImageSimilarity similarity_;
+};
+
+std::vector<RigidTransform> starting_poses(const ImageRegistrationOptions& options) {
+  std::vector<RigidTransform> poses = {RigidTransform::Identity()};
+  const double offset = std::min(options.start_offset_mm, 0.9 * kEdge * options.max_translation_mm);
+  if (!(offset > 0.0)) return poses;
+  for (int axis = 0; axis < 3; ++axis)
+    for (double sign : {-1.0, 1.0})
+      poses.emplace_back(Eigen::Translation3d(sign * offset * Vec3::Unit(axis)));
+  return poses;
+}
+
+// A start and where it has come to.
+struct Path {
+  PoseAscent end;
+  int iterations = 0;
+  int starts = 1;  // that have come there
+};
+
+// Every start up the hills of one level.
+void climb_all(Level& level, std::vector<Path>& paths, int& evaluations) {
+  for (Path& path : paths) {
+    path.end = level.climb(path.end.T);
+    path.iterations += path.end.iterations;
+    evaluations += path.end.evaluations;
+  }
+}
+
+// Starts that have met need not be followed one by one.
+void merge(const Task& task, std::vector<Path>& paths) {
+  std::vector<Path> kept;
+  for (const Path& path : paths) {
+    const auto met = std::find_if(kept.begin(), kept.end(), [&](const Path& other) {
+      return task.apart_mm(path.end.T, other.end.T) < kMet * task.options.same_pose_mm;
+    });
+    if (met == kept.end())
+      kept.push_back(path);
+    else
+      met->starts += path.starts;
+  }
+  paths = std::move(kept);
+}
+
+// Keeps the path that came highest; returns the fraction of all starts that came to the same pose.
+double keep_best(const Task& task, std::vector<Path>& paths) {
+  // A path that left the MRI has value 0 and is never the best: the first one began inside.
+  const Path best = *std::max_element(paths.begin(), paths.end(), [](const Path& a, const Path& b) {
+    return a.end.value < b.end.value;
+  });
+  int agreeing = 0, all = 0;
+  for (const Path& path : paths) {
+    all += path.starts;
+    if (path.end.valid && task.apart_mm(path.end.T, best.end.T) <= task.options.same_pose_mm)
+      agreeing += path.starts;
+  }
+  paths = {best};
+  return static_cast<double>(agreeing) / all;
+}
+
+Status check_end(const Task& task, const ImageRegistration& result) {
+  if (task.reach(result.T_ras_ras) < kEdge) return {};
+  return fail(
+      ErrorCode::kNotConverged,
+      fmt::format("image registration: the best pose, {:.1f} mm and {:.1f} deg away, lies at "
+                  "the edge of the search ({:g} mm, {:g} deg)",
+                  result.shift_mm, result.rotation_deg, task.options.max_translation_mm,
+                  task.options.max_rotation_deg));
+}
+
+}  // namespace
+
+Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region,
+                                              const ImageRegistrationOptions& options) {
+  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_image("MRI", mri); !ok) return tl::unexpected(ok.error());
+  if (region)
+    if (Status ok = check_image("region", *region); !ok) return tl::unexpected(ok.error());
+  ImageRegistrar registrar;
+  registrar.options_ = options;
+  if (region) registrar.region_ = *region;
+  for (const ImageLevel& level : options.levels)
+    registrar.levels_.push_back(geometry::gaussian_smooth(mri, level.smoothing_mm));
+  return registrar;
+}
+
+Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples) const {
+  if (Status ok = check_samples(samples); !ok) return tl::unexpected(ok.error());
+  const auto task = make_task(samples, options_);
+  if (!task) return tl::unexpected(task.error());
+
+  ImageRegistration result;
+  std::vector<Path> paths;
+  for (const RigidTransform& start : starting_poses(options_)) {
+    paths.emplace_back();
+    paths.back().end.T = start;
+  }
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    auto level =
+        Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
+    if (!level) return tl::unexpected(level.error());
+    climb_all(*level, paths, result.evaluations);
+    merge(*task, paths);
+    // The finest level costs most: only the best goes there.
+    if (i + 2 == levels_.size() || levels_.size() == 1) result.agreement = keep_best(*task, paths);
+    if (i + 1 < levels_.size()) continue;
+    const PoseAscent& end = paths.front().end;
+    result.T_ras_ras = end.T;
+    result.converged = end.converged;
+    result.iterations = paths.front().iterations;
+    result.nmi_before = level->similarity(RigidTransform::Identity()).nmi;
+    const Similarity similarity = level->similarity(end.T);
+    result.nmi_after = similarity.nmi;
+    result.overlap = similarity.overlap;
+  }
+  result.shift_mm = task->shift_mm(result.T_ras_ras);
+  result.rotation_deg = task->rotation_deg(result.T_ras_ras);
+  if (Status ok = check_end(*task, result); !ok) return tl::unexpected(ok.error());
+  return result;
+}
+
+}  // namespace brainshift::registration

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/registration/image_registration.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "common/registration/rigid_increment.hpp"
+#include "tests/unit/registration/blob_image.hpp"
+
+namespace brainshift::registration {
+namespace {
+
+using testing::HasSubstr;
+
+const test::Blobs& blobs() {
+  static const test::Blobs all(11);
+  return all;
+}
+const VoxelImage& mri() {
+  static const VoxelImage image = test::image_of(blobs());
+  return image;
+}
+IntensitySamples samples() { return test::samples_of(blobs(), 12000, 12); }
+
+RigidTransform known_error() {
+  Vec6 xi;
+  xi << 0.08, -0.05, 0.06, 3.0, -2.0, 3.5;
+  return rigid_increment(xi, Vec3(2, 1, -3));
+}
+
+ImageRegistrar registrar(const ImageRegistrationOptions& options = {}) {
+  auto made = ImageRegistrar::create(mri(), nullptr, options);
+  EXPECT_TRUE(made) << (made ? "" : made.error().message);
+  return std::move(*made);
+}
+
+// Largest distance from its true place of any sample.
+double error_mm(const RigidTransform& T_found, const RigidTransform& T_error) {
+  const Points truth = samples().positions;
+  return (test::moved(T_found * T_error, truth) - truth).colwise().norm().maxCoeff();
+}
+
+// Registers the samples, displaced by the known error and with their intensities as `remap` has them.
+template <typename Remap>
+ImageRegistration recover(const Remap& remap) {
+  IntensitySamples displaced = samples();
+  displaced.positions = test::moved(known_error(), displaced.positions);
+  for (double& value : displaced.intensities) value = remap(value);
+  const auto result = registrar().align(displaced);
+  EXPECT_TRUE(result) << (result ? "" : result.error().message);
+  return result ? *result : ImageRegistration{};
+}
+
+TEST(ImageRegistration, LeavesWhatIsInPlace) {
+  const auto result = registrar().align(samples());
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->converged);
+  EXPECT_LT(error_mm(result->T_ras_ras, RigidTransform::Identity()), 0.1);
+  EXPECT_EQ(result->overlap, 1.0);
+  EXPECT_GE(result->nmi_after, result->nmi_before);
+}
+
+TEST(ImageRegistration, TakesOutAKnownError) {
+  const ImageRegistration result = recover([](double value) { return value; });
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_mm(result.T_ras_ras, known_error()), 0.1);
+  EXPECT_GT(result.nmi_after, result.nmi_before + 0.1);
+  EXPECT_GT(result.agreement, 0.8);
+  EXPECT_NEAR(result.rotation_deg, Vec3(0.08, -0.05, 0.06).norm() * 180.0 / std::numbers::pi, 0.3);
+  EXPECT_GT(result.shift_mm, 4.0);
+  EXPECT_GT(result.iterations, 0);
+  EXPECT_GT(result.evaluations, result.iterations);
+}
+
+// So far away that not all starts come to the same hill.
+TEST(ImageRegistration, TakesTheHighestOfSeveralHills) {
+  ImageRegistrationOptions options;
+  options.max_translation_mm = 40.0;
+  options.max_rotation_deg = 30.0;
+  options.min_overlap = 0.3;
+  const Vec3 error(16.0, 0.0, 0.0);
+  IntensitySamples displaced = samples();
+  displaced.positions.colwise() += error;
+  const RigidTransform T_error(Eigen::Translation3d{error});
+  options.start_offset_mm = 12.0;
+  const auto several = registrar(options).align(displaced);
+  ASSERT_TRUE(several);
+  EXPECT_LT(error_mm(several->T_ras_ras, T_error), 0.1);
+  EXPECT_LT(several->agreement, 0.9);
+}
+
+TEST(ImageRegistration, DoesNotCareHowIntensitiesGoTogether) {
+  const auto increasing = [](double value) { return value * value; };
+  const auto inverted = [](double value) { return 100.0 - 7.0 * value; };
+  // Bright in the middle of the range, dark at both ends.
+  const auto neither = [](double value) { return std::exp(-std::pow((value - 1.2) / 0.5, 2)); };
+  EXPECT_LT(error_mm(recover(increasing).T_ras_ras, known_error()), 0.2);
+  EXPECT_LT(error_mm(recover(inverted).T_ras_ras, known_error()), 0.1);
+  EXPECT_LT(error_mm(recover(neither).T_ras_ras, known_error()), 0.2);
+}
+
+TEST(ImageRegistration, BearsSpeckle) {
+  Random random(13);
+  const ImageRegistration result = recover(
+      [&random](double value) { return value * std::hypot(random.normal(), random.normal()); });
+  EXPECT_LT(error_mm(result.T_ras_ras, known_error()), 1.0);
+}
+
+TEST(ImageRegistration, IsTheSameEveryTime) {
+  const auto same = [](double value) { return value; };
+  EXPECT_EQ(recover(same).T_ras_ras.matrix(), recover(same).T_ras_ras.matrix());
+}
+
+TEST(ImageRegistration, SeesOnlyTheRegion) {
+  VoxelImage spoiled = mri();
+  VoxelImage region = mri();
+  for (int k = 0, voxel = 0; k < 65; ++k)
+    for (int j = 0; j < 65; ++j)
+      for (int i = 0; i < 65; ++i, ++voxel) {
+        const bool inside = (mri().T_ras_voxel * Vec3(i, j, k)).norm() < 35.0;
+        region.values[static_cast<std::size_t>(voxel)] = inside ? 1.0f : 0.0f;
+        if (!inside) spoiled.values[static_cast<std::size_t>(voxel)] = 0.0f;
+      }
+  const auto made = ImageRegistrar::create(spoiled, &region);
+  ASSERT_TRUE(made);
+  IntensitySamples displaced = samples();
+  displaced.positions = test::moved(known_error(), displaced.positions);
+  const auto result = made->align(displaced);
+  ASSERT_TRUE(result);
+  EXPECT_LT(error_mm(result->T_ras_ras, known_error()), 0.1);
+}
+
+// Nothing of the image is in the samples: no pose deserves trust.
+TEST(ImageRegistration, LowAgreementTellsUnrelatedImages) {
+  const test::Blobs other(99);
+  const auto result = registrar().align(test::samples_of(other, 12000, 12));
+  if (result) {
+    EXPECT_LT(result->agreement, 0.5);
+  } else {
+    EXPECT_EQ(result.error().code, ErrorCode::kNotConverged);
+  }
+}
+
+void expect_refused(const Result<ImageRegistration>& result, ErrorCode code,
+                    const std::string& text) {
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, code);
+  EXPECT_THAT(result.error().message, HasSubstr(text));
+}
+
+TEST(ImageRegistration, RefusesBadSamples) {
+  const ImageRegistrar mri_registrar = registrar();
+  expect_refused(mri_registrar.align({}), ErrorCode::kInvalidArgument, "0 samples: at least 500");
+  expect_refused(mri_registrar.align(test::samples_of(blobs(), 499, 1)),
+                 ErrorCode::kInvalidArgument, "499 samples");
+  IntensitySamples bad = samples();
+  bad.intensities.conservativeResize(7);
+  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument,
+                 "12000 positions and 7 intensities");
+  bad = samples();
+  bad.intensities[41] = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 41 is not finite");
+  bad = samples();
+  bad.positions(1, 17) = std::numeric_limits<double>::infinity();
+  expect_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 17 is not finite");
+  bad = samples();
+  bad.intensities.setConstant(3.0);
+  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument, "intensities are all 3");
+  bad = samples();
+  bad.positions.setConstant(3.0);
+  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument, "at one place");
+  bad = samples();
+  bad.positions.row(0).array() += 500.0;
+  expect_refused(mri_registrar.align(bad), ErrorCode::kEmptySet, "0 % of the samples");
+}
+
+TEST(ImageRegistration, RefusesAConstantMri) {
+  VoxelImage constant = mri();
+  for (float& value : constant.values) value = 42.0f;
+  const auto made = ImageRegistrar::create(constant, nullptr);
+  ASSERT_TRUE(made);
+  expect_refused(made->align(samples()), ErrorCode::kInvalidArgument, "the MRI is 42");
+}
+
+TEST(ImageRegistration, RefusesAnOptimumAtTheEdge) {
+  ImageRegistrationOptions options;
+  options.max_translation_mm = 3.0;
+  options.start_offset_mm = 1.0;
+  IntensitySamples displaced = samples();
+  displaced.positions.row(0).array() += 5.0;
+  expect_refused(registrar(options).align(displaced), ErrorCode::kNotConverged,
+                 "at the edge of the search (3 mm, 15 deg)");
+}
+
+void expect_refused_mri(const VoxelImage& image, ErrorCode code, const std::string& text,
+                        const ImageRegistrationOptions& options = {}) {
+  const auto made = ImageRegistrar::create(image, nullptr, options);
+  ASSERT_FALSE(made) << text;
+  EXPECT_EQ(made.error().code, code);
+  EXPECT_THAT(made.error().message, HasSubstr(text));
+}
+
+TEST(ImageRegistration, RefusesABadMri) {
+  expect_refused_mri({}, ErrorCode::kInvalidArgument, "MRI of 0 x 0 x 0 voxels");
+  VoxelImage bad = mri();
+  bad.values.pop_back();
+  expect_refused_mri(bad, ErrorCode::kInvalidArgument, "274624 values for 274625 voxels");
+  bad = mri();
+  bad.values[77] = std::numeric_limits<float>::quiet_NaN();
+  expect_refused_mri(bad, ErrorCode::kNotFinite, "MRI voxel 77");
+  bad = mri();
+  bad.T_ras_voxel.linear().col(1).setZero();
+  expect_refused_mri(bad, ErrorCode::kInvalidArgument, "no usable affine");
+  const VoxelImage region;
+  const auto made = ImageRegistrar::create(mri(), &region);
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("region of 0 x 0 x 0 voxels"));
+}
+
+TEST(ImageRegistration, RefusesOptionsOutOfRange) {
+  const auto refused = [](auto change, const std::string& text) {
+    ImageRegistrationOptions options;
+    change(options);
+    expect_refused_mri(mri(), ErrorCode::kInvalidArgument, text, options);
+  };
+  refused([](auto& o) { o.levels.clear(); }, "levels: none");
+  refused([](auto& o) { o.levels[1].smoothing_mm = -1.0; }, "smoothing_mm = -1");
+  refused([](auto& o) { o.levels[1].samples = 10; }, "samples = 10");
+  refused([](auto& o) { o.bins = 4; }, "bins = 4: must be 8 to 256");
+  refused([](auto& o) { o.low_quantile = 0.999; }, "quantiles 0.999 and 0.995");
+  refused([](auto& o) { o.start_offset_mm = -1.0; }, "start_offset_mm = -1");
+  refused([](auto& o) { o.max_iterations = 0; }, "max_iterations = 0");
+  refused([](auto& o) { o.max_translation_mm = 0.0; }, "max_translation_mm = 0");
+  refused([](auto& o) { o.max_rotation_deg = 100.0; }, "max_rotation_deg = 100");
+  refused([](auto& o) { o.min_overlap = 1.5; }, "min_overlap = 1.5");
+  refused([](auto& o) { o.same_pose_mm = 0.0; }, "same_pose_mm = 0");
+}
+
+}  // namespace
+}  // namespace brainshift::registration
