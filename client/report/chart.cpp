@@ -198,7 +198,7 @@ cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area_out) {
 namespace {
 
 void draw_bar(cv::Mat& image, const Mapping& map, const cv::Rect2d& slot, double value,
-              const BarSeries& series, int decimals) {
+              const BarSeries& series, int decimals, bool figures) {
   const double shown = std::clamp(value, map.y.min, map.y.max);
   const double base = map(0.0, std::clamp(0.0, map.y.min, map.y.max)).y;
   const double tip = map(0.0, shown).y;
@@ -207,6 +207,7 @@ void draw_bar(cv::Mat& image, const Mapping& map, const cv::Rect2d& slot, double
   const cv::Size size(static_cast<int>(slot.width),
                       std::max(1, static_cast<int>(std::lround(std::abs(base - tip)))));
   cv::rectangle(image, cv::Rect(corner, size), series.colour, cv::FILLED);
+  if (!figures) return;
   // The figure stands at the bar's foot, where no reference mark can hide it.
   const std::string text = fixed_decimals(value, decimals);
   const TextStyle style{.align = Align::kCentre};
@@ -247,7 +248,7 @@ cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area_out) {
       const double offset = static_cast<double>(s) - 0.5 * static_cast<double>(spec.series.size());
       const cv::Rect2d slot(middle + offset * bar_width + 4, 0, bar_width - 8, 0);
       const auto& value = spec.series[s].values.at(g);
-      if (value) draw_bar(image, map, slot, *value, spec.series[s], spec.decimals);
+      if (value) draw_bar(image, map, slot, *value, spec.series[s], spec.decimals, spec.figures);
       if (s >= spec.references.size() || !spec.references[s].at(g)) continue;
       const double y = map(0.0, std::clamp(*spec.references[s][g], spec.y_min, spec.y_max)).y;
       draw_polyline(image, {{slot.x, y}, {slot.x + slot.width, y}}, {palette::kWhite, 9, 0.0});

@@ -61,6 +61,7 @@ struct BarSpec {
   double y_min = 0.0;  // bars below are cut and still labelled with their value
   double y_max = 100.0;
   int decimals = 1;
+  bool figures = true;  // the value at every bar's foot; many narrow bars have no room for them
   cv::Size size{1800, 1000};
 };
 

@@ -18,8 +18,8 @@ BRAINSHIFT_STUDY_DIR=$(realpath "$out")
 export BRAINSHIFT_STUDY_DIR
 status=0
 study() { step "$1" "$bin/sensing_$1" || status=1; }
-for program in "$bin"/sensing_*; do
-  [ -x "$program" ] && study "${program##*/sensing_}"
+for one in icp cars estimates reregistration ultrasound tracing stereo; do
+  study "$one"
 done
 
 # The same job as an operating room has it: through the daemon and the client, tumour alone and with the cortex.

@@ -106,6 +106,7 @@ void draw(const std::vector<Stages>& results, const std::filesystem::path& file)
     add_group("tumour", &Stage::tumour_mm);
     add_group("craniotomy", &Stage::craniotomy_vector_mm);
   }
+  spec.figures = false;
   spec.y_min = 0.0;
   spec.y_max = 1.1 * largest;
   cv::imwrite(file.string(), client::draw_bars(spec));
