@@ -16,6 +16,7 @@
 #include "common/io/model_file.hpp"
 #include "common/io/plus_config.hpp"
 #include "common/io/sequence_file.hpp"
+#include "common/io/surgery_creation.hpp"
 #include "common/scene/brain_model_builder.hpp"
 
 namespace brainshift::sensing {
@@ -260,7 +261,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   const std::map<std::string, std::string> meta = {
       {"case_id", patient->case_id},     {"model_id", patient->model_id},
       {"case_file", patient->case_file}, {"scenario", options.recording.stem().string()},
-      {"created_utc", utc_now()},        {"software", "brainshift import"}};
+      {"created_utc", io::utc_now()},        {"software", "brainshift import"}};
   if (Status ok = write_surgery(options.out, meta, *observations); !ok) {
     return tl::unexpected(ok.error());
   }

@@ -12,9 +12,6 @@
 
 namespace brainshift::sensing {
 
-// Now, UTC, as ISO 8601 to the second.
-std::string utc_now();
-
 // A new file; nothing is left behind on failure. kWriteFailed, also when the file exists already. meta: surgery_file.hpp.
 Status write_surgery(const std::filesystem::path& path,
                      const std::map<std::string, std::string>& meta,

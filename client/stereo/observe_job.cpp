@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <map>
 
 #include "client/stereo/jobs.hpp"
@@ -11,6 +10,7 @@
 #include "common/io/file_access.hpp"
 #include "common/io/mesh_file.hpp"
 #include "common/io/model_file.hpp"
+#include "common/io/surgery_creation.hpp"
 #include "common/io/surgery_file.hpp"
 #include "common/wire/convert.hpp"
 
@@ -37,15 +37,6 @@ Status check(const ObserveJob& job) {
     return fail(ErrorCode::kInvalidArgument, "--source must have 1 to 64 characters");
   }
   return {};
-}
-
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
 }
 
 // Where the next observation goes: after everything that the surgery holds.
@@ -104,7 +95,7 @@ Result<Target> open_target(const fs::path& path, const io::ModelFile& model) {
                                                    {"model_id", model.model.model_id},
                                                    {"case_file", model.config.file.string()},
                                                    {"scenario", "recorded"},
-                                                   {"created_utc", utc_now()},
+                                                   {"created_utc", io::utc_now()},
                                                    {"software", "brainshift stereo"}};
   auto file = io::SurgeryFile::create(path, meta);
   if (!file) return tl::unexpected(file.error());

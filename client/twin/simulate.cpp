@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/simulate.hpp"
 
-#include <ctime>
-
 #include "client/twin/scenario.hpp"
 #include "client/twin/surgery.hpp"
 #include "common/fem/blas_threads.hpp"
 #include "common/io/config_file.hpp"
+#include "common/io/surgery_creation.hpp"
 #include "common/io/surgery_file.hpp"
 #include "common/scene/brain_model_builder.hpp"
 #include "common/wire/convert.hpp"
@@ -29,15 +28,6 @@ Result<Patient> load_patient(const std::filesystem::path& case_file, const Progr
   return Patient{std::move(*config), std::move(*model)};
 }
 
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
 Status write_surgery(const SimulateOptions& options, const Patient& patient,
                      const SimulatedSurgery& surgery) {
   const std::map<std::string, std::string> meta = {
@@ -46,7 +36,7 @@ Status write_surgery(const SimulateOptions& options, const Patient& patient,
       {"case_file", std::filesystem::absolute(options.case_file).lexically_normal().string()},
       {"scenario", options.scenario},
       {"seed", std::to_string(options.seed)},
-      {"created_utc", utc_now()},
+      {"created_utc", io::utc_now()},
       {"software", "brainshift twin"},
   };
   auto file = io::SurgeryFile::create(options.out, meta);
@@ -59,12 +49,7 @@ Status write_surgery(const SimulateOptions& options, const Patient& patient,
     if (status) status = file->write_truth(observation.sequence, surgery.truths[i]);
   }
   if (status) status = file->close();
-  if (!status) {
-    for (const char* suffix : {"", "-wal", "-shm"}) {
-      std::error_code ignored;
-      std::filesystem::remove(options.out.string() + suffix, ignored);
-    }
-  }
+  if (!status) io::discard_surgery(options.out);
   return status;
 }
 

@@ -10,6 +10,7 @@
 #include <nanoflann.hpp>
 #include <utility>
 
+#include "common/core/point_columns.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
@@ -24,20 +25,8 @@ constexpr double kCancelled = 1e-6;
 // A projection this little beyond a border, relative to the triangle, still falls within it.
 constexpr double kWithin = 1e-12;
 
-// The columns of a matrix as nanoflann's point cloud.
-struct Cloud {
-  const Points& points;
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.cols()); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(i));
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>,
-                                                   Cloud, 3, std::size_t>;
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                                   PointColumns, 3, std::size_t>;
 
 struct Projection {
   Vec3 point = Vec3::Zero();
@@ -183,7 +172,7 @@ Result<std::vector<ContactPair>> search_contact(const Points& nodes,
   if (!master) return tl::unexpected(master.error());
   const std::vector<int> used = master->used_vertices();
   const Points master_nodes = skull.vertices(Eigen::all, used);
-  const Cloud cloud{master_nodes};
+  const PointColumns cloud{master_nodes};
   const KdTree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(8));
 
   std::vector<ContactPair> pairs;

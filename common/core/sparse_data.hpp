@@ -34,7 +34,8 @@ struct SparseData {
   // In the order of the data, each datum in one. Empty: one nameless source.
   std::vector<DataSource> sources = {};
 
-  static constexpr int kMaxCommonErrors = 24;
+  // An alignment has 12, a camera 6: room for the sources of an operating room.
+  static constexpr int kMaxCommonErrors = 48;
 
   int size() const { return static_cast<int>(positions.cols()); }
   bool along_direction(int datum) const {

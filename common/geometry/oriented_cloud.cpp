@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/point_columns.hpp"
+
 namespace brainshift::geometry {
 namespace {
 
@@ -22,21 +24,8 @@ constexpr double kTouching = 1e-9;
 // Planes that are blended; with one, alignment stalls where the closest points change.
 constexpr std::size_t kBlended = 8;
 
-// What nanoflann asks of a set of points.
-struct Columns {
-  const Points& points;
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.cols()); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(i));
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Columns>,
-                                                 Columns, 3, std::uint32_t>;
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                                 PointColumns, 3, std::uint32_t>;
 
 Status check(const Points& points, const Points& normals, const CloudOptions& options) {
   if (points.cols() < 3)
@@ -71,7 +60,7 @@ struct OrientedCloud::Impl {
 
   Points points, normals;
   double reach_mm = 0.0;
-  Columns columns{points};
+  PointColumns columns{points};
   Tree tree{3, columns};
 
   void nearest(const Vec3& x, std::vector<std::uint32_t>& ids, std::vector<double>& squared) const {

@@ -7,23 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/point_columns.hpp"
+
 namespace brainshift::prior {
 namespace {
 
-// The interface nanoflann asks of a point set.
-struct PointCloud {
-  const Points& points;
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.cols()); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(i));
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>,
-                                                   PointCloud, 3, std::size_t>;
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                                   PointColumns, 3, std::size_t>;
 
 }  // namespace
 
@@ -40,7 +30,7 @@ ForcePrior::ForcePrior(const Points& nodes, const VecX& nodal_volumes, double co
   assert(nodal_volumes.size() == nodes.cols());
   assert(modes_.size() == 0 || modes_.rows() == 3 * nodes.cols());
   const double support = kSupportOverCorrelationLength * correlation_length_mm;
-  const PointCloud cloud{nodes};
+  const PointColumns cloud{nodes};
   KdTree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   tree.buildIndex();
 

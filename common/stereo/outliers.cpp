@@ -5,23 +5,13 @@
 #include <cmath>
 #include <nanoflann.hpp>
 
+#include "common/core/point_columns.hpp"
+
 namespace brainshift::stereo {
 namespace {
 
-// The interface nanoflann asks of a point set.
-struct PointCloud {
-  const Points& points;
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.cols()); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(i));
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>,
-                                                   PointCloud, 3, std::size_t>;
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                                   PointColumns, 3, std::size_t>;
 
 // The corner of a regular grid has 1.5 times the mean distance of its inside.
 constexpr double kAlwaysInside = 2.0;
@@ -32,7 +22,7 @@ std::vector<bool> distance_outliers(const Points& points, double sds, int neighb
   const Eigen::Index n = points.cols();
   std::vector<bool> outlier(static_cast<std::size_t>(n), false);
   if (n <= neighbours) return outlier;
-  const PointCloud cloud{points};
+  const PointColumns cloud{points};
   KdTree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   tree.buildIndex();
   // A point is its own nearest neighbour.

@@ -131,10 +131,13 @@ std::vector<Omission> registration_omissions(const registration::IcpResult& icp,
         rotation_prior_sd_deg > 0.0
             ? fmt::format("held by a prior of {:.1f} deg", rotation_prior_sd_deg)
             : std::string("undetermined");
-    omissions.push_back({"rotation",
-                         fmt::format("the boundary shows {} of 6 rigid motions; the others are {}",
-                                     icp.observable_axes, held),
-                         size});
+    std::string axes;
+    for (const std::string& axis : registration::not_shown(icp.observability)) axes += "; " + axis;
+    omissions.push_back(
+        {"rotation",
+         fmt::format("the boundary shows {} of 6 rigid motions; the others are {}{}",
+                     icp.observable_axes, held, axes),
+         size});
   }
   if (!icp.converged) {
     omissions.push_back({"registration convergence",

@@ -174,6 +174,10 @@ TEST(Stereo, PicturesBecomeObservationsOfASurgery) {
   expect_refused(run(observe_command(files, files.path("points.xyz"))),
                  "case.surgery: model_id is \"");
   EXPECT_THAT(observations_of(files.path("out/case.surgery")), SizeIs(2));
+  // Only the sources that a surgery has can be played by themselves.
+  expect_refused(run({brainshift(), "replay", files.path("out/case.surgery"), "--sources", "ius",
+                      "--report", files.path("r.json")}),
+                 "holds no observation of source \"ius\"; it has: stereopsis");
 }
 
 TEST(Stereo, BoardsBecomeACalibration) {

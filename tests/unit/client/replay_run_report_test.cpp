@@ -42,6 +42,8 @@ RunReport full_run() {
   run.principal_direction_deg = 3.1;
   run.truth_scalars["fluid_level_mm"] = 40.0;
   run.left_out = {{"pressure", "drained", "0.02 %"}};
+  run.sources = {{"ius", 41, 0.25, 200, 3, 31.5, 28.75, 0.125, true}, {"stereopsis", 40, 2.0, 300}};
+  run.sources[1].consistent = false;
   run.failures = {{3, "unavailable", "no update \"in\" time"}};
   run.trace = {{1, {2.0, 0.5}, MeanStd{1.9, 0.4}, 12, 0.3, 100.0},
                {2, {1.0, 0.5}, std::nullopt, 2, 0.1, 200.0}};
@@ -58,6 +60,10 @@ TEST(RunReport, ReadsBackWhatItWrote) {
   EXPECT_EQ((*read)[0].seed, full_run().seed);
   EXPECT_EQ((*read)[0].trace[0].cross->mean, 1.9);
   EXPECT_FALSE((*read)[0].trace[1].cross);
+  ASSERT_EQ((*read)[0].sources.size(), 2u);
+  EXPECT_EQ((*read)[0].sources[0].p_value, 0.125);
+  EXPECT_TRUE(std::isnan((*read)[0].sources[1].p_value));
+  EXPECT_FALSE((*read)[0].sources[1].consistent);
 }
 
 TEST(RunReport, HasEveryKeyOfTheContract) {

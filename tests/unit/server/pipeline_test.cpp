@@ -266,6 +266,10 @@ TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
   const auto update = built->run(observation, {});
   ASSERT_TRUE(update.has_value());
   EXPECT_TRUE(leaves_out(*update, "rotation"));
+  for (const Omission& omission : update->left_out) {
+    if (omission.part != "rotation") continue;
+    EXPECT_THAT(omission.reason, HasSubstr("no rotation is shown by the points"));
+  }
 }
 
 TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
