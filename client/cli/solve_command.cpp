@@ -10,9 +10,9 @@
 
 #include "client/cli/command.hpp"
 #include "common/forward/build_problem.hpp"
-#include "common/io/file_access.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/io/problem_file.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/config/problem_file.hpp"
 
 namespace brainshift::client {
 namespace {

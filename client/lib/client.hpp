@@ -22,9 +22,9 @@
 #include <memory>
 #include <string>
 
-#include "common/core/brain_model.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
 #include "common/core/progress.hpp"
 #include "common/wire/convert.hpp"
 

@@ -9,8 +9,8 @@
 #include "client/lib/client.hpp"
 #include "client/replay/score.hpp"
 #include "client/replay/write_file.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 
 namespace brainshift::client {
 namespace {

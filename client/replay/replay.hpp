@@ -10,7 +10,7 @@
 #include "client/replay/play.hpp"
 #include "client/replay/run_report.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 #include "common/core/progress.hpp"
 
 namespace brainshift::client {

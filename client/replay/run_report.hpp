@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::client {
 

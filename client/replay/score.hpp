@@ -16,10 +16,10 @@
 #include <optional>
 
 #include "client/replay/run_report.hpp"
-#include "common/core/brain_model.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/values/estimate.hpp"
+#include "common/io/recording/surgery_file.hpp"
 
 namespace brainshift::client {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "client/report/chart.hpp"
+#include "client/plot/chart.hpp"
 #include "client/report/figures.hpp"
 
 namespace brainshift::client {

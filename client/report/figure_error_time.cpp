@@ -4,7 +4,7 @@
 
 #include "client/report/figures.hpp"
 #include "client/report/paper_values.hpp"
-#include "client/report/xy_chart.hpp"
+#include "client/plot/xy_chart.hpp"
 
 namespace brainshift::client {
 

@@ -4,7 +4,7 @@
 #include <tuple>
 
 #include "client/report/figures.hpp"
-#include "client/report/sheet.hpp"
+#include "client/plot/sheet.hpp"
 #include "client/report/slice_panel.hpp"
 #include "common/geometry/surface.hpp"
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cctype>
 
-#include "common/io/config_file.hpp"
-#include "common/io/image_file.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -28,7 +28,7 @@ Result<Head> load_head(const std::filesystem::path& case_file, const Progress& p
   if (!config) return tl::unexpected<Error>(config.error());
   const auto inputs = io::load_case_inputs(*config);
   if (!inputs) return tl::unexpected<Error>(inputs.error());
-  auto model = scene::build_brain_model(*inputs, progress);
+  auto model = anatomy::build_brain_model(*inputs, progress);
   if (!model) return tl::unexpected<Error>(model.error());
 
   Head head;

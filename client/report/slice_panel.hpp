@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "client/report/canvas.hpp"
+#include "client/plot/canvas.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 #include "common/geometry/tet_locator.hpp"

@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "client/replay/write_file.hpp"
-#include "client/report/canvas.hpp"
+#include "client/plot/canvas.hpp"
 #include "client/report/figures.hpp"
 #include "client/report/head.hpp"
 #include "client/report/html_page.hpp"

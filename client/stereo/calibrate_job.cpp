@@ -5,7 +5,7 @@
 
 #include "client/stereo/jobs.hpp"
 #include "client/stereo/pictures.hpp"
-#include "common/io/calibration_file.hpp"
+#include "common/io/config/calibration_file.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "client/report/canvas.hpp"
-#include "common/io/file_access.hpp"
+#include "client/plot/canvas.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
 namespace {

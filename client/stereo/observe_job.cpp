@@ -6,12 +6,12 @@
 #include <map>
 
 #include "client/stereo/jobs.hpp"
-#include "common/core/observation.hpp"
-#include "common/io/file_access.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/io/model_file.hpp"
-#include "common/io/surgery_creation.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/values/observation.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_creation.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {

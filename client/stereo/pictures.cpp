@@ -7,7 +7,7 @@
 #include <array>
 #include <opencv2/imgcodecs.hpp>
 
-#include "common/io/file_access.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
 namespace {

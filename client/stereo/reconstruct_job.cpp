@@ -2,10 +2,10 @@
 #include "client/stereo/disparity_picture.hpp"
 #include "client/stereo/jobs.hpp"
 #include "client/stereo/pictures.hpp"
-#include "common/io/calibration_file.hpp"
-#include "common/io/file_access.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/io/pose_file.hpp"
+#include "common/io/config/calibration_file.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/pose_file.hpp"
 
 namespace brainshift::client {
 namespace {

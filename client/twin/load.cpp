@@ -3,7 +3,7 @@
 
 #include "common/fem/swelling.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 Vec3 craniotomy_centre(const BrainModel& model) {
   Vec3 centre = Vec3::Zero();
@@ -31,4 +31,4 @@ Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& 
   });
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

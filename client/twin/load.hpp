@@ -2,10 +2,10 @@
 // Swelling of the simulated surgeries (fem/swelling.hpp).
 #pragma once
 
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 // theta(r) = volume_strain (1 - (r / radius)^2)^2 within radius of the centre, 0 outside: densest in the
 // middle, fading out without an edge.
@@ -27,4 +27,4 @@ double volume_strain_at(const Swelling& swelling, double distance_mm);
 Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
                      const Swelling& swelling);
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

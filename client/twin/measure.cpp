@@ -8,7 +8,7 @@
 
 #include "common/geometry/surface.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 constexpr std::uint64_t kSeeds = std::uint64_t{1} << 53;
@@ -98,4 +98,4 @@ TumourBoundary measure_probe_sections(const TriangleSurface& deformed_tumour,
   return boundary;
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -4,10 +4,10 @@
 
 #include "client/twin/scenario.hpp"
 #include "common/core/mesh.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/observation.hpp"
 #include "common/core/random.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 // Adds noise of normally distributed magnitude (zero mean, sd_mm) and uniform direction to every column
 // (paper 2.6). Per component the standard deviation is sd_mm / sqrt(3).
@@ -29,4 +29,4 @@ TumourBoundary measure_probe_sections(const TriangleSurface& deformed_tumour,
 CorticalSurface measure_cortex(const TriangleSurface& deformed, const CortexView& view,
                                Random& random);
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/scenario.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 namespace {
 
@@ -125,4 +125,4 @@ const Scenario* find_scenario(const std::string& name) {
   return nullptr;
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -12,7 +12,7 @@
 
 #include "client/twin/load.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 enum class Measurement {
   kDisplacements,  // 200 tumour surface points with noisy displacements (the paper's simulated data)
@@ -57,4 +57,4 @@ struct Scenario {
 const std::vector<Scenario>& all_scenarios();
 const Scenario* find_scenario(const std::string& name);  // nullptr when unknown
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

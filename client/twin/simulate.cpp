@@ -3,14 +3,14 @@
 
 #include "client/twin/scenario.hpp"
 #include "client/twin/surgery.hpp"
-#include "common/fem/blas_threads.hpp"
-#include "common/io/config_file.hpp"
-#include "common/io/surgery_creation.hpp"
-#include "common/io/surgery_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/recording/surgery_creation.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "common/wire/convert.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 struct Patient {
@@ -23,7 +23,7 @@ Result<Patient> load_patient(const std::filesystem::path& case_file, const Progr
   if (!config) return tl::unexpected(config.error());
   auto inputs = io::load_case_inputs(*config);
   if (!inputs) return tl::unexpected(inputs.error());
-  auto model = scene::build_brain_model(*inputs, progress);
+  auto model = anatomy::build_brain_model(*inputs, progress);
   if (!model) return tl::unexpected(model.error());
   return Patient{std::move(*config), std::move(*model)};
 }
@@ -73,7 +73,7 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
   if (std::filesystem::exists(options.out)) {
     return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
   }
-  fem::use_single_threaded_blas();  // before the first factorisation
+  linalg::use_single_threaded_blas();  // before the first factorisation
   auto patient = load_patient(options.case_file, progress);
   if (!patient) return tl::unexpected(patient.error());
   const auto surgery =
@@ -83,4 +83,4 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
   return write_surgery(options, *patient, *surgery);
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -17,7 +17,7 @@
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 struct ScenarioInfo {
   std::string name;
@@ -35,4 +35,4 @@ struct SimulateOptions {
 // kNotFound for an unknown scenario (the sentence lists the known ones); else as io, scene and fem.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -7,7 +7,7 @@
 
 #include "common/core/random.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 constexpr int kFeatures = 200;
@@ -55,4 +55,4 @@ VariedBrain vary_stiffness(const BrainModel& model, const CaseConfig& config, do
   return varied;
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

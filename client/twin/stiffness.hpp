@@ -8,10 +8,10 @@
 
 #include <cstdint>
 
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 inline constexpr int kStiffnessClasses = 9;
 
@@ -24,4 +24,4 @@ struct VariedBrain {
 VariedBrain vary_stiffness(const BrainModel& model, const CaseConfig& config, double sd,
                            double length_mm, std::uint64_t seed);
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

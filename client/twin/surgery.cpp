@@ -14,7 +14,7 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/registration/surface_distances.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 constexpr double kBetweenInstruments_s = 2.0;
@@ -232,4 +232,4 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   return play(model, config, forward, scenario, seed, progress);
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

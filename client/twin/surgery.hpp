@@ -7,14 +7,14 @@
 
 #include "client/twin/scenario.hpp"
 #include "common/contact/forward_model.hpp"
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/observation.hpp"
 #include "common/core/progress.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 // One entry per observation in both: of the moments in turn, every instrument of a moment with the same truth.
 struct SimulatedSurgery {
@@ -38,4 +38,4 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -13,7 +13,7 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/signed_distance_grid.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 constexpr double kWhiteMatterQuantile = 0.9;  // of the intensities in the brain
@@ -154,4 +154,4 @@ Result<VoxelImage> mri_with_tumour(const VoxelImage& mri, const VoxelImage& brai
   return image;
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

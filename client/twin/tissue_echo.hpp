@@ -17,7 +17,7 @@
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 struct TissueEcho {
   VoxelImage scatter;
@@ -42,4 +42,4 @@ Result<VoxelImage> mri_with_tumour(const VoxelImage& mri, const VoxelImage& brai
                                    const TriangleSurface& tumour,
                                    const TumourAppearance& appearance = {});
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

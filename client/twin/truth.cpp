@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 TruthSolver::TruthSolver(const contact::ForwardModel& forward)
     : forward_(forward),
@@ -45,7 +45,7 @@ Result<Points> TruthSolver::solve_with(const contact::ActiveSet& active, const P
     if (active[i] != factored_[i]) changed.push_back(static_cast<int>(i));
   }
   if (factored_.empty() || changed.size() > kMaxCorrected) {
-    fem::SymmetricMatrix k_p = forward_.stiffness();
+    linalg::SymmetricMatrix k_p = forward_.stiffness();
     forward_.contact().add_stiffness(k_p, forward_.dofs(), active);
     factored_.clear();  // a failed factorisation leaves nothing to reuse
     changed.clear();
@@ -80,4 +80,4 @@ Result<Truth> TruthSolver::solve(const Points& load) {
                                             std::to_string(kMaxIterations) + " solves");
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

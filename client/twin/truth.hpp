@@ -13,7 +13,7 @@
 #include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 struct Truth {
   Points displacement;  // 3 x n, mm
@@ -46,4 +46,4 @@ class TruthSolver {
   contact::ActiveSet factored_;  // the set that penalised_ holds; empty: none yet
 };
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -10,7 +10,7 @@
 
 #include "common/geometry/mask.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 namespace {
 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
@@ -277,4 +277,4 @@ tracking::Recording simulate_ultrasound(const TissueEcho& tissue, const ProbeWin
   return recording;
 }
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

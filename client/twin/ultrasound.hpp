@@ -17,11 +17,11 @@
 #pragma once
 
 #include "client/twin/tissue_echo.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/random.hpp"
 #include "common/tracking/recording.hpp"
 
-namespace brainshift::twin {
+namespace brainshift::client {
 
 // The opening in the skull: an ellipse in the plane tangential to the brain.
 struct ProbeWindow {
@@ -66,4 +66,4 @@ tracking::Recording simulate_ultrasound(const TissueEcho& tissue, const ProbeWin
                                         const UltrasoundProbe& probe, const UltrasoundSweep& sweep,
                                         Random& random);
 
-}  // namespace brainshift::twin
+}  // namespace brainshift::client

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
-#include "common/fem/checked_solve.hpp"
+#include "common/linalg/checked_solve.hpp"
 
 namespace brainshift::contact {
 
-Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
+Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
                                            const Points& load,
@@ -17,18 +17,18 @@ Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness
   fem::StiffnessFactor penalised = factor.clone_analysis();
   while (solution.iterations < options.max_iterations && !solution.converged) {
     VecX unknowns;
-    Result<fem::SolveQuality> quality;
+    Result<linalg::SolveQuality> quality;
     if (count(solution.active) == 0) {
-      quality = fem::checked_solve(stiffness, fem::max_norm(stiffness), factor,
+      quality = linalg::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
                                    dofs.restrict_to(load), unknowns);
     } else {
-      fem::SymmetricMatrix k_p = stiffness;
+      linalg::SymmetricMatrix k_p = stiffness;
       contact.add_stiffness(k_p, dofs, solution.active);
       Points b_p = load;
       contact.add_load(b_p, solution.active);
       if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
       quality =
-          fem::checked_solve(k_p, fem::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
+          linalg::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
     }
     if (!quality) return tl::unexpected(quality.error());
     solution.backward_error = std::max(solution.backward_error, quality->backward_error);

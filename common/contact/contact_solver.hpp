@@ -30,7 +30,7 @@ struct ContactSolverOptions {
 // stiffness: K (lower), dofs and contact as prepared; load: 3 x n, N.
 // Fails as StiffnessFactor and fem::checked_solve do; kNotConverged only by converged == false in the result (best
 // iterate kept).
-Result<ContactSolution> solve_with_contact(const fem::SymmetricMatrix& stiffness,
+Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
                                            const Points& load,

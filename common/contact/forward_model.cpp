@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/contact/tissues.hpp"
-#include "common/fem/checked_solve.hpp"
+#include "common/linalg/checked_solve.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
@@ -29,9 +29,9 @@ fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
 
 Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig& config,
                                        const fem::MaterialMap& materials, const fem::DofMap& dofs,
-                                       const fem::SymmetricMatrix& stiffness) {
+                                       const linalg::SymmetricMatrix& stiffness) {
   if (config.scene.pressure != Carry::kOn) {
-    auto drained = fem::SparseCholesky::factorise(stiffness);
+    auto drained = linalg::SparseCholesky::factorise(stiffness);
     if (!drained) return tl::unexpected(drained.error());
     return fem::StiffnessFactor(std::move(*drained));
   }
@@ -46,12 +46,12 @@ Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig
 
 }  // namespace
 
-ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
+ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, linalg::SymmetricMatrix stiffness,
                            fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s)
     : boundary_(boundary),
       dofs_(std::move(dofs)),
       stiffness_(std::move(stiffness)),
-      stiffness_norm_(fem::max_norm(stiffness_)),
+      stiffness_norm_(linalg::max_norm(stiffness_)),
       factor_(std::move(factor)),
       contact_(std::move(contact)),
       assemble_s_(assemble_s) {}
@@ -63,7 +63,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   fem::DofMap dofs = constrain(model, boundary);
   const auto materials = tissue_map(model, config.material);
   if (!materials) return tl::unexpected(materials.error());
-  fem::SymmetricMatrix stiffness = fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
+  linalg::SymmetricMatrix stiffness = fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
   const double assemble_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -91,7 +91,7 @@ std::uint64_t ForwardModel::bytes() const {
 Status ForwardModel::solve(const Points& load, Points& u) const {
   VecX unknowns;
   const auto quality =
-      fem::checked_solve(stiffness_, stiffness_norm_, factor_, dofs_.restrict_to(load), unknowns);
+      linalg::checked_solve(stiffness_, stiffness_norm_, factor_, dofs_.restrict_to(load), unknowns);
   if (!quality) return tl::unexpected(quality.error());
   dofs_.expand(unknowns, u);
   return {};

@@ -16,10 +16,10 @@
 
 #include "common/contact/contact_solver.hpp"
 #include "common/contact/penalty.hpp"
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 #include "common/core/progress.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/stiffness_factor.hpp"
@@ -35,7 +35,7 @@ class ForwardModel {
   Boundary boundary() const { return boundary_; }
   const fem::DofMap& dofs() const { return dofs_; }
   // Of drained elasticity, with or without pressure; the contact stiffness is added to it.
-  const fem::SymmetricMatrix& stiffness() const { return stiffness_; }
+  const linalg::SymmetricMatrix& stiffness() const { return stiffness_; }
   const fem::StiffnessFactor& factor() const { return factor_; }
   // No pairs under the fixed boundary condition.
   const PenaltyContact& contact() const { return contact_; }
@@ -50,11 +50,11 @@ class ForwardModel {
   Result<ContactSolution> solve_with_contact(const Points& load) const;
 
  private:
-  ForwardModel(Boundary boundary, fem::DofMap dofs, fem::SymmetricMatrix stiffness,
+  ForwardModel(Boundary boundary, fem::DofMap dofs, linalg::SymmetricMatrix stiffness,
                fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s);
   Boundary boundary_;
   fem::DofMap dofs_;
-  fem::SymmetricMatrix stiffness_;
+  linalg::SymmetricMatrix stiffness_;
   double stiffness_norm_;  // fem::max_norm
   fem::StiffnessFactor factor_;
   PenaltyContact contact_;

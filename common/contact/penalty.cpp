@@ -27,7 +27,7 @@ ActiveSet PenaltyContact::penetrating(const Points& u) const {
   return active;
 }
 
-void PenaltyContact::add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+void PenaltyContact::add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                                    const ActiveSet& active) const {
   assert(active.size() == pairs_.size());
   for (int i = 0; i < num_slaves(); ++i) {

@@ -36,7 +36,7 @@ class PenaltyContact {
   ActiveSet penetrating(const Points& u) const;
 
   // K_p from K.
-  void add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+  void add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                      const ActiveSet& active) const;
   // b_p from b (3 x n, N).
   void add_load(Points& b, const ActiveSet& active) const;

@@ -68,7 +68,7 @@ VecX SurfaceContact::penetration(const Points& u) const {
   return p;
 }
 
-void SurfaceContact::add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+void SurfaceContact::add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                                    const ActiveSet& active) const {
   const auto n = static_cast<std::size_t>(space_->nodes_per_face());
   for (std::size_t i = 0; i < points_.size(); ++i) {

@@ -44,7 +44,7 @@ class SurfaceContact {
   VecX penetration(const Points& u) const;
   // N . u at every point: penetration changes by minus this.
   VecX approach(const Points& u) const;
-  void add_stiffness(fem::SymmetricMatrix& lower, const fem::DofMap& dofs,
+  void add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                      const ActiveSet& active) const;
   // Adds sum over the active points of stiffness * values_i N_k N to the nodal forces (3 x n).
   void add_force(const VecX& values, const ActiveSet& active, Points& force) const;

@@ -7,8 +7,8 @@
 // The tumour comes before the regions. Density, permeability and storage are the same everywhere.
 #pragma once
 
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/fem/poro_material.hpp"
 

@@ -29,7 +29,7 @@ bool same_set(const ActiveSet& a, const ActiveSet& b, const VecX& penetration, d
 // Everything that stays the same between iterations.
 class Problem {
  public:
-  Problem(const fem::SymmetricMatrix& stiffness, const fem::ConstrainedDofs& constrained,
+  Problem(const linalg::SymmetricMatrix& stiffness, const fem::ConstrainedDofs& constrained,
           const SurfaceContact& contact, const Points& load)
       : stiffness_(stiffness),
         constrained_(constrained),
@@ -46,7 +46,7 @@ class Problem {
 
   // q of the penalised system with a fixed set. The factor is made on the first call.
   Status solve(const ActiveSet& active, VecX& q, UnilateralSolution& result) {
-    fem::SymmetricMatrix k = stiffness_;
+    linalg::SymmetricMatrix k = stiffness_;
     contact_.add_stiffness(k, constrained_.dofs, active);
     Points f = load_;
     contact_.add_force(lift_penetration_, active, f);
@@ -54,14 +54,14 @@ class Problem {
     if (factor_) {
       if (Status ok = factor_->refactorise(k); !ok) return ok;
     } else {
-      auto made = fem::SparseCholesky::factorise(k);
+      auto made = linalg::SparseCholesky::factorise(k);
       if (!made) return tl::unexpected(made.error());
       factor_.emplace(std::move(*made));
     }
     q = factor_->solve(b);
-    q += factor_->solve(b - fem::multiply(k, q));
+    q += factor_->solve(b - linalg::multiply(k, q));
     const double scale = b.norm();
-    result.relative_residual = scale > 0.0 ? (b - fem::multiply(k, q)).norm() / scale : 0.0;
+    result.relative_residual = scale > 0.0 ? (b - linalg::multiply(k, q)).norm() / scale : 0.0;
     result.rcond = factor_->rcond();
     if (!q.allFinite()) return fail(ErrorCode::kNotFinite, "the solution is not finite");
     return {};
@@ -69,7 +69,7 @@ class Problem {
 
   // t in (0, 1] that minimises the energy on the way from q to q + d. The slope grows with t: bisection.
   double line_search(const VecX& q, const VecX& d) const {
-    const VecX kd = fem::multiply(stiffness_, d);
+    const VecX kd = linalg::multiply(stiffness_, d);
     const double slope_0 = kd.dot(q) - b_.dot(d);
     const double curvature = kd.dot(d);
     const VecX p = penetration(q);
@@ -98,19 +98,19 @@ class Problem {
  private:
   VecX approach(const VecX& q) const { return contact_.approach(constrained_.dofs.expand(q)); }
 
-  const fem::SymmetricMatrix& stiffness_;
+  const linalg::SymmetricMatrix& stiffness_;
   const fem::ConstrainedDofs& constrained_;
   const SurfaceContact& contact_;
   const Points& load_;
   VecX b_;
   VecX lift_penetration_;
   std::vector<double> point_stiffness_;
-  std::optional<fem::SparseCholesky> factor_;
+  std::optional<linalg::SparseCholesky> factor_;
 };
 
 }  // namespace
 
-Result<UnilateralSolution> solve_unilateral(const fem::SymmetricMatrix& stiffness,
+Result<UnilateralSolution> solve_unilateral(const linalg::SymmetricMatrix& stiffness,
                                             const fem::ConstrainedDofs& constrained,
                                             const SurfaceContact& contact, const Points& load,
                                             const UnilateralOptions& options,

@@ -9,7 +9,7 @@
 
 #include "common/contact/surface_contact.hpp"
 #include "common/core/progress.hpp"
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "common/fem/displacement_constraints.hpp"
 
 namespace brainshift::contact {
@@ -31,7 +31,7 @@ struct UnilateralOptions {
 
 // stiffness: K of the constrained unknowns (lower); load: f - K lift, 3 x n nodal. kNotConverged after
 // max_iterations; kFloatingBody when the body comes loose; otherwise as SparseCholesky.
-Result<UnilateralSolution> solve_unilateral(const fem::SymmetricMatrix& stiffness,
+Result<UnilateralSolution> solve_unilateral(const linalg::SymmetricMatrix& stiffness,
                                             const fem::ConstrainedDofs& constrained,
                                             const SurfaceContact& contact, const Points& load,
                                             const UnilateralOptions& options = {},

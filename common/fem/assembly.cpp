@@ -31,7 +31,7 @@ std::vector<std::vector<int>> lower_adjacency(const Eigen::Ref<const Eigen::Matr
 
 // The block is in local axes.
 // Unknowns of one node are consecutive, so one binary search per column finds all of the block's rows.
-void scatter(SymmetricMatrix& lower, const DofMap& dofs, int row_node, int column_node,
+void scatter(linalg::SymmetricMatrix& lower, const DofMap& dofs, int row_node, int column_node,
              const Mat3& block) {
   const long* rows = lower.innerIndexPtr();
   for (int b = 0; b < 3; ++b) {
@@ -51,11 +51,11 @@ void scatter(SymmetricMatrix& lower, const DofMap& dofs, int row_node, int colum
 
 }  // namespace
 
-SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
+linalg::SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
                               const DofMap& dofs) {
   const std::vector<std::vector<int>> neighbours = lower_adjacency(elements, dofs.num_nodes());
   const long n = dofs.num_unknowns();
-  SymmetricMatrix matrix(n, n);
+  linalg::SymmetricMatrix matrix(n, n);
   std::vector<long> rows;
   std::vector<long> starts(1, 0);
   starts.reserve(static_cast<std::size_t>(n) + 1);
@@ -79,7 +79,7 @@ SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
   return matrix;
 }
 
-void add_block(SymmetricMatrix& lower, const DofMap& dofs, NodeIndex row_node,
+void add_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeIndex row_node,
                NodeIndex column_node, Mat3 block) {
   if (!dofs.has_identity_frame(row_node)) block = dofs.frame(row_node).transpose() * block;
   if (!dofs.has_identity_frame(column_node)) block = block * dofs.frame(column_node);

@@ -9,20 +9,20 @@ namespace brainshift::fem {
 
 // Zero matrix with the pattern of the assembled lower triangle: any two nodes of an element are coupled.
 // elements: nodes per element x m.
-SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
+linalg::SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
                               const DofMap& dofs);
 
 // Adds the 3 x 3 block (RAS axes) of node pair (row node, column node) to the lower triangle; entries above the
 // diagonal and of constrained unknowns are skipped. Precondition: an element holds both nodes.
-void add_block(SymmetricMatrix& lower, const DofMap& dofs, NodeIndex row_node,
+void add_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeIndex row_node,
                NodeIndex column_node, Mat3 block);
 
 // Assembles element by element. element_blocks(e) returns a function of two local nodes that gives their block
 // in RAS axes, of which pairs below the diagonal are asked for.
 template <typename ElementBlocks>
-SymmetricMatrix assemble_lower(const Eigen::Ref<const Eigen::MatrixXi>& elements,
+linalg::SymmetricMatrix assemble_lower(const Eigen::Ref<const Eigen::MatrixXi>& elements,
                                const DofMap& dofs, const ElementBlocks& element_blocks) {
-  SymmetricMatrix lower = lower_pattern(elements, dofs);
+  linalg::SymmetricMatrix lower = lower_pattern(elements, dofs);
   for (Eigen::Index e = 0; e < elements.cols(); ++e) {
     const auto block = element_blocks(static_cast<int>(e));
     for (int i = 0; i < elements.rows(); ++i) {

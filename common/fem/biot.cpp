@@ -125,7 +125,7 @@ Result<BiotStepper::Kept*> BiotStepper::factor_for(double dt_s) {
   }
   const BiotMatrix matrix =
       assemble_biot(mesh_, materials_, dofs_, pressure_, dt_s, options_.stabilise);
-  auto factor = SymmetricIndefinite::factorise(matrix.lower, matrix.pressure_unknowns);
+  auto factor = linalg::SymmetricIndefinite::factorise(matrix.lower, matrix.pressure_unknowns);
   if (!factor) return tl::unexpected(factor.error());
   if (factors_.size() >= static_cast<std::size_t>(std::max(1, options_.kept_factors))) {
     factors_.erase(std::min_element(factors_.begin(), factors_.end(), [](auto& a, auto& b) {
@@ -208,7 +208,7 @@ Result<BiotState> BiotStepper::step(const BiotState& state, const BiotLoad& load
   ++steps_;
   const auto kept = factor_for(dt_s);
   if (!kept) return tl::unexpected(kept.error());
-  const SymmetricIndefinite& factor = (*kept)->factor;
+  const linalg::SymmetricIndefinite& factor = (*kept)->factor;
 
   BiotState next = with_prescribed(state, load);
   VecX correction;

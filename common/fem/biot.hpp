@@ -17,7 +17,7 @@
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/biot_matrix.hpp"
-#include "common/fem/symmetric_indefinite.hpp"
+#include "common/linalg/symmetric_indefinite.hpp"
 
 namespace brainshift::fem {
 
@@ -75,7 +75,7 @@ class BiotStepper {
   BiotStepper(const TetMesh& mesh, const MaterialMap& materials, const DofMap& dofs,
               const std::vector<NodeIndex>& drained, const BiotOptions& options);
   struct Kept {
-    SymmetricIndefinite factor;
+    linalg::SymmetricIndefinite factor;
     int stabilised_tets = 0;
     long last_used = 0;
   };

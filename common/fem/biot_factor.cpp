@@ -11,16 +11,16 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-BiotFactor::BiotFactor(BiotMatrix matrix, SymmetricIndefinite factor)
+BiotFactor::BiotFactor(BiotMatrix matrix, linalg::SymmetricIndefinite factor)
     : matrix_(std::move(matrix)), factor_(std::move(factor)) {}
 
 Result<BiotFactor> BiotFactor::factorise(BiotMatrix matrix) {
-  auto factor = SymmetricIndefinite::factorise(matrix.lower, matrix.pressure_unknowns);
+  auto factor = linalg::SymmetricIndefinite::factorise(matrix.lower, matrix.pressure_unknowns);
   if (!factor) return tl::unexpected(factor.error());
   return BiotFactor(std::move(matrix), std::move(*factor));
 }
 
-Status BiotFactor::refactorise(const SymmetricMatrix& stiffness) {
+Status BiotFactor::refactorise(const linalg::SymmetricMatrix& stiffness) {
   replace_stiffness(matrix_, stiffness);
   return factor_.refactorise(matrix_.lower);
 }

@@ -7,9 +7,9 @@
 // dense and never formed: a solve is one with the factor of the whole matrix.
 #pragma once
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/fem/biot_matrix.hpp"
-#include "common/fem/symmetric_indefinite.hpp"
+#include "common/linalg/symmetric_indefinite.hpp"
 
 namespace brainshift::fem {
 
@@ -19,7 +19,7 @@ class BiotFactor {
   static Result<BiotFactor> factorise(BiotMatrix matrix);
 
   // Another stiffness of the same pattern (K_p for K); the pressure's blocks stay.
-  Status refactorise(const SymmetricMatrix& stiffness);
+  Status refactorise(const linalg::SymmetricMatrix& stiffness);
   BiotFactor clone_analysis() const;
 
   // A solve that fails its guards (SymmetricIndefinite::solve) leaves NaN everywhere.
@@ -34,9 +34,9 @@ class BiotFactor {
   double factor_seconds() const { return factor_.factor_seconds(); }
 
  private:
-  BiotFactor(BiotMatrix matrix, SymmetricIndefinite factor);
+  BiotFactor(BiotMatrix matrix, linalg::SymmetricIndefinite factor);
   BiotMatrix matrix_;
-  SymmetricIndefinite factor_;
+  linalg::SymmetricIndefinite factor_;
 };
 
 }  // namespace brainshift::fem

@@ -110,7 +110,7 @@ BiotElement biot_element(const TetGeometry& geometry, const PoroMaterial& materi
 
 BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, const DofMap& dofs,
                          const PressureMap& pressure, double dt_s, bool stabilise) {
-  const SymmetricMatrix stiffness = assemble_stiffness(mesh, materials.elastic(), dofs);
+  const linalg::SymmetricMatrix stiffness = assemble_stiffness(mesh, materials.elastic(), dofs);
   const PressureBlocks blocks = pressure_blocks(mesh, materials, dofs, pressure, dt_s, stabilise);
   BiotMatrix matrix;
   matrix.displacement_unknowns = dofs.num_unknowns();
@@ -126,7 +126,7 @@ BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, cons
   long next = 0;
   for (long j = 0; j < nu; ++j) {
     starts[j] = next;
-    for (SymmetricMatrix::InnerIterator it(stiffness, j); it; ++it) {
+    for (linalg::SymmetricMatrix::InnerIterator it(stiffness, j); it; ++it) {
       rows[next] = it.row();
       values[next++] = it.value();
     }
@@ -146,7 +146,7 @@ BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, cons
   return matrix;
 }
 
-void replace_stiffness(BiotMatrix& matrix, const SymmetricMatrix& stiffness) {
+void replace_stiffness(BiotMatrix& matrix, const linalg::SymmetricMatrix& stiffness) {
   assert(stiffness.rows() == matrix.displacement_unknowns);
   for (long j = 0; j < stiffness.outerSize(); ++j) {
     const long count = stiffness.outerIndexPtr()[j + 1] - stiffness.outerIndexPtr()[j];

@@ -52,7 +52,7 @@ BiotElement biot_element(const TetGeometry& geometry, const PoroMaterial& materi
                          bool stabilise);
 
 struct BiotMatrix {
-  SymmetricMatrix lower;
+  linalg::SymmetricMatrix lower;
   int displacement_unknowns = 0, pressure_unknowns = 0;
   int stabilised_tets = 0;  // elements with theta > 0
 };
@@ -60,6 +60,6 @@ struct BiotMatrix {
 BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, const DofMap& dofs,
                          const PressureMap& pressure, double dt_s, bool stabilise = true);
 // Puts another stiffness of the same pattern, K_p say, in the place of K.
-void replace_stiffness(BiotMatrix& matrix, const SymmetricMatrix& stiffness);
+void replace_stiffness(BiotMatrix& matrix, const linalg::SymmetricMatrix& stiffness);
 
 }  // namespace brainshift::fem

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/fem/block_solver.hpp"
 
-#include "common/fem/checked_solve.hpp"
+#include "common/linalg/checked_solve.hpp"
 
 namespace brainshift::fem {
 
-BlockSolver::BlockSolver(const SymmetricMatrix& stiffness, const StiffnessFactor& factor,
+BlockSolver::BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor,
                          const DofMap& dofs)
     : stiffness_(stiffness),
-      norm_(max_norm(stiffness)),
+      norm_(linalg::max_norm(stiffness)),
       factor_(factor),
       dofs_(dofs),
       nodal_(3, dofs.num_nodes()) {}
@@ -21,7 +21,7 @@ Status BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displac
     rhs_.col(j) = column_;
   }
   factor_.solve_many(rhs_, unknowns_, workspace_);
-  const auto checked = check_many(stiffness_, norm_, factor_, rhs_, unknowns_, workspace_);
+  const auto checked = linalg::check_many(stiffness_, norm_, factor_, rhs_, unknowns_, workspace_);
   if (!checked) return tl::unexpected(checked.error());
   displacements.resize(loads.rows(), loads.cols());
   for (Eigen::Index j = 0; j < loads.cols(); ++j) {

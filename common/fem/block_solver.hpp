@@ -11,13 +11,13 @@ namespace brainshift::fem {
 class BlockSolver {
  public:
   // Keeps references to all three. stiffness: the matrix of the factor.
-  BlockSolver(const SymmetricMatrix& stiffness, const StiffnessFactor& factor, const DofMap& dofs);
+  BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor, const DofMap& dofs);
 
   // U = T K^-1 T^T F; columns are nodal vectors, node-major, 3n rows; F in N, U in mm. Errors as check_many.
   Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
 
  private:
-  const SymmetricMatrix& stiffness_;
+  const linalg::SymmetricMatrix& stiffness_;
   double norm_;
   const StiffnessFactor& factor_;
   const DofMap& dofs_;

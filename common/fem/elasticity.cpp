@@ -25,13 +25,13 @@ TetGeometry tet_geometry(const TetMesh& mesh, int tet) {
   return geometry;
 }
 
-SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
+linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
                                    const DofMap& dofs) {
   return assemble_stiffness(
       mesh, std::vector<Elasticity>(static_cast<std::size_t>(mesh.num_tets()), material), dofs);
 }
 
-SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
+linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
                                    const DofMap& dofs) {
   assert(of_tet.size() == static_cast<std::size_t>(mesh.num_tets()));
   return assemble_lower(mesh.tets, dofs, [&](int tet) {
@@ -47,13 +47,13 @@ SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasti
   });
 }
 
-void add_to_node_block(SymmetricMatrix& lower, const DofMap& dofs, NodeIndex node,
+void add_to_node_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeIndex node,
                        const Mat3& block) {
   assert(dofs.has_identity_frame(node));
   add_block(lower, dofs, node, node, block);
 }
 
-VecX multiply(const SymmetricMatrix& lower, const VecX& x) {
+VecX linalg::multiply(const linalg::SymmetricMatrix& lower, const VecX& x) {
   return lower.selfadjointView<Eigen::Lower>() * x;
 }
 

@@ -15,7 +15,7 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/dof_map.hpp"
@@ -40,20 +40,20 @@ struct TetGeometry {
 TetGeometry tet_geometry(const TetMesh& mesh, int tet);
 
 // Lower triangle (diagonal included) of T^T K T in the unknowns of `dofs`, compressed, sorted; N/mm.
-using SymmetricMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, long>;
-SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
+using linalg::SymmetricMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, long>;
+linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
                                    const DofMap& dofs);
 // One material per tetrahedron.
-SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
+linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
                                    const DofMap& dofs);
 
 // Adds a symmetric 3 x 3 block (RAS axes) to the diagonal block of `node`. Precondition: the node has the
 // identity frame and no constraint (slaves do).
-void add_to_node_block(SymmetricMatrix& lower, const DofMap& dofs, NodeIndex node,
+void add_to_node_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeIndex node,
                        const Mat3& block);
 
 // y = K x from the lower triangle.
-VecX multiply(const SymmetricMatrix& lower, const VecX& x);
+VecX linalg::multiply(const linalg::SymmetricMatrix& lower, const VecX& x);
 
 // Volume that belongs to each node: a quarter of every adjacent tetrahedron, mm^3. Sums to the mesh volume.
 VecX nodal_volumes(const TetMesh& mesh);

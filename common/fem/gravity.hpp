@@ -7,7 +7,7 @@
 // is what makes a brain sag.
 #pragma once
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::fem {

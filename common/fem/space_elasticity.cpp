@@ -76,7 +76,7 @@ Mat3 gradient_of(const DisplacementSpace& space, const Points& u, int element,
 
 }  // namespace
 
-SymmetricMatrix assemble_stiffness(const DisplacementSpace& space, const MaterialMap& materials,
+linalg::SymmetricMatrix assemble_stiffness(const DisplacementSpace& space, const MaterialMap& materials,
                                    const DofMap& dofs) {
   assert(static_cast<int>(materials.of_tet.size()) == space.num_elements());
   return assemble_lower(space.elements, dofs, [&](int element) {

@@ -19,7 +19,7 @@ using VectorField = std::function<Vec3(const Vec3& x)>;
 using Stress = Eigen::Matrix<double, 6, 1>;
 
 // Lower triangle of T^T K T, as assemble_stiffness of elasticity.hpp, of which it is the general form.
-SymmetricMatrix assemble_stiffness(const DisplacementSpace& space, const MaterialMap& materials,
+linalg::SymmetricMatrix assemble_stiffness(const DisplacementSpace& space, const MaterialMap& materials,
                                    const DofMap& dofs);
 
 // K u element by element, without constraints: nodal forces that balance the stress of u. 3 x n.

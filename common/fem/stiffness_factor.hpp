@@ -11,24 +11,24 @@
 #include <variant>
 
 #include "common/fem/biot_factor.hpp"
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 
 namespace brainshift::fem {
 
 class StiffnessFactor {
  public:
   // What one thread needs to solve with a factor that several threads share.
-  using Workspace = SparseCholesky::Workspace;
+  using Workspace = linalg::SparseCholesky::Workspace;
 
-  explicit StiffnessFactor(SparseCholesky factor) : factor_(std::move(factor)) {}
+  explicit StiffnessFactor(linalg::SparseCholesky factor) : factor_(std::move(factor)) {}
   explicit StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}
 
   // The factor of drained elasticity; none with pressure.
-  const SparseCholesky* drained() const { return std::get_if<SparseCholesky>(&factor_); }
+  const linalg::SparseCholesky* drained() const { return std::get_if<linalg::SparseCholesky>(&factor_); }
   bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
 
   // As SparseCholesky. With pressure, a solve that fails its guards is NaN everywhere.
-  Status refactorise(const SymmetricMatrix& stiffness) {
+  Status refactorise(const linalg::SymmetricMatrix& stiffness) {
     return std::visit([&](auto& f) { return f.refactorise(stiffness); }, factor_);
   }
   StiffnessFactor clone_analysis() const {
@@ -43,7 +43,7 @@ class StiffnessFactor {
     return x;
   }
   void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const {
-    if (const auto* cholesky = std::get_if<SparseCholesky>(&factor_)) {
+    if (const auto* cholesky = std::get_if<linalg::SparseCholesky>(&factor_)) {
       cholesky->solve_many(b, x, workspace);
     } else {
       std::get<BiotFactor>(factor_).solve_many(b, x);
@@ -76,7 +76,7 @@ class StiffnessFactor {
   }
 
  private:
-  std::variant<SparseCholesky, BiotFactor> factor_;
+  std::variant<linalg::SparseCholesky, BiotFactor> factor_;
 };
 
 }  // namespace brainshift::fem

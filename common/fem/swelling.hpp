@@ -11,7 +11,7 @@
 
 #include <functional>
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::fem {

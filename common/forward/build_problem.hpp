@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/core/grouped_mesh.hpp"
-#include "common/core/problem_spec.hpp"
+#include "common/values/problem_spec.hpp"
 #include "common/forward/forward_problem.hpp"
 
 namespace brainshift::forward {

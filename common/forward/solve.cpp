@@ -257,7 +257,7 @@ Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& pro
     return tl::unexpected(ok.error());
   }
 
-  const fem::SymmetricMatrix stiffness =
+  const linalg::SymmetricMatrix stiffness =
       fem::assemble_stiffness(space, problem.materials, constrained.dofs);
   const Points lifted = load - fem::internal_force(space, problem.materials, constrained.lift);
   solution.unknowns = constrained.dofs.num_unknowns();

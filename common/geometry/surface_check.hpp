@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "common/core/brain_model.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 

@@ -1,39 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/invert.hpp"
 
-#include "common/inversion/condensed_exact.hpp"
-#include "common/inversion/conjugate_gradients.hpp"
-#include "common/inversion/data_check.hpp"
-#include "common/inversion/estimate_check.hpp"
-#include "common/inversion/iterative_system.hpp"
-#include "common/inversion/refactorised_system.hpp"
-#include "common/inversion/steepest_descent.hpp"
-#include "common/inversion/woodbury_system.hpp"
+#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/inversion/descent/conjugate_gradients.hpp"
+#include "common/inversion/contract/data_check.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
+#include "common/contact/iterative_system.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "common/inversion/descent/steepest_descent.hpp"
+#include "common/contact/woodbury_system.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
 Result<Estimate> paper(const PreparedModel& model, const SparseData& data,
                        const InversionOptions& options) {
-  RefactorisedSystem system(model.forward());
+  contact::RefactorisedSystem system(model.forward());
   return steepest_descent(model, data, options, system);
 }
 
 Result<Estimate> paper_woodbury(const PreparedModel& model, const SparseData& data,
                                 const InversionOptions& options) {
-  WoodburySystem system(model.forward());
+  contact::WoodburySystem system(model.forward());
   return steepest_descent(model, data, options, system);
 }
 
 Result<Estimate> gradients_woodbury(const PreparedModel& model, const SparseData& data,
                                     const InversionOptions& options) {
-  WoodburySystem system(model.forward());
+  contact::WoodburySystem system(model.forward());
   return conjugate_gradients(model, data, options, system);
 }
 
 Result<Estimate> gradients_iterative(const PreparedModel& model, const SparseData& data,
                                      const InversionOptions& options) {
-  const auto system = IterativeSystem::build(model.forward());
+  const auto system = contact::IterativeSystem::build(model.forward());
   if (!system) return tl::unexpected(system.error());
   return conjugate_gradients(model, data, options, **system);
 }

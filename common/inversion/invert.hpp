@@ -6,10 +6,10 @@
 #include <stop_token>
 
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/sparse_data.hpp"
-#include "common/inversion/moving_data.hpp"
-#include "common/inversion/prepared_model.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/sparse_data.hpp"
+#include "common/inversion/contract/moving_data.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 
 namespace brainshift::inversion {
 

@@ -24,7 +24,7 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/core/sparse_data.hpp"
+#include "common/values/sparse_data.hpp"
 #include "common/core/types.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"

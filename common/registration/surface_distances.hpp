@@ -11,9 +11,9 @@
 
 #include <vector>
 
-#include "common/core/brain_model.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
-#include "common/core/sparse_data.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::registration {
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
 
 namespace brainshift::stereo {

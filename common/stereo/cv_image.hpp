@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
 
 namespace brainshift::stereo {

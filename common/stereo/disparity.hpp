@@ -17,7 +17,7 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
 #include "common/stereo/rectify.hpp"
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/outliers.hpp"
 #include "common/stereo/parts.hpp"
 

@@ -10,7 +10,7 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
 
 namespace brainshift::stereo {

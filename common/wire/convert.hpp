@@ -17,10 +17,10 @@
 #include <string>
 #include <string_view>
 
-#include "common/core/brain_model.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::wire {
 

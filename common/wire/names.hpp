@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::wire {
 

@@ -21,7 +21,7 @@
 #include <thread>
 
 #include "common/core/error.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 
 namespace brainshift::server {
 

@@ -5,7 +5,7 @@
 #include <exception>
 #include <string>
 
-#include "common/fem/blas_threads.hpp"
+#include "common/linalg/blas_threads.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/prepare_command.hpp"
 #include "server/main/serve_command.hpp"
@@ -74,7 +74,7 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  brainshift::fem::use_single_threaded_blas();
+  brainshift::linalg::use_single_threaded_blas();
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {

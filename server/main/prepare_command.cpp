@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/brain_model.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/prepared_model.hpp"
-#include "common/io/checkpoint_file.hpp"
-#include "common/io/config_file.hpp"
-#include "common/io/model_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
-#include "common/scene/scene_plan.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
+#include "common/io/model/checkpoint_file.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
+#include "server/pipeline/scene_plan.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
 
@@ -112,7 +112,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto status = check_output(arguments.out); !status) return tl::unexpected(status.error());
   auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
-  if (auto plan = scene::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
+  if (auto plan = server::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
 
@@ -126,7 +126,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   outcome.read_s = seconds_since(start);
 
   start = Clock::now();
-  auto model = scene::build_brain_model(*inputs, bar.progress(""));
+  auto model = anatomy::build_brain_model(*inputs, bar.progress(""));
   if (!model) return tl::unexpected(model.error());
   outcome.model = std::make_shared<const BrainModel>(std::move(*model));
   outcome.mesh_s = seconds_since(start);

@@ -8,15 +8,15 @@
 #include <memory>
 #include <utility>
 
-#include "common/io/config_file.hpp"
-#include "common/io/model_file.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/model/model_file.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/logging.hpp"
-#include "server/main/model_store.hpp"
+#include "server/session/model_store.hpp"
 #include "server/main/stop_signals.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
-#include "server/transport/service.hpp"
+#include "server/service/service.hpp"
 
 namespace brainshift::server {
 namespace {

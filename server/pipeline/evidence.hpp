@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "common/core/estimate.hpp"
-#include "common/inversion/moving_data.hpp"
+#include "common/values/estimate.hpp"
+#include "common/inversion/contract/moving_data.hpp"
 #include "server/pipeline/registration_stage.hpp"
 
 namespace brainshift::server {

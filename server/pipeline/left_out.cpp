@@ -9,7 +9,7 @@
 #include <string>
 
 #include "common/fem/biot_matrix.hpp"
-#include "common/inversion/set_search.hpp"
+#include "common/contact/set_search.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -92,7 +92,7 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
              : fmt::format("scene.contact = off; the brain stays {:.2f} mm off the skull", nearest),
          at_most_mm(errors.contact_mm)});
   } else if (boundary == Boundary::kContact && scene.contact == Carry::kAuto &&
-             active_slaves == 0 && errors.nearest_slave_mm > -inversion::kContactTolerance_mm) {
+             active_slaves == 0 && errors.nearest_slave_mm > -contact::kContactTolerance_mm) {
     omissions.push_back({"contact",
                          fmt::format("no slave touches: the nearest stays {:.2f} mm off the skull",
                                      std::max(0.0, errors.nearest_slave_mm)),

@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
-#include "common/core/estimate.hpp"
-#include "common/inversion/omission_errors.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/estimate.hpp"
+#include "common/inversion/condensed/omission_errors.hpp"
 #include "common/registration/icp.hpp"
 
 namespace brainshift::server {

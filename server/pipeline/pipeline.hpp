@@ -12,12 +12,12 @@
 #include <stop_token>
 #include <vector>
 
-#include "common/core/brain_model.hpp"
-#include "common/core/case_config.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/observation.hpp"
-#include "common/core/sparse_data.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
+#include "common/values/sparse_data.hpp"
 #include "common/inversion/invert.hpp"
 #include "server/pipeline/evidence.hpp"
 

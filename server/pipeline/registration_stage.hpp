@@ -21,11 +21,11 @@
 #include <optional>
 #include <string>
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/observation.hpp"
-#include "common/core/sparse_data.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
+#include "common/values/sparse_data.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface_check.hpp"

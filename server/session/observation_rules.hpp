@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "common/core/error.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::server {
 

@@ -24,7 +24,7 @@
 #include <tuple>
 
 #include "common/core/error.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 #include "server/pipeline/pipeline.hpp"
 

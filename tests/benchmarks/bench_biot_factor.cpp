@@ -13,11 +13,11 @@
 #include "common/contact/forward_model.hpp"
 #include "common/core/units.hpp"
 #include "common/fem/biot_matrix.hpp"
-#include "common/fem/blas_threads.hpp"
-#include "common/fem/symmetric_indefinite.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/symmetric_indefinite.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/io/config_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -51,22 +51,22 @@ double peak_gib() {
 }
 
 // |b - A x| / |b|.
-double relative_residual(const fem::SymmetricMatrix& lower, const VecX& b, const VecX& x) {
-  return (b - fem::multiply(lower, x)).norm() / b.norm();
+double relative_residual(const linalg::SymmetricMatrix& lower, const VecX& b, const VecX& x) {
+  return (b - linalg::multiply(lower, x)).norm() / b.norm();
 }
 
 // (C + G^T K^-1 G) p = -g - G^T K^-1 f by conjugate gradients, preconditioned with C + M / (lambda + 2 G).
 class SchurComplement {
  public:
-  SchurComplement(const fem::BiotMatrix& biot, const fem::SymmetricMatrix& preconditioner)
+  SchurComplement(const fem::BiotMatrix& biot, const linalg::SymmetricMatrix& preconditioner)
       : nu_(biot.displacement_unknowns), np_(biot.pressure_unknowns) {
     const auto& a = biot.lower;
     stiffness_ = a.block(0, 0, nu_, nu_);
     coupling_ = -a.block(nu_, 0, np_, nu_);  // G^T
     pressure_ = -a.block(nu_, nu_, np_, np_);
-    factor_.emplace_back(value_or_exit(fem::SparseCholesky::factorise(stiffness_)));
-    const fem::SymmetricMatrix p = pressure_ + preconditioner;
-    inner_.emplace_back(value_or_exit(fem::SparseCholesky::factorise(p)));
+    factor_.emplace_back(value_or_exit(linalg::SparseCholesky::factorise(stiffness_)));
+    const linalg::SymmetricMatrix p = pressure_ + preconditioner;
+    inner_.emplace_back(value_or_exit(linalg::SparseCholesky::factorise(p)));
   }
   VecX solve(const VecX& b, double tolerance) {
     const VecX f = b.head(nu_);
@@ -77,7 +77,7 @@ class SchurComplement {
     const double stop = tolerance * r.norm();
     for (iterations = 0; iterations < 500 && r.norm() > stop; ++iterations) {
       const VecX gd = coupling_.transpose() * d;
-      const VecX s = fem::multiply(pressure_, d) + coupling_ * factor_[0].solve(gd);
+      const VecX s = linalg::multiply(pressure_, d) + coupling_ * factor_[0].solve(gd);
       const double step = rz / d.dot(s);
       p += step * d;
       r -= step * s;
@@ -96,8 +96,8 @@ class SchurComplement {
 
  private:
   long nu_, np_;
-  fem::SymmetricMatrix stiffness_, coupling_, pressure_;
-  std::vector<fem::SparseCholesky> factor_, inner_;
+  linalg::SymmetricMatrix stiffness_, coupling_, pressure_;
+  std::vector<linalg::SparseCholesky> factor_, inner_;
 };
 
 fem::PoroMaterial tissue(const Material& material) {
@@ -125,7 +125,7 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
 
   start = Clock::now();
   const auto ldl =
-      value_or_exit(fem::SymmetricIndefinite::factorise(biot.lower, biot.pressure_unknowns));
+      value_or_exit(linalg::SymmetricIndefinite::factorise(biot.lower, biot.pressure_unknowns));
   const double ldl_s = ms_since(start) / 1e3;
   const double ldl_ms = median_ms(7, [&] { (void)ldl.solve(b, x); });
   const double residual = relative_residual(biot.lower, b, x);
@@ -150,7 +150,7 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
       fem::assemble_biot(model.mesh, mass_only, forward.dofs(), pressure, 1.0, false);
   const long nu = mass.displacement_unknowns, np = mass.pressure_unknowns;
   start = Clock::now();
-  SchurComplement schur(biot, fem::SymmetricMatrix(-mass.lower.block(nu, nu, np, np)));
+  SchurComplement schur(biot, linalg::SymmetricMatrix(-mass.lower.block(nu, nu, np, np)));
   const double schur_s = ms_since(start) / 1e3;
   const double schur_ms = median_ms(3, [&] { x = schur.solve(b, 1e-12); });
   std::printf(
@@ -168,12 +168,12 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
 
 int main(int argc, char** argv) {
   using namespace brainshift;
-  fem::use_single_threaded_blas();
+  linalg::use_single_threaded_blas();
   const char* name = std::getenv("BRAINSHIFT_CASE");
   auto config =
       value_or_exit(io::read_case_config(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE));
   const auto inputs = value_or_exit(io::load_case_inputs(config));
-  const auto model = value_or_exit(scene::build_brain_model(inputs));
+  const auto model = value_or_exit(anatomy::build_brain_model(inputs));
   std::vector<double> steps;
   for (int i = 1; i < argc; ++i) steps.push_back(std::atof(argv[i]));
   if (steps.empty()) steps = {60.0, 1.0, 0.01};

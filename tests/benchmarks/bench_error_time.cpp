@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "common/fem/blas_threads.hpp"
-#include "common/io/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/io/config/config_file.hpp"
 #include "tests/benchmarks/error_time.hpp"
 
 namespace brainshift::bench {
@@ -112,7 +112,7 @@ Status run_mesh(const Arguments& arguments, CaseConfig config, const MeshWish& w
   auto rows = CsvWriter::create(file("error_time"), kErrorTimeHeading);
   if (!rows) return tl::unexpected(rows.error());
   for (const std::string& name : arguments.scenarios) {
-    auto trial = make_trial(*head, *twin::find_scenario(name), arguments.repetitions,
+    auto trial = make_trial(*head, *client::find_scenario(name), arguments.repetitions,
                             arguments.seed, lines(wish.name + " " + name));
     if (!trial) return tl::unexpected(trial.error());
     if (Status ok = run_trial(arguments, *head, *trial, wish.thousand_nodes, *rows); !ok) return ok;
@@ -160,7 +160,7 @@ void describe(CLI::App& app, Arguments& arguments) {
                       "prior modes of the condensed method; the largest is prepared")
            ->check(CLI::Range(1, 2000)));
   std::vector<std::string> scenarios;
-  for (const twin::Scenario& each : twin::all_scenarios()) scenarios.push_back(each.name);
+  for (const client::Scenario& each : client::all_scenarios()) scenarios.push_back(each.name);
   list(app.add_option("--scenarios", arguments.scenarios, "simulated surgeries")
            ->check(CLI::IsMember(scenarios)));
   app.add_option("--repetitions", arguments.repetitions,
@@ -205,7 +205,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "bench_error_time: %s (see bench_error_time --help)\n", error.what());
     return 2;
   }
-  fem::use_single_threaded_blas();  // before the first factorisation
+  linalg::use_single_threaded_blas();  // before the first factorisation
   const Status status = bench::run(std::move(arguments));
   if (status) return 0;
   std::fprintf(stderr, "bench_error_time: %s\n", status.error().message.c_str());

@@ -18,18 +18,18 @@
 #include <nlohmann/json.hpp>
 
 #include "client/twin/surgery.hpp"
-#include "common/fem/blas.hpp"
-#include "common/fem/blas_threads.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/linalg/blas_threads.hpp"
 #include "common/fem/block_solver.hpp"
 #include "common/fem/sampling.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_exact.hpp"
-#include "common/inversion/condensed_inverter.hpp"
-#include "common/inversion/data_check.hpp"
-#include "common/io/config_file.hpp"
-#include "common/io/model_file.hpp"
-#include "common/io/surgery_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/contract/data_check.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift {
@@ -61,7 +61,7 @@ Result<io::ModelFile> load_head(const Arguments& arguments) {
   if (!config) return tl::unexpected(config.error());
   const auto inputs = io::load_case_inputs(*config);
   if (!inputs) return tl::unexpected(inputs.error());
-  auto model = scene::build_brain_model(*inputs);
+  auto model = anatomy::build_brain_model(*inputs);
   if (!model) return tl::unexpected(model.error());
   return io::ModelFile{std::move(*config), std::move(*model)};
 }
@@ -69,11 +69,11 @@ Result<io::ModelFile> load_head(const Arguments& arguments) {
 // The first observation: of a surgery file, or of a scenario played here.
 Result<Observation> first_observation(const Arguments& arguments, const io::ModelFile& head) {
   if (arguments.surgery.empty()) {
-    const auto* scenario = twin::find_scenario(arguments.scenario);
+    const auto* scenario = client::find_scenario(arguments.scenario);
     if (scenario == nullptr) {
       return fail(ErrorCode::kInvalidArgument, "--scenario " + arguments.scenario + ": unknown");
     }
-    auto played = twin::play_scenario(head.model, head.config, *scenario, arguments.seed);
+    auto played = client::play_scenario(head.model, head.config, *scenario, arguments.seed);
     if (!played) return tl::unexpected(played.error());
     return played->observations.front();
   }
@@ -111,9 +111,9 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
     active.push_back(static_cast<char>(
         std::binary_search(active_nodes.begin(), active_nodes.end(), pair.slave)));
   }
-  fem::SymmetricMatrix k_p = forward.stiffness();
+  linalg::SymmetricMatrix k_p = forward.stiffness();
   forward.contact().add_stiffness(k_p, forward.dofs(), active);
-  auto cholesky = fem::SparseCholesky::factorise(k_p);
+  auto cholesky = linalg::SparseCholesky::factorise(k_p);
   if (!cholesky) return tl::unexpected(cholesky.error());
   const fem::StiffnessFactor factor(std::move(*cholesky));
   const auto solve = [&](const Points& load) {
@@ -327,7 +327,7 @@ int run(const Arguments& arguments) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
-  brainshift::fem::use_single_threaded_blas();
+  brainshift::linalg::use_single_threaded_blas();
   CLI::App app("Compares the condensed methods with the direct posterior at every node.",
                "bench_exactness");
   brainshift::Arguments arguments;

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "client/report/xy_chart.hpp"
-#include "common/core/estimate.hpp"
+#include "client/plot/xy_chart.hpp"
+#include "common/values/estimate.hpp"
 #include "tests/benchmarks/pareto.hpp"
 
 namespace brainshift::bench {

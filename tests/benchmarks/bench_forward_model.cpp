@@ -7,11 +7,11 @@
 #include <cstdlib>
 
 #include "common/contact/forward_model.hpp"
-#include "common/fem/blas_threads.hpp"
-#include "common/inversion/load_modes.hpp"
-#include "common/inversion/prepared_model.hpp"
-#include "common/io/config_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/prior/load_modes.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 
 namespace brainshift {
 namespace {
@@ -32,7 +32,7 @@ const Head& head() {
     if (!config) stop(config.error());
     auto inputs = io::load_case_inputs(*config);
     if (!inputs) stop(inputs.error());
-    auto model = scene::build_brain_model(*inputs);
+    auto model = anatomy::build_brain_model(*inputs);
     if (!model) stop(model.error());
     return Head{std::move(*config), std::move(*model)};
   }();
@@ -59,7 +59,7 @@ BENCHMARK(Assembly)->Unit(benchmark::kMillisecond);
 void AnalyseAndFactorise(benchmark::State& state) {
   double factor_s = 0.0, analyse_s = 0.0;
   for (auto _ : state) {
-    auto factor = fem::SparseCholesky::factorise(forward().stiffness());
+    auto factor = linalg::SparseCholesky::factorise(forward().stiffness());
     factor_s += factor->factor_seconds();
     analyse_s += factor->analyse_seconds();
     benchmark::DoNotOptimize(factor);
@@ -92,7 +92,7 @@ BENCHMARK(SolveInBlocksOf64)->Unit(benchmark::kMillisecond);
 void ApplyPrior(benchmark::State& state) {
   const prior::ForcePrior prior(head().model.mesh.nodes, fem::nodal_volumes(head().model.mesh),
                                 head().config.prior.correlation_length_mm, 1e-6,
-                                inversion::load_modes(head().model, head().config));
+                                prior::load_modes(head().model, head().config));
   const Points w = Points::Random(3, head().model.mesh.num_nodes());
   Points f;
   for (auto _ : state) {
@@ -106,7 +106,7 @@ BENCHMARK(ApplyPrior)->Unit(benchmark::kMillisecond);
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
-  brainshift::fem::use_single_threaded_blas();
+  brainshift::linalg::use_single_threaded_blas();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::RunSpecifiedBenchmarks();

@@ -9,11 +9,11 @@
 
 #include "client/twin/surgery.hpp"
 #include "common/core/statistics.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_inverter.hpp"
-#include "common/inversion/estimate_check.hpp"
-#include "common/io/config_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -39,7 +39,7 @@ double median_ms(const Work& work) {
 void run(const std::string& out, const std::string& case_file) {
   const CaseConfig config = value_or_exit(io::read_case_config(case_file));
   const auto model = std::make_shared<const BrainModel>(
-      value_or_exit(scene::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+      value_or_exit(anatomy::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
   const auto operators =
@@ -47,7 +47,7 @@ void run(const std::string& out, const std::string& case_file) {
   const auto locator = std::make_shared<const geometry::TetLocator>(model->mesh);
   auto inverter = value_or_exit(inversion::CondensedInverter::build(operators, locator, config));
   const auto surgery =
-      value_or_exit(twin::play_scenario(*model, config, *twin::find_scenario("paper"), 1));
+      value_or_exit(client::play_scenario(*model, config, *client::find_scenario("paper"), 1));
   const auto& pairs = std::get<LandmarkPairs>(surgery.observations.front().body);
   const SparseData data{pairs.undeformed, pairs.deformed - pairs.undeformed,
                         VecX::Constant(pairs.undeformed.cols(), config.inversion.sigma_mm)};

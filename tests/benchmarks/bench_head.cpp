@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "common/core/statistics.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/io/config_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 
 namespace brainshift::bench {
 namespace {
@@ -64,7 +64,7 @@ Result<Head> make_head(CaseConfig config, const MeshWish& wish, const Progress& 
   const auto inputs = io::load_case_inputs(config);
   if (!inputs) return tl::unexpected(inputs.error());
   auto start = Clock::now();
-  auto model = scene::build_brain_model(*inputs, progress);
+  auto model = anatomy::build_brain_model(*inputs, progress);
   if (!model) return tl::unexpected(model.error());
   head.mesh_s = seconds_since(start);
   head.model = std::make_shared<const BrainModel>(std::move(*model));

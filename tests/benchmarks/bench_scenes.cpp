@@ -9,11 +9,11 @@
 
 #include "client/twin/surgery.hpp"
 #include "common/core/statistics.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_inverter.hpp"
-#include "common/io/config_file.hpp"
-#include "common/scene/brain_model_builder.hpp"
-#include "common/scene/scene_plan.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
+#include "server/pipeline/scene_plan.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -50,7 +50,7 @@ struct Measured {
 void run(const std::string& case_file) {
   const CaseConfig config = value_or_exit(io::read_case_config(case_file));
   const auto model = std::make_shared<const BrainModel>(
-      value_or_exit(scene::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+      value_or_exit(anatomy::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
   const auto operators =
@@ -67,7 +67,7 @@ void run(const std::string& case_file) {
   parts[3].options.gravity_modes = false;
   parts[4] = {"far_field", {}, &inversion::OmissionErrors::far_field_mm};
   parts[4].options.region_of_interest =
-      scene::region_of_interest(*model, config.scene.region_of_interest_mm);
+      server::region_of_interest(*model, config.scene.region_of_interest_mm);
   std::printf("%d nodes, %d slaves, %zu nodes within %.0f mm of the tumour\n",
               operators->num_nodes(), operators->num_slaves(),
               parts[4].options.region_of_interest.size(), config.scene.region_of_interest_mm);
@@ -80,7 +80,7 @@ void run(const std::string& case_file) {
               "diff mm", "estimate mm", "invert ms", "rebuild ms");
   for (const char* name : {"paper", "no-contact", "distension", "sag-progress"}) {
     const auto surgery =
-        value_or_exit(twin::play_scenario(*model, config, *twin::find_scenario(name), 1));
+        value_or_exit(client::play_scenario(*model, config, *client::find_scenario(name), 1));
     const std::size_t step = std::max<std::size_t>(1, surgery.observations.size() / 3);
     for (std::size_t o = 0; o < surgery.observations.size(); o += step) {
       const SparseData data =

@@ -16,8 +16,8 @@
 #include "client/replay/score.hpp"
 #include "client/twin/measure.hpp"
 #include "client/twin/surgery.hpp"
-#include "common/inversion/condensed_exact.hpp"
-#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
 
 namespace brainshift::bench {
@@ -105,11 +105,11 @@ Status write_failure(const Head& head, const Trial& trial, const Row& row, CsvWr
 
 }  // namespace
 
-Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int repetitions,
+Result<Trial> make_trial(const Head& head, const client::Scenario& scenario, int repetitions,
                          std::uint64_t seed, const Progress& progress) {
-  twin::Scenario first = scenario;
+  client::Scenario first = scenario;
   first.fluid_levels_mm.resize(1);
-  auto surgery = twin::play_scenario(*head.model, head.config, head.prepared->forward(), first,
+  auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(), first,
                                      seed, progress);
   if (!surgery) return tl::unexpected(surgery.error());
   const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
@@ -132,7 +132,7 @@ Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int r
   }
   for (int r = 1; r < repetitions; ++r) {
     trial.data.push_back(sparse_data(
-        twin::measure_displacements(recorded, moved, scenario.noise_sd_mm, random), head.config));
+        client::measure_displacements(recorded, moved, scenario.noise_sd_mm, random), head.config));
   }
   return trial;
 }

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "client/twin/scenario.hpp"
-#include "common/core/estimate.hpp"
-#include "common/core/sparse_data.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/sparse_data.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 
 namespace brainshift::bench {
@@ -24,7 +24,7 @@ struct Trial {
 };
 
 // kInvalidArgument when the scenario's instruments give no displacements (they need a registration first).
-Result<Trial> make_trial(const Head& head, const twin::Scenario& scenario, int repetitions,
+Result<Trial> make_trial(const Head& head, const client::Scenario& scenario, int repetitions,
                          std::uint64_t seed, const Progress& progress = {});
 
 // error_time-*.csv. rank: prior modes used, empty where the method has none. start: "cold" or "warm". status: the

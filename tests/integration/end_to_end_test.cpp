@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "client/lib/client.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
 

@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/observation.hpp"
-#include "common/io/calibration_file.hpp"
-#include "common/io/mesh_file.hpp"
-#include "common/io/model_file.hpp"
-#include "common/io/surgery_file.hpp"
+#include "common/values/observation.hpp"
+#include "common/io/config/calibration_file.hpp"
+#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"

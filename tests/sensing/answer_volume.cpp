@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "common/io/file_access.hpp"
-#include "common/io/sequence_header.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/recording/sequence_header.hpp"
 
 namespace brainshift::test_support {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
-#include "common/fem/blas_threads.hpp"
-#include "common/io/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/io/config/config_file.hpp"
 #include "common/registration/icp.hpp"
-#include "common/scene/brain_model_builder.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "tests/sensing/icp_study.hpp"
 #include "tests/sensing/tumour_points.hpp"
 #include "tests/support/study_record.hpp"
@@ -112,7 +112,7 @@ void compare_with_head(const std::vector<Points>& trials, const geometry::Distan
   const auto config = io::read_case_config(BRAINSHIFT_DEFAULT_CASE);
   const auto inputs = config ? io::load_case_inputs(*config) : tl::unexpected(config.error());
   if (!inputs) return record_left_out("icp_speed", "default head: " + inputs.error().message);
-  const auto model = scene::build_brain_model(*inputs);
+  const auto model = anatomy::build_brain_model(*inputs);
   if (!model) return record_left_out("icp_speed", "default head: " + model.error().message);
   const auto forward = contact::ForwardModel::build(*model, *config, Boundary::kContact);
   if (!forward) return record_left_out("icp_speed", "default head: " + forward.error().message);
@@ -149,7 +149,7 @@ void compare_with_pcl(const std::vector<Points>& trials, const IndexedSurface& t
 }  // namespace
 
 void study_icp_speed() {
-  fem::use_single_threaded_blas();
+  linalg::use_single_threaded_blas();
   const TriangleSurface surface = tumour_surface();
   auto index = geometry::ClosestPointIndex::build(surface).value();
   DistanceGrid grid;

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "client/report/chart.hpp"
+#include "client/plot/chart.hpp"
 #include "common/core/statistics.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
@@ -47,10 +47,10 @@ void add(const client::RunReport& run, const Update& update, Stage& stage) {
   }
 }
 
-Result<Stages> play(const bench::Head& head, twin::Scenario scenario) {
+Result<Stages> play(const bench::Head& head, client::Scenario scenario) {
   scenario.fluid_levels_mm.assign(kMeasurements, scenario.fluid_levels_mm.front());
   const auto surgery =
-      twin::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
+      client::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
   if (!surgery) return tl::unexpected(surgery.error());
   auto session = Surgery::begin(head, head.config);
   if (!session) return tl::unexpected(session.error());
@@ -118,7 +118,7 @@ Status measure(const bench::Head& head, const std::string& study, bool held) {
   std::vector<Stages> results;
   std::vector<double> joint_ms;
   for (const char* name : kScenarios) {
-    auto stages = play(head, *twin::find_scenario(name));
+    auto stages = play(head, *client::find_scenario(name));
     if (!stages)
       return fail(stages.error().code, std::string(name) + ": " + stages.error().message);
     for (std::size_t s = 0; s < kStages; ++s) {

@@ -58,7 +58,7 @@ struct Errors {
 Status try_once(const bench::Head& head, const Points& truth, Random& random, Surgery& session,
                 std::uint64_t& sequence, Errors& errors) {
   const std::vector<NodeIndex> nodes = choose_landmarks(*head.model, random);
-  const LandmarkPairs all = twin::measure_displacements(
+  const LandmarkPairs all = client::measure_displacements(
       head.model->mesh.nodes(Eigen::all, nodes), truth(Eigen::all, nodes), kNoise_mm, random);
   const auto fit_of_all = registration::register_fiducials(all.undeformed, all.deformed);
   if (!fit_of_all) return tl::unexpected(fit_of_all.error());
@@ -126,8 +126,8 @@ void check_real_landmarks() {
 
 Status landmark_study(const bench::Head& head) {
   for (const char* name : {"joint-sag", "joint-mixed"}) {
-    const auto surgery = twin::play_scenario(*head.model, head.config, head.prepared->forward(),
-                                             *twin::find_scenario(name), 1);
+    const auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(),
+                                             *client::find_scenario(name), 1);
     if (!surgery) return tl::unexpected(surgery.error());
     auto session = Surgery::begin(head, head.config);
     if (!session) return tl::unexpected(session.error());

@@ -33,7 +33,7 @@ Observation spoilt(Observation observation, double fraction, Random& random) {
 
 // Mean tumour error over the measurements.
 Result<double> tumour_error(const bench::Head& head, const CaseConfig& config,
-                            const twin::SimulatedSurgery& surgery, double fraction) {
+                            const client::SimulatedSurgery& surgery, double fraction) {
   auto session = Surgery::begin(head, config);
   if (!session) return tl::unexpected(session.error());
   Random random(5);
@@ -53,10 +53,10 @@ Result<double> tumour_error(const bench::Head& head, const CaseConfig& config,
 Status outlier_study(const bench::Head& head) {
   for (const auto& [name, what] :
        {std::pair{"paper-icp", "boundary points"}, std::pair{"paper", "displacements"}}) {
-    twin::Scenario scenario = *twin::find_scenario(name);
+    client::Scenario scenario = *client::find_scenario(name);
     scenario.fluid_levels_mm.assign(kMeasurements, scenario.fluid_levels_mm.front());
     const auto surgery =
-        twin::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
+        client::play_scenario(*head.model, head.config, head.prepared->forward(), scenario, 1);
     if (!surgery) return tl::unexpected(surgery.error());
     double clean = 0.0;
     for (const double fraction : {0.0, 0.1, 0.2, 0.3}) {

@@ -5,11 +5,11 @@
 #include <string>
 
 #include "client/twin/ultrasound.hpp"
-#include "common/io/config_file.hpp"
-#include "common/io/image_file.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
 #include "common/registration/rigid_increment.hpp"
-#include "common/scene/tumour_surface.hpp"
+#include "common/anatomy/tumour_surface.hpp"
 #include "common/ultrasound/frame_samples.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
 #include "tests/support/study_record.hpp"
@@ -44,22 +44,22 @@ Result<Patient> make_patient() {
   if (!inputs) return tl::unexpected(inputs.error());
   auto mri = io::read_nifti(config->mri);
   if (!mri) return tl::unexpected(mri.error());
-  auto tumour = scene::make_tumour_surface(*inputs);
+  auto tumour = anatomy::make_tumour_surface(*inputs);
   if (!tumour) return tl::unexpected(tumour.error());
   patient.tumour = std::move(*tumour);
   patient.brain = std::move(*inputs->brain);
-  const auto tissue = twin::tissue_echo(*mri, patient.brain, patient.tumour);
+  const auto tissue = client::tissue_echo(*mri, patient.brain, patient.tumour);
   if (!tissue) return tl::unexpected(tissue.error());
-  const auto window = twin::probe_window(patient.brain, config->craniotomy);
+  const auto window = client::probe_window(patient.brain, config->craniotomy);
   if (!window) return tl::unexpected(window.error());
-  auto seen = twin::mri_with_tumour(*mri, patient.brain, patient.tumour);
+  auto seen = client::mri_with_tumour(*mri, patient.brain, patient.tumour);
   if (!seen) return tl::unexpected(seen.error());
   patient.mri = std::move(*seen);
   patient.plain_mri = std::move(*mri);
-  twin::UltrasoundSweep sweep;
+  client::UltrasoundSweep sweep;
   sweep.target = patient.tumour.vertices.rowwise().mean();
   Random random(21);
-  patient.recording = twin::simulate_ultrasound(*tissue, *window, {}, sweep, random);
+  patient.recording = client::simulate_ultrasound(*tissue, *window, {}, sweep, random);
   for (const tracking::Link& link : patient.recording.links[0].samples)
     patient.poses.push_back(link.T_to_from);
   return patient;

@@ -5,14 +5,14 @@
 #include <utility>
 
 #include "client/replay/score.hpp"
-#include "common/fem/blas_threads.hpp"
-#include "common/inversion/condensed_inverter.hpp"
-#include "common/io/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/io/config/config_file.hpp"
 
 namespace brainshift::sensing {
 
 Result<bench::Head> make_default_head(double thousand_nodes, double swelling_strain_sd) {
-  fem::use_single_threaded_blas();
+  linalg::use_single_threaded_blas();
   auto config = io::read_case_config(BRAINSHIFT_DEFAULT_CASE);
   if (!config) return tl::unexpected(config.error());
   config->prior.swelling_strain_sd = swelling_strain_sd;

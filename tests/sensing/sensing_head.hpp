@@ -6,7 +6,7 @@
 
 #include "client/replay/run_report.hpp"
 #include "client/twin/surgery.hpp"
-#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 

@@ -11,8 +11,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "common/io/plus_config.hpp"
-#include "common/io/sequence_file.hpp"
+#include "common/io/config/plus_config.hpp"
+#include "common/io/recording/sequence_file.hpp"
 #include "common/tracking/chain.hpp"
 #include "common/ultrasound/compound.hpp"
 #include "tests/sensing/answer_volume.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/stability/linear_body.hpp"
 
-#include "common/core/case_config.hpp"
-#include "common/fem/checked_solve.hpp"
+#include "common/values/case_config.hpp"
+#include "common/linalg/checked_solve.hpp"
 #include "common/fem/deformation.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "tests/stability/toy_problem.hpp"
@@ -15,17 +15,17 @@ constexpr double kSize_mm = 60.0;
 constexpr double kMove_mm = 5.0;
 
 // What the product makes of the body: matrix, factor, checked solve.
-Result<Points> answer(const LinearBody& body, const fem::SymmetricMatrix& matrix,
+Result<Points> answer(const LinearBody& body, const linalg::SymmetricMatrix& matrix,
                       const Points& load, Point& point) {
   if (auto status = geometry::check_mesh(body.mesh); !status) {
     return tl::unexpected(status.error());
   }
-  const auto factor = fem::SparseCholesky::factorise(matrix);
+  const auto factor = linalg::SparseCholesky::factorise(matrix);
   if (!factor) return tl::unexpected(factor.error());
   point.rcond = factor->rcond();
   VecX x;
   const auto quality =
-      fem::checked_solve(matrix, fem::max_norm(matrix), *factor, body.dofs.restrict_to(load), x);
+      linalg::checked_solve(matrix, linalg::max_norm(matrix), *factor, body.dofs.restrict_to(load), x);
   if (!quality) return tl::unexpected(quality.error());
   point.backward_error = quality->backward_error;
   point.iterations = 1 + quality->refinements;
@@ -51,7 +51,7 @@ void solve_linear(const LinearBody& body, Point point, const Options& options) {
   point.unit = "relative";
   const bool uniform = body.materials.size() == 1;
   MatrixR full = reference_stiffness(body.mesh, body.materials, body.dofs);
-  fem::SymmetricMatrix matrix =
+  linalg::SymmetricMatrix matrix =
       uniform ? fem::assemble_stiffness(body.mesh, body.materials.front(), body.dofs)
               : lower_triangle(full);
   for (const auto& [node, stiffness] : body.springs) {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "common/fem/sampling.hpp"
-#include "common/inversion/data_check.hpp"
-#include "common/inversion/load_modes.hpp"
+#include "common/inversion/contract/data_check.hpp"
+#include "common/prior/load_modes.hpp"
 
 namespace brainshift::stability {
 namespace {
@@ -66,14 +66,14 @@ MatrixR reference_stiffness(const TetMesh& mesh, const std::vector<fem::Elastici
   return full;
 }
 
-fem::SymmetricMatrix lower_triangle(const MatrixR& full) {
+linalg::SymmetricMatrix lower_triangle(const MatrixR& full) {
   std::vector<Eigen::Triplet<double, long>> entries;
   for (Eigen::Index j = 0; j < full.cols(); ++j) {
     for (Eigen::Index i = j; i < full.rows(); ++i) {
       if (full(i, j) != 0) entries.emplace_back(i, j, static_cast<double>(full(i, j)));
     }
   }
-  fem::SymmetricMatrix lower(full.rows(), full.cols());
+  linalg::SymmetricMatrix lower(full.rows(), full.cols());
   lower.setFromTriplets(entries.begin(), entries.end());
   return lower;
 }
@@ -208,8 +208,8 @@ bool reference_posterior(Reference& reference, const inversion::PreparedModel& m
   kernel *= other * other;
   MatrixR modes = model.prior().modes().cast<Real>();
   for (Eigen::Index j = 0; j < modes.cols(); ++j) {
-    const PriorPart part = inversion::prior_part(static_cast<int>(j),
-                                                 inversion::load_mode_counts(model.config().prior));
+    const PriorPart part = prior::prior_part(static_cast<int>(j),
+                                                 prior::load_mode_counts(model.config().prior));
     modes.col(j) *= static_cast<Real>(scales[static_cast<std::size_t>(part)]);
   }
   MatrixR forces(dofs.num_unknowns(), 3 * m);  // T^T Sigma T K_p^-1 T^T A^T

@@ -16,9 +16,9 @@
 
 #include "common/contact/penalty.hpp"
 #include "common/core/mesh.hpp"
-#include "common/core/sparse_data.hpp"
+#include "common/values/sparse_data.hpp"
 #include "common/fem/dof_map.hpp"
-#include "common/inversion/prepared_model.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 
 namespace brainshift::stability {
 
@@ -31,7 +31,7 @@ MatrixR reference_stiffness(const TetMesh& mesh, const std::vector<fem::Elastici
                             const fem::DofMap& dofs);
 // The same matrix in double as the product takes it, for problems that it cannot assemble itself (materials per
 // element).
-fem::SymmetricMatrix lower_triangle(const MatrixR& full);
+linalg::SymmetricMatrix lower_triangle(const MatrixR& full);
 
 // T^T f and T q in long double.
 VectorR restrict_to(const fem::DofMap& dofs, const Eigen::Ref<const MatrixR>& nodal);

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 #include "common/core/random.hpp"
 #include "common/core/types.hpp"
 

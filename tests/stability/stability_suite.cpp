@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "client/replay/write_file.hpp"
-#include "common/fem/blas_threads.hpp"
+#include "common/linalg/blas_threads.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/stability/stability_point.hpp"
@@ -207,7 +207,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "stability_suite: %s (see stability_suite --help)\n", error.what());
     return 2;
   }
-  fem::use_single_threaded_blas();
+  linalg::use_single_threaded_blas();
   const auto pass = stability::run(arguments);
   if (pass) return *pass ? 0 : 1;
   std::fprintf(stderr, "stability_suite: %s\n", pass.error().message.c_str());

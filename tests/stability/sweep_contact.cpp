@@ -3,9 +3,9 @@
 // away from its own.
 #include <algorithm>
 
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_exact.hpp"
-#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
 #include "tests/stability/toy_problem.hpp"
 
 namespace brainshift::stability {

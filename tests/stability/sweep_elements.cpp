@@ -56,7 +56,7 @@ void one_ratio(fem::Element element, double nu, Point point, const Options& opti
   if (options.faults != nullptr) options.faults->field(solution->displacement, point);
   const auto discretised = forward::discretise(problem);
   const fem::ConstrainedDofs constrained = discretised->constraints.build();
-  const fem::SymmetricMatrix lower =
+  const linalg::SymmetricMatrix lower =
       fem::assemble_stiffness(discretised->space, problem.materials, constrained.dofs);
   MatrixR full = MatrixR(Eigen::MatrixXd(lower).cast<Real>());
   full = MatrixR(full.selfadjointView<Eigen::Lower>());

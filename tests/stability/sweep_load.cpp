@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Displacements far beyond small strain, and bodies that are hardly held.
-#include "common/fem/checked_solve.hpp"
+#include "common/linalg/checked_solve.hpp"
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/toy_problem.hpp"
 
@@ -40,7 +40,7 @@ void nearly_floating(const Options& options) {
     LinearBody body = standing_block(4);
     body.dofs = fem::DofMap(body.mesh.num_nodes());
     body.dofs.finalise();
-    const double stiffness = support * fem::max_norm(fem::assemble_stiffness(
+    const double stiffness = support * linalg::max_norm(fem::assemble_stiffness(
                                            body.mesh, body.materials.front(), body.dofs));
     for (const NodeIndex node : {0, 4, 20, 124}) body.springs.emplace_back(node, stiffness);
     Point point;

@@ -3,9 +3,9 @@
 // from an empty set, and inversions.
 #include <limits>
 
-#include "common/inversion/iterative_system.hpp"
-#include "common/inversion/refactorised_system.hpp"
-#include "common/inversion/woodbury_system.hpp"
+#include "common/contact/iterative_system.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "common/contact/woodbury_system.hpp"
 #include "tests/stability/toy_problem.hpp"
 
 namespace brainshift::stability {
@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kParameter = "contact penalty (N/mm)";
 
-void system_point(ToyProblem& problem, inversion::PenalisedSystem& system, const Points& load,
+void system_point(ToyProblem& problem, contact::PenalisedSystem& system, const Points& load,
                   Point point, bool iterative, const Options& options) {
   const auto& contact = problem.model->forward().contact();
   contact::ActiveSet active(static_cast<std::size_t>(contact.num_slaves()), 0);
@@ -35,7 +35,7 @@ void system_point(ToyProblem& problem, inversion::PenalisedSystem& system, const
   point.difference = relative_difference(u, problem.reference->displacement(load));
   const double condition = problem.reference->condition();
   // An iterative solver stops at its residual, and says so in its options.
-  point.bound = iterative ? std::min(condition * inversion::IterativeOptions{}.tolerance, 1e-3)
+  point.bound = iterative ? std::min(condition * contact::IterativeOptions{}.tolerance, 1e-3)
                           : rounding_bound(condition);
   options.record(point);
 }
@@ -58,14 +58,14 @@ void sweep_penalty(const Options& options) {
     }
     const Points load = sagging_load(*problem, 8.0);
     const contact::ForwardModel& forward = problem->model->forward();
-    inversion::RefactorisedSystem refactorised(forward);
-    inversion::WoodburySystem woodbury(forward);
+    contact::RefactorisedSystem refactorised(forward);
+    contact::WoodburySystem woodbury(forward);
     point.row = "one set: refactorised";
     system_point(*problem, refactorised, load, point, false, options);
     point.row = "one set: Woodbury";
     system_point(*problem, woodbury, load, point, false, options);
     point.row = "one set: iterative";
-    if (auto iterative = inversion::IterativeSystem::build(forward)) {
+    if (auto iterative = contact::IterativeSystem::build(forward)) {
       system_point(*problem, **iterative, load, point, true, options);
     } else {
       set_refused(iterative.error(), point);

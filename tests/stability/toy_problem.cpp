@@ -9,9 +9,9 @@
 #include "common/fem/deformation.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/fem/sampling.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_inverter.hpp"
-#include "common/inversion/data_region.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/invert.hpp"
 #include "tests/support/toy_patient.hpp"
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include "common/core/case_config.hpp"
-#include "common/inversion/prepared_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 #include "tests/stability/reference.hpp"
 #include "tests/stability/stability_point.hpp"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "client/report/canvas.hpp"
-#include "client/report/xy_chart.hpp"
+#include "client/plot/canvas.hpp"
+#include "client/plot/xy_chart.hpp"
 
 namespace brainshift::stability {
 namespace {

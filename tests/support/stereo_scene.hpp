@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "common/core/stereo_calibration.hpp"
+#include "common/values/stereo_calibration.hpp"
 #include "common/core/types.hpp"
 #include "common/stereo/calibrate.hpp"
 #include "common/stereo/gray_image.hpp"

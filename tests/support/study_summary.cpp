@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "client/replay/write_file.hpp"
-#include "client/report/xy_chart.hpp"
+#include "client/plot/xy_chart.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <set>
 
-#include "common/core/model_id.hpp"
+#include "common/values/model_id.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 

@@ -7,9 +7,9 @@
 
 #include <cmath>
 
-#include "common/inversion/refactorised_system.hpp"
-#include "common/inversion/steepest_descent.hpp"
-#include "common/inversion/woodbury_system.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "common/inversion/descent/steepest_descent.hpp"
+#include "common/contact/woodbury_system.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
@@ -45,10 +45,10 @@ INSTANTIATE_TEST_SUITE_P(Physics, Adjoint,
 TEST_P(Adjoint, OfThePenalisedSystemIsItself) {
   const PreparedModel prepared = model();
   ASSERT_EQ(prepared.forward().factor().carries_pressure(), GetParam().pressure == Carry::kOn);
-  RefactorisedSystem refactorised(prepared.forward());
-  WoodburySystem woodbury(prepared.forward());
+  contact::RefactorisedSystem refactorised(prepared.forward());
+  contact::WoodburySystem woodbury(prepared.forward());
   const Points f = random_points(2), g = random_points(3);
-  PenalisedSystem* const systems[] = {&refactorised, &woodbury};
+  contact::PenalisedSystem* const systems[] = {&refactorised, &woodbury};
   const char* const names[] = {"refactorised", "Woodbury"};
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(systems[i]->activate(some_active(prepared)));

@@ -6,9 +6,9 @@
 
 #include <cmath>
 
-#include "common/core/case_config.hpp"
+#include "common/values/case_config.hpp"
 #include "common/core/units.hpp"
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/fem/gravity.hpp"
 #include "tests/support/box_mesh.hpp"
@@ -33,7 +33,7 @@ double column_error(int cells) {
   const Vec3 down(0, 0, -1);
   const Points weight =
       buoyancy_load(mesh, material, down, 1.0, down);  // plane below the floor: all drained
-  const auto factor = SparseCholesky::factorise(assemble_stiffness(mesh, tissue, dofs));
+  const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(mesh, tissue, dofs));
   EXPECT_TRUE(factor.has_value());
   const Points u = dofs.expand(factor->solve(dofs.restrict_to(weight)));
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "common/fem/space_elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"
@@ -79,7 +79,7 @@ Errors solve_on(Element element, int cells) {
   }
   dofs.finalise();
   const auto materials = MaterialMap::uniform({kTissue}, space.num_elements());
-  const auto factor = SparseCholesky::factorise(assemble_stiffness(space, materials, dofs));
+  const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(space, materials, dofs));
   EXPECT_TRUE(factor.has_value());
   const Points load = body_load(space, VectorField(body_force));
   return errors_of(space, dofs.expand(factor->solve(dofs.restrict_to(load))));

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/verification/poro_column.hpp"
 
@@ -162,7 +162,7 @@ TEST(Terzaghi, LongAfterTheLoadItIsDrainedElasticity) {
   const auto late = stepper->step(BiotState::at_rest(mesh.num_nodes()), load, 1e10 * relaxation_s);
   ASSERT_TRUE(late.has_value()) << late.error().message;
   EXPECT_EQ(stepper->diagnostics().stabilised_tets, 0);
-  const auto factor = SparseCholesky::factorise(assemble_stiffness(mesh, material.elastic, dofs));
+  const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(mesh, material.elastic, dofs));
   const Points drained = dofs.expand(factor->solve(dofs.restrict_to(load.force)));
   const double difference =
       (late->displacement - drained).cwiseAbs().maxCoeff() / drained.cwiseAbs().maxCoeff();

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "tests/support/ball_mesh.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/verification/forward_fixture.hpp"
@@ -107,15 +107,15 @@ Outcome nodal_average(double nu, int cells) {
       }
     }
   }
-  fem::SymmetricMatrix divergence(space.num_nodes(), dofs.num_unknowns());
+  linalg::SymmetricMatrix divergence(space.num_nodes(), dofs.num_unknowns());
   divergence.setFromTriplets(entries.begin(), entries.end());
   const VecX weights =
       (tissue.lambda + 2.0 / 3.0 * tissue.shear) * fem::nodal_volumes(space.mesh).cwiseInverse();
-  const fem::SymmetricMatrix scaled = weights.asDiagonal() * divergence;
-  const fem::SymmetricMatrix full = divergence.transpose() * scaled;
-  fem::SymmetricMatrix lower = fem::assemble_stiffness(space, deviatoric, dofs);
-  lower += fem::SymmetricMatrix(full.triangularView<Eigen::Lower>());
-  const auto factor = fem::SparseCholesky::factorise(lower);
+  const linalg::SymmetricMatrix scaled = weights.asDiagonal() * divergence;
+  const linalg::SymmetricMatrix full = divergence.transpose() * scaled;
+  linalg::SymmetricMatrix lower = fem::assemble_stiffness(space, deviatoric, dofs);
+  lower += linalg::SymmetricMatrix(full.triangularView<Eigen::Lower>());
+  const auto factor = linalg::SparseCholesky::factorise(lower);
   if (!factor) throw std::runtime_error(factor.error().message);
   const auto cavity = faces_where(space.mesh, in_cavity);
   const Points load = fem::pressure_load(space, cavity.faces, kPressure);

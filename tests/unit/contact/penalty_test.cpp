@@ -67,7 +67,7 @@ class Column : public ::testing::Test {
     }
     const PenaltyContact contact(pairs, beta);
     const auto stiffness = fem::assemble_stiffness(mesh, tissue, dofs);
-    auto factor = fem::SparseCholesky::factorise(stiffness);
+    auto factor = linalg::SparseCholesky::factorise(stiffness);
     EXPECT_TRUE(factor.has_value());
     const auto solution = solve_with_contact(stiffness, fem::StiffnessFactor(std::move(*factor)),
                                              dofs, contact, load);

@@ -70,7 +70,7 @@ TEST(SurfaceContact, ForceAndStiffnessAreDerivativesOfTheEnergy) {
 
     fem::DofMap dofs(space.num_nodes());
     dofs.finalise();
-    fem::SymmetricMatrix k = fem::lower_pattern(space.elements, dofs);
+    linalg::SymmetricMatrix k = fem::lower_pattern(space.elements, dofs);
     contact.add_stiffness(k, dofs, active);
     const VecX q = dofs.restrict_to(d);
     double expected = 0.0;
@@ -80,7 +80,7 @@ TEST(SurfaceContact, ForceAndStiffnessAreDerivativesOfTheEnergy) {
       if (active[i]) expected += contact.points()[i].stiffness * a * a;
     }
     ASSERT_GT(expected, 0.0);
-    EXPECT_NEAR(q.dot(fem::multiply(k, q)), expected, 1e-12 * expected);
+    EXPECT_NEAR(q.dot(linalg::multiply(k, q)), expected, 1e-12 * expected);
   }
 }
 

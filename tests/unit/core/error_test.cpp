@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "common/core/estimate.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift {
 namespace {

@@ -81,8 +81,8 @@ TEST(SpaceStiffness, OfLinearElementsIsTheUniformOne) {
   dofs.fix_all(5);
   dofs.finalise();
   const auto materials = MaterialMap::uniform({kTissue}, space.num_elements());
-  const SymmetricMatrix general = assemble_stiffness(space, materials, dofs);
-  const SymmetricMatrix uniform = assemble_stiffness(space.mesh, kTissue, dofs);
+  const linalg::SymmetricMatrix general = assemble_stiffness(space, materials, dofs);
+  const linalg::SymmetricMatrix uniform = assemble_stiffness(space.mesh, kTissue, dofs);
   ASSERT_GT(uniform.norm(), 0.0);
   EXPECT_LT((general - uniform).norm(), 1e-14 * uniform.norm());
 }
@@ -96,7 +96,7 @@ TEST(SpaceStiffness, AgreesWithTheInternalForce) {
     DofMap dofs(space.num_nodes());
     dofs.finalise();
     const Points u = Points::Random(3, space.num_nodes());
-    const VecX product = multiply(assemble_stiffness(space, materials, dofs), dofs.restrict_to(u));
+    const VecX product = linalg::multiply(assemble_stiffness(space, materials, dofs), dofs.restrict_to(u));
     const VecX force = dofs.restrict_to(internal_force(space, materials, u));
     ASSERT_GT(force.norm(), 0.0);
     EXPECT_LT((product - force).norm(), 1e-12 * force.norm());

@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "common/fem/cholesky.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 
@@ -41,23 +41,23 @@ TEST(Elasticity, LameConstantsFollowFromTable1) {
 TEST(Elasticity, RigidBodyMotionsCarryNoForce) {
   TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 20, 40));
   perturb_interior(mesh, 1.5, 7);
-  const SymmetricMatrix k = assemble_stiffness(mesh, kTissue, all_free(mesh));
+  const linalg::SymmetricMatrix k = assemble_stiffness(mesh, kTissue, all_free(mesh));
   const double scale = k.diagonal().maxCoeff();
   for (int axis = 0; axis < 3; ++axis) {
     Points translation = Points::Zero(3, mesh.num_nodes());
     translation.row(axis).setOnes();
-    EXPECT_LT(multiply(k, flat(translation)).cwiseAbs().maxCoeff(), 1e-12 * scale);
+    EXPECT_LT(linalg::multiply(k, flat(translation)).cwiseAbs().maxCoeff(), 1e-12 * scale);
     // Rotations move nodes by up to 40 mm, so rounding is that much larger.
     const Points rotation = infinitesimal_rotation(mesh, Vec3::Unit(axis));
-    EXPECT_LT(multiply(k, flat(rotation)).cwiseAbs().maxCoeff(), 40 * 1e-12 * scale);
+    EXPECT_LT(linalg::multiply(k, flat(rotation)).cwiseAbs().maxCoeff(), 40 * 1e-12 * scale);
   }
 }
 
 TEST(Elasticity, StiffnessHasExactlySixZeroEnergyModes) {
   TetMesh mesh = box_mesh(2, 2, 2, Vec3(20, 20, 20));
   perturb_interior(mesh, 2.0, 3);
-  const SymmetricMatrix lower = assemble_stiffness(mesh, kTissue, all_free(mesh));
-  const SymmetricMatrix both = lower.selfadjointView<Eigen::Lower>();
+  const linalg::SymmetricMatrix lower = assemble_stiffness(mesh, kTissue, all_free(mesh));
+  const linalg::SymmetricMatrix both = lower.selfadjointView<Eigen::Lower>();
   const Eigen::MatrixXd dense(both);
   const VecX eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense).eigenvalues();
   const double largest = eigenvalues[eigenvalues.size() - 1];
@@ -87,10 +87,10 @@ TEST(Elasticity, PatchTestReproducesLinearDisplacement) {
   for (int n = 0; n < mesh.num_nodes(); ++n) {
     if (inside.unknown(n, 0) >= 0) boundary_part.col(n).setZero();
   }
-  const SymmetricMatrix full = assemble_stiffness(mesh, kTissue, all_free(mesh));
-  const VecX reaction = multiply(full, flat(boundary_part));
+  const linalg::SymmetricMatrix full = assemble_stiffness(mesh, kTissue, all_free(mesh));
+  const VecX reaction = linalg::multiply(full, flat(boundary_part));
   const Points load = -Eigen::Map<const Points>(reaction.data(), 3, mesh.num_nodes());
-  const auto factor = SparseCholesky::factorise(assemble_stiffness(mesh, kTissue, inside));
+  const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(mesh, kTissue, inside));
   ASSERT_TRUE(factor.has_value()) << factor.error().message;
   const Points u = inside.expand(factor->solve(inside.restrict_to(load))) + boundary_part;
   EXPECT_LT((u - exact).cwiseAbs().maxCoeff(), 1e-12 * exact.cwiseAbs().maxCoeff());
@@ -138,7 +138,7 @@ TEST(Elasticity, SlidingFloorInRotatedFrameIsExact) {
     dofs.fix_all(0);
     dofs.fix_all(1);
     dofs.finalise();
-    const auto factor = SparseCholesky::factorise(assemble_stiffness(mesh, kTissue, dofs));
+    const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(mesh, kTissue, dofs));
     ASSERT_TRUE(factor.has_value()) << factor.error().message;
     const Points u = dofs.expand(factor->solve(dofs.restrict_to(turn * load)));
     EXPECT_LT((u - turn * exact).cwiseAbs().maxCoeff(), 1e-11 * exact.cwiseAbs().maxCoeff());

@@ -10,8 +10,8 @@
 #include "common/core/random.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/fem/sampling.hpp"
-#include "common/inversion/condense.hpp"
-#include "common/inversion/condensed_inverter.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {
@@ -90,9 +90,9 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
       const NodeIndex slave = forward.contact().pairs()[i].slave;
       active[i] = std::count(active_nodes.begin(), active_nodes.end(), slave) > 0;
     }
-    fem::SymmetricMatrix k_p = forward.stiffness();
+    linalg::SymmetricMatrix k_p = forward.stiffness();
     forward.contact().add_stiffness(k_p, forward.dofs(), active);
-    const auto factor = fem::SparseCholesky::factorise(k_p);
+    const auto factor = linalg::SparseCholesky::factorise(k_p);
     Eigen::MatrixXd inverse(n3, n3), loaded(n3, n3);
     for (Eigen::Index j = 0; j < n3; ++j) {
       Points unit = Points::Zero(3, n3 / 3);

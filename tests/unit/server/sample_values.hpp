@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "common/core/estimate.hpp"
-#include "common/core/observation.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::server {
 

@@ -19,7 +19,7 @@
 #include "common/wire/frame.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
-#include "server/transport/service.hpp"
+#include "server/service/service.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
 namespace brainshift::server {

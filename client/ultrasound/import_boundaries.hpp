@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A recording and contours on its images to tumour boundaries in patient RAS, one per sweep.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/types.hpp"
+#include "common/tracking/chain.hpp"
+#include "common/ultrasound/boundary.hpp"
+
+namespace brainshift::client {
+
+struct BoundaryOptions {
+  std::string image_frame = "Image";
+  std::string ras_frame = "Ras";
+  tracking::ChainOptions chain;
+  double spacing_mm = ultrasound::kBoundarySpacing_mm;
+  // A new sweep begins where no contour was traced for longer than this; 0: the recording is one sweep.
+  double sweep_gap_s = 0.0;
+};
+
+struct SweepBoundary {
+  int first_frame = 0, last_frame = 0;
+  int contours = 0;
+  double time_s = 0.0;  // of the last frame, since the recording's first
+  Points points;        // 3 x m, mm RAS
+};
+
+struct Boundaries {
+  std::vector<SweepBoundary> sweeps;
+  tracking::Chain chain;                         // of every frame
+  std::vector<tracking::Dropped> lost_contours;  // contours on frames without a chain
+};
+
+// kInvalidArgument: no chain from the image frame to RAS, a contour on a frame that does not exist or outside
+// its image, options out of range;
+// a pixel that is not 0.005 to 2 mm wide (metres taken for mm), a boundary that does not span 1 to 300 mm.
+// kEmptySet: no contour lies on a frame with a valid chain; the sentence says why the frames were dropped.
+Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
+                                     const std::vector<tracking::ConstantLink>& constants,
+                                     std::vector<ultrasound::Contour> contours,
+                                     const BoundaryOptions& options = {});
+
+}  // namespace brainshift::client

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/anatomy/brain_mesh.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/mask.hpp"
+#include "common/geometry/mesh_generation.hpp"
+#include "common/geometry/mesh_quality.hpp"
+
+namespace brainshift::anatomy {
+namespace {
+
+// A head is 150-200 mm; 20 admits small phantoms, 400 giants.
+constexpr double kSmallestExtent_mm = 20.0;
+constexpr double kLargestExtent_mm = 400.0;
+// Growth of the edge per mm away from a refined zone; Delaunay refinement grades like this by itself.
+constexpr double kGrading = 1.0 / 3.0;
+constexpr int kRimSamples = 96;
+// As far from the tangent plane as a craniotomy node may lie (node_sets.cpp).
+constexpr double kRimSearch_mm = 15.0;
+
+Status check_extent(const Vec3& size, const std::string& what) {
+  const double extent = size.maxCoeff();
+  if (extent >= kSmallestExtent_mm && extent <= kLargestExtent_mm) return {};
+  // The usual mistake is a factor of 1000 either way.
+  const char* hint = "";
+  if (extent * 1000.0 >= kSmallestExtent_mm && extent * 1000.0 <= kLargestExtent_mm)
+    hint = "; metres instead of millimetres?";
+  if (extent / 1000.0 >= kSmallestExtent_mm && extent / 1000.0 <= kLargestExtent_mm)
+    hint = "; micrometres instead of millimetres?";
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{}: brain extent {:.4g} mm must be between {} and {} mm{}", what, extent,
+                          kSmallestExtent_mm, kLargestExtent_mm, hint));
+}
+
+// Size of the box round the voxels > 0, in mm.
+Vec3 mask_extent(const VoxelImage& mask) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  std::size_t v = 0;
+  for (int k = 0; k < mask.dims[2]; ++k)
+    for (int j = 0; j < mask.dims[1]; ++j)
+      for (int i = 0; i < mask.dims[0]; ++i, ++v) {
+        if (!(mask.values[v] > 0.0f)) continue;
+        const Vec3 x = mask.T_ras_voxel * Vec3(i, j, k);
+        low = low.cwiseMin(x);
+        high = high.cwiseMax(x);
+      }
+  return high - low;
+}
+
+// The voxel centre of the domain's outermost layer that is nearest to a point.
+Vec3 nearest_surface_voxel(const VoxelImage& mask, const Vec3& target) {
+  Vec3 nearest = target;
+  double best = std::numeric_limits<double>::infinity();
+  const auto inside = [&mask](int i, int j, int k) {
+    return i >= 0 && j >= 0 && k >= 0 && i < mask.dims[0] && j < mask.dims[1] && k < mask.dims[2] &&
+           mask.at(i, j, k) >= 0.5f;
+  };
+  for (int k = 0; k < mask.dims[2]; ++k)
+    for (int j = 0; j < mask.dims[1]; ++j)
+      for (int i = 0; i < mask.dims[0]; ++i) {
+        if (!inside(i, j, k)) continue;
+        if (inside(i - 1, j, k) && inside(i + 1, j, k) && inside(i, j - 1, k) &&
+            inside(i, j + 1, k) && inside(i, j, k - 1) && inside(i, j, k + 1))
+          continue;
+        const Vec3 x = mask.T_ras_voxel * Vec3(i, j, k);
+        const double distance = (x - target).squaredNorm();
+        if (distance < best) {
+          best = distance;
+          nearest = x;
+        }
+      }
+  return nearest;
+}
+
+// Where the line from `x` against `normal` first meets the domain, starting kRimSearch_mm above x; x itself
+// when it does not.
+Vec3 drop_to_surface(const geometry::Interpolator& value, const Vec3& x, const Vec3& normal) {
+  for (double height = kRimSearch_mm; height > -kRimSearch_mm; height -= 0.5)
+    if (value(x + height * normal) >= 0.5f) return x + height * normal;
+  return x;
+}
+
+// Points on the rim of the craniotomy: its ellipse in the plane tangential to the mask's surface, dropped
+// to that surface. Good enough to say where the mesh is finer; the node set is chosen later, on the mesh.
+Points craniotomy_rim(const VoxelImage& smooth_mask, const Craniotomy& craniotomy) {
+  const Vec3 centre = nearest_surface_voxel(smooth_mask, craniotomy.centre_mm);
+  const geometry::Interpolator value(smooth_mask);
+  Vec3 gradient;
+  for (int a = 0; a < 3; ++a) {
+    const Vec3 step = 2.0 * Vec3::Unit(a);
+    gradient[a] = static_cast<double>(value(centre + step)) - value(centre - step);
+  }
+  const Vec3 normal = gradient.norm() > 0.0 ? Vec3(-gradient.normalized()) : Vec3(Vec3::UnitX());
+  Vec3 along = craniotomy.long_axis_direction - normal * normal.dot(craniotomy.long_axis_direction);
+  if (along.norm() < 1e-6) along = normal.unitOrthogonal();
+  along.normalize();
+  const Vec3 across = normal.cross(along);
+  Points rim(3, kRimSamples);
+  for (int i = 0; i < kRimSamples; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kRimSamples;
+    const Vec3 x = centre + 0.5 * craniotomy.long_axis_mm * std::cos(angle) * along +
+                   0.5 * craniotomy.short_axis_mm * std::sin(angle) * across;
+    rim.col(i) = drop_to_surface(value, x, normal);
+  }
+  return rim;
+}
+
+// Edge at a distance from the middle of a zone of width `margin` in which `fine` holds.
+double graded(double fine, double coarse, double distance, double margin) {
+  return std::min(coarse, fine + kGrading * std::max(0.0, distance - margin));
+}
+
+// Distance to the tumour (mm), 0 inside. Beyond `reach` only a lower bound, from the sphere round the
+// tumour, because most questions come from far away and the answer no longer matters there.
+class TumourDistance {
+ public:
+  static Result<TumourDistance> build(const TriangleSurface& tumour, double reach) {
+    auto index = geometry::ClosestPointIndex::build(tumour);
+    if (!index) return tl::unexpected(index.error());
+    return TumourDistance(std::move(*index), reach);
+  }
+  double operator()(const Vec3& x) const {
+    const double to_sphere = (x - centre_).norm() - radius_;
+    if (to_sphere > reach_) return to_sphere;
+    return to_sphere < 0.0 && index_->contains(x) ? 0.0 : index_->closest(x).distance_mm;
+  }
+
+ private:
+  TumourDistance(geometry::ClosestPointIndex index, double reach)
+      : index_(std::make_shared<geometry::ClosestPointIndex>(std::move(index))), reach_(reach) {
+    const Points& vertices = index_->surface().vertices;
+    centre_ = vertices.rowwise().mean();
+    radius_ = (vertices.colwise() - centre_).colwise().norm().maxCoeff();
+  }
+  std::shared_ptr<const geometry::ClosestPointIndex> index_;  // a std::function must be copyable
+  double reach_;
+  Vec3 centre_;
+  double radius_ = 0.0;
+};
+
+Result<geometry::SizingField> sizing_field(const MeshGeneration& settings,
+                                           const Craniotomy& craniotomy,
+                                           const VoxelImage& smooth_mask,
+                                           const TriangleSurface& tumour) {
+  std::optional<TumourDistance> to_tumour;
+  if (settings.tumour_edge_mm < settings.edge_mm) {
+    const double reach =
+        settings.tumour_margin_mm + (settings.edge_mm - settings.tumour_edge_mm) / kGrading;
+    auto distance = TumourDistance::build(tumour, reach);
+    if (!distance) return tl::unexpected(distance.error());
+    to_tumour = std::move(*distance);
+  }
+  Points rim(3, 0);
+  if (settings.craniotomy_edge_mm < settings.edge_mm) rim = craniotomy_rim(smooth_mask, craniotomy);
+  return geometry::SizingField([settings, to_tumour, rim](const Vec3& x) {
+    double edge = settings.edge_mm;
+    if (to_tumour)
+      edge = std::min(edge, graded(settings.tumour_edge_mm, settings.edge_mm, (*to_tumour)(x),
+                                   settings.tumour_margin_mm));
+    if (rim.cols() > 0) {
+      const double distance = std::sqrt((rim.colwise() - x).colwise().squaredNorm().minCoeff());
+      edge = std::min(edge, graded(settings.craniotomy_edge_mm, settings.edge_mm, distance,
+                                   settings.craniotomy_margin_mm));
+    }
+    return edge;
+  });
+}
+
+Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& settings,
+                         const TriangleSurface& tumour, const Progress& progress) {
+  const std::string file = fmt::format("images.brain = '{}'", inputs.config.brain.string());
+  if (!inputs.brain) return fail(ErrorCode::kInvalidArgument, file + ": was not read");
+  report(progress, "mask", 0.0);
+  const auto component = geometry::largest_component(*inputs.brain);
+  if (!component)
+    return fail(component.error().code, fmt::format("{}: {}", file, component.error().message));
+  if (Status status = check_extent(mask_extent(*component), file); !status)
+    return tl::unexpected(status.error());
+  const VoxelImage smooth = geometry::gaussian_smooth(*component, settings.smoothing_mm);
+  const auto edge_mm = sizing_field(settings, inputs.config.craniotomy, smooth, tumour);
+  if (!edge_mm) return tl::unexpected(edge_mm.error());
+  auto mesh = geometry::mesh_mask(smooth, *edge_mm, {}, progress);
+  if (!mesh) return fail(mesh.error().code, fmt::format("{}: {}", file, mesh.error().message));
+  return mesh;
+}
+
+}  // namespace
+
+Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface& tumour,
+                                const Progress& progress) {
+  if (const auto* settings = std::get_if<MeshGeneration>(&inputs.config.mesh))
+    return generate(inputs, *settings, tumour, progress);
+  const std::string file =
+      fmt::format("mesh.file = '{}'", std::get<MeshFile>(inputs.config.mesh).path.string());
+  if (!inputs.mesh) return fail(ErrorCode::kInvalidArgument, file + ": was not read");
+  report(progress, "check mesh", 0.0);
+  if (Status status = geometry::check_mesh(*inputs.mesh); !status)
+    return fail(status.error().code, fmt::format("{}: {}", file, status.error().message));
+  const Vec3 size =
+      inputs.mesh->nodes.rowwise().maxCoeff() - inputs.mesh->nodes.rowwise().minCoeff();
+  if (Status status = check_extent(size, file); !status) return tl::unexpected(status.error());
+  return *inputs.mesh;
+}
+
+}  // namespace brainshift::anatomy

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/contact/penalised_system.hpp"
+
+namespace brainshift::contact {
+
+PenalisedSystem::PenalisedSystem(const contact::ForwardModel& forward)
+    : forward_(forward), active_(static_cast<std::size_t>(forward.contact().num_slaves()), 0) {}
+
+Status PenalisedSystem::activate(const contact::ActiveSet& active) {
+  if (active == active_) return {};
+  active_ = active;
+  if (contact::count(active_) > 0) ++changes_;
+  return refresh();
+}
+
+Status PenalisedSystem::solve_with_gaps(const Points& b, Points& u) const {
+  Points b_p = b;
+  forward_.contact().add_load(b_p, active_);
+  return solve(b_p, u);
+}
+
+Result<bool> PenalisedSystem::follow_contact(const Points& b, Points& u) {
+  const contact::ActiveSet penetrating = forward_.contact().penetrating(u);
+  if (penetrating == active_) return false;
+  if (auto status = activate(penetrating); !status) return tl::unexpected(status.error());
+  if (auto status = solve_with_gaps(b, u); !status) return tl::unexpected(status.error());
+  return true;
+}
+
+}  // namespace brainshift::contact

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// K_p refactorised for every new active set, as the paper does; ordering and symbolic analysis are those of K.
+#pragma once
+
+#include "common/fem/stiffness_factor.hpp"
+#include "common/contact/penalised_system.hpp"
+
+namespace brainshift::contact {
+
+class RefactorisedSystem final : public PenalisedSystem {
+ public:
+  explicit RefactorisedSystem(const contact::ForwardModel& forward);
+  // Errors as fem::checked_solve.
+  Status solve(const Points& f, Points& u) const override;
+
+ private:
+  Status refresh() override;
+  linalg::SymmetricMatrix matrix_;  // K_p, lower; empty while no slave is active
+  double norm_ = 0.0;
+  fem::StiffnessFactor penalised_;
+};
+
+}  // namespace brainshift::contact

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/sampled_operators.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <sstream>
+
+#include "common/inversion/contract/data_check.hpp"
+#include "common/inversion/condensed/gather_rows.hpp"
+
+namespace brainshift::inversion {
+SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,
+                                   std::shared_ptr<const geometry::TetLocator> locator,
+                                   ModeWindow window, OutsideRegion outside, ThreadTeam& team)
+    : operators_(std::move(operators)),
+      locator_(std::move(locator)),
+      window_(window),
+      outside_(outside),
+      team_(team),
+      region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
+      region_modes_(gather_rows(operators_->modes, operators_->region)),
+      region_contact_(gather_rows(operators_->contact_columns, operators_->region)) {
+  for (std::size_t i = 0; i < operators_->region.size(); ++i) {
+    region_row_[static_cast<std::size_t>(operators_->region[i])] = static_cast<int>(i);
+  }
+}
+
+void SampledOperators::reserve(int data) {
+  if (data <= capacity_) return;
+  capacity_ = data;
+  rows_.resize(4, data);
+  barycentric_.resize(4, data);
+  weights_.resize(4, data);
+  directions_.resize(3, data);
+  first_row_.resize(static_cast<std::size_t>(data) + 1);
+  left_out_.resize(data);
+  sd_.resize(data);
+  free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
+  before_.resize(3 * data, window_.first);
+  contact_storage_.reset(new double[3 * static_cast<std::size_t>(data) *
+                                    static_cast<std::size_t>(operators_->num_slaves())]);
+}
+
+Status SampledOperators::refuse(const SparseData& data, int datum, const std::string& where) {
+  size_ = 0;
+  std::ostringstream text;
+  text << "sparse data: point " << datum << " at (" << data.positions.col(datum).transpose()
+       << ") mm lies " << where;
+  return fail(ErrorCode::kInvalidArgument, text.str());
+}
+
+Status SampledOperators::locate(const SparseData& data) {
+  assert(data.size() <= capacity_);
+  size_ = data.size();
+  outside_region_ = 0;
+  common_ = data.common_error.rows() > 0 ? static_cast<int>(data.common_error.cols()) : 0;
+  first_row_[0] = 0;
+  for (int i = 0; i < size_; ++i) {
+    const geometry::TetLocation location = locator_->locate(data.positions.col(i));
+    if (!(location.distance_mm <= kOutsideTolerance_mm)) {
+      return refuse(data, i, fmt::format("{:.4g} mm outside the brain", location.distance_mm));
+    }
+    const bool along = data.along_direction(i);
+    directions_.col(i) = along ? Vec3(data.directions.col(i)) : Vec3::Zero();
+    first_row_[static_cast<std::size_t>(i) + 1] = first_row(i) + (along ? 1 : 3);
+    rows_.col(i) = location.nodes;
+    barycentric_.col(i) = location.weights;
+    left_out_[i] = truncated_variance(location);
+    if (left_out_[i] < 0.0) continue;
+    ++outside_region_;
+    if (outside_ == OutsideRegion::kRefuse) {
+      return refuse(data, i,
+                    "outside the region that was prepared; condensed.outside_region = extend would "
+                    "use it");
+    }
+  }
+  if (outside_region_ > 0) return {};
+  for (int i = 0; i < size_; ++i) {
+    for (int k = 0; k < 4; ++k) {  // a node outside has weight 0 here: any row will do
+      rows_(k, i) = std::max(0, region_row_[static_cast<std::size_t>(rows_(k, i))]);
+    }
+  }
+  return {};
+}
+
+double SampledOperators::truncated_variance(const geometry::TetLocation& location) const {
+  bool in_region = true;
+  double variance = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    const int node = location.nodes[k];
+    if (region_row_[static_cast<std::size_t>(node)] >= 0 || location.weights[k] == 0.0) continue;
+    in_region = false;
+    for (int c = 0; c < 4; ++c) {
+      variance += location.weights[k] * operators_->control_weights(c, node) *
+                  operators_->truncated_variance_mm2[operators_->control_neighbours(c, node)];
+    }
+  }
+  return in_region ? -1.0 : std::max(0.0, variance);
+}
+
+void SampledOperators::sample(const SparseData& data, double scale,
+                              const Eigen::Ref<const VecX>& weights) {
+  for (int i = 0; i < size_; ++i) {
+    const double left_out = std::max(0.0, left_out_[i]);
+    sd_[i] = std::sqrt((data.sd_mm[i] * data.sd_mm[i] + scale * scale * left_out) / weights[i]);
+    weights_.col(i) = barycentric_.col(i) / sd_[i];
+  }
+  const Eigen::MatrixXf& modes = outside_region_ == 0 ? region_modes_ : operators_->modes;
+  for (int j = 0; j < window_.first; ++j) {
+    sample_column(modes.col(j).data(), before_.col(j).data());
+  }
+  for (int j = 0; j < window_.count; ++j) {
+    sample_column(modes.col(window_.first + j).data(), free_body_.col(common_ + j).data());
+  }
+  for (int i = 0; i < size_; ++i) {
+    put(data.displacements.col(i) / sd_[i], i, free_body_.col(common_ + window_.count).data());
+    for (int q = 0; q < common_; ++q) {
+      put(data.common_error.col(q).segment<3>(3 * i) / sd_[i], i, free_body_.col(q).data());
+    }
+  }
+}
+
+void SampledOperators::put(const Vec3& value, int datum, double* column) const {
+  double* out = column + first_row(datum);
+  if (first_row(datum + 1) == first_row(datum) + 1) {
+    *out = directions_.col(datum).dot(value);
+  } else {
+    Eigen::Map<Vec3>{out} = value;
+  }
+}
+
+void SampledOperators::sample_column(const float* array, double* out) const {
+  for (int i = 0; i < size_; ++i) {
+    double x = 0.0, y = 0.0, z = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const double weight = weights_(k, i);
+      const float* node = array + 3 * static_cast<std::ptrdiff_t>(rows_(k, i));
+      x += weight * static_cast<double>(node[0]);
+      y += weight * static_cast<double>(node[1]);
+      z += weight * static_cast<double>(node[2]);
+    }
+    put(Vec3(x, y, z), i, out);
+  }
+}
+
+Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+  const Eigen::MatrixXf& columns =
+      outside_region_ == 0 ? region_contact_ : operators_->contact_columns;
+  team_.split(static_cast<long>(active.size()), [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      sample_column(columns.col(active[static_cast<std::size_t>(j)]).data(),
+                    contact_storage_.get() + rows() * j);
+    }
+  });
+  return {contact_storage_.get(), rows(), static_cast<Eigen::Index>(active.size())};
+}
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// SampledOperators: the operators at the data of one update, whitened by their standard deviation.
+//
+//   free_body   R^-1/2 [common error | A U | d]     rows x (q + r + 1)
+//   contact     R^-1/2 A G_A         rows x k
+// A whole displacement has three rows, a datum along a direction n one, n . (A U) and so on; R holds sd^2 / weight.
+// Rows of U and G near the data region are kept in arrays of their own, small enough for the cache. A datum that
+// touches another node is sampled from the full arrays, and what the modes leave out of the prior there is
+// added to its variance (CondensedOperators::truncated_variance_mm2), so that it is not believed too much.
+// Does not allocate after reserve().
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/values/case_config.hpp"
+#include "common/values/condensed_operators.hpp"
+#include "common/core/error.hpp"
+#include "common/values/sparse_data.hpp"
+#include "common/core/thread_team.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/geometry/tet_locator.hpp"
+#include "common/inversion/condensed/mode_window.hpp"
+
+namespace brainshift::inversion {
+
+class SampledOperators {
+ public:
+  SampledOperators(std::shared_ptr<const CondensedOperators> operators,
+                   std::shared_ptr<const geometry::TetLocator> locator, ModeWindow window,
+                   OutsideRegion outside, ThreadTeam& team);
+
+  void reserve(int data);
+  // Locates the data. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside
+  // the brain, or outside the region where the case refuses that (named). Preconditions: check_data;
+  // reserve(data.size()).
+  Status locate(const SparseData& data);
+  // Fills free_body for the data that locate() was given. scale: of the prior's standard deviation, for what the modes
+  // leave out. weights: robust weight per datum, > 0.
+  void sample(const SparseData& data, double scale, const Eigen::Ref<const VecX>& weights);
+  int size() const { return size_; }
+  int rows() const { return first_row_[static_cast<std::size_t>(size_)]; }
+  int first_row(int datum) const { return first_row_[static_cast<std::size_t>(datum)]; }
+  // Whether any datum's variance depends on `scale`.
+  bool outside_region() const { return outside_region_ > 0; }
+  int common() const { return common_; }  // q
+  // mm, with what the modes leave out and the robust weight.
+  double sd(int datum) const { return sd_[datum]; }
+  auto free_body() const { return free_body_.topLeftCorner(rows(), common_ + window_.count + 1); }
+  // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), rows x window.first.
+  auto modes_before() const { return before_.topRows(rows()); }
+  // Valid until the next call.
+  Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
+
+ private:
+  // Of the prior at unit scale, mm^2; -1 when every node that counts was prepared.
+  double truncated_variance(const geometry::TetLocation& location) const;
+  Status refuse(const SparseData& data, int datum, const std::string& where);
+  // The rows of one datum in a column of rows().
+  void put(const Vec3& value, int datum, double* column) const;
+  // out = R^-1/2 A (array column); `array` has 3n rows when any datum lies outside the region, else 3e rows.
+  void sample_column(const float* array, double* out) const;
+
+  std::shared_ptr<const CondensedOperators> operators_;
+  std::shared_ptr<const geometry::TetLocator> locator_;
+  ModeWindow window_;
+  OutsideRegion outside_;
+  ThreadTeam& team_;             // shares the work
+  std::vector<int> region_row_;  // per node, -1 outside the region
+  Eigen::MatrixXf region_modes_, region_contact_;
+  int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
+  Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
+  Eigen::Matrix<double, 4, Eigen::Dynamic> barycentric_, weights_;  // 4 x m; weights_: / sd
+  Points directions_;                                               // 3 x m, zero: whole
+  std::vector<int> first_row_;                                      // m + 1
+  VecX left_out_;  // of the prior's variance at unit scale, mm^2
+  VecX sd_;
+  Eigen::MatrixXd free_body_, before_;
+  std::unique_ptr<double[]> contact_storage_;
+};
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/contract/data_check.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <sstream>
+#include <string>
+
+namespace brainshift::inversion {
+namespace {
+
+// Not on one line, not in one plane.
+Status check_spread(const Points& positions) {
+  const Vec3 centre = positions.rowwise().mean();
+  Mat3 scatter = Mat3::Zero();
+  for (Eigen::Index i = 0; i < positions.cols(); ++i) {
+    const Vec3 arm = positions.col(i) - centre;
+    scatter += arm * arm.transpose();
+  }
+  const Vec3 variances = Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvalues();  // ascending
+  const double limit = kCollinearRatio * kCollinearRatio * variances[2];
+  if (variances[1] > limit && variances[0] > limit) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              "sparse data: the " + std::to_string(positions.cols()) + " positions lie " +
+                  (variances[1] > limit ? "in one plane" : "on one line or in one point"));
+}
+
+// Neighbours that would have to tear apart. Thinned beyond some thousand data: all pairs are looked at.
+Status check_agreement(const SparseData& data) {
+  constexpr int kMostPairs = 2000;
+  const int step = 1 + (data.size() - 1) / kMostPairs;
+  for (int i = 0; i < data.size(); i += step) {
+    if (data.along_direction(i)) continue;
+    for (int j = i + step; j < data.size(); j += step) {
+      if (data.along_direction(j)) continue;
+      const double apart = (data.positions.col(i) - data.positions.col(j)).norm();
+      const double differ = (data.displacements.col(i) - data.displacements.col(j)).norm();
+      const double noise = kContradictionSds * (data.sd_mm[i] + data.sd_mm[j]);
+      if (!(differ > kContradiction_mm + kContradictionStretch * apart + noise)) continue;
+      std::ostringstream text;
+      text << "sparse data: points " << i << " and " << j << " contradict each other: " << apart
+           << " mm apart, their displacements differ by " << differ << " mm";
+      return fail(ErrorCode::kInvalidArgument, text.str());
+    }
+  }
+  return {};
+}
+
+Status check_directions(const SparseData& data) {
+  if (data.directions.cols() == 0) return {};
+  if (data.directions.cols() != data.size()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "sparse data: " + std::to_string(data.directions.cols()) + " directions for " +
+                    std::to_string(data.size()) + " data");
+  }
+  for (int i = 0; i < data.size(); ++i) {
+    const double length = data.directions.col(i).norm();
+    if (length == 0.0 || std::abs(length - 1.0) <= kUnitTolerance) continue;
+    std::ostringstream text;
+    text << "sparse data: direction " << i << " has length " << length << ": must be 0 or 1";
+    return fail(std::isfinite(length) ? ErrorCode::kInvalidArgument : ErrorCode::kNotFinite,
+                text.str());
+  }
+  return {};
+}
+
+// One after the other, nothing left out.
+Status check_sources(const SparseData& data) {
+  int next = 0;
+  for (const DataSource& source : data.sources) {
+    if (source.first != next || source.count < 0) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "sparse data: source \"" + source.name + "\" begins at datum " +
+                      std::to_string(source.first) + ", must begin at " + std::to_string(next));
+    }
+    next += source.count;
+  }
+  if (data.sources.empty() || next == data.size()) return {};
+  return fail(ErrorCode::kInvalidArgument, "sparse data: the sources hold " + std::to_string(next) +
+                                               " of " + std::to_string(data.size()) + " data");
+}
+
+}  // namespace
+
+Status check_whole(const SparseData& data) {
+  for (int i = 0; i < data.size(); ++i) {
+    if (!data.along_direction(i)) continue;
+    return fail(ErrorCode::kInvalidArgument,
+                "sparse data: datum " + std::to_string(i) +
+                    " is a distance along a direction: only method condensed takes it");
+  }
+  return {};
+}
+
+Status check_data(const SparseData& data) {
+  const int m = data.size();
+  if (data.displacements.cols() != m || data.sd_mm.size() != m) {
+    std::ostringstream text;
+    text << "sparse data: " << m << " positions, " << data.displacements.cols()
+         << " displacements and " << data.sd_mm.size()
+         << " standard deviations must be equal counts";
+    return fail(ErrorCode::kInvalidArgument, text.str());
+  }
+  const Eigen::MatrixXd& common = data.common_error;
+  if (common.rows() > 0 &&
+      (common.rows() != 3 * m || common.cols() > SparseData::kMaxCommonErrors)) {
+    std::ostringstream text;
+    text << "sparse data: common_error is " << common.rows() << " x " << common.cols()
+         << ": must have 3 rows for each of " << m << " data and at most "
+         << SparseData::kMaxCommonErrors << " columns";
+    return fail(ErrorCode::kInvalidArgument, text.str());
+  }
+  if (!common.allFinite()) {
+    return fail(ErrorCode::kNotFinite,
+                "sparse data: common_error holds a value that is not finite");
+  }
+  if (m < 3) {
+    return fail(ErrorCode::kInvalidArgument,
+                "sparse data: " + std::to_string(m) + " points, at least 3 are needed");
+  }
+  for (int i = 0; i < m; ++i) {
+    if (!data.positions.col(i).allFinite() || !data.displacements.col(i).allFinite() ||
+        !std::isfinite(data.sd_mm[i])) {
+      return fail(ErrorCode::kNotFinite,
+                  "sparse data: point " + std::to_string(i) +
+                      " has a position, displacement or sd that is not finite");
+    }
+    if (!(data.sd_mm[i] > 0.0)) {
+      std::ostringstream text;
+      text << "sparse data: sd_mm[" << i << "] = " << data.sd_mm[i] << ": must be > 0";
+      return fail(ErrorCode::kInvalidArgument, text.str());
+    }
+  }
+  if (auto status = check_directions(data); !status) return status;
+  if (auto status = check_sources(data); !status) return status;
+  if (auto status = check_spread(data.positions); !status) return status;
+  return check_agreement(data);
+}
+
+}  // namespace brainshift::inversion

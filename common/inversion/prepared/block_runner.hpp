@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// BlockRunner: work on many columns, in blocks dealt to the cores in a fixed partition; every core has its own
+// solver. What a block gives does not depend on the core that worked on it: results are bit-identical for any
+// number of threads, as long as blocks write to different places.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <stop_token>
+#include <string_view>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+#include "common/core/thread_team.hpp"
+#include "common/fem/block_solver.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
+
+namespace brainshift::inversion {
+
+class BlockRunner {
+ public:
+  // Right-hand sides per block: from here on a solve is bound by arithmetic, no longer by reading the factor.
+  static constexpr int kBlock = 64;
+
+  // Keeps a reference to the model. threads: 0 means as many as cores.
+  BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads)
+      : team_(threads), progress_(std::move(progress)), stop_(std::move(stop)) {
+    for (int i = 0; i < team_.size(); ++i) {
+      solvers_.push_back(std::make_unique<fem::BlockSolver>(
+          model.forward().stiffness(), model.forward().factor(), model.forward().dofs()));
+    }
+  }
+  // Status work(first, count, solver) for column ranges that cover [0, columns). kUnavailable when stopped; else
+  // the error of a block, after which no other is begun.
+  template <typename Work>
+  Status run(std::string_view stage, int columns, const Work& work) {
+    const int blocks = (columns + kBlock - 1) / kBlock;
+    std::atomic<int> done{0};
+    std::atomic<bool> failed{false};
+    std::vector<Status> statuses(static_cast<std::size_t>(team_.size()));
+    auto task = [&](int member) {
+      for (int block = member; block < blocks; block += team_.size()) {
+        if (stop_.stop_requested() || failed) return;
+        const int first = block * kBlock;
+        Status& status = statuses[static_cast<std::size_t>(member)];
+        status = work(first, std::min(kBlock, columns - first),
+                      *solvers_[static_cast<std::size_t>(member)]);
+        if (!status) {
+          failed = true;
+          return;
+        }
+        ++done;
+        if (member == 0) report(progress_, stage, static_cast<double>(done) / blocks);
+      }
+    };
+    report(progress_, stage, 0.0);
+    team_.run(task);
+    report(progress_, stage, 1.0);
+    for (const Status& status : statuses) {
+      if (!status) return status;
+    }
+    if (done != blocks) return fail(ErrorCode::kUnavailable, "preparation was stopped");
+    return {};
+  }
+
+ private:
+  ThreadTeam team_;
+  Progress progress_;
+  std::stop_token stop_;
+  std::vector<std::unique_ptr<fem::BlockSolver>> solvers_;
+};
+
+}  // namespace brainshift::inversion

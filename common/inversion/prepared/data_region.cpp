@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/prepared/data_region.hpp"
+
+#include <sstream>
+
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/tet_locator.hpp"
+
+namespace brainshift::inversion {
+
+std::vector<NodeIndex> data_region(const BrainModel& model) {
+  std::vector<char> near(static_cast<std::size_t>(model.mesh.num_nodes()), 0);
+  const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+    const Vec3 node = model.mesh.nodes.col(i);
+    bool within = tumour && (tumour->closest(node).point - node).norm() < kRegionMargin_mm;
+    for (std::size_t k = 0; !within && k < model.craniotomy.size(); ++k) {
+      within = (model.mesh.nodes.col(model.craniotomy[k]) - node).norm() < kRegionMargin_mm;
+    }
+    near[static_cast<std::size_t>(i)] = static_cast<char>(within);
+  }
+  // Where elements are larger than the margin.
+  const geometry::TetLocator locator(model.mesh);
+  const auto add_element_at = [&](const Vec3& point) {
+    const geometry::TetLocation location = locator.locate(point);
+    for (const int node : location.nodes) near[static_cast<std::size_t>(node)] = 1;
+  };
+  for (int t = 0; t < model.tumour.num_triangles(); ++t) {
+    Vec3 centre = Vec3::Zero();
+    for (const int vertex : model.tumour.triangles.col(t)) {
+      add_element_at(model.tumour.vertices.col(vertex));
+      centre += model.tumour.vertices.col(vertex) / 3.0;
+    }
+    add_element_at(centre);
+  }
+  std::vector<NodeIndex> region;
+  for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+    if (near[static_cast<std::size_t>(i)] != 0) region.push_back(i);
+  }
+  return region;
+}
+
+Status check_memory(std::uint64_t bytes, double limit_gib, int slaves, int nodes) {
+  const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
+  if (needed_gib <= limit_gib) return {};
+  std::ostringstream text;
+  text.precision(3);
+  text << "condensed.memory_limit_gib = " << limit_gib << ": the preparation needs " << needed_gib
+       << " GiB (" << slaves << " slaves, " << nodes
+       << " nodes); raise the limit or coarsen the mesh";
+  return fail(ErrorCode::kInvalidArgument, text.str());
+}
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// PreparedModel: everything about a patient that does not depend on what is measured during surgery.
+// Built once per boundary condition (contact or fixed); inversions only read it.
+//
+// Not thread-safe: solves share the factor's workspace. One PreparedModel serves one thread at a time.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/contact/forward_model.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/values/estimate.hpp"
+#include "common/core/progress.hpp"
+#include "common/geometry/tet_locator.hpp"
+#include "common/prior/force_prior.hpp"
+
+namespace brainshift::inversion {
+
+struct PrepareTimings {
+  double assemble_s = 0.0;
+  double analyse_s = 0.0;
+  double factor_s = 0.0;
+  double prior_s = 0.0;
+  double total_s = 0.0;
+  double full_solve_ms = 0.0;         // t_solve: median of single solves K x = b in this process
+  std::uint64_t factor_nonzeros = 0;  // of L
+  std::uint64_t bytes = 0;            // memory of factor, matrix and prior
+};
+
+class PreparedModel {
+ public:
+  // kFloatingBody / kSingularMatrix / kEmptySet / kNotFinite name the cause.
+  static Result<PreparedModel> prepare(std::shared_ptr<const BrainModel> model,
+                                       const CaseConfig& config, Boundary boundary,
+                                       const Progress& progress = {});
+
+  const BrainModel& model() const { return *model_; }
+  const CaseConfig& config() const { return config_; }
+  Boundary boundary() const { return forward_.boundary(); }
+  const PrepareTimings& timings() const { return timings_; }
+  const contact::ForwardModel& forward() const { return forward_; }
+  const prior::ForcePrior& prior() const { return prior_; }
+  const geometry::TetLocator& locator() const { return locator_; }
+
+ private:
+  PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
+                contact::ForwardModel forward, prior::ForcePrior prior);
+  std::shared_ptr<const BrainModel> model_;
+  CaseConfig config_;
+  contact::ForwardModel forward_;
+  prior::ForcePrior prior_;
+  geometry::TetLocator locator_;
+  PrepareTimings timings_;
+};
+
+// The case's prior with the standard deviations of its parts multiplied by `scales` (PriorScales).
+prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales);
+
+}  // namespace brainshift::inversion

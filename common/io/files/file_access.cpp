@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/file_access.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "common/io/files/descriptor.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string system_message(int error) {
+  return std::error_code(error, std::generic_category()).message();
+}
+
+tl::unexpected<Error> write_error(const fs::path& path, const std::string& action, int error) {
+  return file_error(ErrorCode::kWriteFailed, path,
+                    "cannot " + action + ": " + system_message(error));
+}
+
+Status sync_path(const fs::path& path, int flags) {
+  Descriptor file(::open(path.c_str(), flags | O_CLOEXEC));
+  if (file.get() < 0) return write_error(path, "open", errno);
+  if (::fsync(file.get()) != 0) return write_error(path, "sync", errno);
+  return {};
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+}  // namespace
+
+tl::unexpected<Error> file_error(ErrorCode code, const fs::path& path, const std::string& message) {
+  return fail(code, path.string() + ": " + message);
+}
+
+Status check_regular_file(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) {
+    return file_error(ErrorCode::kNotFound, path, "no such file");
+  }
+  if (error) return file_error(ErrorCode::kUnreadable, path, error.message());
+  if (status.type() != fs::file_type::regular) {
+    return file_error(ErrorCode::kUnreadable, path, "not a regular file");
+  }
+  return {};
+}
+
+Result<std::string> read_file(const fs::path& path) {
+  if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+  std::error_code error;
+  const auto size = fs::file_size(path, error);
+  if (error) return file_error(ErrorCode::kUnreadable, path, error.message());
+  std::string content(static_cast<std::size_t>(size), '\0');
+  in.read(content.data(), static_cast<std::streamsize>(content.size()));
+  if (in.bad() || in.gcount() != static_cast<std::streamsize>(content.size())) {
+    return file_error(ErrorCode::kUnreadable, path, "cannot be read to its end");
+  }
+  return content;
+}
+
+Status write_file(const fs::path& path, std::string_view content) {
+  Result<PendingFile> pending = PendingFile::create(path);
+  if (!pending) return tl::unexpected(pending.error());
+  Descriptor file(::open(pending->temporary_path().c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.get() < 0) return write_error(path, "open a temporary file", errno);
+  while (!content.empty()) {
+    const ssize_t written = ::write(file.get(), content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return write_error(path, "write", errno);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (!file.close()) return write_error(path, "write", errno);
+  return pending->commit();
+}
+
+PendingFile::PendingFile(fs::path path, fs::path temporary)
+    : path_(std::move(path)), temporary_(std::move(temporary)) {}
+
+PendingFile::PendingFile(PendingFile&& other) noexcept
+    : path_(std::move(other.path_)), temporary_(std::move(other.temporary_)) {
+  other.temporary_.clear();
+}
+
+PendingFile::~PendingFile() {
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+Result<PendingFile> PendingFile::create(const fs::path& path) {
+  // Process and counter keep two writers of the same target apart; hidden, so that no glob picks it up.
+  static std::atomic<unsigned> counter{0};
+  std::string name = ".";
+  name += path.filename().string() + ".tmp-" + std::to_string(::getpid()) + "-";
+  name += std::to_string(counter++);
+  std::error_code ignored;
+  if (path.filename().empty() || fs::is_directory(path, ignored)) {
+    return file_error(ErrorCode::kWriteFailed, path, "is not a file name");
+  }
+  const fs::path temporary = folder_of(path) / name;
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (file.get() < 0) return write_error(path, "create a temporary file beside it", errno);
+  return PendingFile(path, temporary);
+}
+
+Status PendingFile::commit() {
+  if (Status synced = sync_path(temporary_, O_RDWR); !synced) {
+    return file_error(ErrorCode::kWriteFailed, path_, synced.error().message);
+  }
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0) return write_error(path_, "rename", errno);
+  temporary_.clear();
+  if (Status synced = sync_path(folder_of(path_), O_RDONLY | O_DIRECTORY); !synced) {
+    return file_error(ErrorCode::kWriteFailed, path_, synced.error().message);
+  }
+  return {};
+}
+
+}  // namespace brainshift::io

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/yaml_section.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+
+namespace brainshift::io {
+
+namespace fs = std::filesystem;
+
+struct YamlDocument::State {
+  fs::path file;
+  YAML::Node root;
+  std::map<std::string, int> line_of_key;  // 1-based
+  std::string problem;
+
+  void fail_at(int line, const std::string& message) {
+    if (!problem.empty()) return;
+    problem = file.string();
+    if (line > 0) problem.append(":").append(std::to_string(line));
+    problem.append(": ").append(message);
+  }
+};
+
+struct YamlSection::Node {
+  YAML::Node yaml;
+};
+
+namespace {
+
+int line_of(const YAML::Node& node) { return node.Mark().is_null() ? 0 : node.Mark().line + 1; }
+
+// The value as one short line for a message.
+std::string shown(const YAML::Node& node) {
+  if (node.IsNull()) return "(empty)";
+  if (node.IsMap()) return "(a section)";
+  if (node.IsScalar()) {
+    std::string value = node.Scalar();
+    for (char& c : value) {
+      if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+    }
+    return value.size() > 60 ? value.substr(0, 57) + "..." : value;
+  }
+  std::string list = "[";
+  for (std::size_t i = 0; i < node.size() && i < 6; ++i) {
+    list.append(i > 0 ? ", " : "").append(shown(node[i]));
+  }
+  return list + (node.size() > 6 ? ", ...]" : "]");
+}
+
+// The whole scalar must be one number: "5 mm" and "1,5" are errors.
+template <typename T>
+bool parse_scalar(const YAML::Node& node, T& value) {
+  if (!node.IsScalar()) return false;
+  const std::string& text = node.Scalar();
+  const char* begin = text.data();
+  const char* end = begin + text.size();
+  if (text.size() > 1 && *begin == '+' && begin[1] != '-') ++begin;
+  T parsed{};
+  const auto [stop, error] = std::from_chars(begin, end, parsed);
+  if (error != std::errc() || stop != end) return false;
+  value = parsed;
+  return true;
+}
+
+bool parse_finite(const YAML::Node& node, double& value) {
+  double parsed = 0.0;
+  if (!parse_scalar(node, parsed) || !std::isfinite(parsed)) return false;
+  value = parsed;
+  return true;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
+  return text;
+}
+
+}  // namespace
+
+YamlDocument::YamlDocument(std::unique_ptr<State> state) : state_(std::move(state)) {}
+YamlDocument::YamlDocument(YamlDocument&&) noexcept = default;
+YamlDocument::~YamlDocument() = default;
+
+YamlDocument YamlDocument::parse(const std::string& text, const fs::path& file) {
+  auto state = std::make_unique<State>();
+  state->file = file;
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1) {
+      state->fail_at(0,
+                     "holds " + std::to_string(documents.size()) + " YAML documents: must be one");
+    } else if (documents.empty() || !documents.front().IsMap()) {
+      state->fail_at(0, "is not a YAML mapping of keys to values");
+    } else {
+      state->root = documents.front();
+    }
+  } catch (const YAML::Exception& exception) {
+    const int line = exception.mark.is_null() ? 0 : exception.mark.line + 1;
+    state->fail_at(line, "is not valid YAML: " + exception.msg);
+  }
+  return YamlDocument(std::move(state));
+}
+
+YamlSection YamlDocument::root() {
+  if (!state_->problem.empty()) return YamlSection(*state_, nullptr, "");
+  return YamlSection(*state_, std::make_shared<YamlSection::Node>(YamlSection::Node{state_->root}),
+                     "");
+}
+
+Status YamlDocument::status() const {
+  if (state_->problem.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument, state_->problem);
+}
+
+Error YamlDocument::locate(const Error& error) const {
+  const std::string key = error.message.substr(0, error.message.find_first_of(" :["));
+  const auto found = state_->line_of_key.find(key);
+  std::string place = state_->file.string();
+  if (found != state_->line_of_key.end()) place.append(":").append(std::to_string(found->second));
+  return {error.code, place + ": " + error.message};
+}
+
+YamlSection::YamlSection(YamlDocument::State& state, std::shared_ptr<Node> node, std::string prefix)
+    : state_(&state), node_(std::move(node)), prefix_(std::move(prefix)) {
+  if (!node_) return;
+  // yaml-cpp keeps the first of two equal keys without a word.
+  std::vector<std::string> seen;
+  for (const auto& entry : node_->yaml) {
+    if (!entry.first.IsScalar()) {
+      state_->fail_at(line_of(entry.first), full_key("") + "a key must be plain text");
+      continue;
+    }
+    const std::string& key = entry.first.Scalar();
+    if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
+      state_->fail_at(line_of(entry.first), full_key(key) + ": key is given twice");
+    }
+    seen.push_back(key);
+    state_->line_of_key.emplace(full_key(key), line_of(entry.first));
+  }
+}
+
+std::string YamlSection::full_key(const std::string& key) const {
+  return prefix_.empty() ? key : prefix_ + "." + key;
+}
+
+int YamlSection::line_of_key(const std::string& key) const {
+  const auto found = state_->line_of_key.find(full_key(key));
+  return found == state_->line_of_key.end() ? 0 : found->second;
+}
+
+int YamlSection::own_line() const {
+  const auto found = state_->line_of_key.find(prefix_);
+  return found == state_->line_of_key.end() ? 0 : found->second;
+}
+
+bool YamlSection::has(const std::string& key) {
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
+  if (!node_) return false;
+  const YAML::Node& map = node_->yaml;
+  return static_cast<bool>(map[key]);
+}
+
+std::shared_ptr<YamlSection::Node> YamlSection::take(const std::string& key, Presence presence) {
+  if (!has(key)) {
+    if (presence == Presence::kRequired) {
+      state_->fail_at(own_line(), full_key(key) + ": key is missing");
+    }
+    return nullptr;
+  }
+  const YAML::Node& map = node_->yaml;
+  return std::make_shared<Node>(Node{map[key]});
+}
+
+YamlSection YamlSection::section(const std::string& key, Presence presence) {
+  std::shared_ptr<Node> value = take(key, presence);
+  // A heading whose keys are all commented out.
+  if (value && value->yaml.IsNull()) value = nullptr;
+  if (value && !value->yaml.IsMap()) {
+    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(value->yaml) +
+                                          ": must be a section of keys and values");
+    value = nullptr;
+  }
+  return YamlSection(*state_, value, full_key(key));
+}
+
+std::string YamlSection::one_of(const std::vector<std::string>& keys, Presence presence) {
+  std::vector<std::string> present;
+  for (const std::string& key : keys) {
+    if (has(key)) present.push_back(key);
+  }
+  if (present.size() == 1) return present.front();
+  if (present.empty() && presence == Presence::kOptional) return {};
+  const std::string found = present.empty() ? "none" : joined(present);
+  state_->fail_at(own_line(),
+                  prefix_ + " has " + found + ": must have exactly one of " + joined(keys));
+  return {};
+}
+
+void YamlSection::number(const std::string& key, double& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node || parse_finite(node->yaml, value)) return;
+  state_->fail_at(line_of_key(key),
+                  full_key(key) + " = " + shown(node->yaml) + ": must be a finite number");
+}
+
+void YamlSection::integer(const std::string& key, int& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node || parse_scalar(node->yaml, value)) return;
+  state_->fail_at(line_of_key(key),
+                  full_key(key) + " = " + shown(node->yaml) + ": must be an integer");
+}
+
+void YamlSection::text(const std::string& key, std::string& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node) return;
+  if (!node->yaml.IsScalar()) {
+    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(node->yaml) + ": must be text");
+    return;
+  }
+  value = node->yaml.Scalar();
+}
+
+void YamlSection::choice(const std::string& key, std::string& value,
+                         const std::vector<std::string>& words) {
+  std::string word = value;
+  text(key, word);
+  for (const std::string& known : words) {
+    if (word != known) continue;
+    value = word;
+    return;
+  }
+  std::string list;
+  for (const std::string& known : words) list += (list.empty() ? "" : ", ") + known;
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + word + ": must be one of " + list);
+}
+
+void YamlSection::fail(const std::string& key, const std::string& what) {
+  state_->fail_at(line_of_key(key), full_key(key) + ": " + what);
+}
+
+void YamlSection::path(const std::string& key, fs::path& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node) return;
+  std::string name;
+  if (!node->yaml.IsNull()) text(key, name);
+  if (name.empty()) {
+    value.clear();
+    if (presence == Presence::kRequired) {
+      state_->fail_at(line_of_key(key), full_key(key) + ": must name a file");
+    }
+    return;
+  }
+  value = (fs::absolute(state_->file).parent_path() / name).lexically_normal();
+}
+
+void YamlSection::vector3(const std::string& key, Vec3& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node) return;
+  Vec3 parsed = Vec3::Zero();
+  bool ok = node->yaml.IsSequence() && node->yaml.size() == 3;
+  for (int i = 0; ok && i < 3; ++i) ok = parse_finite(node->yaml[i], parsed[i]);
+  if (ok) {
+    value = parsed;
+    return;
+  }
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(node->yaml) +
+                                        ": must be a list of three finite numbers");
+}
+
+void YamlSection::numbers(const std::string& key, std::vector<double>& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node) return;
+  bool ok = node->yaml.IsSequence();
+  std::vector<double> parsed(ok ? node->yaml.size() : 0);
+  for (std::size_t i = 0; ok && i < parsed.size(); ++i) ok = parse_finite(node->yaml[i], parsed[i]);
+  if (ok) {
+    value = std::move(parsed);
+    return;
+  }
+  state_->fail_at(line_of_key(key),
+                  full_key(key) + " = " + shown(node->yaml) + ": must be a list of finite numbers");
+}
+
+std::vector<std::string> YamlSection::names() {
+  std::vector<std::string> keys;
+  if (!node_) return keys;
+  for (const auto& entry : node_->yaml) {
+    if (!entry.first.IsScalar()) continue;
+    keys.push_back(entry.first.Scalar());
+    has(keys.back());
+  }
+  return keys;
+}
+
+void YamlSection::done() {
+  if (!node_) return;
+  for (const auto& entry : node_->yaml) {
+    if (!entry.first.IsScalar()) continue;
+    const std::string& key = entry.first.Scalar();
+    if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+    state_->fail_at(line_of(entry.first),
+                    full_key(key) + ": unknown key (known here: " + joined(known_) + ")");
+  }
+}
+
+}  // namespace brainshift::io

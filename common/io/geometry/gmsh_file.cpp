@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Gmsh .msh, versions 2.2 and 4.1, ASCII and binary. Both encodings hold the same numbers in the same
+// order, so one reader walks both and only the cursor differs.
+#include <charconv>
+#include <limits>
+#include <map>
+#include <unordered_map>
+
+#include "common/io/files/binary_codec.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
+
+namespace brainshift::io {
+namespace {
+
+constexpr int kTetrahedron = 4;
+constexpr int kTriangle = 2;
+
+// Thrown inside this file only, so that the readers stay a plain list of numbers; parse_gmsh catches it.
+struct FormatProblem {
+  std::string message;
+};
+
+[[noreturn]] void refuse(const std::string& message) { throw FormatProblem{message}; }
+
+// Vertices per element type; 0 for a type this reader does not know.
+int vertices_of_type(std::int64_t type) {
+  // Types 1 to 31 of the reference manual.
+  constexpr int kVertices[] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
+                               8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
+  return type >= 1 && type <= 31 ? kVertices[type] : 0;
+}
+
+class Cursor {
+ public:
+  explicit Cursor(std::string_view content) : rest_(content) {}
+
+  void set_binary(bool swap) {
+    binary_ = true;
+    swap_ = swap;
+  }
+  bool binary() const { return binary_; }
+
+  std::string_view rest() const { return rest_; }
+  std::string_view line() {
+    const std::size_t end = rest_.find('\n');
+    std::string_view text = rest_.substr(0, end);
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.remove_suffix(1);
+    return text;
+  }
+  // A number in text, also in binary files (counts of version 2.2).
+  template <typename T>
+  T text_number() {
+    while (!rest_.empty() &&
+           std::string_view(" \t\r\n").find(rest_.front()) != std::string_view::npos) {
+      rest_.remove_prefix(1);
+    }
+    T value{};
+    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    if (error != std::errc()) {
+      refuse("section '" + section_ + "' ends too early or holds something that is not a number");
+    }
+    rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+    return value;
+  }
+  template <typename T>
+  T number() {
+    if (!binary_) return text_number<T>();
+    if (rest_.size() < sizeof(T)) refuse("section '" + section_ + "' ends too early");
+    const T value = load_number<T>(rest_.data(), swap_);
+    rest_.remove_prefix(sizeof(T));
+    return value;
+  }
+  int integer() { return number<std::int32_t>(); }
+  std::int64_t size() { return number<std::int64_t>(); }  // size_t in the file
+  double real() { return number<double>(); }
+  // A count of things that take at least one byte each: a larger one is a lie and would exhaust memory.
+  std::int64_t checked(std::int64_t count) {
+    if (count < 0 || static_cast<std::uint64_t>(count) > rest_.size()) {
+      refuse("section '" + section_ + "' promises " + std::to_string(count) + " entries");
+    }
+    return count;
+  }
+  void enter(std::string_view name) { section_ = name; }
+  void skip_section() {
+    const std::string end = "$End" + section_.substr(1);
+    const std::size_t at = rest_.find(end);
+    if (at == std::string_view::npos) refuse("section '" + section_ + "' has no end");
+    rest_.remove_prefix(at + end.size());
+    line();
+  }
+
+ private:
+  std::string_view rest_;
+  std::string section_ = "$MeshFormat";
+  bool binary_ = false;
+  bool swap_ = false;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::string_view content) : cursor_(content) {}
+  GroupedMesh read();
+
+ private:
+  void read_format();
+  void read_physical_names();
+  void read_entities();
+  void read_nodes_2();
+  void read_nodes_4();
+  void read_elements_2();
+  void read_elements_4();
+  void add_node(std::int64_t tag, double x, double y, double z);
+  // Takes over the element's vertices if it is a tetrahedron or a triangle.
+  void add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical);
+  // Indices of nodes given by tags.
+  template <int Vertices>
+  Eigen::Matrix<int, Vertices, Eigen::Dynamic> cells(const std::vector<std::int64_t>& tags,
+                                                     const std::string& name) const;
+  GroupedMesh mesh() const;
+
+  Cursor cursor_;
+  bool version_4_ = false;
+  bool has_nodes_ = false;
+  std::map<int, int> physical_of_volume_;
+  std::map<int, std::vector<int>> physicals_of_surface_;
+  std::map<std::string, int> volume_names_, surface_names_;
+  std::unordered_map<std::int64_t, int> index_of_tag_;
+  std::vector<double> coordinates_;
+  std::vector<std::int64_t> tets_;  // tags
+  std::vector<int> labels_;
+  std::vector<std::int64_t> triangles_;  // tags
+  std::vector<int> triangle_labels_;
+};
+
+void Reader::read_format() {
+  if (cursor_.line() != "$MeshFormat") refuse("is not a Gmsh file: it must begin with $MeshFormat");
+  const auto version = cursor_.text_number<double>();
+  const auto binary = cursor_.text_number<int>();
+  const auto size = cursor_.text_number<int>();
+  if (version != 2.2 && version != 4.1) {
+    std::string text = std::to_string(version);
+    refuse("Gmsh format version " + text.substr(0, text.find('.') + 2) +
+           " is not supported: must be 2.2 or 4.1");
+  }
+  version_4_ = version == 4.1;
+  if (size != 8) refuse("Gmsh data size " + std::to_string(size) + " is not supported: must be 8");
+  cursor_.line();
+  if (binary == 1) {
+    if (cursor_.rest().size() < 4) refuse("ends inside $MeshFormat");
+    cursor_.set_binary(load_number<std::int32_t>(cursor_.rest().data(), false) != 1);
+    if (cursor_.integer() != 1) refuse("byte order mark is damaged");
+    cursor_.line();
+  }
+  cursor_.skip_section();
+}
+
+// "dimension tag "name"" per line, as text in binary files too.
+void Reader::read_physical_names() {
+  const std::int64_t count = cursor_.checked(cursor_.text_number<std::int64_t>());
+  cursor_.line();
+  for (std::int64_t i = 0; i < count; ++i) {
+    const auto dimension = cursor_.text_number<int>();
+    const auto tag = cursor_.text_number<int>();
+    const std::string_view rest = cursor_.line();
+    const std::size_t open = rest.find('"');
+    const std::size_t close = rest.rfind('"');
+    if (open == close) refuse("section '$PhysicalNames' holds a name without quotation marks");
+    const std::string name(rest.substr(open + 1, close - open - 1));
+    if (dimension == 3) volume_names_.emplace(name, tag);
+    if (dimension == 2) surface_names_.emplace(name, tag);
+  }
+}
+
+void Reader::read_entities() {
+  std::int64_t counts[4];
+  for (std::int64_t& count : counts) count = cursor_.checked(cursor_.size());
+  for (int dimension = 0; dimension < 4; ++dimension) {
+    for (std::int64_t i = 0; i < counts[dimension]; ++i) {
+      const int tag = cursor_.integer();
+      for (int k = 0; k < (dimension == 0 ? 3 : 6); ++k) cursor_.real();  // point or bounding box
+      const std::int64_t physical_tags = cursor_.checked(cursor_.size());
+      for (std::int64_t k = 0; k < physical_tags; ++k) {
+        const int physical = cursor_.integer();
+        if (dimension == 3 && k == 0) physical_of_volume_[tag] = physical;
+        if (dimension == 2) physicals_of_surface_[tag].push_back(physical);
+      }
+      if (dimension == 0) continue;
+      const std::int64_t bounding = cursor_.checked(cursor_.size());
+      for (std::int64_t k = 0; k < bounding; ++k) cursor_.integer();
+    }
+  }
+}
+
+void Reader::add_node(std::int64_t tag, double x, double y, double z) {
+  const auto index = static_cast<int>(index_of_tag_.size());
+  if (!index_of_tag_.emplace(tag, index).second) {
+    refuse("node " + std::to_string(tag) + " is given twice");
+  }
+  coordinates_.insert(coordinates_.end(), {x, y, z});
+}
+
+void Reader::read_nodes_2() {
+  const std::int64_t count = cursor_.checked(cursor_.text_number<std::int64_t>());
+  if (cursor_.binary()) cursor_.line();
+  for (std::int64_t i = 0; i < count; ++i) {
+    const int tag = cursor_.integer();
+    const double x = cursor_.real();
+    const double y = cursor_.real();
+    add_node(tag, x, y, cursor_.real());
+  }
+}
+
+void Reader::read_nodes_4() {
+  const std::int64_t blocks = cursor_.size();
+  for (int k = 0; k < 3; ++k) cursor_.size();  // number of nodes, smallest and largest tag
+  for (std::int64_t block = 0; block < blocks; ++block) {
+    const int dimension = cursor_.integer();
+    cursor_.integer();  // entity tag
+    const bool parametric = cursor_.integer() != 0;
+    std::vector<std::int64_t> tags(static_cast<std::size_t>(cursor_.checked(cursor_.size())));
+    for (std::int64_t& tag : tags) tag = cursor_.size();
+    for (const std::int64_t tag : tags) {
+      const double x = cursor_.real();
+      const double y = cursor_.real();
+      add_node(tag, x, y, cursor_.real());
+      for (int k = 0; parametric && k < dimension; ++k) cursor_.real();
+    }
+  }
+}
+
+void Reader::add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical) {
+  if (type == kTetrahedron) {
+    tets_.insert(tets_.end(), tags.begin(), tags.end());
+    labels_.push_back(physical);
+  } else if (type == kTriangle && physical != 0) {
+    triangles_.insert(triangles_.end(), tags.begin(), tags.end());
+    triangle_labels_.push_back(physical);
+  }
+}
+
+int checked_vertices(std::int64_t type) {
+  const int vertices = vertices_of_type(type);
+  if (vertices == 0) refuse("element type " + std::to_string(type) + " is unknown");
+  return vertices;
+}
+
+void Reader::read_elements_2() {
+  const std::int64_t count = cursor_.checked(cursor_.text_number<std::int64_t>());
+  if (cursor_.binary()) cursor_.line();
+  std::vector<std::int64_t> vertices;
+  for (std::int64_t read = 0; read < count;) {
+    // A binary file states type and number of tags once for a run of elements.
+    int in_run = 1;
+    int type = 0;
+    int tags = 0;
+    if (cursor_.binary()) {
+      type = cursor_.integer();
+      in_run = cursor_.integer();
+      tags = cursor_.integer();
+      if (in_run < 1) refuse("a run of elements is empty");
+    }
+    for (int i = 0; i < in_run; ++i, ++read) {
+      cursor_.integer();  // element number
+      if (!cursor_.binary()) {
+        type = cursor_.integer();
+        tags = cursor_.integer();
+      }
+      int physical = 0;
+      for (int k = 0; k < tags; ++k) {
+        const int tag = cursor_.integer();
+        if (k == 0) physical = tag;
+      }
+      vertices.resize(static_cast<std::size_t>(checked_vertices(type)));
+      for (std::int64_t& vertex : vertices) vertex = cursor_.integer();
+      add_element(type, vertices, physical);
+    }
+  }
+}
+
+void Reader::read_elements_4() {
+  const std::int64_t blocks = cursor_.size();
+  for (int k = 0; k < 3; ++k) cursor_.size();  // number of elements, smallest and largest tag
+  std::vector<std::int64_t> vertices;
+  for (std::int64_t block = 0; block < blocks; ++block) {
+    const int dimension = cursor_.integer();
+    const int entity = cursor_.integer();
+    const int type = cursor_.integer();
+    const std::int64_t count = cursor_.checked(cursor_.size());
+    const auto physical = physical_of_volume_.find(entity);
+    vertices.resize(static_cast<std::size_t>(checked_vertices(type)));
+    for (std::int64_t i = 0; i < count; ++i) {
+      cursor_.size();  // element tag
+      for (std::int64_t& vertex : vertices) vertex = cursor_.size();
+      if (dimension == 2) {
+        for (const int group : physicals_of_surface_[entity]) add_element(type, vertices, group);
+        continue;
+      }
+      const bool has_label = dimension == 3 && physical != physical_of_volume_.end();
+      add_element(type, vertices, has_label ? physical->second : 0);
+    }
+  }
+}
+
+template <int Vertices>
+Eigen::Matrix<int, Vertices, Eigen::Dynamic> Reader::cells(const std::vector<std::int64_t>& tags,
+                                                           const std::string& name) const {
+  Eigen::Matrix<int, Vertices, Eigen::Dynamic> indices(
+      Vertices, static_cast<Eigen::Index>(tags.size() / Vertices));
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    const auto found = index_of_tag_.find(tags[i]);
+    if (found == index_of_tag_.end()) {
+      refuse(name + " " + std::to_string(i / Vertices) + " has node " + std::to_string(tags[i]) +
+             ", which does not exist");
+    }
+    indices.data()[i] = found->second;
+  }
+  return indices;
+}
+
+GroupedMesh Reader::mesh() const {
+  if (tets_.empty()) refuse("has no 4-node tetrahedron");
+  GroupedMesh result;
+  TetMesh& mesh = result.mesh;
+  mesh.nodes = Eigen::Map<const Points>(coordinates_.data(), 3,
+                                        static_cast<Eigen::Index>(coordinates_.size() / 3));
+  mesh.tets = cells<4>(tets_, "tetrahedron");
+  // A file without physical groups has no labels.
+  for (const int label : labels_) {
+    if (label != 0) mesh.labels = labels_;
+    if (label != 0) break;
+  }
+  result.triangles = cells<3>(triangles_, "triangle");
+  result.triangle_labels = triangle_labels_;
+  result.volume_names = volume_names_;
+  result.surface_names = surface_names_;
+  return result;
+}
+
+GroupedMesh Reader::read() {
+  read_format();
+  bool has_elements = false;
+  while (!cursor_.rest().empty()) {
+    const std::string_view name = cursor_.line();
+    if (name.empty()) continue;
+    if (name.front() != '$') refuse("has text outside of its sections");
+    cursor_.enter(name);
+    if (name == "$Nodes") {
+      version_4_ ? read_nodes_4() : read_nodes_2();
+      has_nodes_ = true;
+    } else if (name == "$Elements") {
+      version_4_ ? read_elements_4() : read_elements_2();
+      has_elements = true;
+    } else if (name == "$Entities") {
+      read_entities();
+    } else if (name == "$PhysicalNames") {
+      read_physical_names();
+    }
+    cursor_.skip_section();
+  }
+  if (!has_nodes_) refuse("has no $Nodes section");
+  if (!has_elements) refuse("has no $Elements section");
+  return mesh();
+}
+
+}  // namespace
+
+Result<GroupedMesh> parse_gmsh(const std::string& content) {
+  try {
+    return Reader(content).read();
+  } catch (const FormatProblem& problem) {
+    return fail(ErrorCode::kUnreadable, problem.message);
+  }
+}
+
+}  // namespace brainshift::io

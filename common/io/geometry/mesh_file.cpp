@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/geometry/mesh_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_point_format(const std::string& extension) {
+  return extension == ".xyz" || extension == ".txt" || extension == ".csv" || extension == ".pts";
+}
+
+// Indices inside the node list and finite coordinates: what every later stage takes for granted.
+template <typename Cells>
+Status check_indices(const Points& points, const Cells& cells, const std::string& cell_name) {
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (!points.col(i).allFinite()) {
+      return fail(ErrorCode::kUnreadable,
+                  "node " + std::to_string(i) + " has a coordinate that is not finite");
+    }
+  }
+  for (Eigen::Index c = 0; c < cells.cols(); ++c) {
+    for (Eigen::Index k = 0; k < cells.rows(); ++k) {
+      if (cells(k, c) >= 0 && cells(k, c) < points.cols()) continue;
+      return fail(ErrorCode::kUnreadable, cell_name + " " + std::to_string(c) + " has node index " +
+                                              std::to_string(cells(k, c)) +
+                                              ": must be between 0 and " +
+                                              std::to_string(points.cols() - 1));
+    }
+  }
+  return {};
+}
+
+// Drops nodes without a tetrahedron, and triangles that need one of them.
+GroupedMesh without_unreferenced_nodes(const GroupedMesh& grouped) {
+  const TetMesh& mesh = grouped.mesh;
+  std::vector<int> new_index(static_cast<std::size_t>(mesh.num_nodes()), -1);
+  for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
+    new_index[static_cast<std::size_t>(mesh.tets.data()[i])] = 0;
+  }
+  GroupedMesh kept = grouped;
+  int next = 0;
+  for (int node = 0; node < mesh.num_nodes(); ++node) {
+    int& index = new_index[static_cast<std::size_t>(node)];
+    if (index < 0) continue;
+    index = next++;
+    kept.mesh.nodes.col(index) = mesh.nodes.col(node);
+  }
+  kept.mesh.nodes.conservativeResize(Eigen::NoChange, next);
+  for (Eigen::Index i = 0; i < mesh.tets.size(); ++i) {
+    kept.mesh.tets.data()[i] = new_index[static_cast<std::size_t>(mesh.tets.data()[i])];
+  }
+  kept.triangle_labels.clear();
+  Eigen::Index triangles = 0;
+  for (Eigen::Index t = 0; t < grouped.triangles.cols(); ++t) {
+    Eigen::Vector3i corners;
+    for (int k = 0; k < 3; ++k)
+      corners[k] = new_index[static_cast<std::size_t>(grouped.triangles(k, t))];
+    if (corners.minCoeff() < 0) continue;
+    kept.triangles.col(triangles++) = corners;
+    kept.triangle_labels.push_back(grouped.triangle_labels[static_cast<std::size_t>(t)]);
+  }
+  kept.triangles.conservativeResize(Eigen::NoChange, triangles);
+  return kept;
+}
+
+Result<MeshWithFields> load_vtu(const fs::path& path, bool with_fields) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Result<MeshWithFields> read = parse_vtu(std::move(*content), with_fields);
+  if (!read) return file_error(read.error().code, path, read.error().message);
+  if (Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return read;
+}
+
+Result<GroupedMesh> load_grouped(const fs::path& path) {
+  if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
+  const std::string extension = lower_extension(path);
+  if (extension != ".msh" && extension != ".vtu") {
+    return file_error(ErrorCode::kUnreadable, path,
+                      "unknown mesh format '" + extension + "': must be .msh or .vtu");
+  }
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Result<GroupedMesh> read =
+      extension == ".msh" ? parse_gmsh(*content) : parse_grouped_vtu(std::move(*content));
+  if (!read) return file_error(read.error().code, path, read.error().message);
+  const Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron").and_then([&] {
+    return check_indices(read->mesh.nodes, read->triangles, "triangle");
+  });
+  if (!ok) return file_error(ok.error().code, path, ok.error().message);
+  return without_unreferenced_nodes(*read);
+}
+
+Result<TriangleSurface> checked(Result<TriangleSurface> surface, const fs::path& path) {
+  if (!surface) return file_error(surface.error().code, path, surface.error().message);
+  if (Status ok = check_indices(surface->vertices, surface->triangles, "triangle"); !ok) {
+    return file_error(ok.error().code, path, ok.error().message);
+  }
+  return surface;
+}
+
+Result<TriangleSurface> load_points(const fs::path& path) {
+  const Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  return checked(parse_xyz(*content), path);
+}
+
+// Possibly without triangles.
+Result<TriangleSurface> load_surface(const fs::path& path) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const std::string extension = lower_extension(path);
+  if (extension == ".stl") return checked(parse_stl(*content), path);
+  if (extension == ".ply") return checked(parse_ply(*content), path);
+  if (extension == ".obj") return checked(parse_obj(*content), path);
+  if (extension == ".vtp") return checked(parse_vtp(std::move(*content)), path);
+  return file_error(ErrorCode::kUnreadable, path,
+                    "unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
+}
+
+}  // namespace
+
+Result<TetMesh> read_tet_mesh(const fs::path& path) {
+  return load_grouped(path).map([](GroupedMesh&& read) { return std::move(read.mesh); });
+}
+
+Result<GroupedMesh> read_grouped_mesh(const fs::path& path) { return load_grouped(path); }
+
+Result<MeshWithFields> read_vtu(const fs::path& path) { return load_vtu(path, true); }
+
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+Result<TriangleSurface> read_surface_or_points(const fs::path& path) {
+  auto surface = is_point_format(lower_extension(path)) ? load_points(path) : load_surface(path);
+  if (surface && surface->num_vertices() == 0)
+    return file_error(ErrorCode::kUnreadable, path, "has no point");
+  return surface;
+}
+
+Result<TriangleSurface> read_surface(const fs::path& path) {
+  auto surface = load_surface(path);
+  if (surface && surface->num_triangles() == 0)
+    return file_error(ErrorCode::kUnreadable, path, "has no triangle");
+  return surface;
+}
+
+}  // namespace brainshift::io

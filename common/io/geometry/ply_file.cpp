@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .ply, ascii and binary: elements "vertex" (x, y, z) and "face" (a list of vertex indices); all other
+// elements and properties are skipped. Source: Greg Turk, "The PLY Polygon File Format".
+#include <charconv>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <sstream>
+#include <vector>
+
+#include "common/io/files/binary_codec.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
+
+namespace brainshift::io {
+namespace {
+
+// Thrown inside this file only; parse_ply catches it.
+struct FormatProblem {
+  std::string message;
+};
+
+[[noreturn]] void refuse(const std::string& message) { throw FormatProblem{message}; }
+
+struct Property {
+  std::string name;
+  std::string type;
+  std::string count_type;  // not empty: a list
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  std::string format;
+  std::vector<Element> elements;
+};
+
+Header read_header(std::string_view& rest) {
+  constexpr std::string_view kEnd = "end_header";
+  const std::size_t end = rest.find(kEnd);
+  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos) refuse("is not a PLY file");
+  std::istringstream lines{std::string(rest.substr(0, end))};
+  rest.remove_prefix(std::min(rest.size(), rest.find('\n', end) + 1));
+
+  Header header;
+  std::string line;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    std::string first;
+    words >> first;
+    if (first == "format") words >> header.format;
+    if (first == "element") {
+      Element element;
+      if (!(words >> element.name >> element.count)) refuse("element without a count: " + line);
+      header.elements.push_back(element);
+    }
+    if (first == "property") {
+      if (header.elements.empty()) refuse("property before the first element");
+      Property property;
+      words >> property.type;
+      if (property.type == "list") words >> property.count_type >> property.type;
+      if (!(words >> property.name)) refuse("property without a name");
+      header.elements.back().properties.push_back(property);
+    }
+  }
+  if (header.format != "ascii" && header.format != "binary_little_endian") {
+    refuse("PLY format '" + header.format +
+           "' is not supported: must be ascii or binary_little_endian");
+  }
+  return header;
+}
+
+class Cursor {
+ public:
+  Cursor(std::string_view rest, bool ascii) : rest_(rest), ascii_(ascii) {}
+
+  double value(const std::string& type) {
+    if (ascii_) return text_number();
+    if (type == "char" || type == "int8") return binary<std::int8_t>();
+    if (type == "uchar" || type == "uint8") return binary<std::uint8_t>();
+    if (type == "short" || type == "int16") return binary<std::int16_t>();
+    if (type == "ushort" || type == "uint16") return binary<std::uint16_t>();
+    if (type == "int" || type == "int32") return binary<std::int32_t>();
+    if (type == "uint" || type == "uint32") return binary<std::uint32_t>();
+    if (type == "float" || type == "float32") return binary<float>();
+    if (type == "double" || type == "float64") return binary<double>();
+    refuse("property type '" + type + "' is unknown");
+  }
+  std::size_t remaining() const { return rest_.size(); }
+
+ private:
+  template <typename T>
+  double binary() {
+    if (rest_.size() < sizeof(T)) refuse("ends too early");
+    const T number = load_number<T>(rest_.data(), false);
+    rest_.remove_prefix(sizeof(T));
+    return static_cast<double>(number);
+  }
+  double text_number() {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
+    double number = 0.0;
+    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), number);
+    if (error != std::errc()) refuse("ends too early or holds something that is not a number");
+    rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+    return number;
+  }
+  std::string_view rest_;
+  bool ascii_;
+};
+
+int to_index(double value) {
+  const bool fits = value >= 0.0 && value <= std::numeric_limits<int>::max();
+  return fits ? static_cast<int>(value) : -1;  // the caller's index check names it
+}
+
+// One entry of an element: scalars by name; a list of vertex indices goes to `indices`.
+void read_entry(Cursor& cursor, const Element& element, std::map<std::string, double>& scalars,
+                std::vector<int>& indices) {
+  indices.clear();
+  for (const Property& property : element.properties) {
+    if (property.count_type.empty()) {
+      scalars[property.name] = cursor.value(property.type);
+      continue;
+    }
+    const double count = cursor.value(property.count_type);
+    if (!(count >= 0.0) || count > static_cast<double>(cursor.remaining())) {
+      refuse("a list promises an impossible number of entries");
+    }
+    const bool is_face = property.name == "vertex_indices" || property.name == "vertex_index";
+    for (int k = 0; k < static_cast<int>(count); ++k) {
+      const double value = cursor.value(property.type);
+      if (is_face) indices.push_back(to_index(value));
+    }
+  }
+}
+
+TriangleSurface read_ply(std::string_view rest) {
+  const Header header = read_header(rest);
+  Cursor cursor(rest, header.format == "ascii");
+  TriangleSurface surface;
+  for (const Element& element : header.elements) {
+    if (element.properties.empty()) continue;
+    // Every entry takes at least a byte.
+    if (element.count > cursor.remaining()) refuse("element '" + element.name + "' ends too early");
+    const auto count = static_cast<Eigen::Index>(element.count);
+    if (element.name == "vertex") surface.vertices.resize(3, count);
+    if (element.name == "face") surface.triangles.resize(3, count);
+    std::map<std::string, double> scalars;
+    std::vector<int> indices;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      read_entry(cursor, element, scalars, indices);
+      if (element.name == "vertex") {
+        if (scalars.count("x") + scalars.count("y") + scalars.count("z") != 3) {
+          refuse("element 'vertex' lacks x, y or z");
+        }
+        surface.vertices.col(i) << scalars["x"], scalars["y"], scalars["z"];
+      }
+      if (element.name == "face") {
+        if (indices.size() != 3) {
+          refuse("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
+                 " vertices: must have 3");
+        }
+        surface.triangles.col(i) << indices[0], indices[1], indices[2];
+      }
+    }
+  }
+  return surface;
+}
+
+}  // namespace
+
+Result<TriangleSurface> parse_ply(const std::string& content) {
+  try {
+    return read_ply(content);
+  } catch (const FormatProblem& problem) {
+    return fail(ErrorCode::kUnreadable, problem.message);
+  }
+}
+
+}  // namespace brainshift::io

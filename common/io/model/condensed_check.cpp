@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// misfit_of of model_layout.hpp.
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+
+#include "common/core/thread_team.hpp"
+#include "common/io/model/model_layout.hpp"
+
+namespace brainshift::io {
+namespace {
+
+// A number is finite unless all bits of its exponent are set. Whole-number arithmetic without branches, so that
+// the compiler vectorises it: the loop runs as fast as memory.
+bool finite(const float* values, std::size_t count) {
+  constexpr std::uint32_t kExponent = 0x7f800000u;
+  std::uint32_t bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t bits;
+    std::memcpy(&bits, values + i, sizeof bits);
+    bad |= (bits & kExponent) == kExponent ? 1u : 0u;
+  }
+  return bad == 0;
+}
+bool finite(const double* values, std::size_t count) {
+  constexpr std::uint64_t kExponent = 0x7ff0000000000000u;
+  std::uint64_t bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint64_t bits;
+    std::memcpy(&bits, values + i, sizeof bits);
+    bad |= (bits & kExponent) == kExponent ? 1u : 0u;
+  }
+  return bad == 0;
+}
+
+constexpr Eigen::Index kWorthThreads = 1 << 20;
+
+template <typename Matrix>
+bool all_finite(const Matrix& values) {
+  std::atomic<bool> good{true};
+  ThreadTeam team(values.size() < kWorthThreads ? 1 : 0);
+  team.split(static_cast<long>(values.size()), [&](long begin, long end) {
+    if (!finite(values.data() + begin, static_cast<std::size_t>(end - begin))) good = false;
+  });
+  return good;
+}
+
+// Collects the first thing that is wrong.
+class Check {
+ public:
+  explicit Check(Boundary boundary)
+      : group_("condensed/" + std::string(to_string(boundary)) + "/") {}
+
+  void that(bool holds, const std::string& name, const std::string& problem) {
+    if (!holds && !found_) found_ = group_ + name + " " + problem;
+  }
+  template <typename Matrix>
+  void matrix(const std::string& name, const Matrix& values, Eigen::Index rows,
+              Eigen::Index columns) {
+    // Without slaves or control nodes, an array has no numbers and any shape is as good.
+    const bool fits = (values.rows() == rows && values.cols() == columns) ||
+                      (values.size() == 0 && rows * columns == 0);
+    that(fits, name,
+         "is " + shape(values.rows(), values.cols()) + ": must be " + shape(rows, columns));
+    if constexpr (!std::is_same_v<typename Matrix::Scalar, int>) {
+      if (!found_) that(all_finite(values), name, "holds a number that is not finite");
+    }
+  }
+  // Distinct indices below `limit`.
+  void nodes(const std::string& name, const std::vector<NodeIndex>& list, Eigen::Index limit,
+             bool sorted) {
+    std::vector<NodeIndex> ordered = list;
+    if (!sorted) std::sort(ordered.begin(), ordered.end());
+    const bool rises = std::adjacent_find(ordered.begin(), ordered.end(),
+                                          [](int a, int b) { return a >= b; }) == ordered.end();
+    that(rises, name, sorted ? "is not sorted" : "names a node twice");
+    that(!rises || ordered.empty() || (ordered.front() >= 0 && ordered.back() < limit), name,
+         "names a node that the mesh does not have");
+  }
+  std::optional<std::string> found() const { return found_; }
+
+ private:
+  static std::string shape(Eigen::Index rows, Eigen::Index columns) {
+    return std::to_string(rows) + " x " + std::to_string(columns);
+  }
+  std::string group_;
+  std::optional<std::string> found_;
+};
+
+bool symmetric(const Eigen::MatrixXd& matrix) {
+  constexpr Eigen::Index kTile = 64;  // both tiles stay in the cache
+  const Eigen::Index n = matrix.cols();
+  for (Eigen::Index j = 0; j < n; j += kTile) {
+    for (Eigen::Index i = 0; i <= j; i += kTile) {
+      const Eigen::Index rows = std::min(kTile, n - i), columns = std::min(kTile, n - j);
+      if (matrix.block(i, j, rows, columns) != matrix.block(j, i, columns, rows).transpose()) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool are_slaves(std::vector<NodeIndex> list, std::vector<NodeIndex> slaves) {
+  std::sort(list.begin(), list.end());
+  std::sort(slaves.begin(), slaves.end());
+  return std::includes(slaves.begin(), slaves.end(), list.begin(), list.end());
+}
+
+}  // namespace
+
+std::optional<std::string> misfit_of(const CondensedOperators& operators, const BrainModel& model) {
+  const Eigen::Index n = model.mesh.num_nodes();
+  const Eigen::Index r = operators.modes.cols();
+  const auto s = static_cast<Eigen::Index>(operators.slaves.size());
+  const auto c = static_cast<Eigen::Index>(operators.control.size());
+  Check check(operators.boundary);
+  check.that(operators.model_id == model.model_id, "model_id",
+             "is '" + operators.model_id + "': the operators belong to another model than '" +
+                 model.model_id + "'");
+  check.nodes("slaves", operators.slaves, n, false);
+  check.that(are_slaves(operators.slaves, model.slaves), "slaves",
+             "names a node that is no slave of the model");
+  check.nodes("region", operators.region, n, true);
+  check.nodes("control", operators.control, n, true);
+  check.matrix("modes", operators.modes, 3 * n, r);
+  check.that(operators.gravity_modes >= 0 && operators.gravity_modes <= r, "gravity_modes",
+             "= " + std::to_string(operators.gravity_modes) + ": must be from 0 to the " +
+                 std::to_string(r) + " modes");
+  check.that(operators.swelling_modes >= 0 && operators.load_modes() <= r, "swelling_modes",
+             "= " + std::to_string(operators.swelling_modes) + ": must be from 0 to the " +
+                 std::to_string(r) + " modes less those of gravity");
+  check.matrix("contact_columns", operators.contact_columns, 3 * n, s);
+  check.matrix("compliance", operators.compliance, s, s);
+  if (!check.found()) {
+    check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
+  }
+  check.matrix("slave_modes", operators.slave_modes, s, r);
+  check.matrix("slave_normals", operators.slave_normals, 3, s);
+  check.matrix("initial_penetration_mm", operators.initial_penetration_mm, s, 1);
+  check.matrix("truncated_variance_mm2", operators.truncated_variance_mm2, c, 1);
+  check.matrix("control_neighbours", operators.control_neighbours, 4, c == 0 ? 0 : n);
+  check.matrix("control_weights", operators.control_weights, 4, c == 0 ? 0 : n);
+  const auto& neighbours = operators.control_neighbours;
+  check.that(neighbours.size() == 0 || (neighbours.minCoeff() >= 0 && neighbours.maxCoeff() < c),
+             "control_neighbours", "names a control node that does not exist");
+  return check.found();
+}
+
+}  // namespace brainshift::io

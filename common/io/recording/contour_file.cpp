@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/recording/contour_file.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "common/io/recording/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr int kMostFrames = 1'000'000;
+
+struct Row {
+  int line = 0;
+  int frame = 0;
+  Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
+};
+
+bool parse_row(std::string_view text, Row& row) {
+  double frame = 0.0;
+  const std::size_t first = text.find(',');
+  if (first == std::string_view::npos) return false;
+  const std::size_t second = text.find(',', first + 1);
+  if (second == std::string_view::npos) return false;
+  if (!parse_number(text.substr(0, first), frame) ||
+      !parse_number(text.substr(first + 1, second - first - 1), row.at_px.x()) ||
+      !parse_number(text.substr(second + 1), row.at_px.y())) {
+    return false;
+  }
+  if (frame < 0.0 || frame > kMostFrames || frame != std::floor(frame)) return false;
+  row.frame = static_cast<int>(frame);
+  return true;
+}
+
+Result<std::vector<Row>> read_rows(const fs::path& path, const std::string& content) {
+  std::vector<Row> rows;
+  std::istringstream lines(content);
+  std::string text;
+  bool heading_allowed = true;
+  for (int line = 1; std::getline(lines, text); ++line) {
+    const std::string_view cells = trimmed(std::string_view(text).substr(0, text.find('#')));
+    if (cells.empty()) continue;
+    Row row;
+    row.line = line;
+    const bool heading = heading_allowed && cells == "frame,u_px,v_px";
+    heading_allowed = false;
+    if (heading) continue;
+    if (!parse_row(cells, row)) {
+      return io::file_error(
+          ErrorCode::kUnreadable, path,
+          fmt::format("line {}: \"{}\" must be frame,u_px,v_px with a frame from 0", line,
+                      cells.substr(0, 60)));
+    }
+    rows.push_back(row);
+  }
+  if (rows.empty())
+    return io::file_error(ErrorCode::kEmptySet, path, "holds no row frame,u_px,v_px");
+  return rows;
+}
+
+Result<std::vector<ultrasound::Contour>> contours_of_rows(const fs::path& path,
+                                                          const std::vector<Row>& rows,
+                                                          bool closed) {
+  std::vector<ultrasound::Contour> contours;
+  std::set<int> finished;
+  for (std::size_t first = 0; first < rows.size();) {
+    std::size_t end = first;
+    while (end < rows.size() && rows[end].frame == rows[first].frame) ++end;
+    if (!finished.insert(rows[first].frame).second) {
+      return io::file_error(ErrorCode::kUnreadable, path,
+                            fmt::format("line {}: frame {} comes a second time", rows[first].line,
+                                        rows[first].frame));
+    }
+    ultrasound::Contour contour;
+    contour.frame = rows[first].frame;
+    contour.closed = closed;
+    contour.points_px.resize(2, static_cast<Eigen::Index>(end - first));
+    for (std::size_t i = first; i < end; ++i) {
+      contour.points_px.col(static_cast<Eigen::Index>(i - first)) = rows[i].at_px;
+    }
+    contours.push_back(std::move(contour));
+    first = end;
+  }
+  return contours;
+}
+
+// What is wrong with one entry of "contours", or nothing.
+std::string read_entry(const json& entry, ultrasound::Contour& contour) {
+  if (!entry.is_object()) return "is no object";
+  for (const auto& [key, value] : entry.items()) {
+    if (key != "frame" && key != "closed" && key != "points_px")
+      return "key " + key + " is unknown";
+  }
+  const auto frame = entry.find("frame");
+  if (frame == entry.end() || !frame->is_number_unsigned() || *frame > kMostFrames) {
+    return "frame must be a whole number from 0";
+  }
+  contour.frame = frame->get<int>();
+  const auto closed = entry.find("closed");
+  if (closed != entry.end() && !closed->is_boolean()) return "closed must be true or false";
+  contour.closed = closed == entry.end() || closed->get<bool>();
+  const auto points = entry.find("points_px");
+  if (points == entry.end() || !points->is_array()) return "points_px must be a list of [u, v]";
+  contour.points_px.resize(2, static_cast<Eigen::Index>(points->size()));
+  for (std::size_t i = 0; i < points->size(); ++i) {
+    const json& point = (*points)[i];
+    if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
+      return fmt::format("points_px[{}] must be [u, v]", i);
+    }
+    contour.points_px.col(static_cast<Eigen::Index>(i)) << point[0].get<double>(),
+        point[1].get<double>();
+  }
+  return {};
+}
+
+Result<std::vector<ultrasound::Contour>> contours_of_json(const fs::path& path,
+                                                          const std::string& content) {
+  const json document = json::parse(content, nullptr, false);
+  const auto list = document.is_object() ? document.find("contours") : document.end();
+  if (!document.is_object() || list == document.end() || !list->is_array()) {
+    return io::file_error(ErrorCode::kUnreadable, path, "must be JSON with a list \"contours\"");
+  }
+  std::vector<ultrasound::Contour> contours;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    ultrasound::Contour contour;
+    const std::string problem = read_entry((*list)[i], contour);
+    if (!problem.empty()) {
+      return io::file_error(ErrorCode::kUnreadable, path,
+                            fmt::format("contours[{}]: {}", i, problem));
+    }
+    contours.push_back(std::move(contour));
+  }
+  if (contours.empty()) return io::file_error(ErrorCode::kEmptySet, path, "holds no contour");
+  return contours;
+}
+
+}  // namespace
+
+Result<std::vector<ultrasound::Contour>> read_contours(const fs::path& path, bool closed) {
+  const auto content = io::read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  if (path.extension() == ".json") return contours_of_json(path, *content);
+  if (path.extension() != ".csv") {
+    return io::file_error(ErrorCode::kUnreadable, path, "contours must be a .csv or .json file");
+  }
+  const auto rows = read_rows(path, *content);
+  if (!rows) return tl::unexpected(rows.error());
+  return contours_of_rows(path, *rows, closed);
+}
+
+Result<std::vector<ultrasound::Seed>> read_seeds(const fs::path& path) {
+  const auto content = io::read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const auto rows = read_rows(path, *content);
+  if (!rows) return tl::unexpected(rows.error());
+  std::vector<ultrasound::Seed> seeds;
+  for (const Row& row : *rows) seeds.push_back({row.frame, row.at_px});
+  return seeds;
+}
+
+}  // namespace brainshift::io

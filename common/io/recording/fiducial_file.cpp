@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/recording/fiducial_file.hpp"
+
+#include <fmt/format.h>
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "common/io/recording/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
+
+namespace brainshift::io {
+namespace {
+
+struct Rows {
+  std::vector<Vec3> reference, ras;
+  bool paired = false, single = false;
+};
+
+bool parse_point(const std::vector<std::string_view>& cells, std::size_t first, Vec3& point) {
+  return parse_number(cells[first], point[0]) && parse_number(cells[first + 1], point[1]) &&
+         parse_number(cells[first + 2], point[2]);
+}
+
+bool take_row(const std::vector<std::string_view>& cells, Rows& rows) {
+  Vec3 first, second;
+  if (cells.size() == 6 && parse_point(cells, 0, first) && parse_point(cells, 3, second)) {
+    rows.reference.push_back(first);
+    rows.ras.push_back(second);
+    rows.paired = true;
+    return true;
+  }
+  if (cells.size() != 4 || !parse_point(cells, 1, first)) return false;
+  if (cells[0] != "reference" && cells[0] != "ras") return false;
+  (cells[0] == "ras" ? rows.ras : rows.reference).push_back(first);
+  rows.single = true;
+  return true;
+}
+
+Points columns(const std::vector<Vec3>& points) {
+  Points matrix(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
+  }
+  return matrix;
+}
+
+}  // namespace
+
+Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
+  const auto content = io::read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  Rows rows;
+  std::istringstream lines(*content);
+  std::string text;
+  bool heading_allowed = true;
+  for (int line = 1; std::getline(lines, text); ++line) {
+    const std::string_view row = trimmed(std::string_view(text).substr(0, text.find('#')));
+    if (row.empty()) continue;
+    const bool taken = take_row(cells_of(row), rows);
+    double number = 0.0;
+    const bool heading = heading_allowed && !taken && !parse_number(cells_of(row).back(), number);
+    heading_allowed = false;
+    if (heading) continue;
+    if (!taken || (rows.paired && rows.single)) {
+      return io::file_error(
+          ErrorCode::kUnreadable, path,
+          fmt::format("line {}: \"{}\" must be 6 numbers (reference x, y, z, RAS x, y, z), or "
+                      "reference,x,y,z and ras,x,y,z in every row",
+                      line, row.substr(0, 60)));
+    }
+  }
+  FiducialFile file;
+  file.matched = rows.single;
+  auto fit = rows.single
+                 ? registration::match_fiducials(columns(rows.reference), columns(rows.ras))
+                 : registration::register_fiducials(columns(rows.reference), columns(rows.ras));
+  if (!fit) return io::file_error(fit.error().code, path, fit.error().message);
+  file.fit = std::move(*fit);
+  return file;
+}
+
+}  // namespace brainshift::io

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "common/io/recording/sequence_header.hpp"
+
+namespace brainshift::io {
+namespace {
+
+constexpr std::size_t kLargestData = std::size_t{8} << 30;
+// No deflate stream expands further than this (zlib's technical notes: 1032 to 1).
+constexpr std::size_t kLargestRatio = 1040;
+
+tl::unexpected<Error> unreadable(const std::string& message) {
+  return fail(ErrorCode::kUnreadable, message);
+}
+
+Result<std::size_t> expected_bytes(const SequenceHeader& header, int bytes_per_value) {
+  auto bytes = static_cast<std::size_t>(bytes_per_value);
+  for (const std::int64_t size : header.sizes) {
+    if (bytes > kLargestData / static_cast<std::size_t>(size)) {
+      return unreadable("its sizes promise more than 8 GiB of pixels");
+    }
+    bytes *= static_cast<std::size_t>(size);
+  }
+  return bytes;
+}
+
+// zlib or gzip stream, whichever it is, in pieces: zlib counts its buffers with 32 bits.
+Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
+  if (size / kLargestRatio > compressed.size()) {
+    return unreadable(
+        fmt::format("its sizes promise {} bytes of pixels: {} compressed ones are too few", size,
+                    compressed.size()));
+  }
+  std::string expanded(size, '\0');
+  z_stream stream{};
+  if (inflateInit2(&stream, 15 + 32) != Z_OK) return fail(ErrorCode::kInternal, "zlib: no memory");
+  std::size_t read = 0, written = 0;
+  int state = Z_OK;
+  char surplus = 0;  // where a byte too many goes
+  while (state == Z_OK) {
+    constexpr std::size_t kPiece = std::numeric_limits<uInt>::max();
+    const auto in = static_cast<uInt>(std::min(kPiece, compressed.size() - read));
+    const auto out = static_cast<uInt>(std::min(kPiece, size - written));
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(compressed.data() + read));
+    stream.avail_in = in;
+    stream.next_out = reinterpret_cast<Bytef*>(out > 0 ? expanded.data() + written : &surplus);
+    stream.avail_out = out > 0 ? out : 1;
+    state = inflate(&stream, Z_NO_FLUSH);
+    read += in - stream.avail_in;
+    if (out == 0 && stream.avail_out == 0) {
+      written = size + 1;
+      break;
+    }
+    if (out > 0) written += out - stream.avail_out;
+  }
+  inflateEnd(&stream);
+  if (written > size) return unreadable("its pixels are more than its sizes say");
+  if (state != Z_STREAM_END || written != size) {
+    return unreadable(fmt::format("its compressed pixels are {}: {} of {} bytes",
+                                  state == Z_DATA_ERROR ? "damaged" : "truncated", written, size));
+  }
+  return expanded;
+}
+
+}  // namespace
+
+Result<std::string> sequence_values(const SequenceHeader& header, int bytes_per_value) {
+  const auto size = expected_bytes(header, bytes_per_value);
+  if (!size) return tl::unexpected(size.error());
+  std::string values;
+  if (header.compressed) {
+    auto expanded = inflate_all(header.data, *size);
+    if (!expanded) return tl::unexpected(expanded.error());
+    values = std::move(*expanded);
+  } else {
+    if (header.data.size() != *size) {
+      return unreadable(
+          fmt::format("holds {} bytes of pixels, its sizes say {}", header.data.size(), *size));
+    }
+    values = std::string(header.data);
+  }
+  const bool swap = header.big_endian != (std::endian::native == std::endian::big);
+  if (swap && bytes_per_value > 1) {
+    const auto step = static_cast<std::ptrdiff_t>(bytes_per_value);
+    for (auto at = values.begin(); at != values.end(); at += step) std::reverse(at, at + step);
+  }
+  return values;
+}
+
+}  // namespace brainshift::io

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/linalg/blas.hpp"
+
+#include <cblas.h>
+
+#include <algorithm>
+#include <cassert>
+
+extern "C" void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+
+namespace brainshift::linalg::blas {
+namespace {
+
+template <typename Matrix>
+int leading(const Matrix& matrix) {
+  // BLAS wants at least 1, also for an empty matrix.
+  return static_cast<int>(std::max<Eigen::Index>(1, matrix.outerStride()));
+}
+template <typename Matrix>
+int rows(const Matrix& matrix) {
+  return static_cast<int>(matrix.rows());
+}
+template <typename Matrix>
+int columns(const Matrix& matrix) {
+  return static_cast<int>(matrix.cols());
+}
+
+}  // namespace
+
+void multiply(double alpha, const In<double>& a, const In<double>& b, double beta, Out<double> c) {
+  assert(a.cols() == b.rows() && c.rows() == a.rows() && c.cols() == b.cols());
+  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, rows(c), columns(c), columns(a), alpha,
+              a.data(), leading(a), b.data(), leading(b), beta, c.data(), leading(c));
+}
+
+void multiply(float alpha, const In<float>& a, const In<float>& b, float beta, Out<float> c) {
+  assert(a.cols() == b.rows() && c.rows() == a.rows() && c.cols() == b.cols());
+  cblas_sgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, rows(c), columns(c), columns(a), alpha,
+              a.data(), leading(a), b.data(), leading(b), beta, c.data(), leading(c));
+}
+
+void multiply_transposed(double alpha, const In<double>& a, const In<double>& b, double beta,
+                         Out<double> c) {
+  assert(a.rows() == b.rows() && c.rows() == a.cols() && c.cols() == b.cols());
+  cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, rows(c), columns(c), rows(a), alpha,
+              a.data(), leading(a), b.data(), leading(b), beta, c.data(), leading(c));
+}
+
+void gram(const In<double>& a, double beta, Out<double> c) {
+  assert(c.rows() == a.cols() && c.cols() == a.cols());
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, rows(c), rows(a), 1.0, a.data(), leading(a),
+              beta, c.data(), leading(c));
+}
+
+bool cholesky(Out<double> a) {
+  assert(a.rows() == a.cols());
+  const char lower = 'L';
+  const int n = rows(a), lda = leading(a);
+  int info = 0;
+  if (n > 0) dpotrf_(&lower, &n, a.data(), &lda, &info);
+  return info == 0;
+}
+
+void solve_lower(const In<double>& l, Out<double> b) {
+  assert(l.rows() == b.rows());
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, rows(b), columns(b),
+              1.0, l.data(), leading(l), b.data(), leading(b));
+}
+
+void solve_lower_transposed(const In<double>& l, Out<double> b) {
+  assert(l.rows() == b.rows());
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),
+              1.0, l.data(), leading(l), b.data(), leading(b));
+}
+
+void solve_lower_transposed_right(const In<float>& l, Out<float> b) {
+  assert(l.rows() == b.cols());
+  cblas_strsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),
+              1.0F, l.data(), leading(l), b.data(), leading(b));
+}
+
+void add_scaled(long n, double alpha, const double* x, double* y) {
+  cblas_daxpy(static_cast<int>(n), alpha, x, 1, y, 1);
+}
+void add_scaled(long n, float alpha, const float* x, float* y) {
+  cblas_saxpy(static_cast<int>(n), alpha, x, 1, y, 1);
+}
+
+}  // namespace brainshift::linalg::blas

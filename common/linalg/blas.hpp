@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The few dense kernels of the hot path, on the system's BLAS and LAPACK: they choose their instructions at run
+// time, which code compiled for any x86-64 cannot. Column-major; views, nothing is allocated here.
+// Preconditions: shapes agree, outputs do not overlap inputs (asserted in debug builds).
+#pragma once
+
+#include <Eigen/Core>
+
+namespace brainshift::linalg::blas {
+
+template <typename T>
+using In =
+    Eigen::Ref<const Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>, 0, Eigen::OuterStride<>>;
+template <typename T>
+using Out = Eigen::Ref<Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>, 0, Eigen::OuterStride<>>;
+
+// C = alpha A B + beta C
+void multiply(double alpha, const In<double>& a, const In<double>& b, double beta, Out<double> c);
+void multiply(float alpha, const In<float>& a, const In<float>& b, float beta, Out<float> c);
+// C = alpha A^T B + beta C
+void multiply_transposed(double alpha, const In<double>& a, const In<double>& b, double beta,
+                         Out<double> c);
+// Lower triangle of C = A^T A + beta C.
+void gram(const In<double>& a, double beta, Out<double> c);
+// Lower triangle of A -> L with L L^T = A, in place; false when A is not positive definite.
+[[nodiscard]] bool cholesky(Out<double> a);
+// B = L^-1 B and B = L^-T B.
+void solve_lower(const In<double>& l, Out<double> b);
+void solve_lower_transposed(const In<double>& l, Out<double> b);
+// B = B L^-T
+void solve_lower_transposed_right(const In<float>& l, Out<float> b);
+// y += alpha x, n entries
+void add_scaled(long n, double alpha, const double* x, double* y);
+void add_scaled(long n, float alpha, const float* x, float* y);
+
+}  // namespace brainshift::linalg::blas

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/linalg/checked_solve.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "common/core/random.hpp"
+
+namespace brainshift::linalg {
+namespace {
+
+constexpr std::uint64_t kSeed = 19670401;  // any fixed number
+
+// NaN where the vector holds one: Eigen's maximum does not say.
+double max_abs(const VecX& v) {
+  return v.allFinite() ? v.lpNorm<Eigen::Infinity>() : std::numeric_limits<double>::quiet_NaN();
+}
+
+Error refusal(const VecX& b, const VecX& x, const SolveQuality& quality) {
+  if (!b.allFinite()) return {ErrorCode::kNotFinite, "solve: the right-hand side is not finite"};
+  if (!x.allFinite()) return {ErrorCode::kNotFinite, "solve: the solution is not finite"};
+  std::ostringstream text;
+  text << "solve: backward error " << quality.backward_error << " after " << quality.refinements
+       << " refinements is above " << kRefuseAbove << "; the factor does not belong to the matrix";
+  return {ErrorCode::kSingularMatrix, text.str()};
+}
+
+}  // namespace
+
+double max_norm(const SymmetricMatrix& lower) {
+  VecX sums = VecX::Zero(lower.rows());
+  for (Eigen::Index j = 0; j < lower.outerSize(); ++j) {
+    for (SymmetricMatrix::InnerIterator it(lower, j); it; ++it) {
+      const double size = std::abs(it.value());
+      sums[it.row()] += size;
+      if (it.row() != it.col()) sums[it.col()] += size;
+    }
+  }
+  return sums.size() > 0 ? sums.maxCoeff() : 0.0;
+}
+
+double backward_error(const SymmetricMatrix& lower, double norm, const VecX& b, const VecX& x,
+                      VecX& product) {
+  product.noalias() = lower.selfadjointView<Eigen::Lower>() * x;
+  const double scale = norm * max_abs(x) + max_abs(b);
+  if (scale == 0.0) return 0.0;
+  return max_abs(b - product) / scale;
+}
+
+Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
+                                   const SparseCholesky& factor, const VecX& b, VecX& x) {
+  factor.solve(b, x);
+  SolveQuality quality;
+  VecX product, better, correction;
+  quality.backward_error = backward_error(lower, norm, b, x, product);
+  while (quality.backward_error > kRefineAbove && quality.refinements < kMaxRefinements) {
+    factor.solve(VecX(b - product), correction);
+    better = x + correction;
+    const double error = backward_error(lower, norm, b, better, product);
+    ++quality.refinements;
+    if (!(error < quality.backward_error)) break;  // as good as this factor gets
+    x.swap(better);
+    quality.backward_error = error;
+  }
+  if (!(quality.backward_error <= kRefuseAbove)) return tl::unexpected(refusal(b, x, quality));
+  return quality;
+}
+
+Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
+                                const SparseCholesky& factor, const Eigen::MatrixXd& b,
+                                Eigen::MatrixXd& x, SparseCholesky::Workspace& workspace) {
+  Random random(kSeed);
+  VecX signs(b.cols()), product, column;
+  for (Eigen::Index j = 0; j < signs.size(); ++j) signs[j] = random.uniform() < 0.5 ? -1.0 : 1.0;
+  const VecX rhs = b * signs;
+  SolveQuality quality;
+  VecX combined = x * signs;
+  quality.backward_error = backward_error(lower, norm, rhs, combined, product);
+  Eigen::MatrixXd residual, correction;
+  while (quality.backward_error > kRefineAbove && quality.refinements < kMaxRefinements) {
+    residual.resizeLike(b);
+    for (Eigen::Index j = 0; j < b.cols(); ++j) {
+      column.noalias() = lower.selfadjointView<Eigen::Lower>() * x.col(j);
+      residual.col(j) = b.col(j) - column;
+    }
+    factor.solve_many(residual, correction, workspace);
+    ++quality.refinements;
+    combined.noalias() = (x + correction) * signs;
+    const double error = backward_error(lower, norm, rhs, combined, product);
+    if (!(error < quality.backward_error)) break;
+    x += correction;
+    quality.backward_error = error;
+  }
+  if (!(quality.backward_error <= kRefuseAbove)) {
+    return tl::unexpected(refusal(rhs, combined, quality));
+  }
+  return quality;
+}
+
+Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
+                                   const fem::StiffnessFactor& factor, const VecX& b, VecX& x) {
+  if (const SparseCholesky* drained = factor.drained()) {
+    return checked_solve(lower, norm, *drained, b, x);
+  }
+  factor.solve(b, x);
+  if (!x.allFinite()) return tl::unexpected(refusal(b, x, {}));
+  return SolveQuality{};
+}
+
+Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
+                                const fem::StiffnessFactor& factor, const Eigen::MatrixXd& b,
+                                Eigen::MatrixXd& x, fem::StiffnessFactor::Workspace& workspace) {
+  if (const SparseCholesky* drained = factor.drained()) {
+    return check_many(lower, norm, *drained, b, x, workspace);
+  }
+  if (x.allFinite()) return SolveQuality{};
+  const VecX signs = VecX::Ones(b.cols());
+  return tl::unexpected(refusal(b * signs, x * signs, {}));
+}
+
+}  // namespace brainshift::linalg

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// SparseCholesky: supernodal L L^T of a symmetric positive definite matrix (CHOLMOD, nested dissection).
+//
+// CHOLMOD answers "success" to NaN, to infinity and to some singular matrices, so every factorisation is
+// guarded: lower triangle -> finite input -> no negative or zero pivot -> reciprocal condition estimate above
+// kMinRcond. Whether a solve is right is the business of checked_solve.hpp.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/core/error.hpp"
+#include "common/fem/elasticity.hpp"
+
+namespace brainshift::linalg {
+
+class SparseCholesky {
+ public:
+  // A free-floating body has a reciprocal pivot ratio of rounding size (1e-15); a head with sliding support
+  // has about 1e-5, with penalty springs down to 1e-8.
+  static constexpr double kMinRcond = 1e-13;
+
+  // lower: lower triangle, sorted. kInvalidArgument (an entry above the diagonal), kNotFinite, kFloatingBody (a pivot vanished: not enough support) or
+  // kSingularMatrix.
+  static Result<SparseCholesky> factorise(const SymmetricMatrix& lower);
+  SparseCholesky(SparseCholesky&&) noexcept;
+  SparseCholesky& operator=(SparseCholesky&&) noexcept;
+  ~SparseCholesky();
+
+  // New values, same pattern: reuses the ordering and symbolic analysis. After a failure the factor must
+  // not be used until a refactorise succeeds. A copy that shares nothing but the analysis: clone_analysis.
+  Status refactorise(const SymmetricMatrix& lower);
+  // A second factor with the same ordering and pattern, no values yet; call refactorise on it.
+  SparseCholesky clone_analysis() const;
+
+  // x = K^-1 b. Not thread-safe: workspace is reused between calls.
+  void solve(const VecX& b, VecX& x) const;
+  VecX solve(const VecX& b) const;
+  // Several right-hand sides at once, one per column; cheaper per column than single solves.
+  Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const;
+
+  // What one thread needs to solve with a factor that several threads share.
+  class Workspace {
+   public:
+    Workspace();
+    Workspace(Workspace&&) noexcept;
+    Workspace& operator=(Workspace&&) noexcept;
+    ~Workspace();
+
+   private:
+    friend class SparseCholesky;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+  };
+  // X = K^-1 B, one right-hand side per column. Thread-safe as long as every thread has its own workspace.
+  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
+
+  int size() const;
+  double rcond() const;            // CHOLMOD's estimate: squared ratio of extreme pivots of L
+  std::uint64_t nonzeros() const;  // of L
+  std::uint64_t bytes() const;     // of the factor
+  double analyse_seconds() const;
+  double factor_seconds() const;  // of the last (re)factorisation
+
+ private:
+  struct Impl;
+  explicit SparseCholesky(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace brainshift::linalg

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// CaseInputs: the files that a case names, read but not yet interpreted.
+#pragma once
+
+#include <optional>
+
+#include "common/values/case_config.hpp"
+#include "common/core/mesh.hpp"
+
+namespace brainshift {
+
+struct CaseInputs {
+  CaseConfig config;
+  std::optional<VoxelImage> brain;                // when the mesh is generated; > 0 is brain
+  std::optional<TetMesh> mesh;                    // when a ready mesh is given
+  std::optional<VoxelImage> tumour_labels;        // TumourLabel
+  std::optional<TriangleSurface> tumour_surface;  // TumourSurface
+  std::optional<TriangleSurface> skull;           // contact.skull_file
+};
+
+}  // namespace brainshift

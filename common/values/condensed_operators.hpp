@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// CondensedOperators: all that an update needs of one patient under one boundary condition, as plain arrays.
+//
+// A displacement is carried by few numbers, prior modes z and contact forces f (N, one per active slave):
+//   u = U z + G_A f,     z ~ N(0, I_r),     U U^T ~ C = K^-1 Sigma K^-1
+//   G = K^-1 N           column j: unit force on slave j along its normal N_j, from skull into brain
+//   Phi = N^T K^-1 N     compliance of the slaves, mm/N
+// n nodes, r modes, s slaves. Nodal arrays are node-major (x0 y0 z0 x1 ...), 3n rows.
+//
+// The first `gravity_modes + swelling_modes` columns of U are K^-1 M, exact. The others come from a randomised Nystrom
+// approximation of K^-1 Sigma_kernel K^-1 (Halko, Martinsson, Tropp 2011, SIAM Review 53:217, sec. 5.5) whose
+// test vectors are supported where data come from: near the tumour, at the craniotomy and on the slaves.
+// Single precision in what is only summed up to a displacement (relative rounding 6e-8 of each term).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/values/estimate.hpp"
+#include "common/core/types.hpp"
+
+namespace brainshift {
+
+struct CondensedOperators {
+  Boundary boundary = Boundary::kContact;
+  std::string model_id;  // of the BrainModel they belong to
+
+  double prepare_s = 0.0;  // time it took to factorise and condense
+  int gravity_modes = 0;
+  int swelling_modes = 0;           // after the gravity modes
+  Eigen::MatrixXf modes;            // U, 3n x r, mm
+  Eigen::MatrixXf contact_columns;  // G, 3n x s, mm/N
+  Eigen::MatrixXd compliance;       // Phi, s x s, mm/N, symmetric
+  Eigen::MatrixXd slave_modes;      // N^T U, s x r, mm
+  Points slave_normals;             // 3 x s, unit, from skull into brain
+  VecX initial_penetration_mm;      // s; negative: open
+  std::vector<NodeIndex> slaves;    // s
+
+  // Nodes near the data, whose rows of U and G are gathered so that sampling touches little memory.
+  std::vector<NodeIndex> region;  // sorted
+  // Nodes where the standard deviation is evaluated, and what truncation left out there:
+  // tr(C - U U^T) / 3 per node, mm^2, for the free body.
+  std::vector<NodeIndex> control;  // c, sorted
+  VecX truncated_variance_mm2;     // c
+  // Interpolation from the control nodes to every node: 4 x n indices into `control`, 4 x n weights, sum 1.
+  Eigen::Matrix<int, 4, Eigen::Dynamic> control_neighbours;
+  Eigen::Matrix<float, 4, Eigen::Dynamic> control_weights;
+
+  int num_nodes() const { return static_cast<int>(modes.rows() / 3); }
+  int num_modes() const { return static_cast<int>(modes.cols()); }
+  int load_modes() const { return gravity_modes + swelling_modes; }
+  int num_slaves() const { return static_cast<int>(contact_columns.cols()); }
+  // Memory held by the arrays.
+  std::uint64_t bytes() const;
+};
+
+inline std::uint64_t CondensedOperators::bytes() const {
+  const auto of = [](const auto& values) -> std::uint64_t {
+    return static_cast<std::uint64_t>(values.size()) * sizeof(*values.data());
+  };
+  return of(modes) + of(contact_columns) + of(compliance) + of(slave_modes) + of(slave_normals) +
+         of(initial_penetration_mm) + of(slaves) + of(region) + of(control) +
+         of(truncated_variance_mm2) + of(control_neighbours) + of(control_weights);
+}
+
+}  // namespace brainshift

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/values/estimate.hpp"
+
+namespace brainshift {
+
+std::string_view to_string(Boundary boundary) {
+  return boundary == Boundary::kContact ? "contact" : "fixed";
+}
+
+std::string_view to_string(Method method) {
+  switch (method) {
+    case Method::kCondensed: return "condensed";
+    case Method::kCondensedExact: return "condensed-exact";
+    case Method::kPaper: return "paper";
+    case Method::kPaperWoodbury: return "paper-woodbury";
+    case Method::kConjugateGradients: return "cg";
+    case Method::kIterativeSolver: return "pcg";
+  }
+  return "condensed";
+}
+
+std::string_view to_string(EstimateStatus status) {
+  switch (status) {
+    case EstimateStatus::kNotRun: return "not_run";
+    case EstimateStatus::kIterating: return "iterating";
+    case EstimateStatus::kConverged: return "converged";
+    case EstimateStatus::kIterationLimit: return "iteration_limit";
+    case EstimateStatus::kDeadline: return "deadline";
+  }
+  return "not_run";
+}
+
+}  // namespace brainshift

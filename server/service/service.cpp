@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/service/service.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <ctime>
+#include <utility>
+
+#include "server/session/observation_rules.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using wire::MessageType;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+Reply error_reply(const Error& error) {
+  return {MessageType::kErrorReply, wire::encode(error), false};
+}
+
+Reply model_not_ready() { return error_reply({ErrorCode::kModelNotReady, "no model is loaded"}); }
+
+std::string utc_now(const char* format) {
+  return fmt::format(fmt::runtime(format), fmt::gmtime(std::time(nullptr)));
+}
+
+io::SurgeryRecord record(const char* kind, std::uint64_t sequence, std::string payload) {
+  return {kind, sequence, Clock::now().time_since_epoch() / std::chrono::nanoseconds(1),
+          std::move(payload)};
+}
+
+}  // namespace
+
+Service::Service(ServiceOptions options, Outbox& outbox)
+    : options_(std::move(options)), outbox_(outbox), started_(Clock::now()) {
+  if (!options_.journal_dir.empty()) {
+    Journal::Options journal;
+    journal.open = options_.open_journal;
+    journal.on_error = [](const Error& error) { spdlog::error("{}", error.message); };
+    journal_ = std::make_unique<Journal>(std::move(journal));
+  }
+  if (options_.model) {
+    SessionHooks hooks;
+    hooks.prepare = options_.prepare;
+    hooks.on_ready = [this](const auto& request, const auto& info) {
+      begin_journal(request, info);
+    };
+    hooks.publish = [this](wire::UpdateMessage message) { publish(std::move(message)); };
+    session_ = std::make_unique<Session>(options_.model->case_id, std::move(hooks));
+  }
+}
+
+Service::~Service() { stop(); }
+
+void Service::stop() {
+  if (session_) session_->stop();
+  if (journal_) journal_->stop();
+}
+
+std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame& frame) {
+  switch (frame.type) {
+    case MessageType::kStatusRequest:
+      return Reply{MessageType::kStatusReply, wire::encode(status()), false};
+    case MessageType::kSubscribeRequest: {
+      const std::uint64_t session = session_ ? session_->state().session_id : 0;
+      return Reply{MessageType::kSubscribeReply, wire::encode_subscribe_reply(session), true};
+    }
+    case MessageType::kStartSessionRequest: return start_session(peer, frame);
+    case MessageType::kModelRequest:
+      if (!options_.model) return model_not_ready();
+      if (encoded_model_.empty()) encoded_model_ = wire::encode(*options_.model);
+      return Reply{MessageType::kModelReply, encoded_model_, false};
+    case MessageType::kObservation: return observe(frame);
+    default: break;
+  }
+  return error_reply({ErrorCode::kProtocol, fmt::format("message type {} is not a request",
+                                                        static_cast<int>(frame.type))});
+}
+
+std::optional<Reply> Service::start_session(const std::string& peer, const wire::Frame& frame) {
+  if (!session_) return model_not_ready();
+  const auto request = wire::decode_session_request(frame.payload);
+  if (!request) return error_reply(request.error());
+  session_->start(*request, [this, peer, id = frame.request_id](Result<wire::SessionInfo> info) {
+    std::string bytes;
+    if (info) {
+      spdlog::info("session ready session={} prepare_s={:.2f}", info->session_id, info->prepare_s);
+      bytes = wire::encode_frame(MessageType::kStartSessionReply, id, wire::encode(*info));
+    } else {
+      spdlog::warn("session refused code={} reason=\"{}\"", to_string(info.error().code),
+                   info.error().message);
+      bytes = wire::encode_frame(MessageType::kErrorReply, id, wire::encode(info.error()));
+    }
+    outbox_.post({Delivery::kReply, peer, std::make_shared<const std::string>(std::move(bytes))});
+  });
+  return std::nullopt;
+}
+
+Reply Service::observe(const wire::Frame& frame) {
+  if (!session_) return model_not_ready();
+  auto observation = wire::decode_observation(frame.payload);
+  if (!observation) return error_reply(observation.error());
+  const std::uint64_t sequence = observation->sequence;
+  // Queued before the worker can answer it, so that the journal holds cause before effect.
+  const auto receipt = session_->submit(std::move(*observation), [&] {
+    if (journal_) journal_->append(record("observation", sequence, std::string(frame.payload)));
+  });
+  if (!receipt) {
+    spdlog::debug("observation refused sequence={} code={} reason=\"{}\"", sequence,
+                  to_string(receipt.error().code), receipt.error().message);
+    return error_reply(receipt.error());
+  }
+  return {MessageType::kObservationReply, wire::encode(*receipt), false};
+}
+
+wire::DaemonStatus Service::status() const {
+  wire::DaemonStatus status;
+  status.version = options_.version;
+  status.uptime_ms = static_cast<std::uint64_t>(milliseconds_since(started_));
+  if (!session_) return status;
+  const Session::State state = session_->state();
+  status.model_ready = true;
+  status.case_id = options_.model->case_id;
+  status.model_id = options_.model->model_id;
+  status.busy = state.busy;
+  status.updates = state.updates;
+  return status;
+}
+
+void Service::begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info) {
+  if (!journal_) return;
+  const auto path =
+      journal_path(options_.journal_dir, request.case_id,
+                   fmt::format("{}-{}", utc_now("{:%Y%m%dT%H%M%SZ}"), info.session_id));
+  journal_->begin(path, {{"case_id", request.case_id},
+                         {"model_id", info.model_id},
+                         {"case_file", options_.case_file.string()},
+                         {"scenario", "recorded"},
+                         {"method", std::string(to_string(request.method))},
+                         {"boundary", std::string(to_string(request.boundary))},
+                         {"created_utc", utc_now("{:%Y-%m-%dT%H:%M:%SZ}")},
+                         {"software", "brainshiftd " + options_.version}});
+  spdlog::info("journal {}", path.string());
+}
+
+void Service::publish(wire::UpdateMessage message) {
+  Update& update = message.update;
+  const bool estimated = update.final && !message.error;
+  if (journal_) {
+    if (const auto journal = journal_->status(); !journal) {
+      update.left_out.push_back({"journal", journal.error().message,
+                                 "none in the estimate: this update is not recorded"});
+    }
+  }
+  const auto encode_start = Clock::now();
+  std::string payload = wire::encode(message);
+  if (estimated) {
+    // The message carries the times of its own encoding and journalling, so it is encoded once more.
+    update.timings.encode_ms = milliseconds_since(encode_start);
+    const auto journal_start = Clock::now();
+    if (journal_) journal_->append(record("update", update.sequence, payload));
+    update.timings.journal_ms = milliseconds_since(journal_start);
+    payload = wire::encode(message);
+  }
+  const Delivery delivery = message.error  ? Delivery::kFailure
+                            : update.final ? Delivery::kFinal
+                                           : Delivery::kIterate;
+  outbox_.post(
+      {delivery,
+       {},
+       std::make_shared<const std::string>(wire::encode_frame(MessageType::kUpdate, 0, payload))});
+}
+
+}  // namespace brainshift::server

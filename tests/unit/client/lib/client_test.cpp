@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/lib/client.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/client/lib/fake_daemon.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+using wire::encode_frame;
+using wire::Frame;
+using wire::MessageType;
+using Answers = FakeDaemon::Answers;
+
+// Long enough for a loaded machine; a test that waits for it has failed.
+constexpr milliseconds kPatient(20000);
+constexpr milliseconds kShort(150);
+
+Client connect(const std::string& endpoint, milliseconds timeout = kPatient) {
+  auto client = Client::connect(endpoint, {.request_timeout = timeout, .session_timeout = timeout});
+  EXPECT_TRUE(client) << client.error().message;
+  return std::move(*client);
+}
+
+std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3") {
+  wire::DaemonStatus status;
+  status.version = version;
+  return encode_frame(MessageType::kStatusReply, id, encode(status));
+}
+
+std::string update_frame(std::uint64_t sequence, bool final = true) {
+  wire::UpdateMessage message;
+  message.update.sequence = sequence;
+  message.update.final = final;
+  message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
+  return encode_frame(MessageType::kUpdate, 0, encode(message));
+}
+
+template <typename T>
+void expect_error(const Result<T>& result, ErrorCode code, const std::string& text) {
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, code) << result.error().message;
+  EXPECT_THAT(result.error().message, HasSubstr(text));
+}
+
+TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    const auto reply = [&](MessageType type, const std::string& payload) -> Answers {
+      return {encode_frame(type, request.request_id, payload)};
+    };
+    switch (request.type) {
+      case MessageType::kStatusRequest: return {status_reply(request.request_id)};
+      case MessageType::kStartSessionRequest: {
+        wire::SessionInfo info;
+        info.model_id = wire::decode_session_request(request.payload).value().case_id;
+        return reply(MessageType::kStartSessionReply, encode(info));
+      }
+      case MessageType::kModelRequest: {
+        BrainModel model;
+        model.case_id = "colin27";
+        model.mesh.nodes = Points::Random(3, 1000);
+        return reply(MessageType::kModelReply, wire::encode(model));
+      }
+      case MessageType::kSubscribeRequest:
+        return reply(MessageType::kSubscribeReply, wire::encode_subscribe_reply(1));
+      case MessageType::kObservation: {
+        const auto observation = wire::decode_observation(request.payload).value();
+        return reply(MessageType::kObservationReply,
+                     encode(wire::ObservationReceipt{observation.sequence, true}));
+      }
+      default: ADD_FAILURE() << "unexpected request"; return {};
+    }
+  });
+  Client client = connect(daemon.endpoint());
+  EXPECT_EQ(client.status().value().version, "1.2.3");
+  EXPECT_EQ(client.start_session({.case_id = "case 7"}).value().model_id, "case 7");
+  EXPECT_EQ(client.model().value().mesh.num_nodes(), 1000);
+  EXPECT_TRUE(client.subscribe());
+  Observation observation;
+  observation.sequence = 42;
+  observation.body = TumourBoundary{Points::Random(3, 200), 0.51};
+  const auto receipt = client.submit(observation);
+  ASSERT_TRUE(receipt);
+  EXPECT_EQ(receipt->observation_sequence, 42u);
+  EXPECT_TRUE(receipt->replaced_pending);
+}
+
+TEST(Client, AnErrorReplyBecomesTheCallersError) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    return {encode_frame(MessageType::kErrorReply, request.request_id,
+                         wire::encode(Error{ErrorCode::kModelNotReady, "no model is loaded"}))};
+  });
+  Client client = connect(daemon.endpoint());
+  expect_error(client.model(), ErrorCode::kModelNotReady, "no model is loaded");
+}
+
+TEST(Client, AComplaintAboutAnUnreadableRequestIsItsAnswer) {
+  FakeDaemon daemon([](const Frame&) -> Answers {
+    return {encode_frame(MessageType::kErrorReply, 0,
+                         wire::encode(Error{ErrorCode::kProtocol, "frame CRC-32"}))};
+  });
+  Client client = connect(daemon.endpoint());
+  expect_error(client.status(), ErrorCode::kProtocol, "frame CRC-32");
+}
+
+TEST(Client, LateRepliesOfTimedOutRequestsAreIgnored) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    if (request.request_id == 1) return {};
+    return {status_reply(1, "late"), status_reply(request.request_id, "in time")};
+  });
+  Client impatient = connect(daemon.endpoint(), kShort);
+  expect_error(impatient.status(), ErrorCode::kUnavailable, daemon.endpoint());
+  // The second request may be slow on a loaded machine; ask until it is not.
+  Result<wire::DaemonStatus> status = impatient.status();
+  for (int i = 0; i < 50 && !status; ++i) status = impatient.status();
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(status->version, "in time");
+}
+
+TEST(Client, AReplyToARequestThatWasNeverMadeIsRefused) {
+  FakeDaemon daemon(
+      [](const Frame& request) -> Answers { return {status_reply(request.request_id + 7)}; });
+  Client client = connect(daemon.endpoint());
+  expect_error(client.status(), ErrorCode::kProtocol, "never made");
+}
+
+TEST(Client, MalformedRepliesAreRefusedNamingTheEndpoint) {
+  std::string damaged = status_reply(1);
+  damaged.back() = static_cast<char>(damaged.back() ^ 1);
+  for (const std::string& message : {std::string(), std::string("junk"), damaged,
+                                     status_reply(1).substr(0, 30), FakeDaemon::kMultipart}) {
+    FakeDaemon daemon([&](const Frame&) -> Answers { return {message}; });
+    Client client = connect(daemon.endpoint());
+    expect_error(client.status(), ErrorCode::kProtocol, daemon.endpoint());
+  }
+}
+
+TEST(Client, AReplyOfAnotherTypeOrWithABadPayloadIsRefused) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    if (request.type == MessageType::kModelRequest) return {status_reply(request.request_id)};
+    return {encode_frame(MessageType::kStatusReply, request.request_id, "\x0a\xff")};
+  });
+  Client client = connect(daemon.endpoint());
+  expect_error(client.model(), ErrorCode::kProtocol, "type 2, must be 6");
+  expect_error(client.status(), ErrorCode::kProtocol, "StatusReply.version");
+}
+
+TEST(Client, SilenceEndsAtTheTimeout) {
+  FakeDaemon daemon([](const Frame&) -> Answers { return {}; });
+  Client client = connect(daemon.endpoint(), kShort);
+  const auto start = std::chrono::steady_clock::now();
+  expect_error(client.status(), ErrorCode::kUnavailable, daemon.endpoint());
+  const auto elapsed = std::chrono::steady_clock::now() - start;
+  EXPECT_GE(elapsed, kShort);
+  EXPECT_LT(elapsed, 10 * kShort);
+}
+
+TEST(Client, AnEndpointWithoutDaemonIsUnavailableWithinTheTimeout) {
+  std::string endpoint;
+  {
+    FakeDaemon daemon([](const Frame&) -> Answers { return {}; });
+    endpoint = daemon.endpoint();
+  }
+  Client client = connect(endpoint, kShort);
+  const auto start = std::chrono::steady_clock::now();
+  expect_error(client.status(), ErrorCode::kUnavailable, "no daemon at " + endpoint);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 10 * kShort);
+}
+
+TEST(Client, BadEndpointsAndOptionsAreRefused) {
+  for (const char* endpoint : {"", "nonsense", "tcp://", "tcp://127.0.0.1", "smoke://signals:1"}) {
+    expect_error(Client::connect(endpoint), ErrorCode::kInvalidArgument, "endpoint");
+  }
+  for (const int bad : {0, -1}) {
+    const milliseconds value(bad);
+    expect_error(Client::connect("tcp://127.0.0.1:1", {.request_timeout = value}),
+                 ErrorCode::kInvalidArgument, "request_timeout");
+    expect_error(Client::connect("tcp://127.0.0.1:1", {.session_timeout = value}),
+                 ErrorCode::kInvalidArgument, "session_timeout");
+    expect_error(Client::connect("tcp://127.0.0.1:1", {.heartbeat_interval = value}),
+                 ErrorCode::kInvalidArgument, "heartbeat_interval");
+  }
+}
+
+TEST(Client, UpdatesBetweenRepliesAreKeptInOrder) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    const std::uint64_t id = request.request_id;
+    return {update_frame(10 * id + 1, false), update_frame(10 * id + 2), status_reply(id),
+            update_frame(10 * id + 3)};
+  });
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.status());
+  ASSERT_TRUE(client.status());
+  for (const std::uint64_t expected : {11, 12, 13, 21, 22, 23}) {
+    const auto message = client.next_update(kPatient);
+    ASSERT_TRUE(message) << message.error().message;
+    EXPECT_EQ(message->update.sequence, expected);
+    EXPECT_EQ(message->update.final, expected % 10 != 1);
+    EXPECT_EQ(message->update.estimate.displacement,
+              Points::Constant(3, 2, static_cast<double>(expected)));
+  }
+  expect_error(client.next_update(milliseconds(1)), ErrorCode::kUnavailable, daemon.endpoint());
+}
+
+TEST(Client, ABadUpdateIsReportedByNextUpdateAndNotByTheRequestItMet) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    return {encode_frame(MessageType::kUpdate, 0, "\xff"), status_reply(request.request_id),
+            update_frame(2)};
+  });
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.status());
+  expect_error(client.next_update(kPatient), ErrorCode::kProtocol, "Update");
+  EXPECT_EQ(client.next_update(kPatient).value().update.sequence, 2u);
+}
+
+TEST(Client, ADaemonThatDiesWhileACallWaitsIsNoticedBeforeTheTimeout) {
+  FakeDaemon daemon([](const Frame&) -> Answers { return {FakeDaemon::kDie}; });
+  Client client = connect(daemon.endpoint());
+  const auto start = std::chrono::steady_clock::now();
+  expect_error(client.start_session({.case_id = "c"}), ErrorCode::kUnavailable,
+               "lost the connection");
+  EXPECT_LT(std::chrono::steady_clock::now() - start, kPatient / 4);
+}
+
+TEST(Client, WorksAgainAfterTheDaemonRestarted) {
+  const auto handler = [](const Frame& request) -> Answers {
+    return {status_reply(request.request_id)};
+  };
+  // A local socket: a loopback port could be taken by another test while nobody holds it.
+  const test_support::TemporaryFolder folder;
+  const std::string endpoint = "ipc://" + (folder / "daemon").string();
+  auto daemon = std::make_unique<FakeDaemon>(handler, endpoint);
+  Client client = connect(endpoint);
+  ASSERT_TRUE(client.status());
+  daemon.reset();
+  expect_error(client.next_update(kPatient), ErrorCode::kUnavailable, "lost the connection");
+  daemon = std::make_unique<FakeDaemon>(handler, endpoint);
+  const auto status = client.status();
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(status->version, "1.2.3");
+}
+
+TEST(Client, ARequestAboveThePayloadCapIsRefusedHere) {
+  Client client = connect("tcp://127.0.0.1:1", kShort);
+  Observation observation;
+  observation.body = TumourBoundary{Points::Constant(3, 3'000'000, 1.0), 0.5};
+  expect_error(client.submit(observation), ErrorCode::kInvalidArgument, "must be at most 67108864");
+}
+
+}  // namespace
+}  // namespace brainshift::client

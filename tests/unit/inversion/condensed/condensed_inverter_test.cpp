@@ -1,0 +1,387 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/condensed_inverter.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "common/contact/set_search.hpp"
+
+#include "tests/unit/inversion/condensed_fixture.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using testing::HasSubstr;
+
+INSTANTIATE_TEST_SUITE_P(Boundaries, Condensed,
+                         ::testing::Values(Boundary::kContact, Boundary::kFixed),
+                         [](const auto& each) { return std::string(to_string(each.param)); });
+
+// Single precision of U and G: 6e-8 of each of some hundred terms, which partly cancel.
+constexpr double kFloatTolerance = 1e-5;
+
+TEST_P(Condensed, EstimateEqualsTheDirectPosteriorOfThePenalisedSystem) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  if (GetParam() == Boundary::kContact) {
+    ASSERT_GT(estimate.contact.active, 5) << "the test shows nothing without contact";
+  }
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  const double largest_mm = direct.mean.cwiseAbs().maxCoeff();
+  ASSERT_GT(largest_mm, 1.0);
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(), kFloatTolerance * largest_mm);
+}
+
+TEST_P(Condensed, DataAlongDirectionsEqualTheDirectPosteriorOfTheirProjections) {
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.directions = Points::Zero(3, data.size());
+  Random random(8);
+  for (int i = 0; i < data.size(); i += 2) {
+    const Vec3 n = random.direction();
+    data.directions.col(i) = n;
+    data.displacements.col(i) = n.dot(data.displacements.col(i)) * n;
+  }
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(),
+            kFloatTolerance * direct.mean.cwiseAbs().maxCoeff());
+  // Whole displacements would have said more.
+  SparseData whole = data;
+  whole.directions.setZero();
+  Estimate other;
+  ASSERT_TRUE(inverter.update(whole, other));
+  EXPECT_GT((other.displacement - estimate.displacement).cwiseAbs().maxCoeff(), 0.05);
+}
+
+// Data that the model explains: noisy samples of an estimate.
+SparseData explained(const SparseData& data, const Estimate& estimate,
+                     const std::vector<NodeIndex>& region, double noise_mm) {
+  SparseData result = data;
+  Random random(21);
+  for (int i = 0; i < data.size(); ++i) {
+    result.displacements.col(i) = estimate.displacement.col(region[static_cast<std::size_t>(i)]);
+    for (int axis = 0; axis < 3; ++axis)
+      result.displacements(axis, i) += noise_mm * random.normal();
+  }
+  return result;
+}
+
+TEST_P(Condensed, GrossErrorsLoseTheirInfluence) {
+  Estimate expected, robust, kept;
+  auto inverter = Condensed::inverter(GetParam());
+  SparseData clean = sagging_data(GetParam(), 0.3);
+  ASSERT_TRUE(inverter.update(clean, expected));
+  clean = explained(clean, expected, operators(GetParam())->region, 0.2);
+  ASSERT_TRUE(inverter.update(clean, expected));
+  SparseData spoilt = clean;
+  for (int i = 0; i < spoilt.size(); i += 5) spoilt.displacements.col(i) += Vec3(5.0, -4.0, 3.0);
+  spoilt.sources = {{"ius", 0, spoilt.size()}};
+  ASSERT_TRUE(inverter.update(spoilt, robust));
+  CaseConfig with = config();
+  with.sensing.robust_weights = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), {}, with).update(spoilt, kept));
+  const auto error = [&](const Estimate& estimate) {
+    return (estimate.displacement - expected.displacement).colwise().norm().maxCoeff();
+  };
+  EXPECT_LT(error(robust), 0.1 * error(kept));
+  ASSERT_EQ(robust.sources.size(), 1u);
+  EXPECT_EQ(robust.sources[0].outliers, (clean.size() + 4) / 5);
+  EXPECT_THAT(robust.reason, HasSubstr("count less as outliers"));
+}
+
+TEST_P(Condensed, ASourceThatContradictsTheOthersIsSaid) {
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  SparseData data = sagging_data(GetParam(), 0.2);
+  data.displacements /= 40.0;  // what the prior expects
+  ASSERT_TRUE(inverter.update(data, estimate));
+  data = explained(data, estimate, operators(GetParam())->region, 0.2);
+  const int half = data.size() / 2;
+  data.sources = {{"ius", 0, half}, {"pointer", half, data.size() - half}};
+  ASSERT_TRUE(inverter.update(data, estimate));
+  ASSERT_EQ(estimate.sources.size(), 2u);
+  for (const SourceSummary& source : estimate.sources) {
+    EXPECT_TRUE(source.consistent) << source.source << ": " << source.p_value;
+    EXPECT_GT(source.degrees_of_freedom, 3.0);
+  }
+  data.displacements.rightCols(data.size() - half).colwise() += Vec3(2.0, 0.0, 2.0);
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_FALSE(estimate.sources[1].consistent);
+  EXPECT_THAT(estimate.reason, HasSubstr("\"pointer\" contradicts the other sources"));
+}
+
+// Data given as a function of the displacement converge to the fixed point; here the place of each datum shifts by a
+// tenth of the displacement at one node.
+TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
+  const SparseData start = sagging_data(GetParam(), 0.2);
+  const NodeIndex node = operators(GetParam())->region.front();
+  int calls = 0;
+  Points last;
+  MovingData moving;
+  moving.nodes = {node};
+  moving.relocate = [&](const Points& u, SparseData& data) {
+    ++calls;
+    const bool moved = last.cols() == 0 || (u - last).norm() > 1e-3;
+    last = u;
+    if (moved) data.displacements = start.displacements.colwise() + Vec3(0.1 * u.col(0));
+    return moved;
+  };
+  Estimate estimate;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(start, estimate, &moving));
+  EXPECT_GE(calls, 2);
+  EXPECT_LT((last.col(0) - estimate.displacement.col(node)).norm(), 2e-3);
+  // What a still inverter makes of the data where they ended.
+  SparseData end = start;
+  end.displacements = start.displacements.colwise() + Vec3(0.1 * last.col(0));
+  Estimate still;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(end, still));
+  EXPECT_LT((still.displacement - estimate.displacement).cwiseAbs().maxCoeff(), 2e-3);
+}
+
+TEST_P(Condensed, MovingDataThatBecomeUselessAreRefused) {
+  const SparseData start = sagging_data(GetParam(), 0.2);
+  MovingData moving;
+  moving.nodes = {0};
+  moving.relocate = [](const Points&, SparseData& data) {
+    data.positions(0, 0) = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  };
+  Estimate estimate;
+  const Status status = Condensed::inverter(GetParam()).update(start, estimate, &moving);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
+}
+
+TEST_P(Condensed, EstimateWithEstimatedScalesEqualsTheDirectPosteriorOfTheScaledPrior) {
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.displacements *= 0.01;  // less than the case's prior expects
+  CaseConfig with = config();
+  with.prior.estimate_scales = true;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam(), {}, with);
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kConverged);
+  const auto& scales = estimate.prior_scales;
+  EXPECT_LT(*std::min_element(scales.begin(), scales.end()), 0.8) << "the test shows nothing";
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves, scales);
+  const Eigen::Map<const VecX> u(estimate.displacement.data(), estimate.displacement.size());
+  EXPECT_LT((u - direct.mean).cwiseAbs().maxCoeff(),
+            kFloatTolerance * direct.mean.cwiseAbs().maxCoeff());
+}
+
+// Equal in the data region; elsewhere the modes leave variance out, which is added as that of the free body.
+TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(data, estimate));
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const auto& region = operators(GetParam())->region;
+  // Widened by what the data lie off more than they should.
+  double squares = 0.0;
+  for (int i = 0; i < data.size(); ++i) {
+    const Vec3 off =
+        data.displacements.col(i) - estimate.displacement.col(region[static_cast<std::size_t>(i)]);
+    squares += off.squaredNorm() / (3.0 * data.size() * data.sd_mm[i] * data.sd_mm[i]);
+  }
+  const double widened = std::max(1.0, std::sqrt(squares));
+  for (int node = 0; node < patient()->mesh.num_nodes(); ++node) {
+    const double variance = direct.covariance.diagonal().segment<3>(3 * node).mean();
+    const double expected_mm = widened * std::sqrt(std::max(0.0, variance));
+    EXPECT_GT(estimate.sd_mm[node], 0.98 * expected_mm) << node;
+    if (std::binary_search(region.begin(), region.end(), node)) {
+      EXPECT_NEAR(estimate.sd_mm[node], expected_mm, 0.05 * expected_mm) << node;
+    }
+  }
+}
+
+TEST_P(Condensed, ContactHolds) {
+  Estimate estimate;
+  auto inverter = Condensed::inverter(GetParam());
+  ASSERT_TRUE(inverter.update(sagging_data(GetParam(), 0.3), estimate));
+  const auto& contact = prepared(GetParam()).forward().contact();
+  const VecX penetration = contact.penetration(estimate.displacement);
+  Eigen::Index active = 0;
+  for (int i = 0; i < contact.num_slaves(); ++i) {
+    const NodeIndex slave = contact.pairs()[static_cast<std::size_t>(i)].slave;
+    if (active < estimate.contact_force_n.size() &&
+        estimate.active_slaves[static_cast<std::size_t>(active)] == slave) {
+      const double force = estimate.contact_force_n[active++];
+      EXPECT_GE(force, 0.0) << i;                                      // it presses,
+      EXPECT_NEAR(penetration[i], force / contact.beta(), 1e-4) << i;  // as the penalty says
+    } else {
+      EXPECT_LT(penetration[i], contact::kContactTolerance_mm + 1e-4) << i;
+    }
+  }
+  EXPECT_EQ(active, estimate.contact_force_n.size());
+}
+
+TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
+  auto warm = Condensed::inverter(GetParam());
+  CondensedOptions from_nothing;
+  from_nothing.warm_start = false;
+  auto cold = Condensed::inverter(GetParam(), from_nothing);
+  Estimate a, b;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const SparseData data = sagging_data(GetParam(), 0.3, seed);
+    ASSERT_TRUE(warm.update(data, a));
+    ASSERT_TRUE(cold.update(data, b));
+    EXPECT_LT((a.displacement - b.displacement).cwiseAbs().maxCoeff(), 2e-3) << seed;
+  }
+}
+
+TEST_P(Condensed, ResetMakesRunsBitIdentical) {
+  auto inverter = Condensed::inverter(GetParam());
+  std::vector<Estimate> first(3), second(3);
+  for (auto* run : {&first, &second}) {
+    inverter.reset();
+    for (std::size_t i = 0; i < run->size(); ++i) {
+      ASSERT_TRUE(inverter.update(sagging_data(GetParam(), 0.3, i + 1), (*run)[i]));
+    }
+  }
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_TRUE(first[i].displacement == second[i].displacement);
+    EXPECT_TRUE(first[i].sd_mm == second[i].sd_mm);
+  }
+}
+
+TEST_P(Condensed, LeavingPartsOutChangesOnlyThem) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate full, without_sd, without_contact;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(data, full));
+  CondensedOptions options;
+  options.uncertainty = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), options).update(data, without_sd));
+  EXPECT_TRUE(full.displacement == without_sd.displacement);
+  EXPECT_EQ(without_sd.sd_mm.size(), 0);
+  options.contact = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), options).update(data, without_contact));
+  EXPECT_EQ(without_contact.contact.active, 0);
+  EXPECT_EQ(without_contact.displacement == full.displacement, GetParam() == Boundary::kFixed);
+}
+
+// Two kinds of data that no load explains together, with a standard deviation far too small.
+TEST_F(Condensed, DataThatThePriorDoesNotExplainWidenTheErrorBarsAndAreSaid) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  Estimate fits, off;
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact).update(data, fits));
+  EXPECT_THAT(fits.reason, testing::Not(HasSubstr("does not explain")));
+  for (int i = 0; i < data.size(); ++i) {
+    data.displacements.col(i) += (i % 2 == 0 ? 2.0 : -2.0) * Vec3::UnitX();
+  }
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact).update(data, off));
+  EXPECT_THAT(off.reason, HasSubstr("the prior does not explain the data"));
+  EXPECT_GT(off.sd_mm.mean(), 1.5 * fits.sd_mm.mean());
+}
+
+TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
+  CaseConfig hurried = config();
+  hurried.condensed.deadline_ms = 1e-9;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
+  ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kDeadline);
+  EXPECT_THAT(estimate.reason, HasSubstr("best iterate"));
+  EXPECT_TRUE(estimate.displacement.allFinite());
+}
+
+TEST_F(Condensed, IterationLimitReturnsTheBestIterateAndSaysSo) {
+  CaseConfig hurried = config();
+  hurried.condensed.max_contact_iterations = 1;
+  Estimate estimate;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
+  ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
+  EXPECT_EQ(estimate.status, EstimateStatus::kIterationLimit);
+}
+
+TEST_F(Condensed, DataOutsideTheRegionAreRefusedWhereTheCaseSaysSo) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  CaseConfig strict = config();
+  strict.condensed.outside_region = OutsideRegion::kRefuse;
+  auto inverter = Condensed::inverter(Boundary::kContact, {}, strict);
+  Estimate estimate;
+  EXPECT_TRUE(inverter.update(data, estimate));
+  const Points before = estimate.displacement;
+  data.positions.col(7) = Vec3(5, 5, 5);  // far from tumour and craniotomy
+  const Status refused = inverter.update(data, estimate);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("point 7 at (5 5 5) mm"));
+  EXPECT_THAT(refused.error().message, HasSubstr("condensed.outside_region"));
+  EXPECT_TRUE(estimate.displacement == before);
+}
+
+TEST_F(Condensed, DataFarFromTheRegionAreBelievedLess) {
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  CondensedOptions few;
+  few.rank = 12;
+  auto inverter = Condensed::inverter(Boundary::kContact, few);
+  Estimate estimate;
+  data.positions.col(0) = Vec3(5, 5, 5);  // far from tumour and craniotomy
+  ASSERT_TRUE(inverter.update(data, estimate));
+  EXPECT_TRUE(estimate.displacement.allFinite());
+}
+
+class RefusedData : public Condensed {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(inverter_.update(good_, estimate_));
+    before_ = estimate_.displacement;
+  }
+  void expect_refused(const SparseData& data, ErrorCode code, const std::string& words) {
+    const Status status = inverter_.update(data, estimate_);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, code);
+    EXPECT_THAT(status.error().message, HasSubstr(words));
+    EXPECT_TRUE(estimate_.displacement == before_) << "the estimate before must stay";
+    EXPECT_TRUE(inverter_.update(good_, estimate_)) << "and the next one must work";
+  }
+  SparseData good_ = sagging_data(Boundary::kContact, 0.3);
+  CondensedInverter inverter_ = Condensed::inverter(Boundary::kContact);
+  Estimate estimate_;
+  Points before_;
+};
+
+TEST_F(RefusedData, TwoPoints) {
+  SparseData data{good_.positions.leftCols(2), good_.displacements.leftCols(2),
+                  good_.sd_mm.head(2)};
+  expect_refused(data, ErrorCode::kInvalidArgument, "2 points");
+}
+TEST_F(RefusedData, NotANumber) {
+  SparseData data = good_;
+  data.displacements(1, 3) = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(data, ErrorCode::kNotFinite, "point 3");
+}
+TEST_F(RefusedData, Collinear) {
+  SparseData data = good_;
+  for (int i = 0; i < data.size(); ++i) data.positions.col(i) = Vec3(20.0 + 0.5 * i, 30, 40);
+  expect_refused(data, ErrorCode::kInvalidArgument, "line");
+}
+TEST_F(RefusedData, Coplanar) {
+  SparseData data = good_;
+  data.positions.row(2).setConstant(40.0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "plane");
+}
+TEST_F(RefusedData, OutsideTheBrain) {
+  SparseData data = good_;
+  data.positions.col(2) = Vec3(30, 30, 300);
+  expect_refused(data, ErrorCode::kInvalidArgument, "point 2");
+}
+TEST_F(RefusedData, Contradictory) {
+  SparseData data = good_;
+  data.positions.col(1) = data.positions.col(0);
+  data.displacements.col(1) = data.displacements.col(0) + Vec3(20, 0, 0);
+  expect_refused(data, ErrorCode::kInvalidArgument, "contradict");
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

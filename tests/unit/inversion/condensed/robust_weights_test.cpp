@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/robust_weights.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+
+#include "common/core/random.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+SparseData whole(int size) {
+  return {Points::Zero(3, size), Points::Zero(3, size), VecX::Ones(size)};
+}
+
+VecX gaussian_norms(int size, int rows, std::uint64_t seed) {
+  Random random(seed);
+  VecX norms(size);
+  for (int i = 0; i < size; ++i) {
+    double squares = 0.0;
+    for (int k = 0; k < rows; ++k) squares += std::pow(random.normal(), 2);
+    norms[i] = std::sqrt(squares);
+  }
+  return norms;
+}
+
+TEST(RobustWeights, LimitsAndMediansAreThoseOfTheChiDistribution) {
+  const auto chi = [](int rows, double p) {
+    return std::sqrt(boost::math::quantile(boost::math::chi_squared(rows), p));
+  };
+  EXPECT_NEAR(kMedianWhole, chi(3, 0.5), 1e-4);
+  EXPECT_NEAR(kMedianAlong, chi(1, 0.5), 1e-5);
+  EXPECT_NEAR(kOutlierWhole, chi(3, 1.0 - 5e-5), 0.01);
+  EXPECT_NEAR(kOutlierAlong, chi(1, 1.0 - 5e-5), 0.01);
+}
+
+TEST(RobustWeights, GaussianDataKeepTheirFullWeight) {
+  RobustWeights weights;
+  weights.reset(300);
+  EXPECT_FALSE(weights.update(whole(300), gaussian_norms(300, 3, 1)));
+  EXPECT_EQ(weights.values().minCoeff(), 1.0);
+  SparseData along = whole(300);
+  along.directions = Points(Vec3(0, 0, 1).replicate(1, 300));
+  EXPECT_FALSE(weights.update(along, gaussian_norms(300, 1, 2)));
+  EXPECT_EQ(weights.values().minCoeff(), 1.0);
+}
+
+TEST(RobustWeights, AGrossErrorLosesItsInfluence) {
+  VecX norms = gaussian_norms(100, 3, 3);
+  norms[7] = 20.0;
+  norms[8] = 200.0;
+  RobustWeights weights;
+  weights.reset(100);
+  EXPECT_TRUE(weights.update(whole(100), norms));
+  EXPECT_LT(weights.values()[7], 0.01);
+  // What pulls is w r; it falls although the error is ten times as large.
+  EXPECT_LT(weights.values()[8] * 200.0, 0.01 * weights.values()[7] * 20.0);
+  EXPECT_EQ(weights.outliers(0, 100), 2);
+  EXPECT_EQ(weights.outliers(9, 91), 0);
+}
+
+// Residuals come with the present weight inside.
+TEST(RobustWeights, StayWhenTheResidualsDo) {
+  VecX norms = gaussian_norms(100, 3, 3);
+  norms[7] = 10.0;
+  RobustWeights weights;
+  weights.reset(100);
+  ASSERT_TRUE(weights.update(whole(100), norms));
+  const double weight = weights.values()[7];
+  norms[7] *= std::sqrt(weight);
+  EXPECT_FALSE(weights.update(whole(100), norms));
+  EXPECT_NEAR(weights.values()[7], weight, 1e-12);
+}
+
+// A whole source that the model cannot explain is not a crowd of outliers.
+TEST(RobustWeights, ASourceThatIsOffAsAWholeKeepsItsWeight) {
+  SparseData data = whole(200);
+  data.sources = {{"a", 0, 100}, {"b", 100, 100}};
+  VecX norms = gaussian_norms(200, 3, 5);
+  norms.tail(100) *= 10.0;
+  RobustWeights weights;
+  weights.reset(200);
+  EXPECT_FALSE(weights.update(data, norms));
+  data.sources.clear();  // together, most of the second half would be outliers of the first
+  EXPECT_TRUE(weights.update(data, norms));
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

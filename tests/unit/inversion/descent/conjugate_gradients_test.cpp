@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/descent/conjugate_gradients.hpp"
+
+#include <algorithm>
+
+#include "common/inversion/invert.hpp"
+#include "common/inversion/descent/misfit.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "tests/unit/inversion/toy_inversion.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+Result<Estimate> run(const PreparedModel& model, const SparseData& data, Method method) {
+  InversionOptions options;
+  options.method = method;
+  return invert(model, data, options);
+}
+
+CaseConfig tight_config(int max_iterations) {
+  CaseConfig config = test_support::toy_config();
+  config.inversion.relative_misfit_change = 1e-10;
+  config.inversion.max_iterations = max_iterations;
+  return config;
+}
+
+TEST(ConjugateGradients, ReachTheDensePosteriorMeanWhereNoContactIs) {
+  const PreparedModel model = prepare(Boundary::kFixed, tight_config(1000));
+  const SparseData data = sagging_data(model, 0.1);
+  const VecX expected = dense_posterior_mean(model, data);
+  const auto estimate = run(model, data, Method::kConjugateGradients);
+  ASSERT_TRUE(estimate.has_value()) << estimate.error().message;
+  EXPECT_EQ(estimate->status, EstimateStatus::kConverged);
+  ASSERT_GT(expected.cwiseAbs().maxCoeff(), 0.5);
+  EXPECT_LT((flat(estimate->displacement) - expected).cwiseAbs().maxCoeff(), 1e-5);
+}
+
+TEST(ConjugateGradients, NeedFewerIterationsThanSteepestDescentForTheSameError) {
+  const PreparedModel model = prepare(Boundary::kFixed, tight_config(1000));
+  SparseData data = sagging_data(model, 0.1);
+  const VecX expected = dense_posterior_mean(model, data);
+  const auto iterations_to = [&](double error_mm, Method method) {
+    int needed = 0;
+    std::stop_source source;
+    InversionOptions options;
+    options.method = method;
+    options.stop = source.get_token();
+    options.on_iterate = [&](const Estimate& iterate) {
+      if ((flat(iterate.displacement) - expected).cwiseAbs().maxCoeff() > error_mm) return;
+      if (needed == 0) needed = static_cast<int>(iterate.history.size());
+      source.request_stop();
+    };
+    (void)invert(model, data, options);
+    return needed == 0 ? 1000 : needed;
+  };
+  const int conjugate = iterations_to(0.05, Method::kConjugateGradients);
+  const int steepest = iterations_to(0.05, Method::kPaperWoodbury);
+  EXPECT_LT(2 * conjugate, steepest);
+  RecordProperty("conjugate", conjugate);
+  RecordProperty("steepest", steepest);
+}
+
+// With contact no dense formula exists, but a minimum for the last active set satisfies w = W_b b = lambda / 2: the
+// forcing that the misfit of the estimate implies must give the estimate back. Other code evaluates it.
+TEST(ConjugateGradients, EndAtAFixedPointOfTheirLastActiveSet) {
+  const PreparedModel model = prepare(Boundary::kContact, tight_config(400));
+  SparseData data = sagging_data(model, 0.1);
+  data.sd_mm.setConstant(
+      5.0);  // a weak pull of the data, so that the fixed point is well conditioned
+  const auto estimate = run(model, data, Method::kConjugateGradients);
+  ASSERT_TRUE(estimate.has_value()) << estimate.error().message;
+  EXPECT_EQ(estimate->status, EstimateStatus::kConverged) << estimate->reason;
+  const auto& pairs = model.forward().contact().pairs();
+  contact::ActiveSet active(pairs.size(), 0);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const auto& slaves = estimate->active_slaves;
+    active[i] = std::find(slaves.begin(), slaves.end(), pairs[i].slave) != slaves.end();
+  }
+  ASSERT_GT(contact::count(active), 0);
+  contact::RefactorisedSystem system(model.forward());
+  ASSERT_TRUE(system.activate(active).has_value());
+  const auto misfit = Misfit::build(model, data);
+  ASSERT_TRUE(misfit.has_value());
+  Points w;
+  ASSERT_TRUE(
+      system.solve(misfit->adjoint(misfit->residual(estimate->displacement)), w).has_value());
+  Points u;
+  ASSERT_TRUE(system.solve_with_gaps(model.prior().apply(w), u).has_value());
+  ASSERT_GT(u.cwiseAbs().maxCoeff(), 0.5);
+  EXPECT_LT((u - estimate->displacement).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+// Where both settle, contact included; the paper's own stop rule ends steepest descent long before on stiff data.
+TEST(ConjugateGradients, MeetSteepestDescentAtTheSameMinimumWithContact) {
+  const PreparedModel model = prepare(Boundary::kContact, tight_config(2000));
+  SparseData data = sagging_data(model, 0.1);
+  data.sd_mm.setConstant(5.0);
+  const auto conjugate = run(model, data, Method::kConjugateGradients);
+  const auto steepest = run(model, data, Method::kPaperWoodbury);
+  ASSERT_TRUE(conjugate.has_value() && steepest.has_value());
+  EXPECT_EQ(steepest->status, EstimateStatus::kConverged) << steepest->reason;
+  EXPECT_GT(conjugate->contact.active, 0);
+  EXPECT_EQ(conjugate->active_slaves, steepest->active_slaves);
+  EXPECT_LT((conjugate->displacement - steepest->displacement).colwise().norm().maxCoeff(), 1e-3);
+  EXPECT_LT(conjugate->history.size(), steepest->history.size());
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/prepared/condense.hpp"
+
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "tests/unit/inversion/condensed_fixture.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using testing::HasSubstr;
+
+// Relative rounding of single precision, with room for the sums behind it.
+constexpr double kFloat = 1e-6;
+
+TEST_F(Condensed, ContactColumnsAreTheResponsesToUnitForces) {
+  const auto ops = operators(Boundary::kContact);
+  const auto& forward = prepared(Boundary::kContact).forward();
+  ASSERT_EQ(ops->num_slaves(), forward.contact().num_slaves());
+  for (const int j : {0, 7, ops->num_slaves() - 1}) {
+    const auto& pair = forward.contact().pairs()[static_cast<std::size_t>(j)];
+    Points load = Points::Zero(3, patient()->mesh.num_nodes());
+    load.col(pair.slave) = pair.normal;
+    const Points u = forward.solve(load);
+    const Eigen::Map<const VecX> expected(u.data(), u.size());
+    ASSERT_GT(expected.cwiseAbs().maxCoeff(), 0.0);
+    EXPECT_LT((ops->contact_columns.col(j).cast<double>() - expected).cwiseAbs().maxCoeff(),
+              kFloat * expected.cwiseAbs().maxCoeff());
+    EXPECT_NEAR(ops->compliance(j, j), pair.normal.dot(u.col(pair.slave)),
+                1e-12 * ops->compliance(j, j));
+  }
+  EXPECT_TRUE(ops->compliance == ops->compliance.transpose());
+}
+
+// U U^T = C between any two nodes of the data region, and on the slaves' normals.
+TEST_F(Condensed, ModesReproduceThePriorCovarianceWhereDataComeFrom) {
+  const auto ops = operators(Boundary::kContact);
+  const auto& model = prepared(Boundary::kContact);
+  for (const NodeIndex node : {ops->region.front(), ops->region.back()}) {
+    Points unit = Points::Zero(3, patient()->mesh.num_nodes());
+    unit(1, node) = 1.0;
+    const Points column = model.forward().solve(model.prior().apply(model.forward().solve(unit)));
+    const VecX row = ops->modes.row(3 * node + 1).cast<double>().transpose();
+    const double scale = column.cwiseAbs().maxCoeff();
+    for (const NodeIndex other : ops->region) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double carried = ops->modes.row(3 * other + axis).cast<double>().dot(row);
+        EXPECT_NEAR(carried, column(axis, other), 10 * kFloat * scale);
+      }
+    }
+  }
+}
+
+TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
+  CondenseOptions one;
+  one.threads = 1;
+  const auto serial = condense(prepared(Boundary::kContact), one);
+  CondenseOptions three;
+  three.threads = 3;
+  const auto parallel = condense(prepared(Boundary::kContact), three);
+  ASSERT_TRUE(serial && parallel);
+  EXPECT_TRUE(serial->contact_columns == parallel->contact_columns);
+  EXPECT_TRUE(serial->compliance == parallel->compliance);
+  EXPECT_TRUE(serial->modes == parallel->modes);
+  EXPECT_TRUE(serial->truncated_variance_mm2 == parallel->truncated_variance_mm2);
+}
+
+TEST_F(Condensed, FinishedBlocksAreNotSolvedAgain) {
+  std::map<int, std::pair<Eigen::MatrixXf, Eigen::MatrixXd>> kept;
+  CondenseOptions options;
+  options.store.load = [&](int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance) {
+    const auto found = kept.find(index);
+    if (found == kept.end()) return false;
+    std::tie(columns, compliance) = found->second;
+    return true;
+  };
+  int saved = 0;
+  options.store.save = [&](int index, const Eigen::MatrixXf& columns,
+                           const Eigen::MatrixXd& compliance) {
+    kept[index] = {columns, compliance};
+    ++saved;
+  };
+  const auto first = condense(prepared(Boundary::kContact), options);
+  ASSERT_TRUE(first);
+  ASSERT_GT(saved, 0);
+  saved = 0;
+  const auto second = condense(prepared(Boundary::kContact), options);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(saved, 0);
+  EXPECT_TRUE(first->contact_columns == second->contact_columns);
+  EXPECT_TRUE(first->compliance == second->compliance);
+}
+
+TEST_F(Condensed, MemoryLimitIsRespectedBeforeWorkBegins) {
+  CaseConfig small = config();
+  small.condensed.memory_limit_gib = 0.001;
+  const auto model = PreparedModel::prepare(patient(), small, Boundary::kContact);
+  ASSERT_TRUE(model);
+  const auto refused = condense(*model);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("condensed.memory_limit_gib = 0.001"));
+}
+
+TEST_F(Condensed, CanBeStopped) {
+  std::stop_source stop;
+  stop.request_stop();
+  CondenseOptions options;
+  options.stop = stop.get_token();
+  const auto stopped = condense(prepared(Boundary::kContact), options);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(Condensed, ProgressRunsFromZeroToOneInEveryStage) {
+  std::map<std::string, std::pair<double, double>> stages;
+  CondenseOptions options;
+  options.progress = [&](std::string_view stage, double fraction) {
+    auto [entry, first] = stages.try_emplace(std::string(stage), fraction, fraction);
+    EXPECT_GE(fraction, first ? 0.0 : entry->second.second);
+    entry->second.second = fraction;
+  };
+  ASSERT_TRUE(condense(prepared(Boundary::kContact), options));
+  for (const char* stage : {"contact columns", "prior modes", "load modes", "uncertainty"}) {
+    ASSERT_TRUE(stages.count(stage)) << stage;
+    EXPECT_EQ(stages[stage].first, 0.0);
+    EXPECT_EQ(stages[stage].second, 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

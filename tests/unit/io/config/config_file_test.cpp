@@ -1,0 +1,473 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/config/config_file.hpp"
+
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace brainshift::io {
+namespace {
+
+using test_support::content_of;
+using test_support::TemporaryFolder;
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+// Line numbers in the tests below count from this text's first line.
+constexpr const char* kMinimal = R"(case_id: small
+images: {brain: mask.nii}
+tumour: {ellipsoid: {centre_mm: [1, 2, 3], semi_axes_mm: [4, 5, 6]}}
+craniotomy: {centre_mm: [7, 8, 9]}
+brainstem: {centre_mm: [0, 0, -60]}
+)";
+
+constexpr const char* kFull = R"(case_id: full
+images: {mri: /data/t1.nii, brain: sub/../mask.nii}
+mesh:
+  generate:
+    edge_mm: 6
+    tumour_edge_mm: 3
+    craniotomy_edge_mm: 4
+    tumour_margin_mm: 11
+    craniotomy_margin_mm: 12
+    smoothing_mm: 1.5
+tumour:
+  label_volume: {file: labels.nii, label: 7}
+craniotomy:
+  centre_mm: [7, 8, 9]
+  long_axis_mm: 30
+  short_axis_mm: 20
+  long_axis_direction: [0, 3, 4]
+brainstem: {centre_mm: [0, 1, -60], radius_mm: 9}
+gravity: {direction: [0, 0, -2]}
+material:
+  shear_modulus_pa: 2200
+  poisson_ratio: 0.45
+  tissue_density_kg_m3: 1040
+  fluid_density_saturated_kg_m3: 1007
+  fluid_density_unsaturated_kg_m3: 1.2
+contact: {gap_mm: 2, skull_file: skull.stl, slave_depth_mm: 25, penalty_n_per_mm: 6}
+prior:
+  correlation_length_mm: 7
+  force_density_sd_n_m3: 900
+  gravity_mode_sd: 0.5
+  gravity_levels_mm: [1, -2.5]
+inversion: {sigma_mm: 0.3, sparse_points: 100, max_iterations: 40, relative_misfit_change: 1e-4}
+)";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(CaseFile, MinimalFileHasTheDefaultsOfCaseConfig) {
+  const auto read = parse_case_config(kMinimal, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const CaseConfig defaults;
+  EXPECT_EQ(read->case_id, "small");
+  EXPECT_EQ(read->file, "/cases/c.yaml");
+  EXPECT_EQ(read->brain, "/cases/mask.nii");
+  EXPECT_THAT(read->mri.string(), IsEmpty());
+  const auto& generate = std::get<MeshGeneration>(read->mesh);
+  EXPECT_EQ(generate.edge_mm, MeshGeneration{}.edge_mm);
+  EXPECT_EQ(generate.tumour_edge_mm, MeshGeneration{}.tumour_edge_mm);
+  EXPECT_EQ(generate.smoothing_mm, MeshGeneration{}.smoothing_mm);
+  EXPECT_EQ(read->craniotomy.long_axis_mm, defaults.craniotomy.long_axis_mm);
+  EXPECT_EQ(read->brainstem.radius_mm, defaults.brainstem.radius_mm);
+  EXPECT_EQ(read->gravity_direction, defaults.gravity_direction);
+  EXPECT_EQ(read->material.poisson_ratio, defaults.material.poisson_ratio);
+  EXPECT_EQ(read->contact.gap_mm, defaults.contact.gap_mm);
+  EXPECT_FALSE(read->contact.skull_file);
+  EXPECT_EQ(read->prior.gravity_levels_mm, defaults.prior.gravity_levels_mm);
+  EXPECT_EQ(read->inversion.max_iterations, defaults.inversion.max_iterations);
+}
+
+TEST(CaseFile, EveryKeyArrivesInItsField) {
+  const auto read = parse_case_config(kFull, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->mri, "/data/t1.nii");
+  EXPECT_EQ(read->brain, "/cases/mask.nii");
+  const auto& generate = std::get<MeshGeneration>(read->mesh);
+  EXPECT_EQ(generate.edge_mm, 6);
+  EXPECT_EQ(generate.tumour_edge_mm, 3);
+  EXPECT_EQ(generate.craniotomy_edge_mm, 4);
+  EXPECT_EQ(generate.tumour_margin_mm, 11);
+  EXPECT_EQ(generate.craniotomy_margin_mm, 12);
+  EXPECT_EQ(generate.smoothing_mm, 1.5);
+  EXPECT_EQ(std::get<TumourLabel>(read->tumour).path, "/cases/labels.nii");
+  EXPECT_EQ(std::get<TumourLabel>(read->tumour).label, 7);
+  EXPECT_EQ(read->craniotomy.centre_mm, Vec3(7, 8, 9));
+  EXPECT_EQ(read->craniotomy.long_axis_mm, 30);
+  EXPECT_EQ(read->craniotomy.short_axis_mm, 20);
+  EXPECT_LT((read->craniotomy.long_axis_direction - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
+  EXPECT_EQ(read->brainstem.centre_mm, Vec3(0, 1, -60));
+  EXPECT_EQ(read->brainstem.radius_mm, 9);
+  EXPECT_EQ(read->gravity_direction, Vec3(0, 0, -1)) << "normalised";
+  EXPECT_EQ(read->material.shear_modulus_pa, 2200);
+  EXPECT_EQ(read->material.poisson_ratio, 0.45);
+  EXPECT_EQ(read->material.tissue_density_kg_m3, 1040);
+  EXPECT_EQ(read->material.fluid_density_saturated_kg_m3, 1007);
+  EXPECT_EQ(read->material.fluid_density_unsaturated_kg_m3, 1.2);
+  EXPECT_EQ(read->contact.gap_mm, 2);
+  EXPECT_EQ(read->contact.skull_file, fs::path("/cases/skull.stl"));
+  EXPECT_EQ(read->contact.slave_depth_mm, 25);
+  EXPECT_EQ(read->contact.penalty_n_per_mm, 6);
+  EXPECT_EQ(read->prior.correlation_length_mm, 7);
+  EXPECT_EQ(read->prior.force_density_sd_n_m3, 900);
+  EXPECT_EQ(read->prior.gravity_mode_sd, 0.5);
+  EXPECT_THAT(read->prior.gravity_levels_mm, ElementsAre(1, -2.5));
+  EXPECT_EQ(read->inversion.sigma_mm, 0.3);
+  EXPECT_EQ(read->inversion.sparse_points, 100);
+  EXPECT_EQ(read->inversion.max_iterations, 40);
+  EXPECT_EQ(read->inversion.relative_misfit_change, 1e-4);
+}
+
+TEST(CaseFile, ReadyMeshAndTumourSurfaceNeedNoBrainMask) {
+  const std::string text =
+      replaced(replaced(kMinimal, "images: {brain: mask.nii}", "mesh: {file: head.msh}"),
+               "{ellipsoid: {centre_mm: [1, 2, 3], semi_axes_mm: [4, 5, 6]}}",
+               "{surface: {file: tumour.stl}}");
+  const auto read = parse_case_config(text, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(std::get<MeshFile>(read->mesh).path, "/cases/head.msh");
+  EXPECT_EQ(std::get<TumourSurface>(read->tumour).path, "/cases/tumour.stl");
+}
+
+TEST(CaseFile, EdgeLengthHoldsForRegionsWithoutTheirOwn) {
+  const auto read =
+      parse_case_config(std::string(kMinimal) + "mesh: {generate: {edge_mm: 12}}", "c");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(std::get<MeshGeneration>(read->mesh).tumour_edge_mm, 12);
+  EXPECT_EQ(std::get<MeshGeneration>(read->mesh).craniotomy_edge_mm, 12);
+}
+
+TEST(CaseFile, HeadingWithoutKeysMeansDefaults) {
+  const auto read =
+      parse_case_config(std::string(kMinimal) + "material:\n  # nothing\nmesh:\n", "c");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->material.poisson_ratio, Material{}.poisson_ratio);
+}
+
+TEST(CaseFile, RelativeCaseFileGivesAbsolutePaths) {
+  const auto read = parse_case_config(kMinimal, "cases/c.yaml");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->brain, fs::current_path() / "cases/mask.nii");
+}
+
+TEST(CaseFile, EmptyGravityLevelsAreAllowed) {
+  const auto read =
+      parse_case_config(std::string(kMinimal) + "prior: {gravity_levels_mm: []}", "c");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_THAT(read->prior.gravity_levels_mm, IsEmpty());
+}
+
+TEST(CaseFile, TextOfACaseReadsBackAsTheSameCase) {
+  for (const char* text : {kMinimal, kFull}) {
+    const auto first = parse_case_config(text, "/cases/c.yaml");
+    ASSERT_TRUE(first);
+    const std::string written = case_config_text(*first);
+    const auto second = parse_case_config(written, first->file);
+    ASSERT_TRUE(second) << second.error().message << written;
+    // Every key is in the text with all digits, so equal texts are equal cases.
+    EXPECT_EQ(case_config_text(*second), written);
+    EXPECT_EQ(second->gravity_direction, first->gravity_direction);
+    EXPECT_EQ(second->craniotomy.long_axis_direction, first->craniotomy.long_axis_direction);
+  }
+}
+
+TEST(CaseFile, TextKeepsAwkwardNamesAndNumbers) {
+  auto config = parse_case_config(kMinimal, "/cases/c.yaml").value();
+  config.case_id = "a: \"b\" \\ #c\t[é]";
+  config.brain = "/data/with space/it's.nii";
+  config.inversion.sigma_mm = 0.1 + 0.2;
+  const auto read = parse_case_config(case_config_text(config), config.file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->case_id, config.case_id);
+  EXPECT_EQ(read->brain, config.brain);
+  EXPECT_EQ(read->inversion.sigma_mm, config.inversion.sigma_mm);
+}
+
+TEST(CaseFile, KeysOfPorePressureAreReadAndWritten) {
+  const std::string text = replaced(
+      std::string(kFull) + "scene: {pressure: on, pressure_step_s: 5}\n", "_unsaturated_kg_m3: 1.2",
+      "_unsaturated_kg_m3: 1.2\n  permeability_m3_s_kg: 2e-8\n  biot_coefficient: 0.75\n"
+      "  storage_per_pa: 3e-6");
+  const auto read = parse_case_config(text, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto again = parse_case_config(case_config_text(*read), "/cases/c.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  for (const CaseConfig& config : {*read, *again}) {
+    EXPECT_EQ(config.scene.pressure, Carry::kOn);
+    EXPECT_EQ(config.scene.pressure_step_s, 5.0);
+    EXPECT_EQ(config.material.permeability_m3_s_kg, 2e-8);
+    EXPECT_EQ(config.material.biot_coefficient, 0.75);
+    EXPECT_EQ(config.material.storage_per_pa, 3e-6);
+  }
+}
+
+TEST(CaseFile, StiffnessOfTissuesIsReadAndWritten) {
+  const std::string text =
+      replaced(kFull, "_unsaturated_kg_m3: 1.2",
+               "_unsaturated_kg_m3: 1.2\n  tumour: {shear_modulus_pa: 6300}\n"
+               "  regions: {2: {poisson_ratio: 0.3}, 7: {shear_modulus_pa: 1e5}}");
+  const auto read = parse_case_config(text, "/cases/c.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto again = parse_case_config(case_config_text(*read), "/cases/c.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  for (const CaseConfig& config : {*read, *again}) {
+    const Material& material = config.material;
+    ASSERT_TRUE(material.tumour);
+    EXPECT_EQ(material.tumour->shear_modulus_pa, 6300.0);
+    EXPECT_EQ(material.tumour->poisson_ratio, material.poisson_ratio) << "as the rest";
+    ASSERT_EQ(material.regions.size(), 2u);
+    EXPECT_EQ(material.regions.at(2).poisson_ratio, 0.3);
+    EXPECT_EQ(material.regions.at(2).shear_modulus_pa, material.shear_modulus_pa);
+    EXPECT_EQ(material.regions.at(7).shear_modulus_pa, 1e5);
+    EXPECT_EQ(largest_poisson_ratio(material), material.poisson_ratio);
+  }
+}
+
+TEST(CaseFile, BadTissuesAreRefusedByName) {
+  const auto message = [](const std::string& lines) {
+    const auto read = parse_case_config(
+        replaced(kFull, "_unsaturated_kg_m3: 1.2", "_unsaturated_kg_m3: 1.2\n" + lines),
+        "/cases/c.yaml");
+    return read ? std::string("accepted") : read.error().message;
+  };
+  EXPECT_THAT(message("  regions: {white: {shear_modulus_pa: 3000}}"),
+              HasSubstr("material.regions.white: must be a label of the mesh"));
+  EXPECT_THAT(message("  regions: {3: {shear_modulus_pa: -1}}"),
+              HasSubstr("material.regions.3.shear_modulus_pa = -1"));
+  EXPECT_THAT(message("  tumour: {poisson_ratio: 0.5}"),
+              HasSubstr("material.tumour.poisson_ratio = 0.5"));
+  EXPECT_THAT(message("  tumour: {stiffness: 0.5}"), HasSubstr("material.tumour.stiffness"));
+}
+
+struct BadCase {
+  const char* name;
+  const char* from;  // replaced in kFull by...
+  const char* to;
+  const char* message;  // what the one line must hold after the file's name
+};
+
+class BadCaseFile : public testing::TestWithParam<BadCase> {};
+
+TEST_P(BadCaseFile, IsRefusedInOneLineThatNamesFileLineKeyAndValue) {
+  const BadCase& bad = GetParam();
+  const auto read = parse_case_config(replaced(kFull, bad.from, bad.to), "/cases/c.yaml");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(read.error().message, StartsWith("/cases/c.yaml:"));
+  EXPECT_THAT(read.error().message, HasSubstr(bad.message));
+  EXPECT_EQ(read.error().message.find('\n'), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, BadCaseFile,
+    testing::Values(
+        BadCase{"UnknownTopKey",
+                "gravity:", "gravitation: 1\ngravity:", ":19: gravitation: unknown key"},
+        BadCase{"UnknownNestedKey", "poisson_ratio", "poison_ratio",
+                ":22: material.poison_ratio: unknown key (known here: shear_modulus_pa, "
+                "poisson_ratio,"},
+        BadCase{"UnknownMeshKey", "edge_mm", "edge", ":5: mesh.generate.edge: unknown key"},
+        BadCase{"UnknownTumourKey", "label: 7", "labels: 7",
+                ":12: tumour.label_volume.labels: unknown key"},
+        BadCase{"KeyTwice", "    smoothing_mm: 1.5", "    edge_mm: 7",
+                ":10: mesh.generate.edge_mm: key is given twice"},
+        BadCase{"SectionTwice", "gravity: {direction: [0, 0, -2]}",
+                "brainstem: {centre_mm: [0, 0, 0]}", ":19: brainstem: key is given twice"},
+        BadCase{"NumberWithUnit", "edge_mm: 6", "edge_mm: 6 mm",
+                ":5: mesh.generate.edge_mm = 6 mm: must be a finite number"},
+        BadCase{"CommaNumber", "0.45", "0,45", ":22: material.poisson_ratio = 0,45: must be"},
+        BadCase{"TextForNumber", "0.45", "soft", ":22: material.poisson_ratio = soft: must be"},
+        BadCase{"NothingForNumber", "0.45", "", ":22: material.poisson_ratio = (empty): must be"},
+        BadCase{"ListForNumber", "0.45", "[0.45, 1]",
+                ":22: material.poisson_ratio = [0.45, 1]: must be"},
+        BadCase{"NotANumber", "0.45", ".nan", ":22: material.poisson_ratio = .nan: must be"},
+        BadCase{"Infinite", "shear_modulus_pa: 2200", "shear_modulus_pa: inf",
+                ":21: material.shear_modulus_pa = inf: must be"},
+        BadCase{"TooLargeForDouble", "0.45", "1e999",
+                ":22: material.poisson_ratio = 1e999: must be"},
+        BadCase{"RealForInteger", "sparse_points: 100", "sparse_points: 100.5",
+                ":32: inversion.sparse_points = 100.5: must be an integer"},
+        BadCase{"TooLargeForInteger", "label: 7", "label: 99999999999",
+                ":12: tumour.label_volume.label = 99999999999: must be an integer"},
+        BadCase{"ShortVector", "[7, 8, 9]", "[7, 8]",
+                ":14: craniotomy.centre_mm = [7, 8]: must be a list of three finite numbers"},
+        BadCase{"LongVector", "[7, 8, 9]", "[7, 8, 9, 10]",
+                ":14: craniotomy.centre_mm = [7, 8, 9, 10]: must be"},
+        BadCase{"TextInVector", "[7, 8, 9]", "[7, 8, z]",
+                ":14: craniotomy.centre_mm = [7, 8, z]: must be"},
+        BadCase{"ScalarForVector", "[7, 8, 9]", "7", ":14: craniotomy.centre_mm = 7: must be"},
+        BadCase{"ScalarForList", "[1, -2.5]", "1",
+                ":31: prior.gravity_levels_mm = 1: must be a list"},
+        BadCase{"ScalarForSection",
+                "{gap_mm: 2, skull_file: skull.stl, slave_depth_mm: 25, "
+                "penalty_n_per_mm: 6}",
+                "2", ":26: contact = 2: must be a section"},
+        BadCase{"ListForText", "case_id: full", "case_id: [a]", ":1: case_id = [a]: must be text"},
+        BadCase{"SectionForPath", "brain: sub/../mask.nii", "brain: {a: b}",
+                ":2: images.brain = (a section): must be text"},
+        BadCase{"TwoTumourKinds", "  label_volume:", "  surface: {file: t.stl}\n  label_volume:",
+                ":11: tumour has label_volume, surface: must have exactly one of ellipsoid, "
+                "label_volume, surface"},
+        BadCase{"NoTumourKind", "  label_volume: {file: labels.nii, label: 7}", "  {}",
+                ":11: tumour has none: must have exactly one of"},
+        BadCase{"TwoMeshKinds", "mesh:", "mesh:\n  file: a.msh",
+                ":3: mesh has generate, file: must have exactly one of"},
+        BadCase{"MissingLabelFile", "file: labels.nii, ", "",
+                ":12: tumour.label_volume.file: key is missing"},
+        BadCase{"EmptyLabelFile", "file: labels.nii", "file: ''",
+                ":12: tumour.label_volume.file: must name a file"},
+        BadCase{"EmptySkullFile", "skull_file: skull.stl", "skull_file: ''",
+                ":26: contact.skull_file: must name a file"},
+        BadCase{"MissingCaseId", "case_id: full\n", "", ": case_id: key is missing"},
+        BadCase{"EmptyCaseId", "case_id: full", "case_id: ''", ":1: case_id: must not be empty"},
+        BadCase{"MissingCraniotomyCentre", "  centre_mm: [7, 8, 9]\n", "",
+                ":13: craniotomy.centre_mm: key is missing"},
+        BadCase{"MissingBrainstem", "brainstem: {centre_mm: [0, 1, -60], radius_mm: 9}\n", "",
+                ": brainstem: key is missing"},
+        BadCase{"MissingBrain", ", brain: sub/../mask.nii", "", ": images.brain: must name"},
+        BadCase{"OutOfRange", "0.45", "0.6", ":22: material.poisson_ratio = 0.6: must be between"},
+        BadCase{"OutOfRangeInList", "-2.5", "-2500",
+                ":31: prior.gravity_levels_mm[1] = -2500: must be between"},
+        BadCase{"ShortAxisLongerThanLong", "short_axis_mm: 20", "short_axis_mm: 31",
+                ":16: craniotomy.short_axis_mm = 31: must be between 1 and 30"},
+        BadCase{"GravityWithoutDirection", "[0, 0, -2]", "[0, 0, 0]",
+                ":19: gravity.direction length = 0"},
+        BadCase{"NotYaml", "mesh:", "mesh: [", "is not valid YAML"},
+        BadCase{"TwoDocuments", "mesh:", "---\nmesh:", "holds 2 YAML documents"}),
+    [](const auto& param) { return param.param.name; });
+
+TEST(CaseFile, WhatIsNoMappingIsRefused) {
+  for (const char* text : {"", "# nothing\n", "just text", "[1, 2]"}) {
+    const auto read = parse_case_config(text, "c.yaml");
+    ASSERT_FALSE(read) << text;
+    EXPECT_THAT(read.error().message, HasSubstr("c.yaml: is not a YAML mapping"));
+  }
+}
+
+TEST(CaseFile, BinaryGarbageIsRefused) {
+  std::string garbage;
+  for (int i = 0; i < 3000; ++i) garbage += static_cast<char>(i * 37 % 251);
+  const auto read = parse_case_config(garbage, "c.yaml");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().message.find('\n'), std::string::npos);
+}
+
+TEST(CaseFile, MissingFileIsNotFound) {
+  const auto read = read_case_config("/nowhere/c.yaml");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(read.error().message, "/nowhere/c.yaml: no such file");
+}
+
+TEST(ShippedCases, AllReadAndAreValid) {
+  int cases = 0;
+  for (const auto& entry :
+       fs::directory_iterator(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases")) {
+    if (entry.path().extension() != ".yaml") continue;
+    ++cases;
+    const auto read = read_case_config(entry.path());
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->case_id, entry.path().stem().string());
+  }
+  EXPECT_GE(cases, 2);
+}
+
+TEST(ShippedCases, DefaultCaseHasThePapersTumourVolume) {
+  const auto read = read_case_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const Vec3 axes = std::get<TumourEllipsoid>(read->tumour).semi_axes_mm;
+  EXPECT_NEAR(4.0 / 3.0 * 3.14159265358979 * axes.prod(), 10990.0, 0.01);
+}
+
+// The default case shows every key: whoever adds one must document it there.
+TEST(ShippedCases, DefaultCaseDocumentsEveryKey) {
+  const auto full = parse_case_config(kFull, "c.yaml");
+  ASSERT_TRUE(full);
+  const std::string shipped =
+      content_of(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml");
+  std::istringstream lines(case_config_text(*full));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t begin = line.find_first_not_of(' ');
+    const std::string key = line.substr(begin, line.find(':') - begin);
+    EXPECT_THAT(shipped, HasSubstr(key + ":"));
+  }
+}
+
+TEST(DaemonFile, ShippedFileHasTheDefaults) {
+  const auto read = read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/daemon.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  const DaemonConfig defaults;
+  EXPECT_EQ(read->endpoint, defaults.endpoint);
+  EXPECT_EQ(read->model, defaults.model);
+  EXPECT_EQ(read->journal_dir, defaults.journal_dir);
+  EXPECT_EQ(read->log_level, defaults.log_level);
+  EXPECT_EQ(read->max_clients, defaults.max_clients);
+  EXPECT_EQ(read->max_message_mib, defaults.max_message_mib);
+}
+
+class DaemonFileKeys : public testing::Test {
+ protected:
+  Result<DaemonConfig> read(const std::string& text) {
+    return read_daemon_config(folder_.write("d.yaml", text));
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
+  const auto config = read(
+      "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
+      "max_message_mib: 5\n");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
+  EXPECT_EQ(config->model, folder_ / "m.h5");
+  EXPECT_EQ(config->journal_dir, "/j");
+  EXPECT_EQ(config->log_level, "debug");
+  EXPECT_EQ(config->max_clients, 3);
+  EXPECT_EQ(config->max_message_mib, 5);
+}
+
+TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
+  const std::pair<const char*, const char*> kBad[] = {
+      {"# a\nport: 5", "d.yaml:2: port: unknown key"},
+      {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
+      {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
+      {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
+      {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 1024"},
+      {"max_message_mib: 1025", "d.yaml:1: max_message_mib = 1025: must be"},
+      {"log_level: loud", "d.yaml:1: log_level = loud: must be trace, debug, info, warn or error"},
+      {"endpoint: 5555", "d.yaml:1: endpoint = 5555: must be tcp://HOST:PORT"},
+      {"endpoint: 'tcp://'", "endpoint = tcp://: must be"},
+      {"endpoint: 'tcp://host'", "endpoint = tcp://host: must be"},
+      {"endpoint: 'tcp://host:'", "endpoint = tcp://host:: must be"},
+      {"endpoint: 'ipc://'", "endpoint = ipc://: must be"},
+      {"model: [a]", "d.yaml:1: model = [a]: must be text"},
+  };
+  for (const auto& [text, message] : kBad) {
+    const auto config = read(text);
+    ASSERT_FALSE(config) << text;
+    EXPECT_EQ(config.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(config.error().message,
+                AllOf(HasSubstr(message), HasSubstr(folder_.path().string())));
+  }
+}
+
+TEST_F(DaemonFileKeys, MissingFileIsNotFound) {
+  const auto config = read_daemon_config(folder_ / "absent.yaml");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace brainshift::io

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/file_access.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace brainshift::io {
+namespace {
+
+using test_support::content_of;
+using test_support::TemporaryFolder;
+
+using testing::HasSubstr;
+
+TEST(FileAccess, WrittenBytesAreReadBack) {
+  const TemporaryFolder folder;
+  const std::string content("a\0b\r\n\xff", 6);
+  ASSERT_TRUE(write_file(folder / "f", content));
+  EXPECT_EQ(read_file(folder / "f").value(), content);
+  EXPECT_EQ(folder.entries(), 1u) << "the temporary file is gone";
+}
+
+TEST(FileAccess, WritingReplacesTheWholeFile) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_file(folder / "f", "a long first content"));
+  ASSERT_TRUE(write_file(folder / "f", "short"));
+  EXPECT_EQ(read_file(folder / "f").value(), "short");
+}
+
+TEST(FileAccess, MissingFileIsNotFoundAndNamed) {
+  const TemporaryFolder folder;
+  const auto read = read_file(folder / "absent");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(read.error().message, HasSubstr("absent: no such file"));
+}
+
+TEST(FileAccess, FolderIsUnreadable) {
+  const TemporaryFolder folder;
+  const auto read = read_file(folder.path());
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+}
+
+TEST(FileAccess, WritingIntoAMissingFolderFailsAndNamesTheFile) {
+  const TemporaryFolder folder;
+  const Status status = write_file(folder / "no" / "f", "x");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  EXPECT_THAT(status.error().message, HasSubstr("no/f: cannot create"));
+}
+
+TEST(FileAccess, WritingOverAFolderFailsAndLeavesNothing) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "d");
+  const Status status = write_file(folder / "d", "x");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(FileAccess, UncommittedFileIsRemovedAndTheOldOneKept) {
+  const TemporaryFolder folder;
+  folder.write("f", "old");
+  {
+    const auto pending = PendingFile::create(folder / "f");
+    ASSERT_TRUE(pending);
+    std::ofstream(pending->temporary_path()) << "half";
+    EXPECT_EQ(folder.entries(), 2u);
+  }
+  EXPECT_EQ(folder.entries(), 1u);
+  EXPECT_EQ(content_of(folder / "f"), "old");
+}
+
+TEST(FileAccess, TwoWritersOfOneFileDoNotMeet) {
+  const TemporaryFolder folder;
+  auto first = PendingFile::create(folder / "f");
+  auto second = PendingFile::create(folder / "f");
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(second);
+  EXPECT_NE(first->temporary_path(), second->temporary_path());
+  std::ofstream(first->temporary_path()) << "first";
+  std::ofstream(second->temporary_path()) << "second";
+  ASSERT_TRUE(first->commit());
+  EXPECT_EQ(content_of(folder / "f"), "first");
+  ASSERT_TRUE(second->commit());
+  EXPECT_EQ(content_of(folder / "f"), "second");
+}
+
+}  // namespace
+}  // namespace brainshift::io

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Surfaces in .stl, .ply and .obj; .vtp is in vtk_file_test.cpp.
+#include <gmock/gmock.h>
+
+#include <cstdint>
+#include <limits>
+#include <sstream>
+
+#include "common/io/geometry/mesh_file.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace brainshift::io {
+namespace {
+
+using test_support::put;
+using test_support::TemporaryFolder;
+
+using testing::HasSubstr;
+
+// A tetrahedron's surface, outward.
+constexpr float kVertices[4][3] = {{0, 0, 0}, {10.5f, 0, 0}, {0, -7.25f, 0}, {0, 0, 3e-2f}};
+constexpr int kTriangles[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {0, 2, 3}};
+
+std::string stl_ascii() {
+  std::ostringstream out;
+  out << "solid test\n";
+  for (const auto& triangle : kTriangles) {
+    out << "  facet normal 0 0 0\n    outer loop\n";
+    for (const int v : triangle) {
+      out << "      vertex " << kVertices[v][0] << ' ' << kVertices[v][1] << ' ' << kVertices[v][2]
+          << '\n';
+    }
+    out << "    endloop\n  endfacet\n";
+  }
+  out << "endsolid test\n";
+  return out.str();
+}
+
+// Begins with "solid", as some programs' binary files do.
+std::string stl_binary() {
+  std::string out = "solid but binary";
+  out.resize(80, ' ');
+  put<std::uint32_t>(out, 4);
+  for (const auto& triangle : kTriangles) {
+    for (int k = 0; k < 3; ++k) put<float>(out, 0);
+    for (const int v : triangle) {
+      for (const float x : kVertices[v]) put<float>(out, x);
+    }
+    put<std::uint16_t>(out, 0);
+  }
+  return out;
+}
+
+constexpr const char* kPlyHeader =
+    "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar "
+    "quality\n"
+    "element edge 1\nproperty int a\nproperty int b\n"
+    "element face 4\nproperty list uchar int vertex_indices\nproperty short flag\nend_header\n";
+
+std::string ply_ascii() {
+  std::ostringstream out;
+  out << "ply\nformat ascii 1.0\ncomment made by hand\n" << kPlyHeader;
+  for (const auto& v : kVertices) out << v[0] << ' ' << v[1] << ' ' << v[2] << " 7\n";
+  out << "0 1\n";
+  for (const auto& t : kTriangles) out << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << " -1\n";
+  return out.str();
+}
+
+std::string ply_binary() {
+  std::string out = std::string("ply\nformat binary_little_endian 1.0\n") + kPlyHeader;
+  for (const auto& v : kVertices) {
+    for (const float x : v) put<float>(out, x);
+    put<std::uint8_t>(out, 7);
+  }
+  put<std::int32_t>(out, 0);
+  put<std::int32_t>(out, 1);
+  for (const auto& t : kTriangles) {
+    put<std::uint8_t>(out, 3);
+    for (const int v : t) put<std::int32_t>(out, v);
+    put<std::int16_t>(out, -1);
+  }
+  return out;
+}
+
+std::string obj(bool from_end) {
+  std::ostringstream out;
+  out << "# made by hand\no head\n";
+  for (const auto& v : kVertices) out << "v " << v[0] << ' ' << v[1] << ' ' << v[2] << '\n';
+  out << "vn 0 0 1\ns off\n";
+  for (const auto& t : kTriangles) {
+    out << 'f';
+    for (const int v : t) out << ' ' << (from_end ? v - 4 : v + 1) << "//1";
+    out << '\n';
+  }
+  return out.str();
+}
+
+struct Format {
+  const char* name;
+  const char* file;
+  std::string content;
+};
+
+class SurfaceFormat : public testing::TestWithParam<Format> {
+ protected:
+  TemporaryFolder folder_;
+};
+
+TEST_P(SurfaceFormat, KnownSurfaceIsReadWithSharedVertices) {
+  const auto surface = read_surface(folder_.write(GetParam().file, GetParam().content));
+  ASSERT_TRUE(surface) << surface.error().message;
+  ASSERT_EQ(surface->num_vertices(), 4);
+  ASSERT_EQ(surface->num_triangles(), 4);
+  for (int t = 0; t < 4; ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const auto& v = kVertices[kTriangles[t][k]];
+      EXPECT_LT((surface->vertices.col(surface->triangles(k, t)) - Vec3(v[0], v[1], v[2])).norm(),
+                1e-6);
+    }
+  }
+}
+
+TEST_P(SurfaceFormat, NoTruncationCrashes) {
+  const std::string& whole = GetParam().content;
+  for (std::size_t size = 0; size < whole.size(); size += 23) {
+    const auto surface = read_surface(folder_.write(GetParam().file, whole.substr(0, size)));
+    if (!surface) {
+      EXPECT_EQ(surface.error().code, ErrorCode::kUnreadable);
+      EXPECT_THAT(surface.error().message, HasSubstr(GetParam().file));
+      continue;
+    }
+    EXPECT_GE(surface->triangles.minCoeff(), 0);
+    EXPECT_LT(surface->triangles.maxCoeff(), surface->num_vertices());
+  }
+}
+
+TEST_P(SurfaceFormat, FlippedBytesNeverCrash) {
+  for (std::size_t at = 0; at < GetParam().content.size(); at += 13) {
+    std::string bytes = GetParam().content;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0xff);
+    const auto surface = read_surface(folder_.write(GetParam().file, bytes));
+    if (!surface) continue;
+    EXPECT_GE(surface->triangles.minCoeff(), 0);
+    EXPECT_LT(surface->triangles.maxCoeff(), surface->num_vertices());
+    EXPECT_TRUE(surface->vertices.allFinite());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SurfaceFormat,
+                         testing::Values(Format{"StlAscii", "s.stl", stl_ascii()},
+                                         Format{"StlBinary", "s.STL", stl_binary()},
+                                         Format{"PlyAscii", "s.ply", ply_ascii()},
+                                         Format{"PlyBinary", "s.ply", ply_binary()},
+                                         Format{"Obj", "s.obj", obj(false)},
+                                         Format{"ObjFromEnd", "s.obj", obj(true)}),
+                         [](const auto& param) { return param.param.name; });
+
+class BadSurface : public testing::Test {
+ protected:
+  std::string refusal(const std::string& name, const std::string& content) {
+    const auto surface = read_surface(folder_.write(name, content));
+    EXPECT_FALSE(surface) << content;
+    if (surface) return {};
+    EXPECT_EQ(surface.error().code, ErrorCode::kUnreadable);
+    return surface.error().message;
+  }
+  static std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadSurface, StlThatEndsEarlyIsRefused) {
+  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "endsolid test", "")),
+              HasSubstr("before endsolid"));
+  EXPECT_THAT(refusal("s.stl", stl_binary().substr(0, 200).replace(0, 5, "other")),
+              HasSubstr("neither an ASCII STL nor a binary one"));
+}
+
+TEST_F(BadSurface, StlFacetWithTwoVerticesIsNamed) {
+  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "      vertex 0 0 0\n", "")),
+              HasSubstr("s.stl: facet 0 does not have three vertices"));
+}
+
+TEST_F(BadSurface, NonFiniteStlCoordinatesAreRefused) {
+  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "10.5", "nan")),
+              HasSubstr("'nan' of facet 0"));
+  std::string bytes = stl_binary();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  bytes.replace(84 + 12, 4, reinterpret_cast<const char*>(&nan), 4);
+  EXPECT_THAT(refusal("s.stl", bytes), HasSubstr("triangle 0 has a coordinate that is not finite"));
+}
+
+TEST_F(BadSurface, PlyProblemsAreNamed) {
+  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "format ascii", "format binary_big_endian")),
+              HasSubstr("'binary_big_endian' is not supported"));
+  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "3 0 1 2", "4 0 1 2 3")),
+              HasSubstr("face 0 has 4 vertices: must have 3"));
+  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "3 0 1 2", "3 0 1 4")),
+              HasSubstr("triangle 0 has node index 4: must be between 0 and 3"));
+  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "element face 4", "element face 5")),
+              HasSubstr("ends too early"));
+  EXPECT_THAT(
+      refusal("s.ply", replaced(ply_ascii(), "element vertex 4", "element vertex 999999999999")),
+      HasSubstr("element 'vertex' ends too early"));
+  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "float z", "float w")),
+              HasSubstr("lacks x, y or z"));
+  EXPECT_THAT(refusal("s.ply", replaced(ply_binary(), "short flag", "strange flag")),
+              HasSubstr("'strange' is unknown"));
+  EXPECT_THAT(refusal("s.ply", "hello"), HasSubstr("not a PLY file"));
+}
+
+TEST_F(BadSurface, ObjProblemsAreNamed) {
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 1 2 3 4")),
+              HasSubstr("s.obj: line 9: face has 4 vertices: must have 3"));
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 1 2 5")),
+              HasSubstr("triangle 0 has node index 4"));
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 0 1 2")),
+              HasSubstr("vertex 0 does not exist"));
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f -5 1 2")),
+              HasSubstr("vertex -5 does not exist"));
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f a b c")),
+              HasSubstr("'a' is no vertex"));
+  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "v 0 0 0", "v 0 0")),
+              HasSubstr("line 3: vertex without three coordinates"));
+}
+
+TEST_F(BadSurface, SurfaceWithoutTriangleIsRefused) {
+  EXPECT_THAT(refusal("s.obj", "v 0 0 0\n"), HasSubstr("s.obj: has no triangle"));
+  EXPECT_THAT(refusal("s.stl", "solid s\nendsolid s\n"), HasSubstr("has no triangle"));
+  EXPECT_THAT(refusal("s.obj", ""), HasSubstr("has no triangle"));
+}
+
+TEST_F(BadSurface, UnknownExtensionAndMissingFileAreNamed) {
+  EXPECT_THAT(refusal("s.xyz", ""), HasSubstr("unknown surface format '.xyz'"));
+  const auto absent = read_surface(folder_ / "absent.stl");
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace brainshift::io

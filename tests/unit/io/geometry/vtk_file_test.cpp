@@ -1,0 +1,385 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .vtu and .vtp in every encoding, put together here by hand; base64 has its own encoder (zlib's is the
+// library's), so that an error in the reader's codec cannot cancel out.
+#include <gmock/gmock.h>
+#include <zlib.h>
+
+#include <cstdint>
+#include <functional>
+#include <sstream>
+
+#include "common/io/geometry/mesh_file.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace brainshift::io {
+namespace {
+
+using test_support::put;
+using test_support::TemporaryFolder;
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::string base64(const std::string& bytes) {
+  const std::string alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bits;
+  for (const unsigned char c : bytes) {
+    for (int b = 7; b >= 0; --b) bits += (c >> b & 1) != 0 ? '1' : '0';
+  }
+  while (bits.size() % 6 != 0) bits += '0';
+  std::string out;
+  for (std::size_t i = 0; i < bits.size(); i += 6) {
+    out += alphabet[std::stoul(bits.substr(i, 6), nullptr, 2)];
+  }
+  while (out.size() % 4 != 0) out += '=';
+  return out;
+}
+
+std::string deflated(const std::string& bytes) {
+  uLongf length = compressBound(bytes.size());
+  std::string out(length, '\0');
+  compress(reinterpret_cast<Bytef*>(out.data()), &length,
+           reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  out.resize(length);
+  return out;
+}
+
+struct Encoding {
+  const char* name;
+  bool ascii = false;
+  bool appended = false;
+  bool raw = false;  // appended only
+  bool compressed = false;
+  bool wide = false;       // UInt64 headers
+  bool joined = false;     // header and data in one base64 stream
+  std::size_t block = 16;  // bytes per compressed block
+};
+
+// Collects a file's arrays in one encoding.
+class Writer {
+ public:
+  explicit Writer(const Encoding& encoding) : encoding_(encoding) {}
+
+  template <typename T>
+  std::string array(const std::string& name, const std::string& type, const std::vector<T>& values,
+                    int components = 1) {
+    std::ostringstream xml;
+    xml << "<DataArray type=\"" << type << "\" Name=\"" << name << "\" NumberOfComponents=\""
+        << components << "\" ";
+    if (encoding_.ascii) {
+      xml.precision(17);
+      xml << "format=\"ascii\">\n";
+      for (const T value : values) xml << +value << "\n ";
+      xml << "</DataArray>\n";
+      return xml.str();
+    }
+    const std::string bytes(reinterpret_cast<const char*>(values.data()),
+                            values.size() * sizeof(T));
+    if (!encoding_.appended) {
+      xml << "format=\"binary\">\n  " << block(bytes) << "\n</DataArray>\n";
+      return xml.str();
+    }
+    xml << "format=\"appended\" offset=\"" << appended_.size() << "\"/>\n";
+    appended_ += block(bytes);
+    return xml.str();
+  }
+
+  std::string file(const std::string& grid, const std::string& piece) const {
+    std::string xml = "<?xml version=\"1.0\"?>\n<VTKFile type=\"" + grid +
+                      "\" version=\"1.0\" byte_order=\"LittleEndian\"";
+    if (encoding_.wide) xml += " header_type=\"UInt64\"";
+    if (encoding_.compressed) xml += " compressor=\"vtkZLibDataCompressor\"";
+    xml += ">\n<" + grid + ">\n" + piece + "</" + grid + ">\n";
+    if (encoding_.appended) {
+      xml += std::string("<AppendedData encoding=\"") + (encoding_.raw ? "raw" : "base64") +
+             "\">\n _" + appended_ + "\n</AppendedData>\n";
+    }
+    return xml + "</VTKFile>\n";
+  }
+
+ private:
+  void number(std::string& out, std::size_t value) const {
+    if (encoding_.wide) {
+      put<std::uint64_t>(out, value);
+    } else {
+      put<std::uint32_t>(out, static_cast<std::uint32_t>(value));
+    }
+  }
+  std::string block(const std::string& bytes) const {
+    std::string header;
+    std::string data = bytes;
+    if (encoding_.compressed) {
+      data.clear();
+      std::string sizes;
+      std::size_t blocks = 0;
+      for (std::size_t at = 0; at < bytes.size(); at += encoding_.block, ++blocks) {
+        const std::string part = deflated(bytes.substr(at, encoding_.block));
+        number(sizes, part.size());
+        data += part;
+      }
+      number(header, blocks);
+      number(header, encoding_.block);
+      number(header, bytes.size() % encoding_.block);
+      header += sizes;
+    } else {
+      number(header, bytes.size());
+    }
+    if (encoding_.raw) return header + data;
+    return encoding_.joined ? base64(header + data) : base64(header) + base64(data);
+  }
+  Encoding encoding_;
+  std::string appended_;
+};
+
+// A tetrahedron, a triangle that is to be ignored, another tetrahedron; point 4 belongs to the triangle.
+const std::vector<double> kPoints = {0, 0, 0,     1.5, 0, 0, 0, 2.25, 0,
+                                     0, 0, -3e-3, 9,   9, 9, 1, 1,    1e2};
+const std::vector<std::int64_t> kConnectivity = {0, 1, 2, 3, 0, 1, 4, 5, 1, 2, 0};
+const std::vector<std::int64_t> kOffsets = {4, 7, 11};
+const std::vector<std::uint8_t> kTypes = {10, 5, 10};
+
+std::string vtu(const Encoding& encoding) {
+  Writer out(encoding);
+  std::string piece = "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
+  piece += out.array("id", "Int32", std::vector<std::int32_t>{0, 1, 2, 3, 4, 5});
+  piece += out.array("u", "Float64", kPoints, 3);
+  piece += out.array("p", "Float32", std::vector<float>{1, 2, 3, 4, 5, 6.5f});
+  piece += "</PointData>\n<CellData>\n" +
+           out.array("label", "Int32", std::vector<std::int32_t>{3, 99, -4}) +
+           "</CellData>\n<Points>\n" + out.array("Points", "Float64", kPoints, 3) +
+           "</Points>\n<Cells>\n" + out.array("connectivity", "Int64", kConnectivity) +
+           out.array("offsets", "Int64", kOffsets) + out.array("types", "UInt8", kTypes) +
+           "</Cells>\n</Piece>\n";
+  return out.file("UnstructuredGrid", piece);
+}
+
+class VtuEncoding : public testing::TestWithParam<Encoding> {
+ protected:
+  TemporaryFolder folder_;
+};
+
+TEST_P(VtuEncoding, KnownMeshIsReadWithItsFields) {
+  const auto read = read_vtu(folder_.write("m.vtu", vtu(GetParam())));
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->mesh.num_nodes(), 6) << "read_vtu keeps every point";
+  EXPECT_EQ(read->mesh.nodes, Eigen::Map<const Points>(kPoints.data(), 3, 6));
+  ASSERT_EQ(read->mesh.num_tets(), 2);
+  EXPECT_EQ(read->mesh.tets.col(0), Eigen::Vector4i(0, 1, 2, 3));
+  EXPECT_EQ(read->mesh.tets.col(1), Eigen::Vector4i(5, 1, 2, 0));
+  EXPECT_THAT(read->mesh.labels, ElementsAre(3, -4));
+  ASSERT_EQ(read->node_fields.size(), 2u) << "integer arrays are no fields";
+  EXPECT_EQ(read->node_fields[0].name, "u");
+  EXPECT_EQ(read->node_fields[0].values, Eigen::Map<const Eigen::MatrixXd>(kPoints.data(), 3, 6));
+  EXPECT_EQ(read->node_fields[1].name, "p");
+  EXPECT_EQ(read->node_fields[1].values.rows(), 1);
+  EXPECT_EQ(read->node_fields[1].values(0, 5), 6.5);
+}
+
+TEST_P(VtuEncoding, TetMeshDropsTheUnreferencedNode) {
+  const auto mesh = read_tet_mesh(folder_.write("m.vtu", vtu(GetParam())));
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  ASSERT_EQ(mesh->num_nodes(), 5);
+  EXPECT_EQ(mesh->nodes.col(mesh->tets(0, 1)), Vec3(1, 1, 100));
+}
+
+TEST_P(VtuEncoding, NoTruncationCrashesOrGivesAPartOfTheMesh) {
+  const std::string whole = vtu(GetParam());
+  for (std::size_t size = 0; size + 1 < whole.size(); size += 101) {
+    const auto read = read_vtu(folder_.write("m.vtu", whole.substr(0, size)));
+    if (read) {
+      // What follows the last array of an appended file may be missing.
+      EXPECT_TRUE(GetParam().appended);
+      EXPECT_EQ(read->mesh.num_tets(), 2);
+      EXPECT_EQ(read->mesh.nodes, Eigen::Map<const Points>(kPoints.data(), 3, 6));
+      continue;
+    }
+    EXPECT_THAT(read.error().message, HasSubstr("m.vtu: "));
+    EXPECT_EQ(read.error().message.find('\n'), std::string::npos);
+  }
+}
+
+TEST_P(VtuEncoding, FlippedBytesNeverCrash) {
+  const std::string whole = vtu(GetParam());
+  for (std::size_t at = 0; at < whole.size(); at += 67) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
+    const auto read = read_vtu(folder_.write("m.vtu", bytes));
+    if (!read) continue;
+    EXPECT_GE(read->mesh.tets.minCoeff(), 0);
+    EXPECT_LT(read->mesh.tets.maxCoeff(), read->mesh.num_nodes());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, VtuEncoding,
+    testing::Values(Encoding{.name = "Ascii", .ascii = true}, Encoding{.name = "Base64"},
+                    Encoding{.name = "Base64Wide", .wide = true},
+                    Encoding{.name = "Base64Joined", .joined = true},
+                    Encoding{.name = "Zlib", .compressed = true},
+                    Encoding{.name = "ZlibWide", .compressed = true, .wide = true},
+                    Encoding{.name = "ZlibOneBlock", .compressed = true, .block = 4096},
+                    Encoding{.name = "ZlibFullBlocks", .compressed = true, .block = 1},
+                    Encoding{.name = "AppendedRaw", .appended = true, .raw = true},
+                    Encoding{.name = "AppendedRawZlib",
+                             .appended = true,
+                             .raw = true,
+                             .compressed = true,
+                             .wide = true},
+                    Encoding{.name = "AppendedBase64", .appended = true},
+                    Encoding{.name = "AppendedBase64Zlib", .appended = true, .compressed = true}),
+    [](const auto& param) { return param.param.name; });
+
+class VtuFile : public testing::Test {
+ protected:
+  // The ascii file with one piece of text replaced.
+  std::string refusal(const std::string& from, const std::string& to) {
+    std::string text = vtu(Encoding{.name = "", .ascii = true});
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    const auto mesh = read_tet_mesh(folder_.write("m.vtu", text.replace(at, from.size(), to)));
+    EXPECT_FALSE(mesh) << from << " -> " << to;
+    if (mesh) return {};
+    EXPECT_EQ(mesh.error().code, ErrorCode::kUnreadable);
+    EXPECT_THAT(mesh.error().message, HasSubstr("m.vtu: "));
+    return mesh.error().message;
+  }
+  static TetMesh large_mesh() {
+    TetMesh mesh;
+    mesh.nodes.resize(3, 60000);  // 1.4 MB: more than one compressed block
+    for (Eigen::Index i = 0; i < mesh.nodes.size(); ++i) {
+      mesh.nodes.data()[i] = 1.0 / (1.0 + static_cast<double>(i));
+    }
+    mesh.tets.resize(4, 50000);
+    for (int t = 0; t < 50000; ++t) mesh.tets.col(t) << t, t + 1, t + 2, t + 10000 - 1;
+    return mesh;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(VtuFile, IndexOutOfRangeIsNamed) {
+  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 6\n 0\n 1\n 4\n"),
+              HasSubstr("tetrahedron 0 has node index 6: must be between 0 and 5"));
+  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n -1\n 0\n 1\n 4\n"),
+              HasSubstr("tetrahedron 0 has node index -1"));
+  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 4294967296\n 0\n 1\n 4\n"),
+              HasSubstr("tetrahedron 0 has node index -1"));
+}
+
+TEST_F(VtuFile, WrongCountsAreNamed) {
+  EXPECT_THAT(refusal("NumberOfPoints=\"6\"", "NumberOfPoints=\"7\""),
+              HasSubstr("Points array 'Points' has 18 numbers: must have 7 x 3"));
+  EXPECT_THAT(refusal("NumberOfPoints=\"6\"", "NumberOfPoints=\"-6\""),
+              HasSubstr("must be a count"));
+  EXPECT_THAT(refusal("NumberOfCells=\"3\"", "NumberOfCells=\"2\""),
+              HasSubstr("'offsets' has 3 numbers"));
+  EXPECT_THAT(refusal("10\n 5\n 10\n", "10\n 5\n"), HasSubstr("'types' has 2 numbers"));
+  EXPECT_THAT(refusal("4\n 7\n 11\n", "3\n 7\n 11\n"), HasSubstr("tetrahedron with 3 vertices"));
+  EXPECT_THAT(refusal("4\n 7\n 11\n", "4\n 7\n 12\n"), HasSubstr("offset 2 is 12"));
+  EXPECT_THAT(refusal("4\n 7\n 11\n", "4\n 3\n 11\n"), HasSubstr("offset 1 is 3"));
+  EXPECT_THAT(refusal("3\n 99\n -4\n", "3\n 99\n"), HasSubstr("'label' has 2 numbers"));
+}
+
+TEST_F(VtuFile, HexahedraAloneAreRefused) {
+  EXPECT_THAT(refusal("10\n 5\n 10\n", "12\n 5\n 12\n"), HasSubstr("has no tetrahedron"));
+}
+
+TEST_F(VtuFile, MissingOrUnknownPartsAreNamed) {
+  EXPECT_THAT(refusal("Name=\"types\"", "Name=\"kinds\""), HasSubstr("no array 'types'"));
+  EXPECT_THAT(refusal("type=\"Float64\" Name=\"Points\"", "type=\"Float16\" Name=\"Points\""),
+              HasSubstr("unknown type 'Float16'"));
+  EXPECT_THAT(refusal("type=\"Float64\" Name=\"Points\"", "type=\"Int64\" Name=\"Points\""),
+              HasSubstr("Points"));
+  EXPECT_THAT(refusal("VTKFile type=\"UnstructuredGrid\"", "VTKFile type=\"ImageData\""),
+              HasSubstr("holds 'ImageData': must be 'UnstructuredGrid'"));
+  EXPECT_THAT(refusal(" byte_order", " compressor=\"vtkLZ4DataCompressor\" byte_order"),
+              HasSubstr("vtkLZ4DataCompressor"));
+  EXPECT_THAT(refusal("</Piece>", "</Piece><Piece/>"), HasSubstr("several pieces"));
+  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1,5\n 2\n 3\n 0\n 1\n 4\n"),
+              HasSubstr("not a number"));
+  EXPECT_THAT(refusal("<VTKFile", "<Other"), HasSubstr("m.vtu: "));
+}
+
+TEST_F(VtuFile, WrittenMeshAndFieldsAreReadBackBitForBit) {
+  TetMesh mesh = large_mesh();
+  for (int t = 0; t < mesh.num_tets(); ++t) mesh.labels.push_back(t % 5 - 1);
+  const NodeField displacement{"displacement <mm> & \"more\"", mesh.nodes * 2.0};
+  const NodeField sd{"sd", mesh.nodes.row(1)};
+  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", mesh, {displacement, sd}));
+  EXPECT_EQ(folder_.entries(), 1u);
+  const auto read = read_vtu(folder_ / "m.vtu");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->mesh.nodes, mesh.nodes);
+  EXPECT_EQ(read->mesh.tets, mesh.tets);
+  EXPECT_EQ(read->mesh.labels, mesh.labels);
+  ASSERT_EQ(read->node_fields.size(), 2u);
+  EXPECT_EQ(read->node_fields[0].name, displacement.name);
+  EXPECT_EQ(read->node_fields[0].values, displacement.values);
+  EXPECT_EQ(read->node_fields[1].values, sd.values);
+}
+
+TEST_F(VtuFile, MeshWithoutLabelsHasNoneWhenReadBack) {
+  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", large_mesh(), {}));
+  const auto read = read_vtu(folder_ / "m.vtu");
+  ASSERT_TRUE(read);
+  EXPECT_THAT(read->mesh.labels, IsEmpty());
+  EXPECT_THAT(read->node_fields, IsEmpty());
+}
+
+TEST_F(VtuFile, FieldOfAnotherLengthIsRefusedAndNothingWritten) {
+  const TetMesh mesh = large_mesh();
+  const Status status = write_vtu(folder_ / "m.vtu", mesh, {{"u", mesh.nodes.leftCols(10)}});
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("field 'u' has 10 columns"));
+  EXPECT_EQ(folder_.entries(), 0u);
+}
+
+TEST_F(VtuFile, UnwritablePlaceIsNamed) {
+  const Status status = write_vtu(folder_ / "no" / "m.vtu", large_mesh(), {});
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  EXPECT_THAT(status.error().message, HasSubstr("no/m.vtu"));
+}
+
+std::string vtp(const Encoding& encoding, const std::vector<std::int32_t>& offsets,
+                const std::string& attributes) {
+  Writer out(encoding);
+  std::string piece = "<Piece NumberOfPoints=\"4\" " + attributes + ">\n<Points>\n";
+  piece +=
+      out.array("Points", "Float32", std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, 3);
+  piece += "</Points>\n<Polys>\n" +
+           out.array("connectivity", "Int32", std::vector<std::int32_t>{0, 2, 1, 0, 1, 3}) +
+           out.array("offsets", "Int32", offsets) + "</Polys>\n</Piece>\n";
+  return out.file("PolyData", piece);
+}
+
+TEST(VtpFile, TrianglesAreReadInEveryEncoding) {
+  const TemporaryFolder folder;
+  for (const Encoding& encoding :
+       {Encoding{.name = "", .ascii = true}, Encoding{.name = "", .compressed = true},
+        Encoding{.name = "", .appended = true, .raw = true}}) {
+    const auto surface =
+        read_surface(folder.write("s.vtp", vtp(encoding, {3, 6}, "NumberOfPolys=\"2\"")));
+    ASSERT_TRUE(surface) << surface.error().message;
+    EXPECT_EQ(surface->num_vertices(), 4);
+    EXPECT_EQ(surface->vertices.col(3), Vec3(0, 0, 1));
+    EXPECT_EQ(surface->triangles.col(0), Eigen::Vector3i(0, 2, 1));
+    EXPECT_EQ(surface->triangles.col(1), Eigen::Vector3i(0, 1, 3));
+  }
+}
+
+TEST(VtpFile, PolygonsAndStripsAreRefused) {
+  const TemporaryFolder folder;
+  const Encoding ascii{.name = "", .ascii = true};
+  const auto quad = read_surface(folder.write("s.vtp", vtp(ascii, {4, 6}, "NumberOfPolys=\"2\"")));
+  ASSERT_FALSE(quad);
+  EXPECT_THAT(quad.error().message, HasSubstr("s.vtp: polygon 0 has 4 vertices: must have 3"));
+  const auto strips = read_surface(
+      folder.write("s.vtp", vtp(ascii, {3, 6}, "NumberOfPolys=\"2\" NumberOfStrips=\"1\"")));
+  ASSERT_FALSE(strips);
+  EXPECT_THAT(strips.error().message, HasSubstr("triangle strips"));
+}
+
+}  // namespace
+}  // namespace brainshift::io

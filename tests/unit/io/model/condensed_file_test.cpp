@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The condensed operators in a model file.
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <functional>
+#include <limits>
+
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/io/model/model_file_example.hpp"
+
+namespace brainshift::io {
+namespace {
+
+using test_example::condensed_file;
+using test_example::with_header;
+using test_support::content_of;
+using test_support::TemporaryFolder;
+using testing::HasSubstr;
+
+void expect_equal(const CondensedOperators& a, const CondensedOperators& b) {
+  EXPECT_EQ(a.boundary, b.boundary);
+  EXPECT_EQ(a.model_id, b.model_id);
+  EXPECT_EQ(a.gravity_modes, b.gravity_modes);
+  EXPECT_EQ(a.modes, b.modes);
+  EXPECT_EQ(a.contact_columns, b.contact_columns);
+  EXPECT_EQ(a.compliance, b.compliance);
+  EXPECT_EQ(a.slave_modes, b.slave_modes);
+  EXPECT_EQ(a.slave_normals, b.slave_normals);
+  EXPECT_EQ(a.initial_penetration_mm, b.initial_penetration_mm);
+  EXPECT_EQ(a.slaves, b.slaves);
+  EXPECT_EQ(a.region, b.region);
+  EXPECT_EQ(a.control, b.control);
+  EXPECT_EQ(a.truncated_variance_mm2, b.truncated_variance_mm2);
+  EXPECT_EQ(a.control_neighbours, b.control_neighbours);
+  EXPECT_EQ(a.control_weights, b.control_weights);
+}
+
+TEST(CondensedFile, OperatorsAreReadBackBitForBit) {
+  const TemporaryFolder folder;
+  const ModelFile original = condensed_file();
+  const Status written = write_model(folder / "m.h5", original);
+  ASSERT_TRUE(written) << written.error().message;
+  const auto read = read_model(folder / "m.h5");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->condensed.size(), 2u);
+  expect_equal(read->condensed[0], original.condensed[0]);
+  expect_equal(read->condensed[1], original.condensed[1]);
+  ASSERT_EQ(read->inputs.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(read->inputs[i].key, original.inputs[i].key);
+    EXPECT_EQ(read->inputs[i].path, original.inputs[i].path);
+    EXPECT_EQ(read->inputs[i].bytes, original.inputs[i].bytes);
+    EXPECT_EQ(read->inputs[i].crc32, original.inputs[i].crc32);
+  }
+}
+
+TEST(CondensedFile, OneBoundaryConditionMayBeMissing) {
+  const TemporaryFolder folder;
+  ModelFile file = condensed_file();
+  file.condensed.erase(file.condensed.begin());
+  ASSERT_TRUE(write_model(folder / "m.h5", file));
+  const auto read = read_model(folder / "m.h5");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->condensed.size(), 1u);
+  expect_equal(read->condensed[0], file.condensed[0]);
+}
+
+TEST(CondensedFile, OperatorsWithoutControlNodesAreReadBack) {
+  const TemporaryFolder folder;
+  ModelFile file = condensed_file();
+  CondensedOperators& operators = file.condensed[0];
+  operators.control.clear();
+  operators.truncated_variance_mm2.resize(0);
+  operators.control_neighbours.resize(4, 0);
+  operators.control_weights.resize(4, 0);
+  const Status written = write_model(folder / "m.h5", file);
+  ASSERT_TRUE(written) << written.error().message;
+  const auto read = read_model(folder / "m.h5");
+  ASSERT_TRUE(read) << read.error().message;
+  expect_equal(read->condensed[0], operators);
+}
+
+// More slaves than one tile of the mirrored triangle, and not a multiple of it.
+TEST(CondensedFile, PackedComplianceOfManySlavesIsReadBackBitForBit) {
+  const TemporaryFolder folder;
+  for (const int slaves : {1, 64, 150}) {
+    ModelFile file = test_example::model_file();
+    file.model.mesh.nodes = Points::Random(3, 200);
+    file.model.slaves.clear();
+    for (int i = 0; i < slaves; ++i) file.model.slaves.push_back(i);
+    file.model.model_id = content_hash(file.model);
+    CondensedOperators operators;
+    operators.model_id = file.model.model_id;
+    operators.modes = Eigen::MatrixXf::Random(600, 2);
+    operators.slaves = file.model.slaves;
+    operators.contact_columns = Eigen::MatrixXf::Random(600, slaves);
+    operators.compliance = Eigen::MatrixXd::Random(slaves, slaves);
+    operators.compliance = (operators.compliance + operators.compliance.transpose()).eval();
+    operators.slave_modes = Eigen::MatrixXd::Random(slaves, 2);
+    operators.slave_normals = Points::Random(3, slaves);
+    operators.initial_penetration_mm = VecX::Random(slaves);
+    file.condensed = {operators};
+    const Status written = write_model(folder / "m.h5", file);
+    ASSERT_TRUE(written) << written.error().message;
+    const auto read = read_model(folder / "m.h5");
+    ASSERT_TRUE(read) << read.error().message;
+    expect_equal(read->condensed[0], operators);
+  }
+}
+
+struct Misfit {
+  std::string message;
+  std::function<void(CondensedOperators&)> make;
+};
+
+TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  using Operators = CondensedOperators;
+  const Misfit cases[] = {
+      {"model_id is 'abc': the operators belong to another model than '",
+       [](Operators& o) { o.model_id = "abc"; }},
+      {"modes is 12 x 3: must be 15 x 3", [](Operators& o) { o.modes.conservativeResize(12, 3); }},
+      {"gravity_modes = 4: must be from 0 to the 3 modes",
+       [](Operators& o) { o.gravity_modes = 4; }},
+      {"gravity_modes = -1: must", [](Operators& o) { o.gravity_modes = -1; }},
+      {"contact_columns is 15 x 1: must be 15 x 2",
+       [](Operators& o) { o.contact_columns.conservativeResize(15, 1); }},
+      {"compliance is 2 x 1: must be 2 x 2",
+       [](Operators& o) { o.compliance.conservativeResize(2, 1); }},
+      {"compliance is not symmetric", [](Operators& o) { o.compliance(0, 1) += 1e-9; }},
+      {"slave_modes is 2 x 2: must be 2 x 3",
+       [](Operators& o) { o.slave_modes.conservativeResize(2, 2); }},
+      {"slave_normals is 3 x 3: must be 3 x 2",
+       [](Operators& o) { o.slave_normals.setZero(3, 3); }},
+      {"initial_penetration_mm is 1 x 1: must be 2 x 1",
+       [](Operators& o) { o.initial_penetration_mm.resize(1); }},
+      {"slaves names a node that is no slave", [](Operators& o) { o.slaves[0] = 1; }},
+      {"slaves names a node that the mesh does not have", [](Operators& o) { o.slaves[0] = 5; }},
+      {"slaves names a node that the mesh does not have", [](Operators& o) { o.slaves[1] = -1; }},
+      {"slaves names a node twice",
+       [](Operators& o) {
+         o.slaves = {2, 2};
+       }},
+      {"region is not sorted",
+       [](Operators& o) {
+         o.region = {2, 0};
+       }},
+      {"region names a node that the mesh",
+       [](Operators& o) {
+         o.region = {0, 9};
+       }},
+      {"control is not sorted",
+       [](Operators& o) {
+         o.control = {1, 1};
+       }},
+      {"truncated_variance_mm2 is 3 x 1: must be 2 x 1",
+       [](Operators& o) { o.truncated_variance_mm2.setZero(3); }},
+      {"control_neighbours is 4 x 4: must be 4 x 5",
+       [](Operators& o) { o.control_neighbours.conservativeResize(4, 4); }},
+      {"control_neighbours names a control node that does not exist",
+       [](Operators& o) { o.control_neighbours(3, 4) = 2; }},
+      {"control_neighbours names a control node that does not exist",
+       [](Operators& o) { o.control_neighbours(0, 0) = -1; }},
+      {"control_weights is 4 x 6: must be 4 x 5",
+       [](Operators& o) { o.control_weights.setZero(4, 6); }},
+      {"modes holds a number that is not finite", [&](Operators& o) { o.modes(14, 2) = -inf; }},
+      {"contact_columns holds a number that is not finite",
+       [&](Operators& o) { o.contact_columns(0, 1) = std::numeric_limits<float>::quiet_NaN(); }},
+      {"compliance holds a number that is not finite",
+       [&](Operators& o) { o.compliance(1, 1) = nan; }},
+      {"slave_modes holds a number that is not finite",
+       [&](Operators& o) { o.slave_modes(0, 0) = -nan; }},
+      {"slave_normals holds a number", [&](Operators& o) { o.slave_normals(2, 1) = nan; }},
+      {"initial_penetration_mm holds a number",
+       [](Operators& o) { o.initial_penetration_mm(0) = std::numeric_limits<double>::infinity(); }},
+      {"truncated_variance_mm2 holds a number",
+       [&](Operators& o) { o.truncated_variance_mm2(1) = nan; }},
+      {"control_weights holds a number", [&](Operators& o) { o.control_weights(3, 4) = inf; }},
+  };
+  const TemporaryFolder folder;
+  for (const Misfit& misfit : cases) {
+    ModelFile file = condensed_file();
+    misfit.make(file.condensed[0]);
+    const Status status = write_model(folder / "m.h5", file);
+    ASSERT_FALSE(status) << misfit.message;
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(status.error().message, HasSubstr("m.h5: condensed/contact/" + misfit.message));
+    EXPECT_EQ(folder.entries(), 0u);
+  }
+}
+
+TEST(CondensedFile, LargestAndTinyNumbersAreFinite) {
+  const TemporaryFolder folder;
+  ModelFile file = condensed_file();
+  using Float = std::numeric_limits<float>;
+  using Double = std::numeric_limits<double>;
+  file.condensed[0].modes.col(0).head(4) << Float::max(), Float::lowest(), Float::denorm_min(),
+      -0.0f;
+  file.condensed[0].slave_modes.row(0) << Double::max(), Double::lowest(), Double::denorm_min();
+  ASSERT_TRUE(write_model(folder / "m.h5", file));
+  const auto read = read_model(folder / "m.h5");
+  ASSERT_TRUE(read) << read.error().message;
+  expect_equal(read->condensed[0], file.condensed[0]);
+}
+
+TEST(CondensedFile, SameBoundaryTwiceIsNotWritten) {
+  const TemporaryFolder folder;
+  ModelFile file = condensed_file();
+  file.condensed[1] = file.condensed[0];
+  const Status status = write_model(folder / "m.h5", file);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, HasSubstr("two sets of operators for the boundary condition"
+                                                " contact"));
+}
+
+// Alters a file behind its checksum, as another program could.
+class AlteredOperators : public testing::Test {
+ protected:
+  AlteredOperators() {
+    EXPECT_TRUE(write_model(folder_ / "m.h5", condensed_file()));
+    bytes_ = content_of(folder_ / "m.h5");
+  }
+  template <typename T>
+  void replace(T value, T by) {
+    const std::string stored(reinterpret_cast<const char*>(&value), sizeof value);
+    const std::size_t at = bytes_.find(stored);
+    ASSERT_NE(at, std::string::npos);
+    std::memcpy(bytes_.data() + at, &by, sizeof by);
+  }
+  std::string refusal() {
+    const auto read = read_model(folder_.write("changed.h5", with_header(bytes_)));
+    if (read) return "";
+    EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+    EXPECT_THAT(read.error().message, HasSubstr("changed.h5: is no usable model file: "));
+    return read.error().message;
+  }
+  TemporaryFolder folder_;
+  std::string bytes_;
+};
+
+TEST_F(AlteredOperators, NotFiniteNumberIsRefused) {
+  replace(200.125f, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/contact_columns holds a number that is not"));
+}
+
+TEST_F(AlteredOperators, OtherModelIdIsRefused) {
+  const std::string id = condensed_file().model.model_id;
+  const std::size_t last = bytes_.rfind(id);
+  ASSERT_NE(bytes_.find(id), last) << "the first one is the model's own";
+  bytes_[last] = bytes_[last] == 'f' ? '0' : 'f';
+  EXPECT_THAT(refusal(), HasSubstr("the operators belong to another model than '" + id));
+}
+
+TEST_F(AlteredOperators, ControlNodeThatDoesNotExistIsRefused) {
+  // The first four of control_neighbours, none of whose neighbours in the file looks the same.
+  const std::array<int, 4> stored = {1, 0, 0, 1};
+  replace(stored, {1, 0, 0, 77});
+  EXPECT_THAT(refusal(), HasSubstr("control_neighbours names a control node that does not exist"));
+}
+
+TEST_F(AlteredOperators, MissingDataSetIsNamed) {
+  const std::size_t at = bytes_.find("slave_normals");
+  ASSERT_NE(at, std::string::npos);
+  bytes_[at + 12] = 't';  // names stay in order, as HDF5 looks them up
+  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/slave_normals is missing"));
+}
+
+}  // namespace
+}  // namespace brainshift::io

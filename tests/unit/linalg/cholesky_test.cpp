@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/linalg/cholesky.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/box_mesh.hpp"
+
+namespace brainshift::linalg {
+namespace {
+
+using test_support::box_mesh;
+using test_support::nodes_where;
+
+constexpr fem::Elasticity kTissue{0.0242, 0.0021};
+
+// A block standing on a fixed floor.
+struct Block {
+  TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  fem::DofMap dofs{mesh.num_nodes()};
+  Block() {
+    for (NodeIndex n : nodes_where(mesh, [](const Vec3& x) { return x[2] == 0.0; }))
+      dofs.fix_all(n);
+    dofs.finalise();
+  }
+  SymmetricMatrix stiffness() const { return fem::assemble_stiffness(mesh, kTissue, dofs); }
+};
+
+VecX random_vector(int n) {
+  std::srand(17);
+  return VecX::Random(n);
+}
+
+TEST(SparseCholesky, SolvesToBackwardErrorOfRoundingSize) {
+  const Block block;
+  const SymmetricMatrix k = block.stiffness();
+  const auto factor = SparseCholesky::factorise(k);
+  ASSERT_TRUE(factor.has_value()) << factor.error().message;
+  const VecX b = random_vector(block.dofs.num_unknowns());
+  const VecX x = factor->solve(b);
+  const double backward = (multiply(k, x) - b).norm() / (k.norm() * x.norm() + b.norm());
+  EXPECT_LT(backward, 1e-15);
+  EXPECT_GT(factor->rcond(), 1e-6);
+  EXPECT_GT(factor->nonzeros(), static_cast<std::uint64_t>(block.dofs.num_unknowns()));
+}
+
+TEST(SparseCholesky, ManyRightHandSidesEqualSingleSolves) {
+  const Block block;
+  const auto factor = SparseCholesky::factorise(block.stiffness());
+  ASSERT_TRUE(factor.has_value());
+  std::srand(3);
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(block.dofs.num_unknowns(), 7);
+  const Eigen::MatrixXd x = factor->solve_many(b);
+  for (int c = 0; c < 7; ++c) {
+    const VecX single = factor->solve(VecX(b.col(c)));
+    EXPECT_LT((x.col(c) - single).norm(), 1e-12 * single.norm());
+  }
+}
+
+TEST(SparseCholesky, RefactorisedCloneEqualsAFreshFactorAndLeavesTheOriginalAlone) {
+  const Block block;
+  const SymmetricMatrix k = block.stiffness();
+  SymmetricMatrix stiffer = k;
+  fem::add_to_node_block(stiffer, block.dofs, block.mesh.num_nodes() - 1, 0.5 * Mat3::Identity());
+  const auto original = SparseCholesky::factorise(k);
+  ASSERT_TRUE(original.has_value());
+  SparseCholesky clone = original->clone_analysis();
+  ASSERT_TRUE(clone.refactorise(stiffer).has_value());
+  const auto fresh = SparseCholesky::factorise(stiffer);
+  ASSERT_TRUE(fresh.has_value());
+  const VecX b = random_vector(block.dofs.num_unknowns());
+  const VecX expected = fresh->solve(b);
+  EXPECT_LT((clone.solve(b) - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_GT((original->solve(b) - expected).norm(), 1e-3 * expected.norm());
+}
+
+TEST(SparseCholesky, RefusesABodyThatFloats) {
+  const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  fem::DofMap dofs(mesh.num_nodes());
+  dofs.finalise();
+  const auto factor = SparseCholesky::factorise(fem::assemble_stiffness(mesh, kTissue, dofs));
+  ASSERT_FALSE(factor.has_value());
+  EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+}
+
+TEST(SparseCholesky, RefusesABodyThatCanOnlySlide) {
+  const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  fem::DofMap dofs(mesh.num_nodes());
+  for (NodeIndex n : nodes_where(mesh, [](const Vec3& x) { return x[2] == 0.0; })) {
+    dofs.fix_normal(n, Vec3::UnitZ());
+  }
+  dofs.finalise();
+  const auto factor = SparseCholesky::factorise(fem::assemble_stiffness(mesh, kTissue, dofs));
+  ASSERT_FALSE(factor.has_value());
+  EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+}
+
+TEST(SparseCholesky, RefusesNumbersThatAreNotFinite) {
+  const Block block;
+  for (double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (long entry : {0L, 100L}) {
+      SymmetricMatrix k = block.stiffness();
+      k.valuePtr()[entry] = bad;
+      const auto factor = SparseCholesky::factorise(k);
+      ASSERT_FALSE(factor.has_value());
+      EXPECT_EQ(factor.error().code, ErrorCode::kNotFinite);
+      auto good = SparseCholesky::factorise(block.stiffness());
+      ASSERT_TRUE(good.has_value());
+      EXPECT_EQ(good->refactorise(k).error().code, ErrorCode::kNotFinite);
+    }
+  }
+}
+
+TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
+  const Block block;
+  SymmetricMatrix k = block.stiffness();
+  k.coeffRef(5, 5) = -1.0;
+  const auto factor = SparseCholesky::factorise(k);
+  ASSERT_FALSE(factor.has_value());
+  EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+}
+
+// Springs at three corners: answers are off by 1e-14 over their stiffness, relative to the body's.
+TEST(SparseCholesky, RefusesABodyThatSpringsHardlyHold) {
+  const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
+  fem::DofMap dofs(mesh.num_nodes());
+  dofs.finalise();
+  const SymmetricMatrix body = fem::assemble_stiffness(mesh, kTissue, dofs);
+  const auto held = [&](double stiffness) {
+    SymmetricMatrix k = body;
+    for (const NodeIndex n : {0, 3, 15}) {
+      fem::add_to_node_block(k, dofs, n, stiffness * Mat3::Identity());
+    }
+    return SparseCholesky::factorise(k);
+  };
+  EXPECT_TRUE(held(1e-8).has_value());
+  for (const double stiffness : {1e-13, 1e-14}) {
+    const auto factor = held(stiffness);
+    ASSERT_FALSE(factor.has_value()) << stiffness;
+    EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
+  }
+}
+
+TEST(SparseCholesky, StiffContactSpringsAreNoReasonToRefuse) {
+  const Block block;
+  SymmetricMatrix k = block.stiffness();
+  fem::add_to_node_block(k, block.dofs, block.mesh.num_nodes() - 1, 1e9 * Mat3::Identity());
+  EXPECT_TRUE(SparseCholesky::factorise(k).has_value());
+}
+
+TEST(SparseCholesky, RefusesEntriesAboveTheDiagonal) {
+  const Block block;
+  SymmetricMatrix k = block.stiffness();
+  const SymmetricMatrix upper = k.transpose();
+  for (const SymmetricMatrix& bad : {upper, SymmetricMatrix(k + upper)}) {
+    const auto factor = SparseCholesky::factorise(bad);
+    ASSERT_FALSE(factor.has_value());
+    EXPECT_EQ(factor.error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST(SparseCholesky, RefusesASystemWithoutUnknowns) {
+  EXPECT_EQ(SparseCholesky::factorise(SymmetricMatrix(0, 0)).error().code, ErrorCode::kEmptySet);
+}
+
+}  // namespace
+}  // namespace brainshift::linalg
