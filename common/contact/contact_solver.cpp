@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/linalg/checked_solve.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
@@ -19,7 +19,7 @@ Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffn
     VecX unknowns;
     Result<linalg::SolveQuality> quality;
     if (count(solution.active) == 0) {
-      quality = linalg::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
+      quality = fem::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
                                    dofs.restrict_to(load), unknowns);
     } else {
       linalg::SymmetricMatrix k_p = stiffness;
@@ -28,7 +28,7 @@ Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffn
       contact.add_load(b_p, solution.active);
       if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
       quality =
-          linalg::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
+          fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
     }
     if (!quality) return tl::unexpected(quality.error());
     solution.backward_error = std::max(solution.backward_error, quality->backward_error);

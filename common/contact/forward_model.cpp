@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/contact/tissues.hpp"
-#include "common/linalg/checked_solve.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
@@ -91,7 +91,7 @@ std::uint64_t ForwardModel::bytes() const {
 Status ForwardModel::solve(const Points& load, Points& u) const {
   VecX unknowns;
   const auto quality =
-      linalg::checked_solve(stiffness_, stiffness_norm_, factor_, dofs_.restrict_to(load), unknowns);
+      fem::checked_solve(stiffness_, stiffness_norm_, factor_, dofs_.restrict_to(load), unknowns);
   if (!quality) return tl::unexpected(quality.error());
   dofs_.expand(unknowns, u);
   return {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/refactorised_system.hpp"
 
-#include "common/linalg/checked_solve.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
@@ -20,7 +20,7 @@ Status RefactorisedSystem::solve(const Points& f, Points& u) const {
   if (contact::count(active()) == 0) return forward().solve(f, u);
   VecX unknowns;
   const auto quality =
-      linalg::checked_solve(matrix_, norm_, penalised_, forward().dofs().restrict_to(f), unknowns);
+      fem::checked_solve(matrix_, norm_, penalised_, forward().dofs().restrict_to(f), unknowns);
   if (!quality) return tl::unexpected(quality.error());
   forward().dofs().expand(unknowns, u);
   return {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/fem/block_solver.hpp"
 
-#include "common/linalg/checked_solve.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::fem {
 
@@ -21,7 +21,7 @@ Status BlockSolver::solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displac
     rhs_.col(j) = column_;
   }
   factor_.solve_many(rhs_, unknowns_, workspace_);
-  const auto checked = linalg::check_many(stiffness_, norm_, factor_, rhs_, unknowns_, workspace_);
+  const auto checked = check_many(stiffness_, norm_, factor_, rhs_, unknowns_, workspace_);
   if (!checked) return tl::unexpected(checked.error());
   displacements.resize(loads.rows(), loads.cols());
   for (Eigen::Index j = 0; j < loads.cols(); ++j) {

@@ -53,10 +53,6 @@ void add_to_node_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeI
   add_block(lower, dofs, node, node, block);
 }
 
-VecX linalg::multiply(const linalg::SymmetricMatrix& lower, const VecX& x) {
-  return lower.selfadjointView<Eigen::Lower>() * x;
-}
-
 VecX nodal_volumes(const TetMesh& mesh) {
   VecX volumes = VecX::Zero(mesh.num_nodes());
   for (int t = 0; t < mesh.num_tets(); ++t) {

@@ -12,13 +12,13 @@
 // pore pressure at drained surfaces has vanished. P1 locks towards nu = 0.5; keep nu <= 0.48.
 #pragma once
 
-#include <Eigen/SparseCore>
 #include <vector>
 
 #include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/dof_map.hpp"
+#include "common/linalg/symmetric_matrix.hpp"
 
 namespace brainshift::fem {
 
@@ -40,7 +40,6 @@ struct TetGeometry {
 TetGeometry tet_geometry(const TetMesh& mesh, int tet);
 
 // Lower triangle (diagonal included) of T^T K T in the unknowns of `dofs`, compressed, sorted; N/mm.
-using linalg::SymmetricMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, long>;
 linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
                                    const DofMap& dofs);
 // One material per tetrahedron.
@@ -51,9 +50,6 @@ linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vecto
 // identity frame and no constraint (slaves do).
 void add_to_node_block(linalg::SymmetricMatrix& lower, const DofMap& dofs, NodeIndex node,
                        const Mat3& block);
-
-// y = K x from the lower triangle.
-VecX linalg::multiply(const linalg::SymmetricMatrix& lower, const VecX& x);
 
 // Volume that belongs to each node: a quarter of every adjacent tetrahedron, mm^3. Sums to the mesh volume.
 VecX nodal_volumes(const TetMesh& mesh);

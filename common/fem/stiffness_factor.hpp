@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "common/fem/biot_factor.hpp"
+#include "common/linalg/checked_solve.hpp"
 #include "common/linalg/cholesky.hpp"
 
 namespace brainshift::fem {
@@ -78,5 +79,15 @@ class StiffnessFactor {
  private:
   std::variant<linalg::SparseCholesky, BiotFactor> factor_;
 };
+
+// x = K^-1 b, as linalg::checked_solve. With pressure, the matrix of the factor is never formed. Its
+// factor has checked itself (symmetric_indefinite.hpp) and leaves NaN where it refused: the answer is
+// then kNotFinite, otherwise a backward error of 0.
+Result<linalg::SolveQuality> checked_solve(const linalg::SymmetricMatrix& lower, double norm,
+                                           const StiffnessFactor& factor, const VecX& b, VecX& x);
+// The same for the columns of B, after factor.solve_many(B, X, workspace).
+Result<linalg::SolveQuality> check_many(const linalg::SymmetricMatrix& lower, double norm,
+                                        const StiffnessFactor& factor, const Eigen::MatrixXd& b,
+                                        Eigen::MatrixXd& x, StiffnessFactor::Workspace& workspace);
 
 }  // namespace brainshift::fem

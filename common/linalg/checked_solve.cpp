@@ -18,27 +18,15 @@ double max_abs(const VecX& v) {
   return v.allFinite() ? v.lpNorm<Eigen::Infinity>() : std::numeric_limits<double>::quiet_NaN();
 }
 
-Error refusal(const VecX& b, const VecX& x, const SolveQuality& quality) {
+}  // namespace
+
+Error solve_refusal(const VecX& b, const VecX& x, const SolveQuality& quality) {
   if (!b.allFinite()) return {ErrorCode::kNotFinite, "solve: the right-hand side is not finite"};
   if (!x.allFinite()) return {ErrorCode::kNotFinite, "solve: the solution is not finite"};
   std::ostringstream text;
   text << "solve: backward error " << quality.backward_error << " after " << quality.refinements
        << " refinements is above " << kRefuseAbove << "; the factor does not belong to the matrix";
   return {ErrorCode::kSingularMatrix, text.str()};
-}
-
-}  // namespace
-
-double max_norm(const SymmetricMatrix& lower) {
-  VecX sums = VecX::Zero(lower.rows());
-  for (Eigen::Index j = 0; j < lower.outerSize(); ++j) {
-    for (SymmetricMatrix::InnerIterator it(lower, j); it; ++it) {
-      const double size = std::abs(it.value());
-      sums[it.row()] += size;
-      if (it.row() != it.col()) sums[it.col()] += size;
-    }
-  }
-  return sums.size() > 0 ? sums.maxCoeff() : 0.0;
 }
 
 double backward_error(const SymmetricMatrix& lower, double norm, const VecX& b, const VecX& x,
@@ -64,7 +52,7 @@ Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
     x.swap(better);
     quality.backward_error = error;
   }
-  if (!(quality.backward_error <= kRefuseAbove)) return tl::unexpected(refusal(b, x, quality));
+  if (!(quality.backward_error <= kRefuseAbove)) return tl::unexpected(solve_refusal(b, x, quality));
   return quality;
 }
 
@@ -94,30 +82,9 @@ Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
     quality.backward_error = error;
   }
   if (!(quality.backward_error <= kRefuseAbove)) {
-    return tl::unexpected(refusal(rhs, combined, quality));
+    return tl::unexpected(solve_refusal(rhs, combined, quality));
   }
   return quality;
-}
-
-Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
-                                   const fem::StiffnessFactor& factor, const VecX& b, VecX& x) {
-  if (const SparseCholesky* drained = factor.drained()) {
-    return checked_solve(lower, norm, *drained, b, x);
-  }
-  factor.solve(b, x);
-  if (!x.allFinite()) return tl::unexpected(refusal(b, x, {}));
-  return SolveQuality{};
-}
-
-Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
-                                const fem::StiffnessFactor& factor, const Eigen::MatrixXd& b,
-                                Eigen::MatrixXd& x, fem::StiffnessFactor::Workspace& workspace) {
-  if (const SparseCholesky* drained = factor.drained()) {
-    return check_many(lower, norm, *drained, b, x, workspace);
-  }
-  if (x.allFinite()) return SolveQuality{};
-  const VecX signs = VecX::Ones(b.cols());
-  return tl::unexpected(refusal(b * signs, x * signs, {}));
 }
 
 }  // namespace brainshift::linalg

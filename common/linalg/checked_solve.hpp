@@ -14,8 +14,7 @@
 
 #include "common/core/error.hpp"
 #include "common/linalg/cholesky.hpp"
-#include "common/fem/elasticity.hpp"
-#include "common/fem/stiffness_factor.hpp"
+#include "common/linalg/symmetric_matrix.hpp"
 
 namespace brainshift::linalg {
 
@@ -28,9 +27,6 @@ struct SolveQuality {
   double backward_error = 0.0;
   int refinements = 0;
 };
-
-// Greatest row sum of absolute values, of the whole symmetric matrix.
-double max_norm(const SymmetricMatrix& lower);
 
 // eta above; NaN when x or b is not finite. norm: max_norm(lower). K x in `product`.
 double backward_error(const SymmetricMatrix& lower, double norm, const VecX& b, const VecX& x,
@@ -45,12 +41,8 @@ Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
                                 const SparseCholesky& factor, const Eigen::MatrixXd& b,
                                 Eigen::MatrixXd& x, SparseCholesky::Workspace& workspace);
 
-// The same for either physics. With pressure the matrix that the factor belongs to is never formed; its factor has
-// checked itself (symmetric_indefinite.hpp) and leaves NaN where it refused: backward_error is 0 then, or kNotFinite.
-Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
-                                   const fem::StiffnessFactor& factor, const VecX& b, VecX& x);
-Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
-                                const fem::StiffnessFactor& factor, const Eigen::MatrixXd& b,
-                                Eigen::MatrixXd& x, fem::StiffnessFactor::Workspace& workspace);
+// What a refused solve reports: kNotFinite when b or x is not finite, else kSingularMatrix with the
+// backward error.
+Error solve_refusal(const VecX& b, const VecX& x, const SolveQuality& quality);
 
 }  // namespace brainshift::linalg

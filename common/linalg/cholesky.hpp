@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "common/core/error.hpp"
-#include "common/fem/elasticity.hpp"
+#include "common/linalg/symmetric_matrix.hpp"
 
 namespace brainshift::linalg {
 

@@ -14,7 +14,7 @@ namespace {
 
 TEST(RealHead, CoarseDefaultCaseGivesAWholeModel) {
   const auto config =
-      io::read_case_config(std::filesystem::path(BRAINSHIFT_CASES_DIR) / "colin27-coarse.yaml");
+      io::read_case_config(std::filesystem::path(BRAINSHIFT_SOURCE_DIR "/config/cases") / "colin27-coarse.yaml");
   ASSERT_TRUE(config) << config.error().message;
   const auto inputs = io::load_case_inputs(*config);
   ASSERT_TRUE(inputs) << inputs.error().message;

@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-void expect_refused(const CaseConfig& config, Method method, anatomy::Boundary boundary,
+void expect_refused(const CaseConfig& config, Method method, Boundary boundary,
                     const std::string& words) {
   const auto plan = plan_scene(config, method, boundary);
   ASSERT_FALSE(plan.has_value()) << words;
@@ -20,17 +20,17 @@ void expect_refused(const CaseConfig& config, Method method, anatomy::Boundary b
 }
 
 TEST(PlanScene, CarriesEverythingByDefault) {
-  const auto plan = plan_scene({}, Method::kCondensed, anatomy::Boundary::kContact);
+  const auto plan = plan_scene({}, Method::kCondensed, Boundary::kContact);
   ASSERT_TRUE(plan.has_value());
   EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
 }
 
 TEST(PlanScene, DefaultsAreAllowedWithEveryMethodAndBoundary) {
   for (const Method method : kAllMethods) {
-    for (const anatomy::Boundary boundary : {anatomy::Boundary::kContact, anatomy::Boundary::kFixed}) {
+    for (const Boundary boundary : {Boundary::kContact, Boundary::kFixed}) {
       const auto plan = plan_scene({}, method, boundary);
       ASSERT_TRUE(plan.has_value()) << to_string(method);
-      EXPECT_EQ(plan->contact, boundary == anatomy::Boundary::kContact);
+      EXPECT_EQ(plan->contact, boundary == Boundary::kContact);
       EXPECT_EQ(plan->uncertainty, method == Method::kCondensed);
     }
   }
@@ -42,7 +42,7 @@ TEST(PlanScene, LeavesOutWhatIsForcedOff) {
   config.scene.uncertainty = Carry::kOff;
   config.scene.gravity_modes = Carry::kOff;
   config.scene.far_field = Carry::kOff;
-  const auto plan = plan_scene(config, Method::kCondensed, anatomy::Boundary::kContact);
+  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
   ASSERT_TRUE(plan.has_value());
   EXPECT_FALSE(plan->contact || plan->uncertainty || plan->gravity_modes || plan->far_field);
 }
@@ -51,52 +51,52 @@ TEST(PlanScene, CarriesWhatIsForcedOn) {
   CaseConfig config;
   config.scene.contact = config.scene.uncertainty = config.scene.gravity_modes =
       config.scene.far_field = config.scene.rotation = Carry::kOn;
-  const auto plan = plan_scene(config, Method::kCondensed, anatomy::Boundary::kContact);
+  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
   ASSERT_TRUE(plan.has_value());
   EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
 }
 
 TEST(PlanScene, CarriesPressureOnlyWhenAsked) {
   CaseConfig config;
-  EXPECT_FALSE(plan_scene(config, Method::kCondensed, anatomy::Boundary::kContact)->pressure);
+  EXPECT_FALSE(plan_scene(config, Method::kCondensed, Boundary::kContact)->pressure);
   config.scene.pressure = Carry::kOn;
   for (const Method method : {Method::kCondensed, Method::kPaper}) {
-    EXPECT_TRUE(plan_scene(config, method, anatomy::Boundary::kContact)->pressure);
-    EXPECT_TRUE(plan_scene(config, method, anatomy::Boundary::kFixed)->pressure);
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kContact)->pressure);
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kFixed)->pressure);
   }
 }
 
 TEST(PlanScene, APriorWithoutGravityModesHasNoneToCarry) {
   CaseConfig config;
   config.prior.gravity_mode_sd = 0.0;
-  EXPECT_FALSE(plan_scene(config, Method::kCondensed, anatomy::Boundary::kContact)->gravity_modes);
+  EXPECT_FALSE(plan_scene(config, Method::kCondensed, Boundary::kContact)->gravity_modes);
 }
 
 TEST(PlanScene, RefusesPartsForcedOnThatAreNotAvailable) {
   CaseConfig config;
   config.scene.pressure = Carry::kOn;
-  expect_refused(config, Method::kIterativeSolver, anatomy::Boundary::kContact,
+  expect_refused(config, Method::kIterativeSolver, Boundary::kContact,
                  "scene.pressure = on: method pcg has no solver for pore pressure");
   config = {};
   config.scene.contact = Carry::kOn;
-  expect_refused(config, Method::kCondensed, anatomy::Boundary::kFixed, "scene.contact = on");
+  expect_refused(config, Method::kCondensed, Boundary::kFixed, "scene.contact = on");
   config = {};
   config.scene.uncertainty = Carry::kOn;
-  expect_refused(config, Method::kPaper, anatomy::Boundary::kContact, "method paper");
+  expect_refused(config, Method::kPaper, Boundary::kContact, "method paper");
   config = {};
   config.scene.gravity_modes = Carry::kOn;
   config.prior.gravity_levels_mm.clear();
-  expect_refused(config, Method::kCondensed, anatomy::Boundary::kContact, "scene.gravity_modes = on");
+  expect_refused(config, Method::kCondensed, Boundary::kContact, "scene.gravity_modes = on");
 }
 
 TEST(PlanScene, RefusesPartsForcedOffThatTheMethodAlwaysCarries) {
   CaseConfig config;
   config.scene.contact = Carry::kOff;
-  expect_refused(config, Method::kPaper, anatomy::Boundary::kContact, "scene.contact = off");
-  EXPECT_TRUE(plan_scene(config, Method::kPaper, anatomy::Boundary::kFixed).has_value());
+  expect_refused(config, Method::kPaper, Boundary::kContact, "scene.contact = off");
+  EXPECT_TRUE(plan_scene(config, Method::kPaper, Boundary::kFixed).has_value());
   config = {};
   config.scene.gravity_modes = Carry::kOff;
-  expect_refused(config, Method::kPaper, anatomy::Boundary::kContact, "scene.gravity_modes = off");
+  expect_refused(config, Method::kPaper, Boundary::kContact, "scene.gravity_modes = off");
 }
 
 TEST(RegionOfInterest, IsTheNodesNoFartherFromTheTumourThanAsked) {
