@@ -19,7 +19,7 @@ namespace {
 
 // A given skull turned so that its normals agree with the brain's. It may be open (a skull with its
 // craniotomy), so an enclosed volume cannot tell; the brain beneath it can.
-Result<TriangleSurface> oriented_skull(TriangleSurface skull, const Boundary& brain,
+Result<TriangleSurface> oriented_skull(TriangleSurface skull, const BrainSurface& brain,
                                        const std::string& file) {
   const auto index = geometry::ClosestPointIndex::build(skull);
   if (!index)
@@ -35,7 +35,7 @@ Result<TriangleSurface> oriented_skull(TriangleSurface skull, const Boundary& br
 }
 
 // The patient's own inner skull surface, or the brain's surface moved outwards by the gap.
-Result<TriangleSurface> make_skull(const CaseInputs& inputs, const Boundary& brain) {
+Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface& brain) {
   const ContactConfig& contact = inputs.config.contact;
   if (!contact.skull_file) return geometry::offset_surface(brain.surface, contact.gap_mm);
   if (!inputs.skull)
@@ -69,10 +69,10 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
     return tl::unexpected(status.error());
 
   report(progress, "node sets", 0.0);
-  const Boundary boundary = boundary_of(*mesh);
-  auto sets = select_node_sets(boundary, config);
+  const BrainSurface brain = brain_surface_of(*mesh);
+  auto sets = select_node_sets(brain, config);
   if (!sets) return tl::unexpected(sets.error());
-  auto skull = make_skull(inputs, boundary);
+  auto skull = make_skull(inputs, brain);
   if (!skull) return tl::unexpected(skull.error());
 
   report(progress, "tumour distances", 0.0);

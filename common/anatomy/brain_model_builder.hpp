@@ -2,16 +2,19 @@
 // CaseInputs -> BrainModel: mesh, surfaces and the node sets of the paper's section 2.6.
 #pragma once
 
-#include "common/values/brain_model.hpp"
-#include "common/values/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_inputs.hpp"
 
 namespace brainshift::anatomy {
 
-// Deterministic. Fails with one sentence naming the key and value: kEmptySet (mask without component, a
-// craniotomy that selects no node, no slave, no tumour voxel), kInvalidArgument (tumour outside the brain;
-// metre/millimetre mix-up of a given mesh, by its extent), kDegenerateMesh.
+// Deterministic. An error is one sentence that names key and value.
+//   kEmptySet         mask without component, a craniotomy that selects no node, no slave, no
+//                     tumour voxel
+//   kInvalidArgument  tumour outside the brain; metres and millimetres mixed up in a given mesh
+//                     (by its extent)
+//   kDegenerateMesh   as make_brain_mesh
 Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress = {});
 
 }  // namespace brainshift::anatomy

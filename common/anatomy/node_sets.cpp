@@ -32,8 +32,8 @@ struct Opening {
 
 std::string text(const Vec3& x) { return fmt::format("[{:g}, {:g}, {:g}]", x[0], x[1], x[2]); }
 
-Result<Opening> place_opening(const Boundary& boundary, const Craniotomy& craniotomy) {
-  const auto index = geometry::ClosestPointIndex::build(boundary.surface);
+Result<Opening> place_opening(const BrainSurface& brain, const Craniotomy& craniotomy) {
+  const auto index = geometry::ClosestPointIndex::build(brain.surface);
   if (!index) return tl::unexpected(index.error());
   const geometry::ClosestPoint nearest = index->closest(craniotomy.centre_mm);
   if (nearest.distance_mm > 0.5 * craniotomy.long_axis_mm)
@@ -45,9 +45,9 @@ Result<Opening> place_opening(const Boundary& boundary, const Craniotomy& cranio
   opening.origin = nearest.point;
   const Vec3 facing = index->triangle_normal(nearest.triangle);
   Vec3 sum = Vec3::Zero();
-  for (int v = 0; v < boundary.surface.num_vertices(); ++v) {
-    const Vec3 normal = boundary.normals.col(v);
-    const double distance = (boundary.surface.vertices.col(v) - opening.origin).norm();
+  for (int v = 0; v < brain.surface.num_vertices(); ++v) {
+    const Vec3 normal = brain.normals.col(v);
+    const double distance = (brain.surface.vertices.col(v) - opening.origin).norm();
     // Walls that face away belong to another part of the surface.
     if (distance <= 0.5 * craniotomy.short_axis_mm && normal.dot(facing) > 0.0) sum += normal;
   }
@@ -74,13 +74,13 @@ bool in_opening(const Opening& opening, const Craniotomy& craniotomy, const Vec3
 }
 
 // The boundary vertices' roles where the case decides by place.
-Result<std::vector<Role>> place_roles(const Boundary& boundary, const CaseConfig& config) {
-  const auto opening = place_opening(boundary, config.craniotomy);
+Result<std::vector<Role>> place_roles(const BrainSurface& brain, const CaseConfig& config) {
+  const auto opening = place_opening(brain, config.craniotomy);
   if (!opening) return tl::unexpected(opening.error());
-  std::vector<Role> roles(boundary.node_of_vertex.size(), Role::kNone);
+  std::vector<Role> roles(brain.node_of_vertex.size(), Role::kNone);
   for (std::size_t v = 0; v < roles.size(); ++v) {
-    const Vec3 x = boundary.surface.vertices.col(static_cast<Eigen::Index>(v));
-    const Vec3 normal = boundary.normals.col(static_cast<Eigen::Index>(v));
+    const Vec3 x = brain.surface.vertices.col(static_cast<Eigen::Index>(v));
+    const Vec3 normal = brain.normals.col(static_cast<Eigen::Index>(v));
     if (in_opening(*opening, config.craniotomy, x, normal)) {
       roles[v] = Role::kCraniotomy;
     } else if ((x - config.brainstem.centre_mm).norm() <= config.brainstem.radius_mm) {
@@ -104,17 +104,17 @@ Result<std::vector<Role>> place_roles(const Boundary& boundary, const CaseConfig
 
 }  // namespace
 
-Boundary boundary_of(const TetMesh& mesh) {
-  Boundary boundary;
-  boundary.surface = geometry::boundary_surface(mesh, &boundary.node_of_vertex);
-  boundary.normals = geometry::vertex_normals(boundary.surface);
-  return boundary;
+BrainSurface brain_surface_of(const TetMesh& mesh) {
+  BrainSurface brain;
+  brain.surface = geometry::boundary_surface(mesh, &brain.node_of_vertex);
+  brain.normals = geometry::vertex_normals(brain.surface);
+  return brain;
 }
 
-Result<NodeSets> select_node_sets(const Boundary& boundary, const CaseConfig& config) {
-  const auto roles = place_roles(boundary, config);
+Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& config) {
+  const auto roles = place_roles(brain, config);
   if (!roles) return tl::unexpected(roles.error());
-  const VecX depth = boundary.surface.vertices.transpose() * config.gravity_direction.normalized();
+  const VecX depth = brain.surface.vertices.transpose() * config.gravity_direction.normalized();
 
   NodeSets sets;
   sets.fluid_plane_depth_mm = -std::numeric_limits<double>::infinity();
@@ -125,7 +125,7 @@ Result<NodeSets> select_node_sets(const Boundary& boundary, const CaseConfig& co
   sets.slave_plane_depth_mm = sets.fluid_plane_depth_mm + config.contact.slave_depth_mm;
 
   for (std::size_t v = 0; v < roles->size(); ++v) {
-    const NodeIndex node = boundary.node_of_vertex[v];
+    const NodeIndex node = brain.node_of_vertex[v];
     switch ((*roles)[v]) {
       case Role::kCraniotomy: sets.craniotomy.push_back(node); break;
       case Role::kBrainstem: sets.brainstem.push_back(node); break;

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which boundary nodes are open, held or in contact: the node sets of the paper's section 2.6.
+// The node sets of the paper's section 2.6: which boundary nodes are open, held or in contact.
 #pragma once
 
 #include <vector>
 
-#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
+#include "common/values/case_config.hpp"
 
 namespace brainshift::anatomy {
 
-// The boundary of a mesh: column v of surface.vertices and normals belongs to mesh node node_of_vertex[v].
-struct Boundary {
+// The outer surface of the brain mesh. Column v of surface.vertices and normals belongs to mesh
+// node node_of_vertex[v].
+struct BrainSurface {
   TriangleSurface surface;
   Points normals;  // unit, outward
   std::vector<NodeIndex> node_of_vertex;
 };
-Boundary boundary_of(const TetMesh& mesh);
+BrainSurface brain_surface_of(const TetMesh& mesh);
 
 // Disjoint; together all boundary nodes. Depth of a point x is x . gravity_direction (mm).
 struct NodeSets {
@@ -28,18 +29,19 @@ struct NodeSets {
   double slave_plane_depth_mm = 0.0;
 };
 
-// craniotomy  inside the ellipse with the given full axes in the tangent plane at the boundary point c
-//             nearest to craniotomy.centre_mm, at most 15 mm from that plane, normal within 60 degrees of
-//             the plane's. The plane's normal is the mean of the boundary normals within half the short
-//             axis of c.
+// craniotomy  nodes inside the ellipse with the given full axes, in the tangent plane at the
+//             surface point c nearest to craniotomy.centre_mm; at most 15 mm from that plane; with
+//             a normal within 60 degrees of the plane's, which is the mean of the surface normals
+//             within half the short axis of c
 // brainstem   other nodes in the brainstem's sphere
-// slaves      other nodes above the second plane: depth < fluid plane + contact.slave_depth_mm, where the
-//             fluid plane passes through the lowest craniotomy node (the largest depth)
+// slaves      other nodes above the second plane: depth < fluid plane + contact.slave_depth_mm,
+//             where the fluid plane passes through the lowest craniotomy node (the largest depth)
 // fixed       the rest
 //
-// kEmptySet names the key: the craniotomy's centre is farther from the boundary than half its long axis,
-// or selects no node; the brainstem's sphere (of radius > 0) selects none; no slave; no fixed node.
+// kEmptySet names the key: the craniotomy's centre is farther from the surface than half its long
+// axis, or the craniotomy selects no node; the brainstem's sphere (of radius > 0) selects none;
+// no slave; no fixed node.
 // kInvalidArgument: long_axis_direction is perpendicular to the surface.
-Result<NodeSets> select_node_sets(const Boundary& boundary, const CaseConfig& config);
+Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& config);
 
 }  // namespace brainshift::anatomy

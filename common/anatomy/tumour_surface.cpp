@@ -88,7 +88,7 @@ Result<TriangleSurface> make_tumour_surface(const CaseInputs& inputs) {
   if (!inputs.tumour_surface)
     return fail(ErrorCode::kInvalidArgument, "tumour.surface.file: was not read");
   return checked_surface(*inputs.tumour_surface,
-                         std::get<TumourSurface>(inputs.config.tumour).path.string());
+                         std::get<TumourSurfaceFile>(inputs.config.tumour).path.string());
 }
 
 Status check_tumour_inside(const TriangleSurface& tumour, const TetMesh& mesh,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/forward_model.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "common/contact/tissues.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/geometry/surface.hpp"
 
@@ -58,14 +58,13 @@ ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, linalg::Symmetri
 
 Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConfig& config,
                                          Boundary boundary, const Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   report(progress, "assemble", 0.0);
   fem::DofMap dofs = constrain(model, boundary);
   const auto materials = tissue_map(model, config.material);
   if (!materials) return tl::unexpected(materials.error());
   linalg::SymmetricMatrix stiffness = fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
-  const double assemble_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double assemble_s = watch.seconds();
 
   std::vector<ContactPair> pairs;
   if (boundary == Boundary::kContact) {

@@ -1,41 +1,48 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ForwardModel: K u = b of one patient under one boundary condition (paper section 2.6), factorised once.
+// ForwardModel: K u = b of one patient under one boundary condition (paper section 2.6),
+// factorised once.
 //
 //   craniotomy, brainstem   stress-free
-//   slaves                  kContact: free, with penalty contact against the skull; kFixed: normal-fixed
-//   fixed                   normal-fixed, tangentially free, exactly (rotated frames, eliminated)
+//   slaves                  kContact: free, with penalty contact against the skull
+//                           kFixed: fixed in the normal direction
+//   fixed                   fixed in the normal direction, tangentially free, exactly (rotated
+//                           frames, eliminated)
 //
-// K is that of drained elasticity, or, with scene.pressure = on, of one backward-Euler step of consolidation of
-// scene.pressure_step_s from rest, with the pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0):
-// cerebrospinal fluid or air surrounds it.
+// The normals of fixed nodes are the average nodal normals of the brain's boundary.
 //
-// Tissues of different stiffness: tissues.hpp.
+// K is the stiffness of drained elasticity. With scene.pressure = on it is that of one
+// backward-Euler step of consolidation of length scene.pressure_step_s from rest, with the
+// pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
+// fluid or air surrounds it.
 //
-// Normals of fixed nodes are the average nodal normals of the brain's boundary.
+// Each tissue has its own stiffness (tissues.hpp).
 #pragma once
 
 #include "common/contact/contact_solver.hpp"
 #include "common/contact/penalty.hpp"
-#include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/estimate.hpp"
 #include "common/core/progress.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/stiffness_factor.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::contact {
 
 class ForwardModel {
  public:
-  // kFloatingBody, kSingularMatrix, kNotFinite, kEmptySet: see StiffnessFactor and search_contact.
+  // kFloatingBody, kSingularMatrix, kNotFinite: as StiffnessFactor. kEmptySet and
+  // kDegenerateMesh: as search_contact. kInvalidArgument and kEmptySet: as tissue_map.
   static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
                                     Boundary boundary, const Progress& progress = {});
 
   Boundary boundary() const { return boundary_; }
   const fem::DofMap& dofs() const { return dofs_; }
-  // Of drained elasticity, with or without pressure; the contact stiffness is added to it.
+  // The matrix of drained elasticity, also when the factor carries pressure. Contact stiffness is
+  // added to it.
   const linalg::SymmetricMatrix& stiffness() const { return stiffness_; }
+  double stiffness_norm() const { return stiffness_norm_; }  // linalg::max_norm
   const fem::StiffnessFactor& factor() const { return factor_; }
   // No pairs under the fixed boundary condition.
   const PenaltyContact& contact() const { return contact_; }
@@ -44,7 +51,7 @@ class ForwardModel {
 
   // u = K^-1 b without contact; b, u: 3 x n. Errors as fem::checked_solve.
   Status solve(const Points& load, Points& u) const;
-  // The same without a look at the residual.
+  // The same without the check of the residual.
   Points solve(const Points& load) const;
   // u with contact iterated to a stable active set; without slaves the same as solve().
   Result<ContactSolution> solve_with_contact(const Points& load) const;
@@ -55,7 +62,7 @@ class ForwardModel {
   Boundary boundary_;
   fem::DofMap dofs_;
   linalg::SymmetricMatrix stiffness_;
-  double stiffness_norm_;  // fem::max_norm
+  double stiffness_norm_;
   fem::StiffnessFactor factor_;
   PenaltyContact contact_;
   double assemble_s_;

@@ -11,14 +11,14 @@ constexpr double kDrift = 10.0;
 
 }  // namespace
 
-IterativeSystem::IterativeSystem(const contact::ForwardModel& forward,
+IterativeSystem::IterativeSystem(const ForwardModel& forward,
                                  const IterativeOptions& options)
     : PenalisedSystem(forward), options_(options) {
   solver_.setMaxIterations(options.max_iterations);
 }
 
 Result<std::unique_ptr<IterativeSystem>> IterativeSystem::build(
-    const contact::ForwardModel& forward, const IterativeOptions& options) {
+    const ForwardModel& forward, const IterativeOptions& options) {
   std::unique_ptr<IterativeSystem> system(new IterativeSystem(forward, options));
   if (auto status = system->refresh(); !status) return tl::unexpected(status.error());
   return system;
@@ -30,7 +30,7 @@ Status IterativeSystem::refresh() {
   solver_.compute(matrix_);
   if (solver_.info() != Eigen::Success) {
     return fail(ErrorCode::kSingularMatrix, "stiffness matrix with " +
-                                                std::to_string(contact::count(active())) +
+                                                std::to_string(count(active())) +
                                                 " active slaves has no incomplete factor");
   }
   return {};
@@ -39,11 +39,11 @@ Status IterativeSystem::refresh() {
 // Moves q by sum_A N (N . r) / beta, what the springs of the active slaves take up, where that lowers the residual
 // r = rhs - K_p q (soft springs take up nothing by themselves). Slaves carry the identity frame and no constraint.
 void IterativeSystem::lift(const VecX& rhs, VecX& residual, VecX& q) const {
-  const contact::PenaltyContact& contact = forward().contact();
+  const PenaltyContact& contact = forward().contact();
   VecX lifted = q;
   for (int i = 0; i < contact.num_slaves(); ++i) {
     if (!active()[static_cast<std::size_t>(i)]) continue;
-    const contact::ContactPair& pair = contact.pairs()[static_cast<std::size_t>(i)];
+    const ContactPair& pair = contact.pairs()[static_cast<std::size_t>(i)];
     const int first = forward().dofs().unknown(pair.slave, 0);
     lifted.segment<3>(first) +=
         pair.normal * (pair.normal.dot(residual.segment<3>(first)) / contact.beta());

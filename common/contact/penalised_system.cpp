@@ -3,13 +3,13 @@
 
 namespace brainshift::contact {
 
-PenalisedSystem::PenalisedSystem(const contact::ForwardModel& forward)
+PenalisedSystem::PenalisedSystem(const ForwardModel& forward)
     : forward_(forward), active_(static_cast<std::size_t>(forward.contact().num_slaves()), 0) {}
 
-Status PenalisedSystem::activate(const contact::ActiveSet& active) {
+Status PenalisedSystem::activate(const ActiveSet& active) {
   if (active == active_) return {};
   active_ = active;
-  if (contact::count(active_) > 0) ++changes_;
+  if (count(active_) > 0) ++changes_;
   return refresh();
 }
 
@@ -20,7 +20,7 @@ Status PenalisedSystem::solve_with_gaps(const Points& b, Points& u) const {
 }
 
 Result<bool> PenalisedSystem::follow_contact(const Points& b, Points& u) {
-  const contact::ActiveSet penetrating = forward_.contact().penetrating(u);
+  const ActiveSet penetrating = forward_.contact().penetrating(u);
   if (penetrating == active_) return false;
   if (auto status = activate(penetrating); !status) return tl::unexpected(status.error());
   if (auto status = solve_with_gaps(b, u); !status) return tl::unexpected(status.error());

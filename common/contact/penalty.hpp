@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Penalty contact against a rigid master surface (paper section 2.3, eq. 9-16).
 //
-//   penetration         P_i = 0p_i - N_i . u_i                                     (eq. 11; > 0 penetrates)
-//   energy              1/2 sum_active beta P_i^2                                   (eq. 14)
-//   modified system     K_p = K + sum_active beta N_i N_i^T,   b_p = b + sum_active beta 0p_i N_i   (eq. 16)
+//   penetration         P_i = 0p_i - N_i . u_i                         (eq. 11; > 0 penetrates)
+//   energy              1/2 sum_active beta P_i^2                       (eq. 14)
+//   modified system     K_p = K + sum_active beta N_i N_i^T             (eq. 16)
+//                       b_p = b + sum_active beta 0p_i N_i
 //   contact force       beta P_i N_i, pushing the brain inwards when P_i > 0
 //
-// In the paper's matrices Q_i = -N_i^T. Slaves carry the identity frame, so only their diagonal blocks change
-// and the symbolic analysis of K serves K_p.
+// In the paper's matrices Q_i = -N_i^T. Slaves carry the identity frame, so only their diagonal
+// blocks change and the symbolic analysis of K serves K_p.
 #pragma once
 
 #include <vector>
@@ -35,10 +36,10 @@ class PenaltyContact {
   // Slaves with P > 0.
   ActiveSet penetrating(const Points& u) const;
 
-  // K_p from K.
+  // Turns K into K_p.
   void add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                      const ActiveSet& active) const;
-  // b_p from b (3 x n, N).
+  // Turns b into b_p (3 x n, N).
   void add_load(Points& b, const ActiveSet& active) const;
 
  private:
@@ -46,6 +47,7 @@ class PenaltyContact {
   double beta_;
 };
 
+// Number of active slaves.
 int count(const ActiveSet& active);
 
 }  // namespace brainshift::contact

@@ -5,11 +5,11 @@
 
 namespace brainshift::contact {
 
-RefactorisedSystem::RefactorisedSystem(const contact::ForwardModel& forward)
+RefactorisedSystem::RefactorisedSystem(const ForwardModel& forward)
     : PenalisedSystem(forward), penalised_(forward.factor().clone_analysis()) {}
 
 Status RefactorisedSystem::refresh() {
-  if (contact::count(active()) == 0) return {};
+  if (count(active()) == 0) return {};
   matrix_ = forward().stiffness();
   forward().contact().add_stiffness(matrix_, forward().dofs(), active());
   norm_ = linalg::max_norm(matrix_);
@@ -17,7 +17,7 @@ Status RefactorisedSystem::refresh() {
 }
 
 Status RefactorisedSystem::solve(const Points& f, Points& u) const {
-  if (contact::count(active()) == 0) return forward().solve(f, u);
+  if (count(active()) == 0) return forward().solve(f, u);
   VecX unknowns;
   const auto quality =
       fem::checked_solve(matrix_, norm_, penalised_, forward().dofs().restrict_to(f), unknowns);

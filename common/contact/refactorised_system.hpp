@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// K_p refactorised for every new active set, as the paper does; ordering and symbolic analysis are those of K.
+// RefactorisedSystem: a new Cholesky factor of K_p for every active set, as in the paper.
+// Ordering and symbolic analysis are those of K.
 #pragma once
 
-#include "common/fem/stiffness_factor.hpp"
 #include "common/contact/penalised_system.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
 class RefactorisedSystem final : public PenalisedSystem {
  public:
-  explicit RefactorisedSystem(const contact::ForwardModel& forward);
+  explicit RefactorisedSystem(const ForwardModel& forward);
   // Errors as fem::checked_solve.
   Status solve(const Points& f, Points& u) const override;
 

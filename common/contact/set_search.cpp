@@ -4,17 +4,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "common/core/fnv1a.hpp"
+
 namespace brainshift::contact {
-namespace {
-
-// FNV-1a over the flags.
-std::uint64_t hash_of(const contact::ActiveSet& set) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const char flag : set) hash = (hash ^ static_cast<unsigned char>(flag)) * 1099511628211ULL;
-  return hash;
-}
-
-}  // namespace
 
 SetSearch::SetSearch(int slaves, int max_iterations, double tolerance_mm)
     : current_(static_cast<std::size_t>(slaves), 0),
@@ -36,7 +28,7 @@ void SetSearch::begin() {
 void SetSearch::forget() { std::fill(current_.begin(), current_.end(), char{0}); }
 
 bool SetSearch::seen_before() {
-  const std::uint64_t hash = hash_of(current_);
+  const std::uint64_t hash = fnv1a({current_.data(), current_.size()});
   if (std::find(visited_.begin(), visited_.end(), hash) != visited_.end()) return true;
   visited_.push_back(hash);
   return false;

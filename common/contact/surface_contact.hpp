@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Frictionless penalty contact of a body's faces with rigid obstacles, integrated over the faces.
+// SurfaceContact: frictionless penalty contact of a body's faces with rigid obstacles, integrated
+// over the faces.
 //
-//   E_c(u) = 1/2 int kappa <P(u)>^2 dA,   P = 0p - N . u,   <P> = max(P, 0)           contact pressure kappa <P>
+//   E_c(u) = 1/2 int kappa <P(u)>^2 dA,   P = 0p - N . u,   <P> = max(P, 0)
+//   contact pressure kappa <P>
 //
-// kappa: N/mm^3. Evaluated at quadrature points of the faces (3 for P1, 6 for P2), each with the pair found in the
-// undeformed place: displacements along the obstacle must be small against its radius. Nodal contact
-// (penalty.hpp) is the paper's; on P2 it would be wrong, because the vertices of a P2 face carry no load.
-// The points' blocks couple nodes of a face only, so the pattern of K holds K + its stiffness.
+// kappa: N/mm^3. It is evaluated at quadrature points of the faces (3 for P1, 6 for P2), each
+// with the contact pair of its undeformed place. So displacements along the obstacle must be
+// small against its radius. The paper uses nodal contact (penalty.hpp). On P2 that would be
+// wrong, because the vertices of a P2 face carry no load.
+// The stiffness of a point couples only nodes of one face, so the pattern of K holds the sum.
 #pragma once
 
 #include <array>
@@ -33,7 +36,7 @@ class SurfaceContact {
  public:
   explicit SurfaceContact(const fem::DisplacementSpace& space);
 
-  // faces: 3 x f vertices; kappa > 0. Fails as contact_pairs.
+  // faces: 3 x f vertices; kappa > 0. Errors as contact_pairs.
   Status add(const Eigen::Matrix<int, 3, Eigen::Dynamic>& faces, const Obstacle& obstacle,
              double kappa);
 
@@ -42,14 +45,15 @@ class SurfaceContact {
   int num_obstacles() const { return num_obstacles_; }
 
   VecX penetration(const Points& u) const;
-  // N . u at every point: penetration changes by minus this.
+  // N . u at every point. The penetration is 0p minus this.
   VecX approach(const Points& u) const;
   void add_stiffness(linalg::SymmetricMatrix& lower, const fem::DofMap& dofs,
                      const ActiveSet& active) const;
   // Adds sum over the active points of stiffness * values_i N_k N to the nodal forces (3 x n).
   void add_force(const VecX& values, const ActiveSet& active, Points& force) const;
 
-  // Pressure at the vertices, N/mm^2: mean over the points around each, weighted by area and by nearness.
+  // Contact pressure at the vertices, N/mm^2: mean over the points around each vertex, weighted
+  // by area and by nearness.
   VecX vertex_pressure(const Points& u) const;
 
  private:

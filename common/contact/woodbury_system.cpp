@@ -2,18 +2,19 @@
 #include "common/contact/woodbury_system.hpp"
 
 #include <algorithm>
+#include <sstream>
 #include <string>
 
 namespace brainshift::contact {
 namespace {
 
-// Right-hand sides per block: a solve costs about a fifth of a single one, and a block of the default head
-// 28 MB.
+// Right-hand sides per block. A solve then costs about a fifth of a single one, and a block of the
+// default head takes 28 MB.
 constexpr std::size_t kBlock = 64;
 
 }  // namespace
 
-WoodburySystem::WoodburySystem(const contact::ForwardModel& forward)
+WoodburySystem::WoodburySystem(const ForwardModel& forward)
     : PenalisedSystem(forward),
       known_(static_cast<std::size_t>(forward.contact().num_slaves()), 0) {
   phi_.resize(forward.contact().num_slaves(), forward.contact().num_slaves());
@@ -23,8 +24,9 @@ int WoodburySystem::columns() const {
   return static_cast<int>(std::count(known_.begin(), known_.end(), 1));
 }
 
-// Slaves carry the identity frame and no constraint (contact/penalty.hpp), so their unknowns are x, y, z.
-void WoodburySystem::solve_columns(const std::vector<int>& slaves) {
+// Slaves carry the identity frame and no constraint (contact/penalty.hpp), so their unknowns are
+// x, y, z.
+Status WoodburySystem::solve_columns(const std::vector<int>& slaves) {
   const auto& pairs = forward().contact().pairs();
   const fem::DofMap& dofs = forward().dofs();
   Eigen::MatrixXd rhs;
@@ -33,12 +35,15 @@ void WoodburySystem::solve_columns(const std::vector<int>& slaves) {
     const auto width = static_cast<Eigen::Index>(std::min(kBlock, slaves.size() - begin));
     rhs.setZero(dofs.num_unknowns(), width);
     for (Eigen::Index j = 0; j < width; ++j) {
-      const contact::ContactPair& pair = pairs[slaves[begin + j]];
+      const ContactPair& pair = pairs[slaves[begin + j]];
       for (int axis = 0; axis < 3; ++axis) {
         rhs(dofs.unknown(pair.slave, axis), j) = pair.normal[axis];
       }
     }
     forward().factor().solve_many(rhs, x, workspace_);
+    const auto quality = fem::check_many(forward().stiffness(), forward().stiffness_norm(),
+                                         forward().factor(), rhs, x, workspace_);
+    if (!quality) return tl::unexpected(quality.error());
     for (Eigen::Index j = 0; j < width; ++j) {
       const int column = slaves[begin + j];
       for (Eigen::Index i = 0; i < phi_.rows(); ++i) {
@@ -48,6 +53,7 @@ void WoodburySystem::solve_columns(const std::vector<int>& slaves) {
       known_[column] = 1;
     }
   }
+  return {};
 }
 
 Status WoodburySystem::refresh() {
@@ -59,7 +65,7 @@ Status WoodburySystem::refresh() {
     if (!known_[i]) missing.push_back(i);
   }
   if (set_.empty()) return {};
-  solve_columns(missing);
+  if (auto status = solve_columns(missing); !status) return status;
   Eigen::MatrixXd capacitance = phi_(set_, set_);
   capacitance.diagonal().array() += 1.0 / forward().contact().beta();
   capacitance_.compute(capacitance);
@@ -70,10 +76,10 @@ Status WoodburySystem::refresh() {
   return {};
 }
 
-Status WoodburySystem::solve(const Points& f, Points& u) const {
-  if (auto status = forward().solve(f, u); !status || set_.empty()) return status;
+Status WoodburySystem::apply(const Points& f, Points& u, VecX& c) const {
+  if (auto status = forward().solve(f, u); !status) return status;
   const auto& pairs = forward().contact().pairs();
-  VecX c(static_cast<Eigen::Index>(set_.size()));
+  c.resize(static_cast<Eigen::Index>(set_.size()));
   for (std::size_t i = 0; i < set_.size(); ++i) {
     c[i] = pairs[set_[i]].normal.dot(u.col(pairs[set_[i]].slave));
   }
@@ -83,6 +89,45 @@ Status WoodburySystem::solve(const Points& f, Points& u) const {
     corrected.col(pairs[set_[i]].slave) -= c[i] * pairs[set_[i]].normal;
   }
   return forward().solve(corrected, u);
+}
+
+VecX WoodburySystem::imbalance(const Points& u, const VecX& c) const {
+  const auto& pairs = forward().contact().pairs();
+  VecX left = c;
+  for (std::size_t i = 0; i < set_.size(); ++i) {
+    const ContactPair& pair = pairs[set_[i]];
+    left[i] -= forward().contact().beta() * pair.normal.dot(u.col(pair.slave));
+  }
+  return left;
+}
+
+Status WoodburySystem::solve(const Points& f, Points& u) const {
+  if (set_.empty()) return forward().solve(f, u);
+  VecX c;
+  if (auto status = apply(f, u, c); !status) return status;
+  const double beta = forward().contact().beta();
+  for (int refinements = 0;; ++refinements) {
+    const VecX left = imbalance(u, c);
+    const double scale = beta * u.cwiseAbs().maxCoeff() + f.cwiseAbs().maxCoeff();
+    const double eta = left.cwiseAbs().maxCoeff();
+    if (eta <= linalg::kRefuseAbove * scale) return {};
+    if (refinements == linalg::kMaxRefinements) {
+      std::ostringstream text;
+      text << "low-rank correction for " << set_.size() << " active slaves: relative imbalance "
+           << eta / scale << " is above " << linalg::kRefuseAbove;
+      return fail(ErrorCode::kSingularMatrix, text.str());
+    }
+    Points residual = Points::Zero(3, f.cols());
+    for (std::size_t i = 0; i < set_.size(); ++i) {
+      const ContactPair& pair = forward().contact().pairs()[set_[i]];
+      residual.col(pair.slave) += left[i] * pair.normal;
+    }
+    Points du;
+    VecX dc;
+    if (auto status = apply(residual, du, dc); !status) return status;
+    u += du;
+    c += dc;
+  }
 }
 
 }  // namespace brainshift::contact

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// DistanceGrid: signed distance (mm) to a closed surface at the nodes of a regular grid, negative inside.
+// DistanceGrid: signed distance (mm) to a closed surface at the nodes of a regular grid.
+// Negative inside the surface.
 //
 // Node (i, j, k) lies at origin_mm + spacing_mm * (i, j, k), patient RAS; its value is
 // values[i + dims[0] * (j + dims[1] * k)]. An empty grid (no values) stands for "not computed".
@@ -35,8 +36,9 @@ struct DistanceGrid {
   Vec3 node(int i, int j, int k) const { return origin_mm + spacing_mm * Vec3(i, j, k); }
 };
 
-// Ok for an empty grid. kInvalidArgument: fewer than 2 nodes along an axis, a number of values that does not fit,
-// spacing not above 0. kNotFinite: a value or the origin.
+// Ok for an empty grid. kInvalidArgument: fewer than 2 nodes along an axis, a number of values
+// that does not match the number of nodes, or a spacing that is not above 0.
+// kNotFinite: a value or the origin.
 Status validate(const DistanceGrid& grid);
 
 }  // namespace brainshift

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // One taxonomy of expected failures for every stage, back end and wire message.
 //
-// A bug asserts. An expected failure (bad file, bad option, singular matrix) returns Result<T> holding
-// an Error: a code that programs branch on and one sentence that names the file, key or set and the
-// offending value. The sentence is what the command line prints; it never spans lines.
+// A bug asserts. An expected failure (bad file, bad option, singular matrix) returns Result<T>
+// that holds an Error: a code that programs branch on and one sentence that names the file, key
+// or set and the offending value. The sentence is what the command line prints; it never spans
+// lines.
 #pragma once
 
 #include <string>

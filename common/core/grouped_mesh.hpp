@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tetrahedral mesh with what its file calls its parts.
+// A tetrahedral mesh with the names that its file gives to regions and surfaces.
 #pragma once
 
 #include <map>
@@ -10,8 +10,9 @@
 
 namespace brainshift {
 
-// Volumes are the labels of mesh.labels; triangles carry a label of their own (0: none) and may be listed once per
-// group. Names map to labels; a label without a name is called by its number.
+// The volume labels are mesh.labels. Triangles have labels of their own (0: none); a triangle
+// that belongs to several groups is listed once per group. Names map to labels. A label without a
+// name is called by its number.
 struct GroupedMesh {
   TetMesh mesh;
   Eigen::Matrix<int, 3, Eigen::Dynamic> triangles;  // mesh nodes, in either orientation

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// IntensitySamples: an image as a set of places and what was seen there, e.g. of tracked ultrasound frames.
+// IntensitySamples: an image as a set of points with one intensity each, for example the pixels
+// of tracked ultrasound frames.
 #pragma once
 
 #include "common/core/types.hpp"

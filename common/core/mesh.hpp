@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plain geometry values: tetrahedral mesh, triangle surface, voxel image. Algorithms on them live in
-// common/geometry.
+// Plain geometry values: tetrahedral mesh, triangle surface, voxel image. The algorithms on them
+// are in common/geometry.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The columns of 3 x n points as the point set that a k-d tree (nanoflann) asks for. Keeps a reference.
+// PointColumns: adapter that lets nanoflann build a k-d tree over the columns of a 3 x n matrix.
+//
+// nanoflann asks its data set for three member functions with fixed names; these are they. The
+// adapter copies nothing: `points` must outlive the tree and must not change while the tree is in
+// use.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +20,7 @@ struct PointColumns {
   }
   template <typename Box>
   bool kdtree_get_bbox(Box&) const {
-    return false;  // the tree finds it itself
+    return false;  // the tree computes the bounding box itself
   }
 };
 

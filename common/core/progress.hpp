@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long work reports where it is.
+// Progress: the callback by which a long computation reports how far it is.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,8 @@
 
 namespace brainshift {
 
-// Called with the stage's name and the fraction done in [0, 1]; may be empty.
+// Called with the name of the stage and the fraction done in [0, 1]. An empty function is
+// allowed.
 using Progress = std::function<void(std::string_view stage, double fraction)>;
 
 inline void report(const Progress& progress, std::string_view stage, double fraction) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers that depend on the seed alone: std::mt19937_64 is specified bit for bit, the standard
-// distributions are not, so the conversions are here.
+// Random numbers that depend on the seed alone. The standard specifies std::mt19937_64 bit for
+// bit but not the distributions, so the conversions are written here.
 #pragma once
 
 #include <algorithm>
@@ -34,11 +34,12 @@ class Random {
     const double r = std::sqrt(1.0 - z * z);
     return {r * std::cos(angle), r * std::sin(angle), z};
   }
-  // 0-based index below count.
+  // 0-based index in [0, count).
   std::uint64_t index(std::uint64_t count) {
     return static_cast<std::uint64_t>(uniform() * static_cast<double>(count));
   }
-  // `count` distinct indices below `total`, in random order (Fisher-Yates); all of them if count >= total.
+  // `count` distinct indices in [0, total), in random order (Fisher-Yates). All of them if
+  // count >= total.
   std::vector<int> choose(int count, int total) {
     std::vector<int> indices(static_cast<std::size_t>(total));
     std::iota(indices.begin(), indices.end(), 0);

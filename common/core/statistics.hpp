@@ -8,7 +8,7 @@
 
 namespace brainshift {
 
-// Mean and sample standard deviation (n-1); zero for fewer than one / two values.
+// Mean and sample standard deviation (n-1). Mean of no value: 0. Deviation of fewer than two: 0.
 struct MeanStd {
   double mean = 0.0;
   double std = 0.0;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // ThreadTeam: a fixed number of threads that work on the same task, each on its own fixed part.
 //
-// Part i of a task always runs on the same member and always covers the same items, so results do not depend
-// on timing. The caller is member 0; the others sleep between tasks. run() neither allocates nor throws.
+// Part i of a task always runs on the same member and always covers the same items, so results do
+// not depend on timing. The caller is member 0; the other members sleep between tasks. run()
+// neither allocates nor throws.
 #pragma once
 
 #include <atomic>
@@ -13,7 +14,7 @@ namespace brainshift {
 
 class ThreadTeam {
  public:
-  // At least 1; 0 means as many as the machine has cores.
+  // Number of threads, the caller included. 0 or less: as many as the machine has cores.
   explicit ThreadTeam(int members = 0);
   ~ThreadTeam();
   ThreadTeam(const ThreadTeam&) = delete;
@@ -21,8 +22,8 @@ class ThreadTeam {
 
   int size() const { return static_cast<int>(threads_.size()) + 1; }
 
-  // Calls task(member) once for every member in [0, size()) and returns when all are done. One caller at a
-  // time; the task must not throw.
+  // Calls task(member) once for every member in [0, size()) and returns when all are done. Only
+  // one thread at a time may call it, and the task must not throw.
   template <typename Task>
   void run(Task& task) {
     run([](void* context, int member) { (*static_cast<Task*>(context))(member); }, &task);

@@ -2,8 +2,9 @@
 // Vocabulary types shared by every stage.
 //
 // Frame: patient RAS in millimetres, everywhere. Transforms are named T_target_source and
-// left-multiply: x_target = T_target_source * x_source. A displacement u moves an undeformed point to
-// its deformed place ("modelling" direction). Internal units are mm, N, s (stress N/mm^2 = MPa).
+// left-multiply: x_target = T_target_source * x_source. A displacement u moves an undeformed
+// point to its deformed place ("modelling" direction). Internal units: mm, N, s (stress N/mm^2 =
+// MPa).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Biot consolidation in time: backward Euler, steps of any size, one factor kept per step size (paper eq. 1-3).
+// BiotStepper: Biot consolidation in time by backward Euler (paper eq. 1-3). Steps may have any
+// size; one factor is kept per step size.
 //
 //   K u - G p = f                                          K, G, H, M, P: biot_matrix.hpp
 //   G^T (u - u0) + dt H p + (M + P)(p - p0) = dt q         u0, p0: state before the step
 //
-// A sudden load at t = 0 is a step with that load from the state of rest; with incompressible constituents the first,
-// short step then gives the undrained pressure. First order in dt, and stable for every dt > 0.
+// A sudden load at t = 0 is a step with that load from the state of rest. With incompressible
+// constituents the first, short step then gives the undrained pressure. First order in dt; stable
+// for every dt > 0.
 //
-// Boundaries: displacements fixed in DofMap and pressures of drained nodes are prescribed, zero unless the load says
-// otherwise; every other boundary is stress-free and sealed, plus the nodal forces and sources of the load.
+// Boundaries: displacements that DofMap fixes and pressures of drained nodes are prescribed, with
+// value zero unless the load gives another. Every other boundary is stress-free and sealed, apart
+// from the nodal forces and sources of the load.
 #pragma once
 
 #include <map>
@@ -29,18 +32,19 @@ struct BiotState {
   }
 };
 
-// At the end of the step. An empty array is zero.
+// Loads and prescribed values at the end of the step. An empty array means zero.
 struct BiotLoad {
-  Points force;  // 3 x n consistent nodal forces, N: tractions, body forces (space_elasticity.hpp)
-  VecX
-      source;  // n consistent nodal inflow, mm^3/s: the paper's psi, and flow in through the boundary
+  // 3 x n consistent nodal forces, N: tractions, body forces (space_elasticity.hpp).
+  Points force;
+  // n consistent nodal inflow, mm^3/s: the paper's psi, and flow in through the boundary.
+  VecX source;
   Points displacement;  // 3 x n, read along the directions that DofMap fixes, mm
   VecX pressure;        // n, read at drained nodes, N/mm^2
 };
 
 struct BiotOptions {
   bool stabilise = true;  // below the step of Vermeer and Verruijt, biot_matrix.hpp
-  int kept_factors = 4;   // step sizes whose factor is kept; the one used longest ago goes first
+  int kept_factors = 4;   // step sizes whose factor is kept; the least recently used goes first
 };
 
 // What the last step did.
@@ -56,17 +60,20 @@ struct BiotDiagnostics {
 
 class BiotStepper {
  public:
-  // drained: nodes whose pressure is prescribed. kInvalidArgument names the material, tetrahedron or node at fault:
-  // S >= 0, k >= 0, 0 <= alpha <= 1, shear > 0, lambda + 2/3 shear > 0, indices in range.
+  // drained: nodes whose pressure is prescribed. kInvalidArgument names the material, tetrahedron
+  // or node that breaks a rule: S >= 0, k >= 0, 0 <= alpha <= 1, shear > 0,
+  // lambda + 2/3 shear > 0, indices in range.
   static Result<BiotStepper> build(const TetMesh& mesh, const MaterialMap& materials,
                                    const DofMap& dofs, const std::vector<NodeIndex>& drained,
                                    const BiotOptions& options = {});
 
-  // State after dt seconds. kInvalidArgument (dt, array sizes), kNotFinite, and as SymmetricIndefinite.
+  // State after dt seconds. kInvalidArgument (dt, array sizes), kNotFinite, and the errors of
+  // SymmetricIndefinite.
   Result<BiotState> step(const BiotState& state, const BiotLoad& load, double dt_s);
   const BiotDiagnostics& diagnostics() const { return diagnostics_; }
 
-  // K u - G p at every node, 3 x n, N: external forces plus, along fixed directions, the reactions of the supports.
+  // K u - G p at every node, 3 x n, N: the external forces plus, along fixed directions, the
+  // reactions of the supports.
   Points internal_force(const BiotState& state) const;
 
   const TetMesh& mesh() const { return mesh_; }

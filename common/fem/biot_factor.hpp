@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // BiotFactor: displacement after one backward-Euler step from rest, with the pressure eliminated:
 //
-//   u = K_b^-1 f,   K_b = K + G (dt H + M + P)^-1 G^T        symmetric positive definite (biot_matrix.hpp)
+//   u = K_b^-1 f,   K_b = K + G (dt H + M + P)^-1 G^T      symmetric positive definite
 //
-// so whatever is done with a factor of K (contact stiffness, adjoints, covariances) can be done with this one. K_b is
-// dense and never formed: a solve is one with the factor of the whole matrix.
+// with the blocks of biot_matrix.hpp. So whatever works with a factor of K (contact stiffness,
+// adjoints, covariances) works with this one too. K_b is dense and never formed: a solve is one
+// with the factor of the whole matrix.
 #pragma once
 
-#include "common/values/case_config.hpp"
 #include "common/fem/biot_matrix.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
+#include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
 
@@ -18,11 +19,11 @@ class BiotFactor {
   // Errors as SymmetricIndefinite::factorise.
   static Result<BiotFactor> factorise(BiotMatrix matrix);
 
-  // Another stiffness of the same pattern (K_p for K); the pressure's blocks stay.
+  // Puts another stiffness of the same pattern (K_p) in the place of K. The pressure blocks stay.
   Status refactorise(const linalg::SymmetricMatrix& stiffness);
   BiotFactor clone_analysis() const;
 
-  // A solve that fails its guards (SymmetricIndefinite::solve) leaves NaN everywhere.
+  // A solve that fails its checks (SymmetricIndefinite::solve) returns NaN everywhere.
   void solve(const VecX& b, VecX& x) const;
   void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const;
 

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The matrix of one backward-Euler step of Biot consolidation on P1-P1 tetrahedra (paper eq. 1-2), symmetric
-// quasi-definite:
+// The matrix of one backward-Euler step of Biot consolidation on P1-P1 tetrahedra (paper eq.
+// 1-2). It is symmetric quasi-definite:
 //
-//   [ K    -G          ] [ u ]      K  drained stiffness            G_ij = integral of alpha N_j div v_i
-//   [ -G^T -(dt H+M+P) ] [ p ]      H  = k grad N . grad N          M = S N N,  P stabilisation
+//   [ K    -G          ] [ u ]     K  drained stiffness        G_ij = int alpha N_j div v_i
+//   [ -G^T -(dt H+M+P) ] [ p ]     H  = k grad N . grad N      M = S N N,  P stabilisation
 //
-// Order of unknowns: displacements as in DofMap, then the pressure of every node that is not drained, by node index.
+// Order of unknowns: displacements as in DofMap, then the pressure of every node that is not
+// drained, by node index.
 // Units: mm, N, s; pressure N/mm^2.
 //
-// Stabilisation. Equal-order pressure oscillates when the step is below the bound of Vermeer and Verruijt (1981, Int.
-// J. Numer. Anal. Methods Geomech. 5:1), h^2 / (6 c_v). There the element gets the polynomial pressure projection of
-// Bochev, Dohrmann and Gunzburger (2006) as White and Borja (2008, CMAME 197:4353) use it, on the increment of p:
+// Stabilisation. Equal-order pressure oscillates when the step is below the bound of Vermeer and
+// Verruijt (1981, Int. J. Numer. Anal. Methods Geomech. 5:1), h^2 / (6 c_v). Below the bound the
+// element gets the polynomial pressure projection of Bochev, Dohrmann and Gunzburger (2006), in
+// the form of White and Borja (2008, CMAME 197:4353), on the increment of p:
 //
-//   P_ij = theta alpha^2 / (2 G) integral (N_i - mean N_i)(N_j - mean N_j),    theta = max(0, 1 - dt / bound)
+//   P_ij = theta alpha^2 / (2 G) integral (N_i - mean N_i)(N_j - mean N_j)
+//   theta = max(0, 1 - dt / bound)
 //
-// theta lets the term fade in, so that the solution is continuous in dt. h is the edge of the regular tetrahedron of
-// the element's volume, c_v = k / (S + alpha^2 / (lambda + 2 G)).
+// theta fades the term in, so that the solution is continuous in dt. h is the edge of the regular
+// tetrahedron with the element's volume; c_v = k / (S + alpha^2 / (lambda + 2 G)).
 #pragma once
 
 #include <vector>
@@ -35,13 +38,14 @@ struct PressureMap {
   PressureMap(int num_nodes, const std::vector<NodeIndex>& drained);
 };
 
-// c_v, mm^2/s; 0 without permeability. Infinite for an element that neither stores nor couples (S = alpha = 0).
+// c_v, mm^2/s. 0 without permeability; infinite for an element that neither stores nor couples
+// (S = alpha = 0).
 double consolidation_coefficient(const PoroMaterial& material);
 // h^2 / (6 c_v) of one element, seconds; infinite without permeability.
 double vermeer_verruijt_step_s(const PoroMaterial& material, double volume_mm3);
 
-// Element matrices for the four local nodes. p-p terms; `coupling` is 3 x 4: rows axis a, G_(i a)j is the same for
-// every j: column i holds alpha V / 4 grad N_i.
+// Element matrices for the four local nodes. `coupling` is 3 x 4: G_(i a)j, for node i, axis a
+// and pressure node j, is the same for every j, so column i holds alpha V / 4 grad N_i.
 struct BiotElement {
   Eigen::Matrix4d diffusion;      // H
   Eigen::Matrix4d storage;        // M
@@ -56,10 +60,10 @@ struct BiotMatrix {
   int displacement_unknowns = 0, pressure_unknowns = 0;
   int stabilised_tets = 0;  // elements with theta > 0
 };
-// Precondition: checked materials, dt_s > 0 and finite (biot.hpp checks).
+// Precondition: valid materials, dt_s > 0 and finite (BiotStepper checks them).
 BiotMatrix assemble_biot(const TetMesh& mesh, const MaterialMap& materials, const DofMap& dofs,
                          const PressureMap& pressure, double dt_s, bool stabilise = true);
-// Puts another stiffness of the same pattern, K_p say, in the place of K.
+// Puts another stiffness of the same pattern (K_p, for example) in the place of K.
 void replace_stiffness(BiotMatrix& matrix, const linalg::SymmetricMatrix& stiffness);
 
 }  // namespace brainshift::fem

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// BlockSolver: K^-1 of several nodal load columns at once; one per thread, sharing the factor.
+// BlockSolver: K^-1 applied to several nodal load columns at once. One per thread; the threads
+// share the factor.
 #pragma once
 
 #include "common/core/error.hpp"
@@ -11,9 +12,11 @@ namespace brainshift::fem {
 class BlockSolver {
  public:
   // Keeps references to all three. stiffness: the matrix of the factor.
-  BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor, const DofMap& dofs);
+  BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor,
+              const DofMap& dofs);
 
-  // U = T K^-1 T^T F; columns are nodal vectors, node-major, 3n rows; F in N, U in mm. Errors as check_many.
+  // U = T K^-1 T^T F. Columns are nodal vectors, node-major, 3n rows; F in N, U in mm. Errors as
+  // check_many.
   Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
 
  private:

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Does a displacement turn elements inside out?
+// Volume ratio of the elements under a displacement: does it turn elements inside out?
 //
-//   J = det F = V(x + u) / V(x),    F = I + grad u      constant in a linear tetrahedron; inverted: J <= 0
+//   J = det F = V(x + u) / V(x),   F = I + grad u      constant in a tetrahedron; inverted: J <= 0
 //
-// Small-strain elasticity does not know: it stretches a tetrahedron through itself without a sign of trouble. J is
-// what tells that an answer left the range in which it means something.
+// Small-strain elasticity stretches a tetrahedron through itself without any sign of trouble. J
+// tells when an answer has left the range in which it has a meaning.
 #pragma once
 
 #include <vector>
@@ -16,19 +16,20 @@ namespace brainshift::fem {
 
 struct Deformation {
   double min_volume_ratio = 1.0;  // the smallest J; NaN where u is not finite
-  int worst_tet = -1;             // that has it; -1 without tetrahedra
+  int worst_tet = -1;             // the tetrahedron with the smallest J; -1 without tetrahedra
   int inverted = 0;               // tetrahedra with J <= 0 or not finite
 };
 
 // u: 3 x n, mm.
 Deformation measure_deformation(const TetMesh& mesh, const Points& u);
 
-// The same for many displacements of one mesh, 3 to 4 ns per tetrahedron and core: in single precision, and again in
-// double wherever J comes out below 0.1 or the element is so flat that single precision would not tell. So
-// `inverted` is exact and min_volume_ratio good to 1 %. Does not allocate after construction. Not thread-safe.
+// The same for many displacements of one mesh, 3 to 4 ns per tetrahedron and core. It computes in
+// single precision, and again in double where J is below 0.1 or the element is so flat that
+// single precision cannot decide. So `inverted` is exact and min_volume_ratio is good to 1 %.
+// Does not allocate after construction. Not thread-safe.
 class DeformationCheck {
  public:
-  // team: that will call measure(); keeps a reference. Copies the mesh.
+  // team: the threads that measure() runs on; keeps a reference. Copies the mesh.
   DeformationCheck(const Points& nodes, const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets,
                    ThreadTeam& team);
   Deformation measure(const Points& u);
@@ -42,7 +43,7 @@ class DeformationCheck {
   Eigen::Matrix<int, 4, Eigen::Dynamic> tets_;
   Vec3 centre_;
   Eigen::Matrix<float, 4, Eigen::Dynamic> deformed_;  // x + u - centre, 0
-  std::vector<float> inverse_volume_;                 // 1 / 6V; NaN: in double always
+  std::vector<float> inverse_volume_;                 // 1 / 6V; NaN: always in double
   std::vector<Deformation> parts_;                    // one per member of the team
 };
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Prescribed displacements, gathered node by node: n . u = value along any number of directions.
+// DisplacementConstraints: prescribed displacements n . u = value, gathered node by node, along
+// any number of directions.
 //
-// Directions of a node are made orthonormal one after the other; they become the first axes of its frame and are
-// eliminated exactly (dof_map.hpp). Values enter as a lift: u = T q + lift, so that K q = T^T (f - K lift).
-// A node whose directions are coordinate axes keeps the identity frame.
+// The directions of a node are made orthonormal one after the other. They become the first axes
+// of its frame and are eliminated exactly (dof_map.hpp). Values enter as a lift: u = T q + lift,
+// so that T^T K T q = T^T (f - K lift). A node whose directions are coordinate axes keeps the
+// identity frame.
 #pragma once
 
 #include <string>
@@ -23,8 +25,9 @@ class DisplacementConstraints {
  public:
   explicit DisplacementConstraints(int num_nodes);
 
-  // n . u = value at a node; n of length one. `source` is what messages name. A direction that others of the node
-  // span already must agree with them: kInvalidArgument naming both sources.
+  // n . u = value at a node; n of length one. Messages name `source`. A direction that the
+  // earlier directions of the node span must agree with them: otherwise kInvalidArgument, naming
+  // both sources.
   Status add(NodeIndex node, const Vec3& direction, double value, const std::string& source);
   Status add_all(NodeIndex node, const Vec3& value, const std::string& source);
 

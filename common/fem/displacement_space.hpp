@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DisplacementSpace: continuous displacements on tetrahedra, linear (P1) or quadratic (P2, straight edges).
+// DisplacementSpace: continuous displacements on tetrahedra, linear (P1) or quadratic (P2,
+// straight edges).
 //
-//   P1   N_k = l_k                                             4 nodes: the vertices
-//   P2   N_k = l_k (2 l_k - 1), N_ab = 4 l_a l_b               10 nodes: vertices, then the middles of the edges
+//   P1   N_k = l_k                                    4 nodes: the vertices
+//   P2   N_k = l_k (2 l_k - 1), N_ab = 4 l_a l_b      10 nodes: vertices, then edge midpoints
 //
-// l_k: barycentric coordinates. Order of nodes: the mesh's vertices with their own indices, then one node per edge,
-// edges in increasing order of (lower, higher) vertex. Order in an element: vertices 0..3, then edges 01 12 02 03 13
-// 23 (VTK's quadratic tetrahedron); in a face: vertices 0..2, then edges 01 12 20.
+// l_k: barycentric coordinates. Order of nodes: the mesh's vertices with their own indices, then
+// one node per edge, edges in increasing order of (lower, higher) vertex. Order in an element:
+// vertices 0..3, then edges 01 12 02 03 13 23 (VTK's quadratic tetrahedron). Order in a face:
+// vertices 0..2, then edges 01 12 20.
 // P1 locks towards nu = 0.5; P2 does not (docs/decisions/0010-locking-free-element.md).
 #pragma once
 
@@ -48,7 +50,8 @@ DisplacementSpace make_space(TetMesh mesh, Element element);
 std::array<int, kMaxFaceNodes> face_nodes(const DisplacementSpace& space,
                                           const Eigen::Vector3i& vertices);
 
-// N_k, and their gradients in mm^-1 (columns; `vertex_gradients`: TetGeometry::gradients), at a barycentric point.
+// N_k at a barycentric point, and their gradients in mm^-1 (one column each). vertex_gradients:
+// TetGeometry::gradients.
 ShapeValues shape_values(Element element, const Eigen::Vector4d& l);
 ShapeGradients shape_gradients(Element element, const Eigen::Matrix<double, 3, 4>& vertex_gradients,
                                const Eigen::Vector4d& l);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // DofMap: from nodal vectors to the unknowns of the linear system.
 //
-// Every node carries an orthonormal frame R (columns = local axes in RAS). Most frames are the identity.
-// At a normal-fixed node the first axis is the boundary normal and its displacement is zero *exactly*: the
-// degree of freedom is rotated and eliminated, no penalty is involved; the two tangential ones stay free.
+// Every node carries an orthonormal frame R (columns = local axes in RAS). Most frames are the
+// identity. At a normal-fixed node the first axis is the boundary normal, and the displacement
+// along it is zero *exactly*: the degree of freedom is rotated and eliminated, without any
+// penalty. The two tangential ones stay free.
 //
 //   u_node = R q_node,   q = (constrained: 0, free: unknowns)     expand:   q -> u   (u = T q)
 //                                                                 restrict: f -> T^T f
@@ -26,7 +27,8 @@ class DofMap {
   void fix_normal(NodeIndex node, const Vec3& normal);
   // Fixes the displacement along two orthonormal directions.
   void fix_plane(NodeIndex node, const Vec3& first, const Vec3& second);
-  // Fixes one component in RAS; others may follow. Precondition: the node's frame is the identity.
+  // Fixes one component in RAS; others may follow. Precondition: the node's frame is the
+  // identity.
   void fix_component(NodeIndex node, int axis);
   // Fixes all three components.
   void fix_all(NodeIndex node);

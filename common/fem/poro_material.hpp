@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Materials of a body made of several tissues: one PoroMaterial per region, one region per tetrahedron.
+// Materials of a body of several tissues: one PoroMaterial per region, one region per
+// tetrahedron.
 //
-//   -div(sigma(u) - alpha p I) = f,     d/dt(alpha div u + S p) - div(k grad p) = 0        (paper eq. 1-2)
+//   -div(sigma(u) - alpha p I) = f,   d/dt(alpha div u + S p) - div(k grad p) = 0  (paper eq. 1-2)
 //
-// Drained elasticity reads `elastic` alone.
+// Drained elasticity uses `elastic` alone.
 #pragma once
 
 #include <vector>
@@ -19,7 +20,7 @@ struct PoroMaterial {
   double permeability = 0.0;      // k: hydraulic conductivity over unit weight, mm^4/(N s)
 };
 
-// Of a case, in internal units.
+// The material of a case, in internal units.
 PoroMaterial poro_material_from(const Material& material);
 
 // of_tet: one index into `materials` per tetrahedron.

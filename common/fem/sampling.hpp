@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sampling matrix A (paper eq. 4): model displacement at points inside the mesh, by linear interpolation.
+// Sampling matrix A (paper eq. 4): displacement at points inside the mesh, by linear
+// interpolation.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -10,11 +11,12 @@
 
 namespace brainshift::fem {
 
-// Scalar weights, m x n: row i holds the (up to four) barycentric weights of point i. The paper's A is this
-// matrix applied to each component: A u = u * weights^T with u 3 x n.
+// Scalar weights, m x n: row i holds the (up to four) barycentric weights of point i. The paper's
+// A applies this matrix to each component: A u = u * weights^T with u 3 x n.
 using SamplingMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// kInvalidArgument naming the first point farther than tolerance_mm outside the mesh, with its distance.
+// kInvalidArgument names the first point that lies farther than tolerance_mm outside the mesh,
+// with its distance.
 Result<SamplingMatrix> sampling_matrix(const geometry::TetLocator& locator, int num_nodes,
                                        const Points& points, double tolerance_mm);
 

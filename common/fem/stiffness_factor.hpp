@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// StiffnessFactor: what solves K u = f for the displacement, whichever physics K holds.
+// StiffnessFactor: solves K u = f for the displacement, with or without pressure in K.
 //
 //   SparseCholesky   drained elasticity
 //   BiotFactor       one step of consolidation, pressure eliminated
 //
-// Both are symmetric positive definite in u and can be refactorised with a stiffness of the same pattern (K_p).
+// Both are symmetric positive definite in u and can be refactorised with a stiffness of the same
+// pattern (K_p).
 #pragma once
 
 #include <utility>
@@ -24,11 +25,13 @@ class StiffnessFactor {
   explicit StiffnessFactor(linalg::SparseCholesky factor) : factor_(std::move(factor)) {}
   explicit StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}
 
-  // The factor of drained elasticity; none with pressure.
-  const linalg::SparseCholesky* drained() const { return std::get_if<linalg::SparseCholesky>(&factor_); }
+  // The factor of drained elasticity; nullptr for one with pressure.
+  const linalg::SparseCholesky* drained() const {
+    return std::get_if<linalg::SparseCholesky>(&factor_);
+  }
   bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
 
-  // As SparseCholesky. With pressure, a solve that fails its guards is NaN everywhere.
+  // As SparseCholesky. With pressure, a solve that fails its checks is NaN everywhere.
   Status refactorise(const linalg::SymmetricMatrix& stiffness) {
     return std::visit([&](auto& f) { return f.refactorise(stiffness); }, factor_);
   }
@@ -80,9 +83,9 @@ class StiffnessFactor {
   std::variant<linalg::SparseCholesky, BiotFactor> factor_;
 };
 
-// x = K^-1 b, as linalg::checked_solve. With pressure, the matrix of the factor is never formed. Its
-// factor has checked itself (symmetric_indefinite.hpp) and leaves NaN where it refused: the answer is
-// then kNotFinite, otherwise a backward error of 0.
+// x = K^-1 b, as linalg::checked_solve. With pressure the matrix of the factor is never formed.
+// Its factor has checked itself (symmetric_indefinite.hpp) and returns NaN where it rejected the
+// solve. Then the error is kNotFinite; otherwise the backward error is given as 0.
 Result<linalg::SolveQuality> checked_solve(const linalg::SymmetricMatrix& lower, double norm,
                                            const StiffnessFactor& factor, const VecX& b, VecX& x);
 // The same for the columns of B, after factor.solve_many(B, X, workspace).

@@ -4,19 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
+#include "common/core/stopwatch.hpp"
 #include "common/fem/biot.hpp"
 
 namespace brainshift::forward {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void add_stabilised(int step, int tets, double dt_s, double bound_s, ForwardSolution& solution) {
   if (tets == 0) return;
@@ -29,7 +23,7 @@ void add_stabilised(int step, int tets, double dt_s, double bound_s, ForwardSolu
 
 Result<ForwardSolution> consolidate(const ForwardProblem& problem, Discretised discretised,
                                     const Progress& progress) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   if (Status ok = check_supports(discretised); !ok) return tl::unexpected(ok.error());
   const fem::ConstrainedDofs constrained = discretised.constraints.build();
   std::vector<NodeIndex> drained;
@@ -46,9 +40,9 @@ Result<ForwardSolution> consolidate(const ForwardProblem& problem, Discretised d
   solution.space = std::move(discretised.space);
   solution.unknowns = constrained.dofs.num_unknowns() + solution.space.num_nodes() -
                       static_cast<int>(drained.size());
-  solution.assemble_s = seconds_since(start);
+  solution.assemble_s = watch.seconds();
 
-  const auto solve_start = Clock::now();
+  const Stopwatch solve_watch;
   fem::BiotState state = fem::BiotState::at_rest(solution.space.num_nodes());
   solution.rcond = 1.0;
   double time_s = 0.0;
@@ -74,7 +68,7 @@ Result<ForwardSolution> consolidate(const ForwardProblem& problem, Discretised d
   }
   report(progress, "time steps", 1.0);
   solution.iterations = static_cast<int>(problem.steps_s.size());
-  solution.solve_s = seconds_since(solve_start);
+  solution.solve_s = solve_watch.seconds();
 
   solution.displacement = state.displacement;
   solution.element_stress =

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ForwardProblem and ForwardSolution: one elastic body on any tetrahedral mesh, its conditions, and what became of it.
+// ForwardProblem and ForwardSolution: one elastic body on any tetrahedral mesh, with its
+// conditions, and the solution.
 //
-//   div sigma(u) + b = 0 in the body,   u or sigma n = t on parts of its boundary,   contact with rigid obstacles
+//   div sigma(u) + b = 0 in the body
+//   u or sigma n = t on parts of its boundary, contact with rigid obstacles on others
 //
-// Small strains. Drained steady state, or with steps_s consolidation from rest (fem/biot.hpp): all loads act from t = 0
-// on, and boundaries without a prescribed pore pressure are sealed. Units mm, N. Conditions and contacts name groups; each has a name of its own,
-// which messages begin with ("conditions.NAME: ...", "contact.NAME: ...").
+// Small strains. Without steps_s: drained steady state. With steps_s: consolidation from rest
+// (fem/biot.hpp), where all loads act from t = 0 on, and boundaries without a prescribed pore
+// pressure are sealed. Units mm, N. Conditions and contacts name groups. Each has a name of its
+// own, and messages begin with it ("conditions.NAME: ...", "contact.NAME: ...").
 #pragma once
 
 #include <array>
@@ -22,8 +25,9 @@
 
 namespace brainshift::forward {
 
-// Part of the boundary. faces: vertices, oriented outwards; vertices may hold some that belong to no face. inner:
-// faces inside the body, which have no outward side; displacements can be prescribed on them, nothing else.
+// Part of the boundary. vertices: may hold some that belong to no face. faces: 3 x f vertices,
+// oriented outwards. inner: faces inside the body, which have no outward side; only displacements
+// can be prescribed on them.
 struct FaceGroup {
   std::vector<NodeIndex> vertices;
   Eigen::Matrix<int, 3, Eigen::Dynamic> faces, inner;
@@ -36,20 +40,20 @@ struct Displacement {
 struct DisplacementField {
   fem::VectorField u;
 };
-// n . u, n: the group's own mean nodal normal (0: free to slide, exactly). Flat faces that meet at an angle need
-// groups of their own.
+// n . u = value (0: free to slide, exactly), with n the mean nodal normal of this group alone.
+// Flat faces that meet at an angle need one group each.
 struct NormalDisplacement {
   double value = 0.0;
 };
 struct Traction {
   fem::VectorField t;  // N/mm^2
 };
-// Pushes against the outward normal, N/mm^2.
+// Pressure against the outward normal, N/mm^2.
 struct Pressure {
   double value = 0.0;
 };
 
-// Prescribed, N/mm^2; 0: drained. Problems with time steps only.
+// Prescribed pore pressure, N/mm^2; 0: drained. Problems with time steps only.
 struct PorePressure {
   double value = 0.0;
 };
@@ -84,7 +88,7 @@ struct ContactResult {
   int points = 0, active = 0;       // quadrature points
   Vec3 force = Vec3::Zero();        // on the body, N
   double area_mm2 = 0.0;            // of the active points
-  double max_penetration_mm = 0.0;  // what the penalty leaves
+  double max_penetration_mm = 0.0;  // that the penalty leaves
   double max_pressure = 0.0;        // N/mm^2
 };
 
@@ -110,15 +114,16 @@ struct ForwardSolution {
   double assemble_s = 0.0, solve_s = 0.0;
 };
 
-// Ok, or the first thing wrong with the problem itself, support included (kFloatingBody).
+// Ok, or the first error of the problem itself, missing support included (kFloatingBody).
 Status validate(const ForwardProblem& problem);
 
-// kappa = 100 E / h: E of the stiffest tissue at the group, h its mean edge; the penetration it leaves is below a
-// hundredth of an edge's own compression.
+// kappa = 100 E / h, with E of the stiffest tissue at the group and h its mean edge. The
+// penetration that remains is below a hundredth of the compression of one edge.
 double default_penalty(const ForwardProblem& problem, const FaceGroup& group);
 
-// What any solver of the problem starts from: nodes, prescribed displacements, and the consistent nodal forces (3 x n,
-// N) of body forces, tractions and pressures, contact aside. Fails as validate, or on a contradiction.
+// What any solver of the problem starts from: nodes, prescribed displacements, and the consistent
+// nodal forces (3 x n, N) of body forces, tractions and pressures, without contact. Errors as
+// validate; kInvalidArgument for prescribed displacements that contradict each other.
 struct Discretised {
   fem::DisplacementSpace space;
   fem::DisplacementConstraints constraints;
@@ -130,7 +135,7 @@ Result<Discretised> discretise(const ForwardProblem& problem);
 // kInvalidArgument, kFloatingBody, kSingularMatrix, kNotFinite, kNotConverged.
 Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress = {});
 
-// Displacement at a point. kInvalidArgument when it lies more than tolerance_mm outside.
+// Values at points. kInvalidArgument: a point lies more than tolerance_mm outside.
 struct ProbeValue {
   Vec3 displacement = Vec3::Zero();
   double contact_pressure = 0.0;  // N/mm^2, of the nearest face point, 0 away from contact

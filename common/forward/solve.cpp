@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <set>
 #include <utility>
 
 #include "common/contact/unilateral_solver.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/forward/consolidate.hpp"
 #include "common/forward/forward_problem.hpp"
 #include "common/forward/support.hpp"
@@ -14,12 +14,6 @@
 
 namespace brainshift::forward {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Nodes of a group in the space: its vertices, and with P2 the middles of its faces' edges.
 std::set<int> nodes_of(const fem::DisplacementSpace& space, const FaceGroup& group) {
@@ -235,7 +229,7 @@ Result<Discretised> discretise(const ForwardProblem& problem) {
 }
 
 Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& progress) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   report(progress, "assemble", 0.0);
   auto discretised = discretise(problem);
   if (!discretised) return tl::unexpected(discretised.error());
@@ -261,14 +255,14 @@ Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& pro
       fem::assemble_stiffness(space, problem.materials, constrained.dofs);
   const Points lifted = load - fem::internal_force(space, problem.materials, constrained.lift);
   solution.unknowns = constrained.dofs.num_unknowns();
-  solution.assemble_s = seconds_since(start);
+  solution.assemble_s = watch.seconds();
   report(progress, "assemble", 1.0);
 
-  const auto solve_start = Clock::now();
+  const Stopwatch solve_watch;
   auto found =
       contact::solve_unilateral(stiffness, constrained, *contact, lifted, options, progress);
   if (!found) return tl::unexpected(found.error());
-  solution.solve_s = seconds_since(solve_start);
+  solution.solve_s = solve_watch.seconds();
   solution.displacement = std::move(found->displacement);
   solution.iterations = found->iterations;
   solution.relative_residual = found->relative_residual;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Can the body still move as a rigid one? Answered from the directions that are held, not from a pivot.
+// Check that a body cannot move rigidly. It looks at the directions that are held, not at a
+// pivot.
 #pragma once
 
 #include <vector>
@@ -15,8 +16,9 @@ struct HeldDirection {
   Vec3 direction;
 };
 
-// kFloatingBody, saying how many of the six rigid motions are free, unless the directions hold them all. Rotations are
-// weighed by the size of the body (mm), so that the answer does not depend on the unit of length.
+// Ok when the directions hold all six rigid motions; otherwise kFloatingBody, with the number of
+// motions that are free. Rotations are weighted by the size of the body (mm), so that the answer
+// does not depend on the unit of length.
 Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm);
 
 }  // namespace brainshift::forward

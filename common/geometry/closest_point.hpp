@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closest point on a triangle surface, by an AABB tree built once (CGAL). Queries are thread-safe.
+// Closest point on a triangle surface, by an AABB tree built once (CGAL). Queries are
+// thread-safe.
 //
 // Triangles without area are ignored: their points lie on their neighbours' edges.
 #pragma once
@@ -19,24 +20,26 @@ struct ClosestPoint {
 
 class ClosestPointIndex {
  public:
-  // kEmptySet when the surface has no triangle, or none with an area; kNotFinite when a vertex is not
-  // finite; kInvalidArgument when a triangle names a vertex that does not exist. Copies the surface.
+  // kEmptySet: the surface has no triangle, or none with an area. kNotFinite: a vertex is not
+  // finite. kInvalidArgument: a triangle names a vertex that does not exist. Copies the surface.
   static Result<ClosestPointIndex> build(const TriangleSurface& surface);
   ClosestPointIndex(ClosestPointIndex&&) noexcept;
   ClosestPointIndex& operator=(ClosestPointIndex&&) noexcept;
   ~ClosestPointIndex();
 
-  // Precondition: the query is finite. On an edge or vertex, any of the triangles that meet there.
+  // Precondition: the query is finite. On an edge or vertex: any of the triangles that meet
+  // there.
   ClosestPoint closest(const Vec3& query) const;
   const TriangleSurface& surface() const;
   // Unit outward normal of a triangle.
   Vec3 triangle_normal(int triangle) const;
-  // Unit outward normal at a closest point: of the triangle, of both triangles at an edge (mean), or of all
-  // triangles at a vertex (mean weighted by angle). Its sign against (query - point) tells inside from
-  // outside at edges and vertices too, where one triangle's normal may not (Baerentzen & Aanaes 2005).
+  // Unit outward normal at a closest point: of the triangle; of both triangles at an edge (mean);
+  // or of all triangles at a vertex (mean weighted by angle). The sign of its product with
+  // (query - point) tells inside from outside, also at edges and vertices, where the normal of
+  // one triangle may not (Baerentzen & Aanaes 2005).
   Vec3 pseudo_normal(const ClosestPoint& closest) const;
-  // True when the query lies inside the closed surface: majority over three rays of an odd number of
-  // crossings. On the surface itself the answer may be either.
+  // True when the query lies inside the closed surface: majority over three rays of an odd number
+  // of crossings. On the surface itself the answer may be either.
   bool contains(const Vec3& query) const;
 
  private:

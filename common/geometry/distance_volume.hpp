@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Distance to a closed surface and its gradient anywhere, by trilinear interpolation of a DistanceGrid: some ten
-// nanoseconds a point, where a search for the closest triangle takes about a microsecond.
+// DistanceVolume: distance to a closed surface and its gradient anywhere, by trilinear
+// interpolation of a DistanceGrid. About ten nanoseconds a point, where a search for the closest
+// triangle takes about a microsecond.
 //
-//   d(x) = sum over the 8 nodes of x's cell of their value times the product of (1 - |x - node|_axis / h)
-//   g(x) = the gradient of that same interpolant, of length close to 1; not continuous from cell to cell
+//   d(x) = sum over the 8 nodes of x's cell of value * product over axes (1 - |x - node|_axis / h)
+//   g(x) = the gradient of d, of length close to 1; not continuous from cell to cell
 //
-// Error of d against the surface itself: at most about h^2 / (4 R) beside a smooth surface of radius R, more within
-// a spacing of creases and of points that are equally far from several places of the surface.
-// Outside the grid the surface is taken to be where it is closest to the nearest point c of the grid:
-// p = c - d(c) g(c) / |g(c)|, d = |x - p|, g = (x - p) / d. Exact for a plane and a sphere, continuous at the rim.
+// Error of d against the surface itself: at most about h^2 / (4 R) near a smooth surface of
+// radius R. It is larger within a spacing of creases, and of points that are equally far from
+// several places of the surface.
+//
+// Outside the grid, let c be the nearest point of the grid and p = c - d(c) g(c) / |g(c)|, the
+// surface point closest to c. Then d = |x - p| and g = (x - p) / d. This is exact for a plane and
+// a sphere, and continuous at the rim of the grid.
 //
 // Precondition: finite points.
 #pragma once
@@ -19,7 +23,7 @@
 
 namespace brainshift::geometry {
 
-// One point per row: coordinates lie behind one another in memory, as loops over many points want them.
+// One point per row, so that each coordinate is contiguous in memory, for loops over many points.
 using PointRows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
 struct DistanceSample {
@@ -29,11 +33,11 @@ struct DistanceSample {
 
 class DistanceVolume {
  public:
-  // kEmptySet: a grid without values; otherwise the errors of validate(grid).
+  // kEmptySet: a grid without values. Otherwise the errors of validate(grid).
   static Result<DistanceVolume> create(DistanceGrid grid);
 
   DistanceSample at(const Vec3& x) const;
-  // The same for all points; distances and gradients must have as many rows. Does not allocate.
+  // The same for all points. Distances and gradients must have as many rows. Does not allocate.
   void at(const PointRows& points, VecX& distances_mm, PointRows& gradients) const;
   const DistanceGrid& grid() const { return grid_; }
 

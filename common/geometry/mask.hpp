@@ -7,20 +7,21 @@
 
 namespace brainshift::geometry {
 
-// 1 where the voxel is > 0 and belongs to the largest 6-connected component with its cavities filled,
-// else 0. A cavity is a 6-connected set of other voxels that does not reach the border of the image.
-// Of components with the same size the one with the lowest voxel index wins. NaN counts as not > 0.
-// Linear time, by run-length union-find. kEmptySet when no voxel is > 0.
+// 1 where the voxel is > 0 and belongs to the largest 6-connected component, or to a cavity of
+// it; else 0. A cavity is a 6-connected set of other voxels that does not reach the border of the
+// image. Of components with the same size, the one with the lowest voxel index wins. NaN counts
+// as not > 0. Linear time, by run-length union-find. kEmptySet when no voxel is > 0.
 Result<VoxelImage> largest_component(const VoxelImage& image);
 
-// Gaussian smoothing with standard deviation sigma_mm >= 0 (per axis in mm; zero outside the image).
-// Separable along the voxel axes, cut at 3.5 sigma and normalised; isotropic when the columns of the
-// affine are orthogonal. A sigma under a tenth of a voxel leaves that axis alone.
+// Gaussian smoothing with standard deviation sigma_mm >= 0 (per axis, mm). Voxels outside the
+// image count as zero. Separable along the voxel axes, cut off at 3.5 sigma and normalised;
+// isotropic when the columns of the affine are orthogonal. An axis whose sigma is less than a
+// tenth of a voxel is left as it is.
 VoxelImage gaussian_smooth(const VoxelImage& image, double sigma_mm);
 
-// Trilinear interpolation at a point (mm RAS). Voxels beyond the image count as 0, so the value falls
-// linearly to 0 within one voxel of the outermost centres. Class because it inverts the affine once.
-// Precondition: the affine is invertible.
+// Trilinear interpolation at a point (mm RAS). Voxels beyond the image count as 0, so the value
+// falls linearly to 0 within one voxel of the outermost centres. It is a class because it inverts
+// the affine once. Precondition: the affine is invertible.
 class Interpolator {
  public:
   explicit Interpolator(const VoxelImage& image);  // keeps a reference

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parts of a tetrahedral mesh that hang together by faces. Parts that only share a node or an edge would
-// turn about it like a hinge: for elasticity they are separate bodies.
+// Components of a tetrahedral mesh that are connected by faces. Parts that share only a node or
+// an edge could turn about it like a hinge: for elasticity they are separate bodies.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tetrahedra from a smooth brain mask, by CGAL Mesh_3 (Delaunay refinement, then perturbation/exudation).
+// Tetrahedra from a smooth brain mask, by CGAL Mesh_3 (Delaunay refinement, then
+// perturbation/exudation).
 //
-// The domain is {x : mask(x) >= level} with trilinear interpolation. Deterministic: the same input gives
-// the same mesh bit for bit on one machine (fixed seeds, and optimisation that stops at a quality bound,
-// never at a time limit). The surface is a closed manifold.
+// The domain is {x : mask(x) >= level} with trilinear interpolation. Deterministic: the same
+// input gives the same mesh bit for bit on one machine, because seeds are fixed and the
+// optimisation stops at a quality bound, never at a time limit. The surface is a closed manifold.
 //
 // Reference: Jamin, Alliez, Yvinec, Boissonnat, CGALmesh: a generic framework for Delaunay mesh
 // generation, ACM Trans. Math. Softw. 41 (2015).
@@ -25,15 +26,15 @@ struct MeshingOptions {
   double facet_angle_deg = 25.0;           // CGAL's guarantee needs <= 30
   double facet_distance_over_edge = 0.15;  // surface approximation error / edge
   double cell_radius_edge_ratio = 2.2;
-  // Optimisation stops when no dihedral angle is smaller; 0 leaves it out, when only the surface matters.
+  // Optimisation stops when no dihedral angle is smaller. 0: no optimisation, for callers that
+  // need only the surface.
   double sliver_bound_deg = 12.0;
 };
 
 // Nodes are numbered along a Morton (Z-order) curve and tetrahedra by their lowest node, so that
-// neighbours in space are neighbours in memory. Only the largest part that hangs together by faces is
-// kept, without unused nodes.
-// kEmptySet when the domain is empty; kDegenerateMesh when the result fails check_mesh (largest component
-// is kept first).
+// neighbours in space are neighbours in memory. Only the largest component (connected by faces)
+// is kept, without unused nodes.
+// kEmptySet: the domain is empty. kDegenerateMesh: the largest component fails check_mesh.
 Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
                           const MeshingOptions& options = {}, const Progress& progress = {});
 

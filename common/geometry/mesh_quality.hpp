@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Is this mesh fit for a finite-element model?
+// Quality figures of a tetrahedral mesh, and the check that it can carry a finite-element model.
 #pragma once
 
 #include "common/core/error.hpp"
@@ -17,9 +17,12 @@ struct MeshQuality {
 };
 MeshQuality mesh_quality(const TetMesh& mesh);
 
-// Ok, or one sentence that names the first offender: kNotFinite (node), kInvalidArgument (index out of
-// range), kDegenerateMesh (inverted or flat tetrahedron with its volume; several components; unused
-// nodes), kEmptySet (no tetrahedron). Flat means volume < 1e-9 x (longest edge)^3.
+// Ok, or one sentence that names the first offender.
+//   kNotFinite        a node
+//   kInvalidArgument  a node index out of range
+//   kDegenerateMesh   an inverted or flat tetrahedron, with its volume; several components; unused
+//                     nodes. Flat means volume < 1e-9 x (longest edge)^3.
+//   kEmptySet         no tetrahedron
 Status check_mesh(const TetMesh& mesh);
 
 }  // namespace brainshift::geometry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces of meshes: boundary extraction, normals, offset, sampling.
+// Triangle surfaces: boundary of a mesh, normals, offset, volume, sampling, plane sections.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace brainshift::geometry {
 
-// Faces that belong to exactly one tetrahedron, 3 x t mesh node indices, oriented outwards; in increasing
-// order of their sorted nodes. tet_of_triangle (optional) receives the tetrahedron of each.
-// Precondition: positively oriented tetrahedra.
+// Faces that belong to exactly one tetrahedron: 3 x t mesh node indices, oriented outwards, in
+// increasing order of their sorted nodes. tet_of_triangle (optional) receives the tetrahedron of
+// each face. Precondition: positively oriented tetrahedra.
 Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles(
     const TetMesh& mesh, std::vector<int>* tet_of_triangle = nullptr);
 
@@ -21,33 +21,35 @@ Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles(
 TriangleSurface boundary_surface(const TetMesh& mesh,
                                  std::vector<NodeIndex>* node_of_vertex = nullptr);
 
-// Unit outward normals at vertices, 3 x v: area-weighted mean of the adjacent triangles' normals (the
-// paper's "average nodal normal"); zero column for an unused vertex.
+// Unit outward normals at the vertices, 3 x v: area-weighted mean of the adjacent triangles'
+// normals (the paper's "average nodal normal"). The column of an unused vertex is zero.
 Points vertex_normals(const TriangleSurface& surface);
 
 // The surface moved by distance_mm along its vertex normals (paper 2.6: skull = brain + 1 mm).
 TriangleSurface offset_surface(const TriangleSurface& surface, double distance_mm);
 
-// Enclosed volume (mm^3) by the divergence theorem, positive for outward orientation; and area (mm^2).
+// Enclosed volume (mm^3) by the divergence theorem, positive for outward orientation. Area
+// (mm^2).
 double enclosed_volume(const TriangleSurface& surface);
 double area(const TriangleSurface& surface);
 
 // True when every edge is shared by exactly two oppositely oriented triangles.
 bool is_closed(const TriangleSurface& surface);
 
-// A closed surface of an ellipsoid, about `edge_mm` between neighbouring vertices: a geodesic sphere of
-// frequency n (10 n^2 + 2 vertices, all on the ellipsoid), stretched. Its volume is below the ellipsoid's
-// by a fraction of order (edge / radius)^2. Axes and edge must be > 0; n is limited to [1, 512].
+// Closed surface of an ellipsoid with about `edge_mm` between neighbouring vertices: a geodesic
+// sphere of frequency n (10 n^2 + 2 vertices, all on the ellipsoid), stretched. Its volume is
+// below that of the ellipsoid by a fraction of order (edge / radius)^2. Axes and edge must be >
+// 0; n is limited to [1, 512].
 TriangleSurface ellipsoid_surface(const Vec3& centre, const Vec3& semi_axes_mm, double edge_mm);
 
-// `count` points drawn uniformly by area (3 x count); the same seed gives the same points on every platform.
-// Precondition: at least one triangle, of positive area.
+// `count` points drawn uniformly by area (3 x count). The same seed gives the same points on
+// every platform. Precondition: at least one triangle, and a positive area.
 Points sample_surface(const TriangleSurface& surface, int count, std::uint64_t seed);
 
-// Where a plane (point x with normal . x == offset) cuts the surface: segments, 3 x 2s, columns 2i and 2i+1
-// are the ends of segment i, in the order of their triangles. Neighbouring segments share their ends bit for
-// bit. A triangle in the plane gives no segment of its own; the rim of a flat part lying in the plane does
-// where the surface goes on below the plane.
+// Section of the surface with the plane normal . x == offset: s segments, 3 x 2s. Columns 2i and
+// 2i+1 are the ends of segment i; segments are in the order of their triangles. Neighbouring
+// segments share their ends bit for bit. A triangle that lies in the plane gives no segment. The
+// rim of a flat part that lies in the plane does, where the surface continues below the plane.
 Points plane_section(const TriangleSurface& surface, const Vec3& normal, double offset);
 
 }  // namespace brainshift::geometry

@@ -68,7 +68,7 @@ Status orient(CheckedSurface& checked, const CorticalSite& site,
   if (cosine > 0.0) return {};
   surface.triangles.row(1).swap(surface.triangles.row(2));
   checked.turned = true;
-  checked.notes.push_back("the triangles looked into the head and were turned round");
+  checked.notes.emplace_back("the triangles looked into the head and were turned round");
   return {};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Edges of a triangle surface: who shares them, the rims of its holes, the parts that hang together.
+// Edges of a triangle surface: shared edges, the rims of holes, the parts connected by edges.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,9 @@ struct SurfaceRims {
   std::vector<double> rim_mm;    // its length
 };
 
-// kDegenerateMesh: a triangle with a repeated or unknown vertex, an edge of more than two triangles, or one that two
-// triangles pass in the same direction; the sentence names the triangles or the vertices.
+// kDegenerateMesh: a triangle with a repeated or unknown vertex, an edge of more than two
+// triangles, or an edge that two triangles pass in the same direction. The sentence names the
+// triangles or the vertices.
 Result<SurfaceRims> surface_rims(const TriangleSurface& surface);
 
 }  // namespace brainshift::geometry

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which tetrahedron holds a point, and its barycentric weights: the rows of the sampling matrix A.
+// TetLocator: the tetrahedron that holds a point, and the point's barycentric weights. They are
+// the rows of the sampling matrix A.
 //
 //   x = sum_k weights[k] nodes.col(nodes[k])
 //
-// Inside: a uniform grid of tetrahedra. Outside: the closest point of the boundary triangles; weights then
-// describe that point, of the tetrahedron behind it (the fourth weight is 0).
+// Inside the mesh the search uses a uniform grid of tetrahedra. Outside, it takes the closest
+// point of the boundary triangles: the weights describe that point in the tetrahedron behind it,
+// and the fourth weight is 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,8 +21,8 @@ struct TetLocation {
   int tet = -1;
   Eigen::Vector4i nodes = Eigen::Vector4i::Zero();
   Eigen::Vector4d weights = Eigen::Vector4d::Zero();  // sum 1; all >= 0 when inside
-  double distance_mm =
-      0.0;  // 0 inside; else distance from the query to the point the weights describe
+  // 0 inside; outside, the distance from the query to the point that the weights describe.
+  double distance_mm = 0.0;
 };
 
 class TetLocator {
@@ -31,8 +33,9 @@ class TetLocator {
   TetLocator& operator=(TetLocator&&) noexcept;
   ~TetLocator();
 
-  // The tetrahedron holding the query; outside the mesh, the closest point of the mesh. Thread-safe.
-  // A query that is not finite, or a mesh without tetrahedra: tet -1, infinite distance.
+  // The tetrahedron that holds the query; for a query outside, the closest point of the mesh.
+  // Thread-safe. A query that is not finite, or a mesh without tetrahedra: tet -1, infinite
+  // distance.
   TetLocation locate(const Vec3& query) const;
 
   // Its copy of the mesh.

@@ -6,7 +6,7 @@
 
 namespace brainshift::geometry {
 
-// Corner a and edges of a triangle with an area, and the products that every query needs.
+// A triangle with an area: corner a, two edges, and the products that every query needs.
 struct TriangleFrame {
   Vec3 a, ab, ac;
   double ab_ab, ab_ac, ac_ac, determinant;
@@ -14,8 +14,9 @@ struct TriangleFrame {
   TriangleFrame(const Vec3& a_, const Vec3& b, const Vec3& c);
 };
 
-// The point of the triangle closest to x: the foot of the perpendicular on its plane if that lies inside, otherwise
-// the nearest of the points closest on the three edges.
+// The point of the triangle closest to x. It is the foot of the perpendicular on the triangle's
+// plane if that lies inside the triangle, otherwise the nearest of the closest points of the
+// edges.
 Vec3 closest_on_triangle(const TriangleFrame& triangle, const Vec3& x);
 
 }  // namespace brainshift::geometry

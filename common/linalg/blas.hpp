@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The few dense kernels of the hot path, on the system's BLAS and LAPACK: they choose their instructions at run
-// time, which code compiled for any x86-64 cannot. Column-major; views, nothing is allocated here.
+// The few dense kernels of the hot path, on the system's BLAS and LAPACK. Those choose their
+// instructions at run time; code compiled for any x86-64 cannot. Column-major views; nothing is
+// allocated here.
 // Preconditions: shapes agree, outputs do not overlap inputs (asserted in debug builds).
 #pragma once
 

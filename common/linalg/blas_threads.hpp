@@ -4,9 +4,9 @@
 
 namespace brainshift::linalg {
 
-// Limits a threaded OpenBLAS to one thread: its own threads make supernodal factorisation 3-30 times slower
-// on small or busy machines, and break bit-identical results. Does nothing with a serial BLAS. Factorisations and
-// inverters call it themselves; a program may call it earlier.
+// Limits a threaded OpenBLAS to one thread. Its own threads make supernodal factorisation 3-30
+// times slower on small or busy machines, and break bit-identical results. Does nothing with a
+// serial BLAS. Factorisations and inverters call it themselves; a program may call it earlier.
 void use_single_threaded_blas();
 
 }  // namespace brainshift::linalg

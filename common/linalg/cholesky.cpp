@@ -5,18 +5,14 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 #include <sstream>
 
+#include "common/core/stopwatch.hpp"
 #include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::linalg {
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // A CHOLMOD view of Eigen's arrays; nothing is copied.
 cholmod_sparse view_of(const SymmetricMatrix& lower) {
@@ -173,10 +169,10 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
   use_single_threaded_blas();
   SparseCholesky cholesky(std::make_unique<Impl>());
   Impl& impl = *cholesky.impl_;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   cholmod_sparse view = view_of(lower);
   impl.factor = cholmod_l_analyze(&view, &impl.common);
-  impl.analyse_s = seconds_since(start);
+  impl.analyse_s = watch.seconds();
   impl.nonzeros = static_cast<std::uint64_t>(impl.common.lnz);
   if (impl.factor == nullptr) {
     return fail(ErrorCode::kSingularMatrix,
@@ -190,10 +186,10 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
 Status SparseCholesky::refactorise(const SymmetricMatrix& lower) {
   assert(static_cast<std::size_t>(lower.rows()) == impl_->factor->n);
   if (auto finite = check_finite(lower); !finite) return finite;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   cholmod_sparse view = view_of(lower);
   const int ok = cholmod_l_factorize(&view, impl_->factor, &impl_->common);
-  impl_->factor_s = seconds_since(start);
+  impl_->factor_s = watch.seconds();
   if (!ok || impl_->common.status < CHOLMOD_OK) {
     return fail(ErrorCode::kSingularMatrix,
                 "stiffness matrix: factorisation failed (CHOLMOD status " +

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// SparseCholesky: supernodal L L^T of a symmetric positive definite matrix (CHOLMOD, nested dissection).
+// SparseCholesky: supernodal L L^T of a symmetric positive definite matrix (CHOLMOD, nested
+// dissection).
 //
-// CHOLMOD answers "success" to NaN, to infinity and to some singular matrices, so every factorisation is
-// guarded: lower triangle -> finite input -> no negative or zero pivot -> reciprocal condition estimate above
-// kMinRcond. Whether a solve is right is the business of checked_solve.hpp.
+// CHOLMOD reports success for NaN, for infinity and for some singular matrices. So every
+// factorisation is checked: lower triangle -> finite input -> no negative or zero pivot ->
+// reciprocal condition estimate above kMinRcond. checked_solve.hpp checks the solves.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +17,19 @@ namespace brainshift::linalg {
 
 class SparseCholesky {
  public:
-  // A free-floating body has a reciprocal pivot ratio of rounding size (1e-15); a head with sliding support
-  // has about 1e-5, with penalty springs down to 1e-8.
+  // A free-floating body has a reciprocal pivot ratio of rounding size (1e-15); a head with
+  // sliding support has about 1e-5, and down to 1e-8 with penalty springs.
   static constexpr double kMinRcond = 1e-13;
 
-  // lower: lower triangle, sorted. kInvalidArgument (an entry above the diagonal), kNotFinite, kFloatingBody (a pivot vanished: not enough support) or
-  // kSingularMatrix.
+  // lower: lower triangle, sorted. kInvalidArgument: an entry above the diagonal. kNotFinite.
+  // kFloatingBody: a pivot vanished, i.e. not enough support. kSingularMatrix.
   static Result<SparseCholesky> factorise(const SymmetricMatrix& lower);
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
   ~SparseCholesky();
 
-  // New values, same pattern: reuses the ordering and symbolic analysis. After a failure the factor must
-  // not be used until a refactorise succeeds. A copy that shares nothing but the analysis: clone_analysis.
+  // New values, same pattern: reuses the ordering and symbolic analysis. After a failure the
+  // factor must not be used until a refactorise succeeds.
   Status refactorise(const SymmetricMatrix& lower);
   // A second factor with the same ordering and pattern, no values yet; call refactorise on it.
   SparseCholesky clone_analysis() const;
@@ -52,7 +53,8 @@ class SparseCholesky {
     struct Impl;
     std::unique_ptr<Impl> impl_;
   };
-  // X = K^-1 B, one right-hand side per column. Thread-safe as long as every thread has its own workspace.
+  // X = K^-1 B, one right-hand side per column. Thread-safe if every thread has its own
+  // workspace.
   void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
 
   int size() const;

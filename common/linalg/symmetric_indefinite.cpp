@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "common/core/random.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/linalg/checked_solve.hpp"
 
@@ -27,10 +27,6 @@ constexpr int kMostRefined = 2;  // steps of iterative refinement
 // can be measured, and keeps extreme steps accurate.
 constexpr double kPivotThreshold = 0.01;
 constexpr std::uint64_t kSeed = 17;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // MUMPS is not reentrant (module variables), not even for different instances.
 std::mutex& mumps_mutex() {
@@ -122,7 +118,7 @@ struct SymmetricIndefinite::Impl {
 
 // Pattern, ordering and symbolic factorisation.
 Status SymmetricIndefinite::Impl::analyse(const SymmetricMatrix& lower) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const auto entries = static_cast<std::size_t>(lower.nonZeros());
   rows.resize(entries);
   columns.resize(entries);
@@ -155,7 +151,7 @@ Status SymmetricIndefinite::Impl::analyse(const SymmetricMatrix& lower) {
   mumps.jcn = columns.data();
   mumps.perm_in = position.empty() ? nullptr : position.data();
   const int status = call(1);
-  analyse_s = seconds_since(start);
+  analyse_s = watch.seconds();
   if (status < 0) {
     return fail(ErrorCode::kSingularMatrix,
                 "consolidation matrix: symbolic analysis failed (MUMPS status " +
@@ -286,7 +282,7 @@ Status SymmetricIndefinite::refactorise(const SymmetricMatrix& lower) {
   Impl& impl = *impl_;
   assert(lower.rows() == impl.mumps.n && lower.nonZeros() == impl.mumps.nnz);
   if (auto finite = check_finite(lower); !finite) return finite;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   impl.rescale(lower);
   impl.mumps.a = impl.scaled.valuePtr();
   int status = impl.call(2);
@@ -314,7 +310,7 @@ Status SymmetricIndefinite::refactorise(const SymmetricMatrix& lower) {
                     " (the pressure unknowns)" + advice);
   }
   impl.rcond = impl.estimate_rcond();
-  impl.factor_s = seconds_since(start);
+  impl.factor_s = watch.seconds();
   if (!(impl.rcond >= kMinRcond)) {
     return fail(ErrorCode::kFloatingBody, "consolidation matrix: reciprocal condition " +
                                               text_of(impl.rcond) + " is below " +

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Load modes of the prior: few nodal force fields for what is physically uncertain about the loads.
+// Load modes of the prior: a few nodal force fields for what is physically uncertain about the
+// loads, each times the standard deviation that the case gives it.
 //
-//   gravity   buoyancy of a fluid plane at each level of the case, along gravity (what drainage leaves open) and along
-//             the two directions across it (what pose leaves open): triples (along, across, across)
-//   swelling  tissue that changes its volume by theta around the tumour's centre c (fem/swelling.hpp), for each radius s
-//             of the case: theta = exp(-r^2 / 2 s^2), and for a centre that is not c the three fields
-//             theta = (x_i - c_i) / s exp(1/2 - r^2 / 2 s^2), whose largest value is 1 too: fours
-// times the case's standard deviations; that of swelling is shared by the radii, so that theta(c) has it.
+//   gravity   for each fluid level of the case the buoyancy of a fluid plane at that level: along
+//             gravity (what drainage leaves open) and along the two directions across it (what
+//             pose leaves open); three columns (along, across, across) per level
+//   swelling  tissue that changes its volume by the strain theta around the tumour's centre c
+//             (fem/swelling.hpp); four columns for each radius s of the case, r = |x - c|:
+//               theta = exp(-r^2 / 2 s^2)
+//               theta = (x_i - c_i) / s exp(1/2 - r^2 / 2 s^2), i = 1, 2, 3, for a centre that is
+//                       not c; the largest value is 1 too
+// The standard deviation of swelling is shared by the radii, so that theta(c) as a whole has it.
 #pragma once
 
 #include "common/values/brain_model.hpp"
@@ -25,7 +29,8 @@ LoadModeCounts load_mode_counts(const PriorConfig& config);
 // 3n x all(), N: gravity, then swelling.
 Eigen::MatrixXd load_modes(const BrainModel& model, const CaseConfig& config);
 
-// The part that a column of the load modes belongs to, and every column after them.
+// The part of the prior that column `column` of the load modes belongs to. Columns after the load
+// modes belong to kOther.
 PriorPart prior_part(int column, const LoadModeCounts& counts);
 
 }  // namespace brainshift::prior

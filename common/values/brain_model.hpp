@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// BrainModel: the patient's geometry before surgery, with the node sets of the paper's section 2.6.
+// BrainModel: the patient's geometry before surgery, with the node sets of the paper's section
+// 2.6.
 //
-// Made from a case (MRI, mask, tumour, craniotomy, pose) once; everything later is derived from it.
-// The four node sets are disjoint and together are exactly the boundary nodes:
+// Made once from a case (MRI, mask, tumour, craniotomy, pose). Everything later is derived from
+// it. The four node sets are disjoint and together are exactly the boundary nodes:
 //   craniotomy, brainstem  stress-free
-//   slaves                 above the second plane; may separate from or touch the skull (contact), or
-//                          are treated like `fixed` under the fixed boundary condition
+//   slaves                 above the second plane; may separate from or touch the skull (contact),
+//                          or are treated like `fixed` under the fixed boundary condition
 //   fixed                  fixed in the normal direction, free tangentially
 #pragma once
 
@@ -24,13 +25,14 @@ struct BrainModel {
   std::string model_id;
 
   TetMesh mesh;
-  // Boundary of the mesh, 3 x t *mesh node* indices, outward.
+  // Boundary of the mesh: 3 x t mesh node indices, oriented outwards.
   Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles;
   // Inner surface of the skull (master surface); outward with respect to the brain.
   TriangleSurface skull;
   // Undeformed tumour surface.
   TriangleSurface tumour;
-  // Signed distance to it, for fast alignment; derived from `tumour`, so no part of model_id. May be empty.
+  // Signed distance to the tumour surface, for fast alignment. May be empty. It is derived from
+  // `tumour`, so it does not enter model_id.
   DistanceGrid tumour_distance;
 
   std::vector<NodeIndex> craniotomy;
@@ -40,10 +42,11 @@ struct BrainModel {
 
   // Unit vector along gravity, RAS.
   Vec3 gravity_direction = Vec3(0, -1, 0);
-  // The reference fluid plane through the lowest craniotomy node: depth of a point is
-  // x . gravity_direction, the plane is depth == fluid_plane_depth_mm, above it depth is smaller.
+  // Depth of a point: x . gravity_direction. The reference fluid plane is depth ==
+  // fluid_plane_depth_mm and passes through the lowest craniotomy node; above it depth is
+  // smaller.
   double fluid_plane_depth_mm = 0.0;
-  // The second plane, deeper by the case's slave depth; boundary nodes above it are slaves.
+  // The second plane, deeper by the case's slave depth. Boundary nodes above it are slaves.
   double slave_plane_depth_mm = 0.0;
 };
 

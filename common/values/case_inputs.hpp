@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// CaseInputs: the files that a case names, read but not yet interpreted.
+// CaseInputs: the contents of the files that a case names, not interpreted yet.
 #pragma once
 
 #include <optional>
 
-#include "common/values/case_config.hpp"
 #include "common/core/mesh.hpp"
+#include "common/values/case_config.hpp"
 
 namespace brainshift {
 
@@ -14,7 +14,7 @@ struct CaseInputs {
   std::optional<VoxelImage> brain;                // when the mesh is generated; > 0 is brain
   std::optional<TetMesh> mesh;                    // when a ready mesh is given
   std::optional<VoxelImage> tumour_labels;        // TumourLabel
-  std::optional<TriangleSurface> tumour_surface;  // TumourSurface
+  std::optional<TriangleSurface> tumour_surface;  // TumourSurfaceFile
   std::optional<TriangleSurface> skull;           // contact.skull_file
 };
 

@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// CondensedOperators: all that an update needs of one patient under one boundary condition, as plain arrays.
+// CondensedOperators: all that an update must know of one patient under one boundary condition,
+// as plain arrays.
 //
-// A displacement is carried by few numbers, prior modes z and contact forces f (N, one per active slave):
+// A displacement is described by prior modes z and contact forces f (N, one per active slave):
 //   u = U z + G_A f,     z ~ N(0, I_r),     U U^T ~ C = K^-1 Sigma K^-1
-//   G = K^-1 N           column j: unit force on slave j along its normal N_j, from skull into brain
+//   G = K^-1 N           column j: unit force on slave j along its normal N_j, from skull to brain
 //   Phi = N^T K^-1 N     compliance of the slaves, mm/N
 // n nodes, r modes, s slaves. Nodal arrays are node-major (x0 y0 z0 x1 ...), 3n rows.
 //
-// The first `gravity_modes + swelling_modes` columns of U are K^-1 M, exact. The others come from a randomised Nystrom
-// approximation of K^-1 Sigma_kernel K^-1 (Halko, Martinsson, Tropp 2011, SIAM Review 53:217, sec. 5.5) whose
-// test vectors are supported where data come from: near the tumour, at the craniotomy and on the slaves.
-// Single precision in what is only summed up to a displacement (relative rounding 6e-8 of each term).
+// The first `gravity_modes + swelling_modes` columns of U are K^-1 M, exact. The others come from
+// a randomised Nystrom approximation of K^-1 Sigma_kernel K^-1 (Halko, Martinsson, Tropp 2011,
+// SIAM Review 53:217, sec. 5.5). Its test vectors are supported where data come from: near the
+// tumour, at the craniotomy and on the slaves.
+// Arrays that are only summed up to a displacement are in single precision (relative rounding
+// 6e-8 of each term).
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "common/values/estimate.hpp"
 #include "common/core/types.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift {
 
@@ -37,13 +40,15 @@ struct CondensedOperators {
   VecX initial_penetration_mm;      // s; negative: open
   std::vector<NodeIndex> slaves;    // s
 
-  // Nodes near the data, whose rows of U and G are gathered so that sampling touches little memory.
+  // Nodes near the data. The rows of U and G at these nodes are gathered in one block, so that
+  // sampling touches little memory.
   std::vector<NodeIndex> region;  // sorted
-  // Nodes where the standard deviation is evaluated, and what truncation left out there:
-  // tr(C - U U^T) / 3 per node, mm^2, for the free body.
+  // Nodes where the standard deviation is evaluated, and the variance per node that the
+  // truncation to r modes leaves out: tr(C - U U^T) / 3, mm^2, for the free body.
   std::vector<NodeIndex> control;  // c, sorted
   VecX truncated_variance_mm2;     // c
-  // Interpolation from the control nodes to every node: 4 x n indices into `control`, 4 x n weights, sum 1.
+  // Interpolation from the control nodes to every node: 4 x n indices into `control` and 4 x n
+  // weights whose sum is 1 per node.
   Eigen::Matrix<int, 4, Eigen::Dynamic> control_neighbours;
   Eigen::Matrix<float, 4, Eigen::Dynamic> control_weights;
 

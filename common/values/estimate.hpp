@@ -14,17 +14,24 @@
 
 namespace brainshift {
 
+// Boundary condition at the slaves.
 enum class Boundary {
   kContact,  // slaves may leave the skull and may not penetrate it
   kFixed,    // slaves are fixed in the normal direction, free tangentially
 };
 enum class Method {
-  kCondensed,  // prepared before surgery, prior reduced to its leading modes: the everyday method
-  kCondensedExact,  // the same with the whole prior; for comparison
-  kPaper,           // adjoint steepest descent with refactorisation (paper section 2.4)
-  kPaperWoodbury,  // the same, contact as a low-rank correction of the factor instead of refactorisation
-  kConjugateGradients,  // the same minimiser by conjugate gradients in place of steepest descent
-  kIterativeSolver,  // conjugate gradients whose solves are preconditioned CG too (the paper's outlook)
+  // Prepared before surgery, prior reduced to its leading modes: the everyday method.
+  kCondensed,
+  // The same with the whole prior; for comparison.
+  kCondensedExact,
+  // Adjoint steepest descent, K_p refactorised for every contact set (paper section 2.4).
+  kPaper,
+  // The same, with contact as a low-rank correction of the factor of K instead.
+  kPaperWoodbury,
+  // Conjugate gradients in place of steepest descent, contact as in kPaperWoodbury.
+  kConjugateGradients,
+  // Conjugate gradients whose linear solves are preconditioned CG too (the paper's outlook).
+  kIterativeSolver,
 };
 inline constexpr Method kAllMethods[] = {
     Method::kCondensed,     Method::kCondensedExact,     Method::kPaper,
@@ -46,21 +53,28 @@ std::string_view to_string(EstimateStatus status);  // "not_run", "iterating", .
 struct IterationRecord {
   int iteration = 0;                // from 1
   MeanStd misfit_mm;                // of |d - A x| over the sparse data (eps_sprs)
-  int penetrating = 0;              // slaves with positive penetration
+  int penetrating = 0;              // slaves, counted as in ContactSummary
   double max_penetration_mm = 0.0;  // 0 when nothing penetrates
   double elapsed_ms = 0.0;          // since the start of the inversion, monotonic clock
 };
 
-// Parts of the force prior: buoyancy along gravity, buoyancy across it, swelling, all other forces.
+// Parts of the force prior: buoyancy along gravity, buoyancy across it, swelling, all other
+// forces.
 enum class PriorPart { kAlongGravity, kAcrossGravity, kSwelling, kOther };
 inline constexpr int kPriorParts = 4;
 using PriorScaleValues = std::array<double, kPriorParts>;
 
 struct ContactSummary {
-  int active = 0;       // slaves carrying a contact force
-  int penetrating = 0;  // slaves with penetration above the reporting tolerance
-  double max_penetration_mm = 0.0;
-  int iterations = 0;  // contact iterations (active-set changes)
+  int active = 0;  // slaves that carry a contact force
+  // Slaves with more than 0.01 mm of penetration (inversion::kPenetrationTolerance_mm).
+  int penetrating = 0;
+  double max_penetration_mm = 0.0;  // 0 when nothing penetrates
+  // What was counted depends on the method.
+  //   descent methods (paper, paper-woodbury, cg, pcg): how often the active set changed to
+  //     another set that is not empty (PenalisedSystem::changes)
+  //   condensed, condensed-exact: active sets evaluated, i.e. the length of Estimate::history. At
+  //     least 1, also without contact; the best set counts again when it is evaluated once more.
+  int iterations = 0;
 };
 
 // How the data of one instrument fared in an update.
@@ -69,25 +83,27 @@ struct SourceSummary {
   std::uint64_t observation_sequence = 0;  // the observation they were taken from
   double age_s = 0.0;                      // behind the newest observation of the update
   int data = 0;
-  int outliers =
-      0;  // data whose robust weight fell below one half, and points that their alignment left aside
-  // Consistency with the other sources: Mahalanobis distance between what this source says and what the others predict
-  // with the prior, squared; its expectation (degrees of freedom) and the probability of a larger one by chance. NaN
-  // for a single source and for methods that do not compute it.
+  // Data whose robust weight fell below one half, plus points that their alignment left out.
+  int outliers = 0;
+  // Consistency with the other sources. chi_square: squared Mahalanobis distance between the data
+  // of this source and what the other sources and the prior predict for them. degrees_of_freedom:
+  // its expectation. p_value: probability of a larger chi_square by chance. All three are NaN for
+  // a single source and for methods that do not compute them.
   double chi_square = std::numeric_limits<double>::quiet_NaN();
   double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
   double p_value = std::numeric_limits<double>::quiet_NaN();
   bool consistent = true;  // p_value is not below kInconsistent
 };
-// A source that disagrees more than once in a thousand surgeries by chance is said to contradict the others.
+// Below this p_value a source is reported to contradict the others. If all sources follow their
+// stated errors, chance alone brings a source below it once in a thousand updates.
 inline constexpr double kInconsistent = 1e-3;
 
 struct Estimate {
   EstimateStatus status = EstimateStatus::kNotRun;
   std::string reason;   // one sentence: why it stopped
   Points displacement;  // 3 x n, mm; at every node, moves undeformed to deformed
-  // n, mm, or empty when uncertainty was not computed: root mean square over the three components of the
-  // standard deviation of a node's displacement.
+  // n, mm: root mean square over the three components of the standard deviation of a node's
+  // displacement. Empty when uncertainty was not computed.
   VecX sd_mm;
   ContactSummary contact;
   std::vector<NodeIndex> active_slaves;
@@ -95,19 +111,21 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
-  // Estimated strength of the prior's parts in units of the case's; condensed method only.
+  // Estimated strength of the prior's parts, in units of the case's standard deviations.
+  // Estimated by method condensed only; 1 otherwise.
   PriorScaleValues prior_scales{1.0, 1.0, 1.0, 1.0};
-  // Volume of an element after over before (det F), the smallest; at 0 and below it is inverted and the estimate there
-  // is no deformation of tissue. NaN before it was looked at.
+  // Smallest ratio of an element's volume after to before (det F). At 0 and below the element is
+  // inverted, and the estimate there is no deformation of tissue. NaN: not measured.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
   int inverted_elements = 0;
-  std::vector<SourceSummary>
-      sources;  // in the order of the data; empty for data without named sources
-  double rebuild_ms =
-      0.0;  // part of the inversion's time spent on field and sd; condensed methods only
+  // In the order of the data. Empty for data without named sources.
+  std::vector<SourceSummary> sources;
+  // Time spent on displacement and sd_mm, part of the inversion's time. Condensed methods only.
+  double rebuild_ms = 0.0;
 };
 
-// Something that the scene did not need, with the reason and an estimate of the error it causes.
+// A part of the model that an update left out, the reason, and an estimate of the error it
+// causes.
 struct Omission {
   std::string part;
   std::string reason;

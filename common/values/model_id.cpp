@@ -4,49 +4,41 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "common/core/fnv1a.hpp"
+
 namespace brainshift {
 namespace {
 
-class Fnv1a {
+// Arrays by their size and their bytes, one after the other.
+class ArrayHash {
  public:
-  template <typename T>
-  void add_array(const T* data, std::size_t count) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(data);
-    add_bytes(bytes, count * sizeof(T));
-  }
-  void add_size(std::size_t n) {
-    const auto n64 = static_cast<std::uint64_t>(n);
-    add_array(&n64, 1);
-  }
   template <typename Derived>
   void add(const Eigen::PlainObjectBase<Derived>& matrix) {
-    add_size(static_cast<std::size_t>(matrix.size()));
-    add_array(matrix.data(), static_cast<std::size_t>(matrix.size()));
+    add_array(matrix.data(), matrix.size());
   }
   void add(const std::vector<int>& values) {
-    add_size(values.size());
-    add_array(values.data(), values.size());
+    add_array(values.data(), static_cast<Eigen::Index>(values.size()));
   }
   void add(const std::string& text) {
-    add_size(text.size());
-    add_array(text.data(), text.size());
+    add_array(text.data(), static_cast<Eigen::Index>(text.size()));
   }
-  std::uint64_t value() const { return hash_; }
+  void add(const double* values, std::size_t count) { hash_.add(values, count * sizeof(double)); }
+  std::uint64_t value() const { return hash_.value(); }
 
  private:
-  void add_bytes(const unsigned char* bytes, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) {
-      hash_ ^= bytes[i];
-      hash_ *= 1099511628211ull;
-    }
+  template <typename T>
+  void add_array(const T* data, Eigen::Index size) {
+    const auto count = static_cast<std::uint64_t>(size);
+    hash_.add(&count, sizeof count);
+    hash_.add(data, static_cast<std::size_t>(size) * sizeof(T));
   }
-  std::uint64_t hash_ = 14695981039346656037ull;
+  Fnv1a hash_;
 };
 
 }  // namespace
 
 std::string content_hash(const BrainModel& model) {
-  Fnv1a hash;
+  ArrayHash hash;
   hash.add(model.case_id);
   hash.add(model.mesh.nodes);
   hash.add(model.mesh.tets);
@@ -62,7 +54,7 @@ std::string content_hash(const BrainModel& model) {
   hash.add(model.fixed);
   hash.add(model.gravity_direction);
   const double depths[] = {model.fluid_plane_depth_mm, model.slave_plane_depth_mm};
-  hash.add_array(depths, 2);
+  hash.add(depths, 2);
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash.value()));
   return text;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Content hash of a BrainModel: 16 hexadecimal digits (FNV-1a, 64 bit) over mesh, node sets, surfaces and
-// pose, bit for bit. It detects a stale or foreign model; it is no cryptographic signature.
+// Content hash of a BrainModel: 16 hexadecimal digits (FNV-1a, 64 bit) over case id, mesh, node
+// sets, surfaces and pose, bit for bit. It detects a stale or foreign model. It is not a
+// cryptographic signature.
 #pragma once
 
 #include <string>

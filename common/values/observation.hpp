@@ -18,7 +18,8 @@ struct TumourBoundary {
   double sd_mm = 0.0;
 };
 
-// Exposed cortical surface from stereopsis, deformed configuration. Triangles may be empty (points only).
+// Exposed cortical surface from stereopsis, deformed configuration. It may have no triangles
+// (points only).
 struct CorticalSurface {
   TriangleSurface surface;
   double sd_mm = 0.0;

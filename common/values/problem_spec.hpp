@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ProblemSpec: one forward problem as a problem file states it (docs/solve.md), in the file's units. Names are
-// resolved against a mesh by forward::build_problem.
+// ProblemSpec: one forward problem as a problem file states it (docs/solve.md), in the file's
+// units. forward::build_problem resolves the names against a mesh.
 #pragma once
 
 #include <array>
@@ -44,7 +44,7 @@ struct GroupSpec {
   std::variant<PlaneSelector, BoxSelector, SphereSelector> where;
 };
 
-// Exactly one kind; displacement components may be given singly.
+// Exactly one kind of condition. Displacement components may be given singly.
 struct ConditionSpec {
   std::string name, on;
   std::array<std::optional<double>, 3> displacement_mm;
@@ -94,7 +94,7 @@ struct ProblemSpec {
   std::vector<ProbeSpec> probes;
 };
 
-// Ranges of all values, each message beginning with its key. kInvalidArgument.
+// Checks the range of every value. kInvalidArgument; the message begins with the key.
 Status validate(const ProblemSpec& problem);
 
 }  // namespace brainshift

@@ -2,11 +2,12 @@
 // SparseData: displacements at points of the undeformed brain; the d of the paper's eq. 4.
 //
 //   d = A u + common_error c + e,   c ~ N(0, I),   e ~ N(0, diag(sd^2))
-// A datum is a whole displacement (three components) or, with a direction n, the part of it along n: a distance to a
-// measured surface says nothing about sliding along it.
-// Assumption: errors are zero-mean and Gaussian; e is independent from datum to datum and isotropic, and what the
-// data have in common (an alignment that is off) is in common_error. Methods that know independent errors only, as
-// the paper's does, leave common_error out.
+// A datum is a whole displacement (three components) or, with a direction n, the part of it along
+// n: a distance to a measured surface tells nothing about sliding along that surface.
+//
+// Assumptions: errors are zero-mean and Gaussian. e is isotropic and independent from datum to
+// datum. An error that several data share, for example a misalignment, is in common_error.
+// Methods that know independent errors only, such as the paper's, ignore common_error.
 #pragma once
 
 #include <string>
@@ -27,14 +28,14 @@ struct SparseData {
   Points positions;      // 3 x m, undeformed, mm RAS
   Points displacements;  // 3 x m, mm; along a direction: (n . d) n
   VecX sd_mm;            // m, standard deviation per component
-  // 3m x q, mm, q <= kMaxCommonErrors; row 3 i + axis belongs to datum i. No rows: none.
+  // 3m x q, mm, q <= kMaxCommonErrors; row 3 i + axis belongs to datum i. No rows: no such error.
   Eigen::MatrixXd common_error = {};
-  // 3 x m, a unit vector or zero (the whole displacement) per datum. No columns: all are whole.
+  // 3 x m: per datum a unit vector, or zero for a whole displacement. No columns: all are whole.
   Points directions = {};
-  // In the order of the data, each datum in one. Empty: one nameless source.
+  // In the order of the data; each datum belongs to one source. Empty: one source without a name.
   std::vector<DataSource> sources = {};
 
-  // An alignment has 12, a camera 6: room for the sources of an operating room.
+  // An alignment has 12 common errors and a camera 6: this is enough for the sources of a room.
   static constexpr int kMaxCommonErrors = 48;
 
   int size() const { return static_cast<int>(positions.cols()); }
@@ -45,7 +46,8 @@ struct SparseData {
   int rows() const;
 };
 
-// Data of several sources as one: counts and common errors add up, errors of different sources are independent.
+// Joins the data of several sources. Rows and common errors are concatenated: errors of different
+// sources are independent.
 SparseData combine(const std::vector<SparseData>& parts);
 
 }  // namespace brainshift

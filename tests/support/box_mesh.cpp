@@ -47,6 +47,13 @@ TetMesh box_mesh(int nx, int ny, int nz, const Vec3& size) {
   return mesh;
 }
 
+TetMesh box_mesh(const Vec3& low, const Vec3& high, int cells, double jitter) {
+  TetMesh mesh = box_mesh(cells, cells, cells, high - low);
+  mesh.nodes.colwise() += low;
+  if (jitter > 0.0) perturb_interior(mesh, jitter * (high - low).minCoeff() / cells, 7);
+  return mesh;
+}
+
 void perturb_interior(TetMesh& mesh, double amplitude, unsigned seed) {
   const auto boundary = geometry::boundary_triangles(mesh);
   std::vector<char> on_boundary(static_cast<std::size_t>(mesh.num_nodes()), 0);

@@ -1,28 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures of known scenes by two known cameras, ray by ray: a bumpy, textured patch like an exposed cortex, and a
-// chessboard. Written without the code under test: its own lens, its own rays.
+// Pictures of known scenes by two known cameras, computed ray by ray: a bumpy, textured patch
+// like an exposed cortex, and a chessboard. Independent of the code under test: own lens, own
+// rays.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "common/values/stereo_calibration.hpp"
 #include "common/core/types.hpp"
 #include "common/stereo/calibrate.hpp"
 #include "common/stereo/gray_image.hpp"
+#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::test_support {
 
 enum class Eye { kLeft, kRight };
 
-// Two cameras of 640 x 480 px, 1100 px focal length, 30 mm apart, turned so that their axes meet at `meet_mm`, with
-// lenses that distort by a few pixels at the rim.
+// Two cameras of 640 x 480 px, 1100 px focal length, 30 mm apart, turned so that their axes meet
+// at `meet_mm`. Their lenses distort by a few pixels at the rim.
 StereoCalibration operating_rig(double meet_mm = 250.0);
 
 // Pixel of a point in the left camera's frame; Brown's lens.
 Eigen::Vector2d project(const StereoCalibration& rig, Eye eye, const Vec3& x_left);
 
-// Where a pixel looks, left camera's frame: from the camera's centre along a direction.
+// Line of sight of a pixel, in the left camera's frame: from the camera's centre along a
+// direction.
 struct Ray {
   Vec3 origin, direction;
 };

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "client/plot/chart.hpp"
 #include "client/replay/write_file.hpp"
-#include "client/plot/xy_chart.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 
@@ -55,7 +55,7 @@ std::string with_unit(const std::string& axis) {
 
 struct Chart {
   std::string study;
-  client::XyChartSpec spec;
+  client::ChartSpec spec;
 };
 
 // One chart per study and pair of axes, one line per series, in the order of the record.
@@ -83,7 +83,7 @@ std::vector<Chart> charts_of(const CsvTable& points, const std::string& title) {
         std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.legend == legend; });
     if (series == all.end()) {
       const std::size_t k = all.size();
-      series = all.insert(all.end(), client::XySeries{});
+      series = all.insert(all.end(), client::Series{});
       series->legend = legend;
       series->colour = colours[k % std::size(colours)];
       series->marker = markers[k % std::size(markers)];
@@ -105,7 +105,7 @@ std::vector<Chart> charts_of(const CsvTable& points, const std::string& title) {
 }
 
 // One entry in the legend for all that is known exactly.
-void shorten_legend(client::XyChartSpec& spec) {
+void shorten_legend(client::ChartSpec& spec) {
   bool explained = false;
   for (auto& series : spec.series) {
     if (series.marker != Marker::kNone) continue;
@@ -123,7 +123,7 @@ Result<std::vector<std::string>> draw(std::vector<Chart> charts, const fs::path&
       name = chart.study + "-" + std::to_string(k);
     }
     const fs::path file = folder / (name + ".png");
-    if (!cv::imwrite(file.string(), client::draw_xy_chart(chart.spec))) {
+    if (!cv::imwrite(file.string(), client::draw_chart(chart.spec))) {
       return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
     }
     names.push_back(name + ".png");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A folder of its own for each test, removed afterwards, and the bytes tests put into files.
-// CTest runs every test as a process of its own, several at a time: a fixed name would be shared by two of them.
+// TemporaryFolder: a new folder for each test, removed afterwards; and helpers to write its
+// files. CTest runs every test as its own process, several at a time, so two of them would share
+// a fixed name.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -7,9 +7,10 @@
 
 namespace brainshift::test_support {
 
-// Box mesh cells^3. Craniotomy: nodes of the top face within 16 mm of its centre; brainstem: bottom-face nodes
-// within 8 mm of its centre; fixed: remaining boundary nodes at z <= 30 mm; slaves: the other ones. Skull: the
-// boundary moved outwards by gap_mm. Tumour: a ball of radius 10 mm at (30, 30, 40).
+// Box mesh cells^3. Craniotomy: nodes of the top face within 16 mm of its centre. Brainstem:
+// nodes of the bottom face within 8 mm of its centre. Fixed: the other boundary nodes at z <= 30
+// mm. Slaves: the rest of the boundary. Skull: the boundary moved outwards by gap_mm. Tumour: a
+// ball of radius 10 mm at (30, 30, 40).
 BrainModel toy_patient(int cells = 5, double gap_mm = 1.0);
 
 CaseConfig toy_config();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A virtual probe swept over an ellipsoid whose place is known, as a recording in either file format.
+// A virtual probe swept over an ellipsoid at a known place, as a recording in either file format.
 #pragma once
 
 #include <map>

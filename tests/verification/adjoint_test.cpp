@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "common/contact/refactorised_system.hpp"
-#include "common/inversion/descent/steepest_descent.hpp"
+#include "tests/unit/inversion/objective.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"

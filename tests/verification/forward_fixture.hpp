@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the studies of forward::solve share: groups by predicate, one material, solving.
+// Shared by the studies of forward::solve: groups by predicate, one material, solving.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -35,8 +35,8 @@ inline Eigen::Matrix3Xi faces_of(const TetMesh& mesh, const std::vector<NodeInde
   return faces.leftCols(count);
 }
 
-// A column of `layers` layers and one cell across, height z: sides sealed and laterally fixed, bottom fixed and
-// sealed, top drained and loaded with pressure q.
+// A column of `layers` layers, one cell across, height along z. Sides: sealed and fixed
+// laterally. Bottom: sealed and fixed. Top: drained and loaded with pressure q.
 struct Column {
   static constexpr double kHeight = 10.0, kWidth = 0.5;
   TetMesh mesh;

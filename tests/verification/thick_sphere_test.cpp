@@ -3,10 +3,10 @@
 //   u_r(r) = p a^3 / (b^3 - a^3) [ (1 - 2 nu) r / E + (1 + nu) b^3 / (2 E r^2) ]
 // Near nu = 1/2 the volume hardly changes: P1 locks, P2 does not. What remains of P2's error is the flat faces of the
 // cavity, alike for every nu.
-#include <chrono>
 #include <cmath>
 #include <map>
 
+#include "common/core/stopwatch.hpp"
 #include "common/linalg/cholesky.hpp"
 #include "tests/support/ball_mesh.hpp"
 #include "tests/support/study_record.hpp"
@@ -82,7 +82,7 @@ Outcome thick_sphere(fem::Element element, double nu, int cells) {
 // The third candidate, for the comparison only: P1 with the dilatation averaged around each node (Bonet & Burton
 // 1998): K = K_dev + kappa sum_n d_n d_n^T / V_n, with d_n^T u the change of the nodal volume V_n.
 Outcome nodal_average(double nu, int cells) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const auto space = fem::make_space(shell(cells), fem::Element::kP1);
   fem::DofMap dofs(space.num_nodes());
   for (int n = 0; n < space.num_nodes(); ++n) {
@@ -120,9 +120,9 @@ Outcome nodal_average(double nu, int cells) {
   const auto cavity = faces_where(space.mesh, in_cavity);
   const Points load = fem::pressure_load(space, cavity.faces, kPressure);
   const Points u = dofs.expand(factor->solve(dofs.restrict_to(load)));
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  const double elapsed_s = watch.seconds();
   return {error_pct(space.mesh, cavity.vertices, u, nu), stress_pct(space, u, nu),
-          dofs.num_unknowns(), elapsed.count()};
+          dofs.num_unknowns(), elapsed_s};
 }
 
 std::string series(const std::string& element, double nu) {

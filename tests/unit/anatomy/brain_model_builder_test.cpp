@@ -220,7 +220,7 @@ TEST(BrainModelBuilder, LabelVolumeGivesTheSurfaceOfItsLargestPart) {
 TEST(BrainModelBuilder, AGivenTumourSurfaceIsTurnedOutwards) {
   CaseInputs inputs = ball_case();
   const TriangleSurface surface = geometry::ellipsoid_surface(kBallCentre, Vec3(9, 9, 9), 3.0);
-  inputs.config.tumour = TumourSurface{"tumour.stl"};
+  inputs.config.tumour = TumourSurfaceFile{"tumour.stl"};
   for (const auto& given : {surface, testing::inside_out(surface)}) {
     inputs.tumour_surface = given;
     EXPECT_NEAR(geometry::enclosed_volume(built(inputs).tumour), geometry::enclosed_volume(surface),

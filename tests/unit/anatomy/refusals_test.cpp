@@ -9,7 +9,7 @@
 
 #include "common/geometry/surface.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
-#include "tests/unit/geometry/box_mesh.hpp"
+#include "tests/support/box_mesh.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
 namespace brainshift::anatomy {
@@ -32,7 +32,7 @@ void expect_refused(const CaseInputs& inputs, ErrorCode code,
 CaseInputs box_case() {
   CaseInputs inputs = ball_case();
   inputs.config.mesh = MeshFile{"box.msh"};
-  inputs.mesh = geometry::testing::box_mesh(kBallCentre - Vec3::Constant(40),
+  inputs.mesh = test_support::box_mesh(kBallCentre - Vec3::Constant(40),
                                             kBallCentre + Vec3::Constant(40), 8);
   inputs.config.tumour = TumourEllipsoid{kBallCentre + Vec3(20, 0, 0), Vec3(10, 8, 6)};
   inputs.config.craniotomy.centre_mm = kBallCentre + Vec3(41, 3, 2);
@@ -80,7 +80,7 @@ TEST(Refusals, FilesThatWereNotRead) {
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"contact.skull_file = 'skull.stl'"});
   inputs.config.tumour = TumourLabel{"labels.nii", 1};
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"tumour.label_volume.file"});
-  inputs.config.tumour = TumourSurface{"tumour.stl"};
+  inputs.config.tumour = TumourSurfaceFile{"tumour.stl"};
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"tumour.surface.file"});
 }
 
@@ -130,7 +130,7 @@ TEST(Refusals, ALabelTooSmallForASurface) {
 
 TEST(Refusals, ATumourSurfaceThatIsNotClosedOrNotWhole) {
   CaseInputs inputs = box_case();
-  inputs.config.tumour = TumourSurface{"tumour.stl"};
+  inputs.config.tumour = TumourSurfaceFile{"tumour.stl"};
   const TriangleSurface whole = geometry::ellipsoid_surface(kBallCentre, Vec3(9, 9, 9), 3.0);
   inputs.tumour_surface = whole;
   inputs.tumour_surface->triangles.conservativeResize(3, whole.num_triangles() - 1);

@@ -11,13 +11,14 @@
 namespace brainshift::contact {
 namespace {
 
-using contact::ActiveSet;
+using inversion::patient;
+using inversion::prepare;
 
 enum class Kind { kRefactorised, kWoodbury, kIterative };
 
 class PenalisedSystems : public ::testing::TestWithParam<Kind> {
  protected:
-  static std::unique_ptr<PenalisedSystem> make(const contact::ForwardModel& forward) {
+  static std::unique_ptr<PenalisedSystem> make(const ForwardModel& forward) {
     switch (GetParam()) {
       case Kind::kRefactorised: return std::make_unique<RefactorisedSystem>(forward);
       case Kind::kWoodbury: return std::make_unique<WoodburySystem>(forward);
@@ -46,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, PenalisedSystems,
 // factors of the set before must not leak into the next.
 TEST_P(PenalisedSystems, EqualsADenseSolveForEverySet) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
-  const contact::ForwardModel& forward = model.forward();
+  const ForwardModel& forward = model.forward();
   const auto system = make(forward);
   ActiveSet few = some_active(model);
   ActiveSet others(few.size(), 0);
@@ -69,7 +70,7 @@ TEST_P(PenalisedSystems, EqualsADenseSolveForEverySet) {
     Points u;
     ASSERT_TRUE(system->solve(f, u).has_value());
     ASSERT_GT(expected.norm(), 1.0);
-    EXPECT_LT((u - expected).norm(), 1e-9 * expected.norm()) << contact::count(active);
+    EXPECT_LT((u - expected).norm(), 1e-9 * expected.norm()) << count(active);
   }
 }
 

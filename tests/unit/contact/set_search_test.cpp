@@ -21,9 +21,9 @@ TEST(SetSearch, PenetratingSlavesJoinAndPullingOnesLeave) {
   SetSearch search(3, 10);
   search.begin();
   EXPECT_EQ(search.next(VecX::Zero(3), Vec3(0.5, -0.5, 0.2), kUnit), SetSearch::Step::kContinue);
-  EXPECT_EQ(search.current(), (contact::ActiveSet{1, 0, 1}));
+  EXPECT_EQ(search.current(), (ActiveSet{1, 0, 1}));
   EXPECT_EQ(search.next(Vec3(0.4, 0, -0.3), Vec3(0, -0.1, 0), kUnit), SetSearch::Step::kContinue);
-  EXPECT_EQ(search.current(), (contact::ActiveSet{1, 0, 0}));
+  EXPECT_EQ(search.current(), (ActiveSet{1, 0, 0}));
 }
 
 TEST(SetSearch, ViolationsWithinTheToleranceAreNone) {
@@ -39,7 +39,7 @@ TEST(SetSearch, ViolationsWithinTheToleranceAreNone) {
 // change at once.
 struct Chase {
   VecX forces = VecX::Zero(2), penetration = VecX::Zero(2);
-  explicit Chase(const contact::ActiveSet& set, double least) {
+  explicit Chase(const ActiveSet& set, double least) {
     if (!set[0] && !set[1]) penetration << 1.0, 1.0;
     if (set[0] && set[1]) forces << -1.0, -1.0;
     if (set[0] && !set[1]) penetration << 0.0, least;
@@ -64,7 +64,7 @@ TEST(SetSearch, ACycleIsSaidAndTheBestSetKept) {
   EXPECT_EQ(run_chase(search, 0.1), SetSearch::Step::kExhausted);
   EXPECT_EQ(search.iteration(), 12);
   EXPECT_TRUE(search.cycled());
-  EXPECT_EQ(search.best(), (contact::ActiveSet{1, 0}));
+  EXPECT_EQ(search.best(), (ActiveSet{1, 0}));
   EXPECT_EQ(search.violation_mm(), 0.1);
 }
 
@@ -72,7 +72,7 @@ TEST(SetSearch, ACycleWhoseBestSetHoldsEndsEarly) {
   SetSearch search(2, 30);
   EXPECT_EQ(run_chase(search, 0.9 * kHolds_mm), SetSearch::Step::kExhausted);
   EXPECT_LT(search.iteration(), 15);
-  EXPECT_EQ(search.best(), (contact::ActiveSet{1, 0}));
+  EXPECT_EQ(search.best(), (ActiveSet{1, 0}));
 }
 
 TEST(SetSearch, FollowSaysWhetherTheSetIsAnother) {
@@ -80,7 +80,7 @@ TEST(SetSearch, FollowSaysWhetherTheSetIsAnother) {
   search.begin();
   const Chase now(search.current(), 0.1);
   EXPECT_TRUE(search.follow(now.forces, now.penetration));
-  EXPECT_EQ(search.current(), (contact::ActiveSet{1, 1}));
+  EXPECT_EQ(search.current(), (ActiveSet{1, 1}));
   EXPECT_FALSE(search.follow(VecX::Zero(2), VecX::Zero(2)));
 }
 
@@ -119,9 +119,9 @@ TEST(SetSearch, BeginsWhereTheLastOneEndedUntilItIsForgotten) {
   search.begin();
   search.next(VecX::Zero(3), Vec3(1, 1, -1), kUnit);
   search.begin();
-  EXPECT_EQ(search.current(), (contact::ActiveSet{1, 1, 0}));
+  EXPECT_EQ(search.current(), (ActiveSet{1, 1, 0}));
   search.forget();
-  EXPECT_EQ(search.current(), (contact::ActiveSet{0, 0, 0}));
+  EXPECT_EQ(search.current(), (ActiveSet{0, 0, 0}));
 }
 
 }  // namespace

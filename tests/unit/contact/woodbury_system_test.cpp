@@ -7,14 +7,17 @@
 namespace brainshift::contact {
 namespace {
 
+using inversion::prepare;
+using inversion::sagging_data;
+
 TEST(Woodbury, SolvesForAColumnOnce) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
   WoodburySystem system(model.forward());
   EXPECT_EQ(system.columns(), 0);
-  contact::ActiveSet active = some_active(model);
+  ActiveSet active = some_active(model);
   ASSERT_TRUE(system.activate(active).has_value());
   const int first = system.columns();
-  EXPECT_EQ(first, contact::count(active));
+  EXPECT_EQ(first, count(active));
   active[0] = 0;
   active[1] = 1;
   ASSERT_TRUE(system.activate(active).has_value());
@@ -27,9 +30,8 @@ TEST(Woodbury, EqualsRefactorisation) {
   const auto run = [&](Method method) {
     std::vector<std::vector<NodeIndex>> sets;
     inversion::InversionOptions options;
-    options.method = method;
     options.on_iterate = [&](const Estimate& iterate) { sets.push_back(iterate.active_slaves); };
-    return std::make_pair(inversion::invert(model, data, options), sets);
+    return std::make_pair(inversion::invert(model, data, method, options), sets);
   };
   const auto [paper, paper_sets] = run(Method::kPaper);
   const auto [woodbury, woodbury_sets] = run(Method::kPaperWoodbury);

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "common/geometry/surface.hpp"
-#include "tests/unit/geometry/box_mesh.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace brainshift::geometry {
 namespace {
 
-using testing::box_mesh;
+using test_support::box_mesh;
 
 ClosestPointIndex index_of(const TriangleSurface& surface) {
   auto index = ClosestPointIndex::build(surface);

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "tests/unit/geometry/box_mesh.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -29,7 +29,7 @@ TetMesh regular_tetrahedron(double edge) {
   return mesh;
 }
 
-TetMesh good_mesh() { return testing::box_mesh(Vec3(-3, 0, 2), Vec3(5, 6, 9), 3, 0.1); }
+TetMesh good_mesh() { return test_support::box_mesh(Vec3(-3, 0, 2), Vec3(5, 6, 9), 3, 0.1); }
 
 // Two tetrahedra with `shared_nodes` nodes in common.
 TetMesh joined_by(int shared_nodes) {
@@ -70,7 +70,7 @@ TEST(MeshQuality, OfARegularTetrahedronIsClosedForm) {
 
 TEST(MeshQuality, OfKuhnCubesCountsEachEdgeOnce) {
   const int n = 3;
-  const MeshQuality quality = mesh_quality(testing::box_mesh(Vec3::Zero(), Vec3::Constant(n), n));
+  const MeshQuality quality = mesh_quality(test_support::box_mesh(Vec3::Zero(), Vec3::Constant(n), n));
   EXPECT_NEAR(quality.volume_mm3, n * n * n, 1e-12);
   EXPECT_NEAR(quality.min_dihedral_deg, 45.0, 1e-10);
   EXPECT_NEAR(quality.max_dihedral_deg, 90.0, 1e-10);

@@ -10,13 +10,13 @@
 #include <set>
 #include <vector>
 
-#include "tests/unit/geometry/box_mesh.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace brainshift::geometry {
 namespace {
 
 using std::numbers::pi;
-using testing::box_mesh;
+using test_support::box_mesh;
 
 TetMesh one_tet() {
   TetMesh mesh;

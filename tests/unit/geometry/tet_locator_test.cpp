@@ -10,12 +10,12 @@
 
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
-#include "tests/unit/geometry/box_mesh.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace brainshift::geometry {
 namespace {
 
-using testing::box_mesh;
+using test_support::box_mesh;
 
 Vec3 described(const TetMesh& mesh, const TetLocation& location) {
   Vec3 x = Vec3::Zero();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 
 #include "common/fem/elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
@@ -20,12 +21,23 @@ TEST(WendlandC2, IsOneAtZeroAndVanishesAtItsSupport) {
   EXPECT_DOUBLE_EQ(wendland_c2(10.5, 21.0), 3.0 / 16.0);  // (1/2)^4 * 3
 }
 
-TEST(WendlandC2, StaysCloseToThePapersCorrelation) {
+// Largest difference of the two formulas: 0.1976 at r = 2.376 L, and never negative. Other supports
+// fail: with S = 4 L it is 0.223, with S = 4.4 L 0.174.
+TEST(WendlandC2, FallsALittleFasterThanThePapersCorrelation) {
   constexpr double kLength = 5.0;
-  for (double r = 0.0; r < 30.0; r += 0.25) {
+  double largest = 0.0, at = 0.0;
+  for (int k = 0; k <= 3000; ++k) {
+    const double r = 0.01 * k;
     const double paper = (1.0 + r / kLength) * std::exp(-r / kLength);
-    EXPECT_NEAR(wendland_c2(r, kSupportOverCorrelationLength * kLength), paper, 0.2) << "r = " << r;
+    const double difference = paper - wendland_c2(r, kSupportOverCorrelationLength * kLength);
+    EXPECT_GE(difference, 0.0) << "r = " << r;
+    if (difference > largest) {
+      largest = difference;
+      at = r;
+    }
   }
+  EXPECT_NEAR(largest, 0.1976, 1e-4);
+  EXPECT_NEAR(at / kLength, 2.376, 0.01);
 }
 
 TEST(ForcePrior, EqualsTheDenseDefinition) {

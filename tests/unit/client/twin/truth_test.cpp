@@ -26,7 +26,8 @@ class TruthSolverTest : public testing::Test {
       contact::ForwardModel::build(model, config, Boundary::kContact);
 };
 
-// From 1 active slave to all 88 of them, in steps within and beyond what is corrected for. The reference begins every search from the empty set and factorises anew.
+// From no active slave to all 88 of them. The reference begins every search from the empty set and
+// factorises K_p anew for every set.
 TEST_F(TruthSolverTest, EqualsASearchFromTheEmptySetForEveryLoadOfASeries) {
   ASSERT_TRUE(forward);
   TruthSolver solver(*forward);
