@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Robust weights of data: one that lies farther off than chance and the rest of its source explain counts less.
+// Robust weights: a datum counts less when chance and its source do not explain its residual.
 //
 //   r_i  whitened residual of datum i (3 rows, or 1 along a direction), without its weight
-//   s    = max(1, median |r_i| / median of |N(0, I)|) over its source: what the model cannot explain of a whole
-//          source is no reason to distrust single data
+//   s    = max(1, median |r_i| / median of |N(0, I)|) over its source: what the model cannot
+//          explain of a whole source is no reason to distrust single data
 //   w_i  = 1 for |r_i| <= c s,  (c s / |r_i|)^4 beyond: the influence w r of a gross error vanishes
-// c is passed by a Gaussian residual once in some 20,000 data, so that good data keep their full weight: the estimate is
-// then the posterior mean itself. Iteratively reweighted least squares: Holland & Welsch 1977, Comm. Stat. A6:813.
+// A Gaussian residual exceeds c in one of some 20,000 data, so good data keep their full weight and
+// the estimate is the posterior mean itself. The reason reports weights below kOutlierWeight as
+// outliers. Iteratively reweighted least squares: Holland & Welsch 1977, Comm. Stat. A6:813.
+// Two data at one place that contradict each other are named by contradictions.hpp.
 #pragma once
 
 #include <vector>
@@ -32,8 +34,8 @@ class RobustWeights {
   void reset(int data);
   auto values() const { return weights_.head(size_); }
 
-  // norms: |r_i| with the present weight inside (sqrt(w) |r|), m. Returns true when a weight changed by more than
-  // kWeightTolerance.
+  // norms: |r_i| with the present weight inside (sqrt(w) |r|), m. Returns true when a weight
+  // changed by more than kWeightTolerance.
   bool update(const SparseData& data, const Eigen::Ref<const VecX>& norms);
   // Outliers among data [first, first + count).
   int outliers(int first, int count) const;
