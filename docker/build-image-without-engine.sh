@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# build-image-without-engine.sh: builds docker/Dockerfile and starts the daemon from the image once, with
-# debootstrap and buildah alone: no container engine, no registry. Needs root on Debian 12.
+# build-image-without-engine.sh: builds docker/Dockerfile and starts the daemon from the image once,
+# with debootstrap and buildah alone: no container engine, no registry. Needs root on Debian 12.
 #
-#   1. debootstrap a Debian 12 root file system and commit it under the Dockerfile's base name, debian:12
+#   1. debootstrap a Debian 12 root file system; commit it under the Dockerfile's base, debian:12
 #   2. buildah bud in a chroot, never pulling
-#   3. run `brainshiftd serve` from the image as its own user, without a model, on a loopback port; see that
-#      it says where it listens and greets a peer; stop it
+#   3. run `brainshiftd serve` from the image as its own user, without a model, on a loopback port;
+#      check that it names its endpoint and greets a peer; stop it
 #   4. write build/image/brainshift.tar for `docker load` or `podman load`
 #
 # Environment:
-#   BRAINSHIFT_HOST_APT=1   the build uses this machine's apt sources, apt settings and certificates (mounted
-#                           during the build, never in the image), e.g. behind a mirror; proxies set in the
-#                           usual variables are passed in either way
+#   BRAINSHIFT_HOST_APT=1   the build uses this machine's apt sources, settings and certificates,
+#                           e.g. behind a mirror. They are mounted during the build and never in the
+#                           image. The build receives the usual proxy variables either way.
 #   BRAINSHIFT_IMAGE_DIR    where storage and the archive go (default build/image)
 #   JOBS                    compilers at once in the build stage (default 2)
 set -euo pipefail
@@ -36,7 +36,8 @@ mkdir -p "$dir"
 container=
 daemon=
 bud() { buildah --root "$dir/storage" --runroot "$dir/run" --storage-driver vfs "$@"; }
-# The last process below a pid. buildah answers SIGTERM by killing what it runs, so the daemon is told itself.
+# The last process below a pid. buildah answers SIGTERM by killing what it runs, so the signal goes
+# to the daemon itself.
 innermost() {
   local pid=$1 child
   while child=$(cat /proc/"$pid"/task/*/children 2>/dev/null | tr -s ' ' '\n' | head -n 1) && [ -n "$child" ]; do
@@ -71,7 +72,7 @@ make_base() {
   rm -rf --one-file-system "$rootfs"
   debootstrap --variant=minbase --keyring="$keyring" "$suite" "$rootfs" ${mirror:+"$mirror"} \
     >"$dir/debootstrap.log" 2>&1 || { tail -n 5 "$dir/debootstrap.log" >&2; fail "debootstrap failed"; }
-  # debootstrap leaves downloaded packages, lists and the mirror it used; the base needs none of them.
+  # debootstrap leaves downloaded packages, lists and its mirror. The base needs none of them.
   rm -rf "$rootfs"/var/cache/apt/archives/*.deb "$rootfs"/var/lib/apt/lists/*
   printf 'deb http://deb.debian.org/%s %s main\n' \
     debian "$suite" debian "$suite-updates" debian-security "$suite-security" >"$rootfs/etc/apt/sources.list"
@@ -110,7 +111,7 @@ while IFS= read -r -t 60 -u "$output" line; do
 done
 [ -n "$endpoint" ] || { tail -n 5 "$dir/daemon.log" >&2; fail "the daemon did not say that it listens"; }
 say "daemon says: listening on $endpoint; it runs as $(in_image id -un)"
-# A ZeroMQ peer greets whoever connects with 0xff, eight bytes of length and 0x7f (ZMTP 3.1, section 3).
+# A ZeroMQ peer greets with 0xff, eight bytes of length and 0x7f (ZMTP 3.1, section 3).
 hostport=${endpoint#tcp://}
 greeting=$(timeout 10 bash -c 'exec 3<>"/dev/tcp/$1/$2" && head -c 10 <&3 | od -An -tx1 | tr -d " \n"' \
   greet "${hostport%:*}" "${hostport##*:}") || fail "nothing accepts connections at $endpoint"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# install-packages.sh FILE: installs the Debian packages listed in FILE (one per line, # starts a comment).
-# Asks dpkg first: where nothing is missing it needs neither network nor root and ends at once.
+# install-packages.sh FILE: installs the Debian packages listed in FILE (one per line, # starts a
+# comment). It asks dpkg first: when no package is missing, it needs neither network nor root.
 set -euo pipefail
 
 fail() { echo "install-packages: $*" >&2; exit 1; }
@@ -33,7 +33,7 @@ apt() {
 install() { apt install -y --no-install-recommends "${missing[@]}"; }
 give_up() { tail -n 20 "$log" >&2; fail "apt-get $1 failed"; }
 
-# Lists older than a day name versions that a mirror may have dropped; a fresh machine has none at all.
+# Lists older than a day name versions that a mirror may have dropped. A fresh machine has no lists.
 lists_fresh() {
   find /var/lib/apt/lists -maxdepth 1 -name '*_Packages*' -mmin -1440 2>/dev/null | grep -q .
 }
