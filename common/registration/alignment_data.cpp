@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sparse data from an alignment, with the errors that all its points share.
+#include "common/registration/alignment_data.hpp"
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
-
-#include "common/registration/icp.hpp"
 
 namespace brainshift::registration {
 namespace {

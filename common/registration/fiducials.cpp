@@ -14,12 +14,13 @@
 namespace brainshift::registration {
 namespace {
 
-// Points whose second principal spread is below this fraction of the first lie on a line: a rotation about it would
-// be known ten times worse than the others.
-constexpr double kCollinear = 0.01;
-// Fiducials nearer to one another than this fraction of their extent are the same one, given twice.
+// Below this ratio of the second principal spread to the first, the fiducials lie on a line: a
+// rotation about it would be known some hundred times worse than the others.
+constexpr double kThinnestArrangement = 0.01;
+// Two fiducials nearer to one another than this fraction of the extent are one, given twice.
 constexpr double kSamePlace = 1e-3;
-// Extents (largest distance between two) of one arrangement measured twice.
+// The largest ratio between the extents (largest distance between two points) of one arrangement
+// that is measured twice.
 constexpr double kExtentRatio = 1.5;
 
 double extent_mm(const Points& points) {
@@ -53,7 +54,7 @@ Status check_set(const char* name, const Points& points) {
         return refuse(
             fmt::format("fiducials: {} ones {} and {} are at the same place", name, j, i));
   const Vec3 spread = principal_spread(points);
-  if (!(spread[1] > kCollinear * kCollinear * spread[2]))
+  if (!(spread[1] > kThinnestArrangement * kThinnestArrangement * spread[2]))
     return refuse(fmt::format("fiducials: all {} {} ones lie on one line", points.cols(), name));
   return {};
 }
@@ -77,8 +78,8 @@ RigidTransform least_squares(const Points& measured, const Points& image) {
   const Vec3 from = measured.rowwise().mean(), to = image.rowwise().mean();
   const Mat3 covariance = (image.colwise() - to) * (measured.colwise() - from).transpose();
   const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // The best orthogonal matrix may be a reflection (always possible for fiducials in a plane); the weakest direction
-  // is then turned round.
+  // The best orthogonal matrix may be a reflection: for fiducials in a plane, a reflection fits as
+  // well as a rotation. The weakest direction is then turned round.
   const double handedness = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   const Vec3 signs(1.0, 1.0, handedness < 0.0 ? -1.0 : 1.0);
   RigidTransform T = RigidTransform::Identity();
@@ -100,7 +101,8 @@ FiducialRegistration fit(const Points& measured, const Points& image) {
   return result;
 }
 
-// Depth-first over assignments; a branch ends where a distance to a fiducial already assigned does not fit.
+// Depth-first over assignments. A branch ends where a distance to a fiducial that is already
+// assigned does not fit.
 class Matcher {
  public:
   Matcher(const Points& measured, const Points& image, double tolerance_mm)
@@ -194,7 +196,8 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
   if (Status good = check_match(measured, image, options); !good)
     return tl::unexpected(good.error());
   const double here = extent_mm(measured), there = extent_mm(image);
-  // Some of the image's may not have been measured, so only the measured ones may span less; a unit's factor is more.
+  // Some of the image's fiducials may not have been measured, so only the measured ones may span
+  // less. A wrong unit makes a factor of at least 10.
   if (here > kExtentRatio * there || there > 8.0 * here)
     return tl::unexpected(check_extents(here, there).error());
   Matcher matcher(measured, image, options.tolerance_mm);

@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -18,23 +17,19 @@ namespace {
 using geometry::PointRows;
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
-// Closer than this (mm), the direction from the surface to a point is rounding; the triangle's normal is not.
-constexpr double kTouching = 1e-7;
-// The Welsch scale starts at this multiple of the median residual, so that half of the points pull with at
-// least 0.88 of their weight, and shrinks by the factor per step until it is the one asked for.
+// The Welsch scale starts at this multiple of the median residual: half of the points then pull
+// with at least 0.88 of their weight. It shrinks by the factor per step until it is the one asked
+// for.
 constexpr double kStartOverMedian = 2.0;
 constexpr double kScaleFactor = 0.6;
 // Curvature below this fraction of the largest is taken for zero when a step is computed.
 constexpr double kNullCurvature = 1e-9;
-// Rotation that is left out: correspondences change along a step that was not taken, hence twice its size; and
-// two standard deviations for what the points do not tell.
+// Rotation that is left out. Correspondences change along a step that was not taken, hence twice
+// its size; and two standard deviations for what the points do not tell.
 constexpr double kStepSafety = 2.0;
 constexpr double kStandardDeviations = 2.0;
 // Below this, 1 - exp(-x) is summed as a series, since the difference would lose its digits.
 constexpr double kSeries = 1e-3;
-
-// Distances of points (one per row) from a surface, and their gradients.
-using Measure = std::function<void(const PointRows& points, VecX& residuals, PointRows& gradients)>;
 
 // What a pose gives: moved points, distances to the surface and their directions.
 struct Fit {
@@ -54,7 +49,7 @@ struct Fit {
 
 class Icp {
  public:
-  Icp(const Points& points, Measure measure, const RigidTransform& T_initial,
+  Icp(const Points& points, const TargetSurface& surface, const RigidTransform& T_initial,
       const IcpOptions& options);
   IcpResult run();
 
@@ -77,19 +72,20 @@ class Icp {
   void summarise(IcpResult& result);
 
   const PointRows points_;
-  const Measure measure_;
+  const TargetSurface& surface_;
   const RigidTransform& initial_pose_;
   const IcpOptions& options_;
-  Vec3 centroid_;
+  // Aligned, because the rounding of Eigen's mean over columns depends on the address it writes to.
+  alignas(16) Vec3 centroid_;
   double radius_mm_;
   double prior_information_ = 0.0;  // 1 / rad^2
   Fit current_, next_;
 };
 
-Icp::Icp(const Points& points, Measure measure, const RigidTransform& T_initial,
+Icp::Icp(const Points& points, const TargetSurface& surface, const RigidTransform& T_initial,
          const IcpOptions& options)
     : points_(points.transpose()),
-      measure_(std::move(measure)),
+      surface_(surface),
       initial_pose_(T_initial),
       options_(options),
       centroid_(points.rowwise().mean()),
@@ -104,7 +100,7 @@ void Icp::move(const RigidTransform& T, Fit& fit) const {
   fit.T = T;
   fit.moved = points_.lazyProduct(T.linear().transpose());
   fit.moved.rowwise() += T.translation().transpose();
-  measure_(fit.moved, fit.residuals, fit.gradients);
+  surface_.measure(fit.moved, fit.residuals, fit.gradients);
   fit.rotation = rotation_vector(T.linear() * initial_pose_.linear().transpose());
   fit.scale_mm = 0.0;
 }
@@ -124,9 +120,10 @@ void Icp::weigh(double scale_mm, Fit& fit) const {
                   prior_information_ * fit.rotation.squaredNorm();
 }
 
-// Gauss-Newton. Along axes that the data do not show, the facets of the surface and the noise would still
-// pull the pose a little way in an arbitrary direction: there only the prior speaks. Rotation goes first:
-// where it can be traded against translation (a sphere seen from one side), the translation does the work.
+// Gauss-Newton. Along axes that the data do not show, the facets of the surface and the noise
+// would still pull the pose a little way in an arbitrary direction, so only the prior acts there.
+// Rotation axes are removed first: where a rotation can be traded against a translation (a sphere
+// seen from one side), the translation does the work.
 Vec6 Icp::step(const Fit& fit, const PoseInformation& points, double threshold,
                bool rotates) const {
   Mat6 keep = Mat6::Identity();
@@ -168,8 +165,8 @@ double Icp::start_scale() const {
   return std::max(options_.welsch_scale_mm, kStartOverMedian * *middle);
 }
 
-// Correspondences change under the step; it is halved until the objective itself goes down. True when what was
-// left of the step is within the tolerances.
+// Correspondences change under the step, so it is halved until the objective itself goes down.
+// True when the remaining step is within the tolerances.
 bool Icp::descend(const PoseInformation& data, Vec6 xi) {
   const auto attempt = [&] {
     move(rigid_increment(xi, data.centre) * current_.T, next_);
@@ -247,55 +244,13 @@ double Icp::left_out_rotation(const Fit& fit, const PoseInformation& data, doubl
   return kStepSafety * greatest + kStandardDeviations * longest / std::sqrt(information);
 }
 
-void measure_triangles(const geometry::ClosestPointIndex& surface, const PointRows& points,
-                       VecX& residuals, PointRows& gradients) {
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const Vec3 x = points.row(i);
-    const geometry::ClosestPoint closest = surface.closest(x);
-    const Vec3 away = x - closest.point;
-    const Vec3 n = closest.distance_mm > kTouching ? Vec3(away / closest.distance_mm)
-                                                   : surface.triangle_normal(closest.triangle);
-    gradients.row(i) = n;
-    residuals[i] = n.dot(away);
-  }
-}
-
-Result<IcpResult> align_to(Measure measure, const Points& points,
-                           const RigidTransform& T_surface_points_initial,
-                           const IcpOptions& options) {
-  if (auto status = check_alignment(points, T_surface_points_initial, options); !status)
-    return tl::unexpected(status.error());
-  return Icp(points, std::move(measure), T_surface_points_initial, options).run();
-}
-
 }  // namespace
 
-Result<IcpResult> align(const Points& points, const geometry::ClosestPointIndex& surface,
+Result<IcpResult> align(const Points& points, const TargetSurface& surface,
                         const RigidTransform& T_surface_points_initial, const IcpOptions& options) {
-  const auto measure = [&surface](const PointRows& rows, VecX& residuals, PointRows& gradients) {
-    measure_triangles(surface, rows, residuals, gradients);
-  };
-  return align_to(measure, points, T_surface_points_initial, options);
-}
-
-Result<IcpResult> align(const Points& points, const geometry::DistanceVolume& surface,
-                        const RigidTransform& T_surface_points_initial, const IcpOptions& options) {
-  const auto measure = [&surface](const PointRows& rows, VecX& residuals, PointRows& gradients) {
-    surface.at(rows, residuals, gradients);
-  };
-  return align_to(measure, points, T_surface_points_initial, options);
-}
-
-Result<IcpResult> align(const Points& points, const geometry::OrientedCloud& surface,
-                        const RigidTransform& T_surface_points_initial, const IcpOptions& options) {
-  const auto measure = [&surface](const PointRows& rows, VecX& residuals, PointRows& gradients) {
-    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      const geometry::DistanceSample sample = surface.at(rows.row(i));
-      residuals[i] = sample.distance_mm;
-      gradients.row(i) = sample.gradient;
-    }
-  };
-  return align_to(measure, points, T_surface_points_initial, options);
+  if (auto status = check_alignment(points, T_surface_points_initial, options); !status)
+    return tl::unexpected(status.error());
+  return Icp(points, surface, T_surface_points_initial, options).run();
 }
 
 }  // namespace brainshift::registration

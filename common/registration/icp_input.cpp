@@ -10,8 +10,10 @@
 namespace brainshift::registration {
 namespace {
 
-// Points whose second principal spread is below this fraction of the first lie on a line.
-constexpr double kCollinear = 1e-5;
+// Below this ratio of the second principal spread to the first, the points lie on a line up to the
+// rounding of their coordinates. align() accepts thinner shapes than register_fiducials(), because
+// it reports the axes that they do not show.
+constexpr double kThinnestCloud = 1e-5;
 
 Status check_options(const IcpOptions& options) {
   const auto positive = [](const char* name, double value) -> Status {
@@ -45,7 +47,7 @@ Status check_points(const Points& points, const RigidTransform& T) {
   const Vec3 spread =
       Eigen::SelfAdjointEigenSolver<Mat3>(centred * centred.transpose(), Eigen::EigenvaluesOnly)
           .eigenvalues();
-  if (!(spread[1] > kCollinear * kCollinear * spread[2]))
+  if (!(spread[1] > kThinnestCloud * kThinnestCloud * spread[2]))
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("boundary points: all {} lie on one line", points.cols()));
   if (!T.matrix().allFinite()) return fail(ErrorCode::kNotFinite, "initial pose: not finite");

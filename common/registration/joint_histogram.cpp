@@ -72,8 +72,8 @@ void JointHistogram::add(double s, double m) {
   count_ += 1.0;
 }
 
-// With F = (HA + HB) / HAB:  dF/dp(a,b) = (F (log p(a,b) + 1) - log pA(a) - log pB(b) - 2) / HAB. What is the same for
-// all bins has no effect, since the sum of p does not change.
+// With F = (HA + HB) / HAB:  dF/dp(a,b) = (F (log p(a,b) + 1) - log pA(a) - log pB(b) - 2) / HAB.
+// A term that is equal for all bins has no effect, since the sum of p does not change.
 double JointHistogram::nmi() {
   slope_.setZero();
   if (count_ == 0.0) return 0.0;

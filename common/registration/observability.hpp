@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which rotations and translations of a pose the points show, and in words.
+// Which rotations and translations of a pose the points show, in numbers and in words.
 //
-// A ratio is the information about an axis over that about the best known of all six (rotation scaled by the
-// points' rms radius): 1e-2 means known ten times worse. Rotation: with the translation unknown. Translation: with
-// the rotation known, for where one can be traded against the other, the translation does the work.
+// A ratio is the information about an axis divided by that about the best known of all six
+// (rotation scaled by the points' rms radius). A ratio of 1e-2 means that the axis is known ten
+// times worse.
+// Ratios of rotations hold with the translation unknown. Ratios of translations hold with the
+// rotation known: where one can be traded against the other, the translation does the work.
 #pragma once
 
 #include <string>
@@ -14,7 +16,8 @@
 namespace brainshift::registration {
 
 struct Observability {
-  // Ascending; column k of the axes belongs to ratio k. Unit vectors in the surface's frame.
+  // Ratios ascend, no unit. Column k of the axes belongs to ratio k: unit vectors in the surface's
+  // frame.
   Vec3 rotation_ratios = Vec3::Zero();
   Mat3 rotation_axes = Mat3::Identity();
   Vec3 translation_ratios = Vec3::Zero();
@@ -25,8 +28,9 @@ struct Observability {
   bool translation_shown(int k) const { return translation_ratios[k] >= threshold; }
 };
 
-// One sentence per axis that is not observable: "rotation about (0.10, 0.90, 0.20) is not shown by the points", or one
-// for all three where none is. Axes point to the half space of their largest component. Empty when all are shown.
+// One sentence per axis that is not observable: "rotation about (0.10, 0.90, 0.20) is not shown by
+// the points". Where none of three is observable, one sentence for all: "no rotation is shown by
+// the points". The largest component of an axis is positive. Empty when all are shown.
 std::vector<std::string> not_shown(const Observability& seen);
 
 }  // namespace brainshift::registration

@@ -83,7 +83,7 @@ Observability observability(const PoseInformation& information, double ratio) {
   const double largest =
       Eigen::SelfAdjointEigenSolver<Mat6>(information.hessian, Eigen::EigenvaluesOnly)
           .eigenvalues()[5];
-  if (!(largest > 0.0)) {  // every point is an outlier: nothing is shown
+  if (!(largest > 0.0)) {  // every point is an outlier and shows nothing
     seen.threshold = std::max(ratio, 1e-300);
     return seen;
   }
@@ -106,7 +106,7 @@ Mat6 pose_covariance(const PoseInformation& information, const Observability& se
       keep.bottomRightCorner<3, 3>() -=
           seen.translation_axes.col(k) * seen.translation_axes.col(k).transpose();
   known = keep * known * keep;
-  // Taking the Schur complement's part along an axis away leaves nothing known of that rotation, while the
+  // Without the Schur complement's part along an axis, nothing is known of that rotation, and the
   // translation still goes along with it.
   const Mat3 rotation = rotation_information(known);
   Mat3 shown = Mat3::Zero();

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What distances r_i with gradients g_i and weights w_i tell about a small rigid motion of the points x_i:
-// the Gauss-Newton normal equations of sum_i w_i (r_i + J_i xi)^2 / sd^2, and what follows from them.
+// What distances r_i with gradients g_i and weights w_i tell about a small rigid motion of the
+// points x_i: the Gauss-Newton normal equations of sum_i w_i (r_i + J_i xi)^2 / sd^2, and their
+// consequences.
 //
-// Coordinates: xi = (radius * w, t), w a rotation vector about the points' centre c, radius their rms distance
-// from it, so that all six are in mm:  J_i = ((x_i - c) x g_i / radius, g_i).
+// Coordinates: xi = (radius * w, t). w is a rotation vector about the points' centre c, radius
+// their rms distance from it, so that all six are in mm:  J_i = ((x_i - c) x g_i / radius, g_i).
 #pragma once
 
 #include "common/core/types.hpp"
@@ -16,30 +17,32 @@ namespace brainshift::registration {
 struct PoseInformation {
   Mat6 hessian = Mat6::Zero();   // mm^-2
   Vec6 gradient = Vec6::Zero();  // of half the sum, mm^-1
-  Vec3 centre = Vec3::Zero();
+  Vec3 centre = Vec3::Zero();    // c, mm
   double radius_mm = 1.0;
 };
 
-// One row per point. Does not allocate; the order of summation depends on the number of points alone.
+// points, gradients: m x 3; residuals (mm), weights: m. Does not allocate. The order of summation
+// depends on the number of points alone.
 PoseInformation pose_information(const geometry::PointRows& points,
                                  const geometry::PointRows& gradients, const VecX& residuals,
                                  const VecX& weights, double sd_mm, const Vec3& centre,
                                  double radius_mm);
 
-// What is known of the rotation when the translation is not: the Schur complement, 3 x 3.
+// Information about the rotation with the translation unknown: the Schur complement, 3 x 3, mm^-2.
 Mat3 rotation_information(const Mat6& hessian);
 
-// An axis with less than `ratio` of the largest eigenvalue of the Hessian counts as not observable.
+// An axis with less than `ratio` of the Hessian's largest eigenvalue is not observable.
 Observability observability(const PoseInformation& information, double ratio);
 
-// Standard deviations of what nothing tells: half a turn, and a metre.
+// Standard deviations of an axis without any information: half a turn, and a metre.
 inline constexpr double kUnknownRotationSd_rad = 3.14159265358979323846;
 inline constexpr double kUnknownTranslationSd_mm = 1000.0;
 
-// Covariance of (w, t), radians and mm, about the centre: inverse of the points' information and the prior's
-// (1 / variance of each rotation axis, rad^-2; 0: none). Rotation axes that are not observable (all of them unless
-// `rotates`) are known from the prior alone, and what they leave open in the translation is kept; translation
-// axes that are not observable have the standard deviation above.
+// Covariance of (w, t), radians and mm, about the centre: the inverse of the points' information
+// plus the prior's. rotation_prior: 1 / variance of each rotation axis, rad^-2; 0: no prior.
+// Rotation axes that are not observable (all of them unless `rotates`) are known from the prior
+// alone, and their effect on the translation is kept. Translation axes that are not observable
+// have the standard deviation above.
 Mat6 pose_covariance(const PoseInformation& information, const Observability& seen, bool rotates,
                      double rotation_prior);
 

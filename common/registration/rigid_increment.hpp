@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Small rigid motions about a centre c, and how a distance changes with them.
 //
-//   T(xi) x = c + exp([w]x) (x - c) + t,      xi = (w, t): rotation vector in radians, translation in mm
+//   T(xi) x = c + exp([w]x) (x - c) + t,      xi = (w, t): rotation vector (rad), translation (mm)
 //   d/dxi  n . T(xi) x  at xi = 0   =   ((x - c) x n,  n)
 #pragma once
 
@@ -12,12 +12,13 @@ namespace brainshift::registration {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
+// T(xi), mm.
 RigidTransform rigid_increment(const Vec6& xi, const Vec3& centre);
 
 // Rotation vector w with exp([w]x) = rotation, |w| <= pi.
 Vec3 rotation_vector(const Mat3& rotation);
 
-// Gradient of n . T(xi) x at xi = 0, for a fixed direction n.
+// Gradient of n . T(xi) x at xi = 0, for a fixed direction n: mm per radian, and no unit.
 Vec6 direction_gradient(const Vec3& x, const Vec3& n, const Vec3& centre);
 
 }  // namespace brainshift::registration

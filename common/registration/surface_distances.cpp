@@ -28,7 +28,8 @@ Vec3 barycentric(const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
   return Vec3(1.0 - wb - wc, wb, wc);
 }
 
-// What a camera whose pose is a little off does to all points alike: three shifts, three turns about the centre.
+// Errors of all points together when the camera's pose is wrong: three shifts, and three turns
+// about the centre.
 Eigen::MatrixXd pose_errors(const Points& places, const SurfaceDistanceOptions& options) {
   const bool shifts = options.pose_sd_mm > 0.0, turns = options.pose_sd_deg > 0.0;
   const Eigen::Index columns = (shifts ? 3 : 0) + (turns ? 3 : 0);

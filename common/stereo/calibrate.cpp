@@ -8,6 +8,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "common/core/rigid_motion.hpp"
 #include "common/stereo/cv_image.hpp"
 
 namespace brainshift::stereo {

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A stereo calibration from pictures of a chessboard taken by both cameras at once.
 //
-// The board's inner corners lie at (i, j, 0) x square_mm. Intrinsics, distortion, T_right_left and the pose of every
-// board minimise the sum of squared distances between seen and projected corners over both pictures:
+// The board's inner corners lie at (i, j, 0) x square_mm. Intrinsics, distortion, T_right_left and
+// the pose of every board minimise the sum of squared distances between seen and projected corners
+// over both pictures:
 //   rms_px = sqrt(sum |seen - projected|^2 / number of corners)
-// First each camera alone (Zhang 2000), then all together (OpenCV 4.6, calib3d). Three radial terms need corners at the
-// picture's rim; k3 is kept at 0, because boards seldom reach it.
-// Independent of that minimisation, the epipolar error: the distance of a corner, undistorted, from the line on which
-// its partner in the other picture says that it must lie (Hartley & Zisserman 2004, section 11.4.3), rms over both
-// pictures.
+// First each camera is calibrated alone (Zhang 2000), then all together (OpenCV 4.6, calib3d). A
+// third radial term needs corners at the picture's rim. Boards seldom reach it, so k3 stays 0.
 //
-// Assumption: corners are found with independent errors of equal size; the board is flat and moved between pairs.
+// The epipolar error is independent of that minimisation: the distance of a corner, undistorted,
+// from the epipolar line of its partner in the other picture (Hartley & Zisserman 2004, section
+// 11.4.3), rms over both pictures.
+//
+// Assumption: corners are found with independent errors of equal size. The board is flat and moved
+// between pairs.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,22 +21,24 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
+#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 
 struct ChessBoard {
-  int columns = 9, rows = 6;  // inner corners, columns != rows so that a turned board is known
+  // Inner corners. With columns != rows a board turned by a quarter is recognised.
+  int columns = 9, rows = 6;
   double square_mm = 25.0;
 };
 
-// Ok, or kInvalidArgument naming the key: fewer than 3 x 3 corners, or a square that has no size.
+// kInvalidArgument with the key: fewer than 3 or more than 100 corners along a side, a square_mm
+// that is not finite and > 0.
 Status validate(const ChessBoard& board);
 
 struct CalibrationOptions {
-  int min_pairs = 5;  // below it the boards' tilts hardly separate focal length from distance
-  // A calibration worse than this has mixed up its boards or its cameras; good ones stay below 0.5.
+  int min_pairs = 5;  // with fewer, the boards' tilts hardly separate focal length from distance
+  // A calibration worse than this mixed up its boards or its cameras. Good ones stay below 0.5.
   double max_rms_px = 2.0;
 };
 
@@ -48,25 +53,28 @@ struct PicturePair {
   GrayImage left, right;
 };
 
-// Distance of a corner, undistorted, from the epipolar line of its partner, rms over both pictures, px; also for
-// corners that took no part in the calibration. Precondition: as many corners left as right, at least one.
+// The epipolar error, px; also of corners that took no part in the calibration. Precondition: as
+// many corners left as right, at least one.
 double epipolar_rms(const StereoCalibration& calibration, const std::vector<BoardCorners>& corners);
 
-// Inner corners of the board in a picture, refined to sub-pixel; empty when it is not seen whole.
+// Inner corners of the board in a picture, 2 x n px, refined to sub-pixel. Empty when the picture
+// does not show the whole board.
 Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board);
 
-// From corners at hand. kInvalidArgument: too few pairs, a number of corners that is not the board's, pictures of no
-// size, left and right swapped. kNotConverged: rms above options.max_rms_px, or a minimisation that fails.
+// From corners at hand. kInvalidArgument: a bad board (validate), too few pairs, a number of
+// corners that is not the board's, pictures of no size, left and right swapped. kNotConverged: rms
+// above options.max_rms_px, or a minimisation that fails.
 Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
                                     const ChessBoard& board, int width_px, int height_px,
                                     const CalibrationOptions& options = {});
 
 struct CalibrationResult {
   StereoCalibration calibration;
-  std::vector<std::string> without_board;  // names of pairs in which a picture shows no whole board
+  std::vector<std::string> without_board;  // names of pairs with a picture without a whole board
 };
 
-// From pictures. As above; kInvalidArgument also for pictures of different sizes (the sentence names the pair).
+// From pictures. Errors as above; kInvalidArgument also for pictures of different sizes, with the
+// pair's name.
 Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs, const ChessBoard& board,
                                     const CalibrationOptions& options = {});
 

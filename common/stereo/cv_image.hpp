@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures as OpenCV sees them. Private to common/stereo: pulls in OpenCV.
+// Pictures and cameras as OpenCV sees them. Private to common/stereo: it includes OpenCV.
 #pragma once
 
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
+#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 
-// A view without a copy; valid as long as the picture. Nobody writes through it.
+// A view without a copy, valid as long as the picture. Callers must not write through it.
 inline cv::Mat view_of(const GrayImage& image) {
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
 }

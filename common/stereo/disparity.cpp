@@ -18,11 +18,12 @@ namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kDisparityScale = 16;  // StereoSGBM counts sixteenths of a pixel
-// Penalties of a disparity that changes by one pixel, and by more, per pixel of the block (Hirschmueller's P1 and P2 as
-// OpenCV's manual scales them).
+// Penalties of a disparity that changes by one pixel, and by more, per pixel of the block
+// (Hirschmueller's P1 and P2 as OpenCV's manual scales them).
 constexpr int kSmallStep = 8, kLargeStep = 32;
 constexpr int kPreFilterCap = 31;
-// SGBM guesses the right picture's disparities from the left one's costs and takes -1 for 1 px; here both are matched.
+// SGBM's own check is off: it guesses the right picture's disparities from the left one's costs,
+// and takes -1 for 1 px. Here both pictures are matched.
 constexpr int kNoOwnCheck = 10000;
 // Sobel's 3 x 3 derivative, over 8: white noise of variance 1 gives one of this variance.
 constexpr double kSobelNoise = 12.0 / 64.0;
@@ -52,8 +53,8 @@ Status check(const RectifiedPair& pair, const MatchOptions& options) {
   return {};
 }
 
-// Disparities of the first picture in px, NaN where there is none. Pictures are widened on the left, because SGBM
-// leaves a strip without result where the search would leave the second picture.
+// Disparities of the first picture in px, NaN where there is none. Both pictures are widened,
+// because SGBM leaves a strip without result where the search would leave the second picture.
 cv::Mat match_one_way(const cv::Mat& first, const cv::Mat& second, const MatchOptions& options) {
   const int searched = (options.disparities + 15) / 16 * 16;
   const int widen_left = std::max(0, options.min_disparity_px + searched);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A picture of one grey level per pixel, 0 to 255, and maps of one number per pixel. Row by row, pixel (x, y) with x to
-// the right and y down.
+// A picture of one grey level per pixel, 0 to 255, and maps of one number per pixel. Pixels are
+// stored row by row; in pixel (x, y), x points to the right and y down.
 #pragma once
 
 #include <cstddef>

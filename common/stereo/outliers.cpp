@@ -10,8 +10,9 @@
 namespace brainshift::stereo {
 namespace {
 
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
-                                                   PointColumns, 3, std::size_t>;
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                        PointColumns, 3, std::size_t>;
 
 // The corner of a regular grid has 1.5 times the mean distance of its inside.
 constexpr double kAlwaysInside = 2.0;

@@ -11,14 +11,14 @@
 #include <utility>
 #include <vector>
 
-#include "common/values/stereo_calibration.hpp"
 #include "common/stereo/outliers.hpp"
 #include "common/stereo/parts.hpp"
+#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 namespace {
 
-// A block whose pixels are mostly not valid has no place of its own.
+// A block needs this fraction of valid pixels for a vertex.
 constexpr double kMinBlockFill = 0.5;
 
 Status check(const ReconstructOptions& options, const RigidTransform& T_ras_camera) {
@@ -115,8 +115,8 @@ void drop_outliers(Grid& grid, const ReconstructOptions& options, ReconstructedS
 
 using Triangle = std::array<int, 3>;
 
-// Counter-clockwise seen from the camera (picture axes: x right, y down), unless its normal is too far from the line of
-// sight.
+// Adds a triangle that is counter-clockwise seen from the camera (picture axes: x right, y down),
+// unless its normal is too far from the line of sight.
 void add_triangle(const Grid& grid, const Triangle& t, double min_cosine,
                   std::vector<Triangle>& out) {
   const auto point = [&](int k) {

@@ -82,7 +82,8 @@ Result<Rectified> rectify(const GrayImage& left, const GrayImage& right,
   g.baseline_mm = -P2.at<double>(0, 3) / P2.at<double>(0, 0);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) g.R_left_rectified(i, j) = R1(j, i);
-  // OpenCV takes the larger component of the baseline; a valid calibration may still be too near the diagonal.
+  // OpenCV takes the larger component of the baseline. A valid calibration may still be too near
+  // the diagonal.
   if (!(g.baseline_mm > 0.0) || P2.at<double>(1, 3) != 0.0) {
     return fail(ErrorCode::kInvalidArgument,
                 "T_right_left: the cameras do not stand side by side enough to be rectified");

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transform from one frame to another for every image of a recording, through its tracked links and constant ones.
+// The transform from one frame to another for every image of a recording, through its tracked
+// links and constant ones.
 //
 //   T_target_source(i) = T_n ... T_2 T_1,  every tracked T_k at the time time_s[i] - latency_s
 //
-// latency_s: how much later an image was stamped than its tissue was seen; the tracker's clock is the reference. A frame
-// whose image or any link is not valid at that time has no transform, and the report says why.
+// latency_s: by how much an image's stamp is later than the moment it shows. The tracker's clock
+// is the reference. A frame has no transform when its image or any link is not valid at that time;
+// the result says why.
 #pragma once
 
 #include <optional>
@@ -23,7 +25,7 @@ struct ConstantLink {
 };
 
 struct ChainOptions {
-  double latency_s = 0.0;  // -1 to 1
+  double latency_s = 0.0;  // -1 to 1, s
   PoseTimeOptions time;
 };
 
@@ -36,18 +38,19 @@ struct Dropped {
 
 struct Chain {
   std::vector<std::optional<AffineTransform>> T_target_source;  // per frame of the recording
-  std::vector<std::string> why_not;  // per frame, why it has none; else empty
+  std::vector<std::string> why_not;  // per frame, why it has no transform; else empty
   std::vector<std::string> links;    // names, in walking order
   int used = 0;
   std::vector<Dropped> dropped;
 };
 
-// kInvalidArgument: no chain (transform_graph.hpp), or options out of range; the sentence names them.
+// constants and the recording's links together name the frames; source and target are two of them.
+// kInvalidArgument: no chain (transform_graph.hpp), or an option out of range (named).
 Result<Chain> evaluate_chain(const Recording& recording, const std::vector<ConstantLink>& constants,
                              const std::string& source, const std::string& target,
                              const ChainOptions& options = {});
 
-// Adds a frame to the entry of that reason.
+// Counts a frame in the entry of that reason, which is made when it is missing.
 void count_dropped(std::vector<Dropped>& dropped, const std::string& reason, int frame);
 
 }  // namespace brainshift::tracking

@@ -34,7 +34,8 @@ PoseOutcome outcome_of(LinkStatus status) {
   return PoseOutcome::kMissing;
 }
 
-// The two samples that decide: the last at or before t and the first after it, or the two nearest one end.
+// The two samples that decide: the last at or before t and the first after it, or the two at one
+// end.
 struct Bracket {
   std::size_t first, second;
   double outside_s;  // how far t lies beyond them

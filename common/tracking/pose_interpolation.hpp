@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A transform between two recorded ones, and a link's transform at any time.
 //
-// With A = Q_A S_A the polar decomposition of the linear part (Q a rotation, S symmetric; S = I for a rigid motion):
+// With A = Q_A S_A the polar decomposition of the linear part (Q a rotation, S symmetric; S = I
+// for a rigid motion):
 //   T(a) = [ slerp(Q_A, Q_B; a)  ((1 - a) S_A + a S_B)  |  (1 - a) t_A + a t_B ]
-// that is, the source frame's origin moves on a straight line and its axes turn about one fixed axis at constant rate
-// (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
+// The source frame's origin moves on a straight line, and its axes turn about one fixed axis at
+// constant rate (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
 #pragma once
 
 #include <optional>
@@ -19,7 +20,8 @@ namespace brainshift::tracking {
 AffineTransform interpolate(const AffineTransform& A, const AffineTransform& B, double a);
 
 struct PoseTimeOptions {
-  // Two samples farther apart than this say nothing about the time between them. Trackers record 10 to 60 a second.
+  // Two samples farther apart than this say nothing about the time between them. Trackers record
+  // 10 to 60 samples a second.
   double max_age_s = 0.2;
   // How far before the first or after the last sample a pose may be extrapolated.
   double max_extrapolation_s = 0.02;
@@ -32,9 +34,10 @@ struct PoseAtTime {
   AffineTransform T_to_from = AffineTransform::Identity();  // when kOk
 };
 
-// The link at time t_s. A sample at that very time decides alone. Otherwise the nearest samples before and after do, frames
-// without the transform being passed over: both must be valid (nothing is bridged across an invalid sample) and at most
-// max_age_s apart. time_s: of the frames, never decreasing, as many as samples.
+// The link at time t_s. time_s: of the frames, s, never decreasing, one per sample.
+// A sample at that very time decides alone. Otherwise the nearest samples before and after it
+// decide; frames without the transform are passed over. Both samples must be valid, since nothing
+// is bridged across an invalid one, and at most max_age_s apart.
 PoseAtTime pose_at(const std::vector<double>& time_s, const std::vector<Link>& samples, double t_s,
                    const PoseTimeOptions& options = {});
 

@@ -1,27 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/tracking/recording.hpp"
 
-#include <fmt/format.h>
-
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cstdint>
 #include <cstring>
 
 namespace brainshift::tracking {
 namespace {
-
-constexpr double kLargestCondition = 1e4;
-
-Status check_finite(const Eigen::Matrix4d& matrix) {
-  if (!matrix.allFinite()) {
-    return fail(ErrorCode::kNotFinite, "holds a value that is not a finite number");
-  }
-  if (!matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-9)) {
-    return fail(ErrorCode::kInvalidArgument, "its last row is not 0 0 0 1");
-  }
-  return {};
-}
 
 template <typename T>
 void copy_values(std::string_view bytes, Eigen::MatrixXf& values) {
@@ -54,41 +38,6 @@ Eigen::MatrixXf Recording::frame_values(int frame) const {
     case PixelType::kUint16: copy_values<std::uint16_t>(bytes, values); break;
   }
   return values;
-}
-
-Status check_rigid(const Eigen::Matrix4d& matrix, double tolerance) {
-  if (Status finite = check_finite(matrix); !finite) return finite;
-  const Mat3 R = matrix.topLeftCorner<3, 3>();
-  const double error = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (error > tolerance) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("is no rigid motion: R^T R differs from I by {:.3g}", error));
-  }
-  if (R.determinant() < 0.0) {
-    return fail(ErrorCode::kInvalidArgument, "is no rigid motion: it is a reflection");
-  }
-  return {};
-}
-
-Status check_affine(const Eigen::Matrix4d& matrix) {
-  if (Status finite = check_finite(matrix); !finite) return finite;
-  const Mat3 linear = matrix.topLeftCorner<3, 3>();
-  const Vec3 stretch = Eigen::JacobiSVD<Mat3>(linear).singularValues();
-  if (!(stretch[2] > 0.0) || stretch[0] > kLargestCondition * stretch[2]) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("cannot be inverted: it stretches by {:.3g} and by {:.3g}", stretch[0],
-                            stretch[2]));
-  }
-  return {};
-}
-
-RigidTransform nearest_rigid(const Eigen::Matrix4d& matrix) {
-  const Mat3 linear = matrix.topLeftCorner<3, 3>();
-  const Eigen::JacobiSVD<Mat3> svd(linear, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  RigidTransform T = RigidTransform::Identity();
-  T.linear() = svd.matrixU() * svd.matrixV().transpose();
-  T.translation() = matrix.topRightCorner<3, 1>();
-  return T;
 }
 
 }  // namespace brainshift::tracking

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Recording: tracked ultrasound as it was recorded; images and, per image, the transforms between named frames.
+// Recording: tracked ultrasound as it was recorded. It holds images and, per image, the transforms
+// between named frames.
 //
-// Pixel (u, v) of a frame has its centre at integer coordinates: u along the transducer's marked axis, v away from the
-// transducer (orientation "MF"; readers turn other orientations into this one). Transforms left-multiply, in mm.
+// Pixel (u, v) of a frame has its centre at integer coordinates: u along the transducer's marked
+// axis, v away from the transducer (orientation "MF"; readers turn other orientations into this
+// one).
+// Transforms left-multiply, in mm.
 #pragma once
 
 #include <string>
@@ -17,9 +20,9 @@ namespace brainshift::tracking {
 
 enum class LinkStatus {
   kOk,
-  kInvalid,       // the tracker said so, or the matrix is not usable (Recording::defects says why)
+  kInvalid,       // by the tracker, or the matrix is unusable (Recording::defects says why)
   kMissing,       // the frame does not carry this transform
-  kWithoutStatus  // a matrix without a word on its validity: never used
+  kWithoutStatus  // a matrix whose validity is not recorded: never used
 };
 
 struct Link {
@@ -36,11 +39,11 @@ struct LinkSeries {
 enum class PixelType { kUint8, kInt16, kUint16 };
 int bytes_per_pixel(PixelType type);
 
-// A matrix that its status called valid and that is none.
+// A matrix with the status "OK" that is not a valid transform.
 struct Defect {
   int frame = 0;
-  std::string field;
-  std::string what;
+  std::string field;  // of the recording: the transform's name
+  std::string what;   // why it is not valid
 };
 
 struct Recording {
@@ -59,14 +62,5 @@ struct Recording {
   // Rows of a frame as numbers; height x width.
   Eigen::MatrixXf frame_values(int frame) const;
 };
-
-// Ok for a rigid motion: finite, last row 0 0 0 1, |R^T R - I| <= tolerance in every entry, det R > 0. Recordings hold
-// six digits; the default leaves room for four. The error says what is wrong, without a file or name.
-Status check_rigid(const Eigen::Matrix4d& matrix, double tolerance = 2e-3);
-// Ok for an invertible affine map: finite, last row 0 0 0 1, condition of the linear part at most 1e4.
-Status check_affine(const Eigen::Matrix4d& matrix);
-
-// The rigid motion nearest to a matrix that check_rigid accepts (polar decomposition), same translation.
-RigidTransform nearest_rigid(const Eigen::Matrix4d& matrix);
 
 }  // namespace brainshift::tracking

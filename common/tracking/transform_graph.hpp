@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which links lead from one named frame to another.
 //
-// Frames are the nodes, links the edges; a link can be walked against its direction with the inverse transform. The path is
-// a shortest one (breadth first); among several, the one whose links were added first.
+// Frames are the nodes, links the edges. A link can be walked against its direction with the
+// inverse transform. The path is a shortest one (breadth first); among several, the one whose
+// links come first in the list.
 #pragma once
 
 #include <string>
@@ -19,9 +20,10 @@ struct ChainStep {
   bool inverted = false;
 };
 
-// Steps in walking order: the first leaves `from`. Empty when from == to. kInvalidArgument: a frame that no link names, or
-// frames that are not connected; the sentence lists the frames that can be reached and the others. Two links between the
-// same two frames are refused, since they may disagree.
+// Steps in walking order: the first leaves `from`. Empty when from == to.
+// kInvalidArgument: frames that are not connected, or a frame that no link names (the sentence
+// lists the frames that can be reached, and the others); a link from a frame to itself; two links
+// between the same two frames, since they may disagree.
 Result<std::vector<ChainStep>> shortest_chain(const std::vector<FramePair>& links,
                                               const std::string& from, const std::string& to);
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Names of transforms as PLUS and 3D Slicer write them: "ProbeToTracker" maps coordinates from Probe to Tracker.
+// Names of transforms as PLUS and 3D Slicer write them: "ProbeToTracker" maps coordinates from
+// Probe to Tracker.
 //
-// A frame's name begins with a capital letter; the "To" between two names is followed by one. A name in which more than
-// one "To" could be the link ("ArmToToolToTracker") says no pair of frames.
+// A frame's name begins with a capital letter, so a capital follows the "To" between two names. A
+// name in which more than one "To" could be the link ("ArmToToolToTracker") is ambiguous and
+// rejected.
 #pragma once
 
 #include <string>
@@ -20,11 +22,11 @@ struct FramePair {
   std::string name() const { return from + "To" + to; }
 };
 
-// kInvalidArgument naming the text.
+// kInvalidArgument: no pair of frames, or an ambiguous one; the sentence quotes the name.
 Result<FramePair> parse_transform_name(std::string_view name);
 
-// Frames of pixels: "Image" and names that end in it ("CroppedImage"). A link from or to one may scale (pixels to mm);
-// every other link is a rigid motion.
+// Frames of pixels: "Image" and names that end in it ("CroppedImage"). A link from or to such a
+// frame may scale (pixels to mm); every other link is a rigid motion.
 bool is_image_frame(std::string_view frame);
 
 }  // namespace brainshift::tracking

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Traced contours to boundary points in space.
 //
-// A contour is a polyline of pixels (u, v) of one image; x = T_target_image (u, v, 0). It is resampled at equal arc length
-// in mm, so that every mm of boundary weighs the same however densely it was clicked. The default spacing of 0.2 mm is
-// that of the paper's section 2.5.
+// A contour is a polyline of pixels (u, v) of one image; x = T_target_image (u, v, 0). It is
+// resampled at equal arc length in mm, so that every mm of boundary weighs the same however
+// densely a person clicked. The default spacing of 0.2 mm is that of the paper's section 2.5.
 #pragma once
 
 #include "common/core/error.hpp"
@@ -19,9 +19,10 @@ struct Contour {
 
 constexpr double kBoundarySpacing_mm = 0.2;
 
-// 3 x m in the target frame, mm. The spacing is stretched so that a whole number of steps fits; an open contour keeps both
-// ends. kInvalidArgument / kNotFinite naming the frame: fewer than 3 points (open: 2), a contour without length, a point
-// that is not finite, more than 1e6 points to make.
+// 3 x m in the target frame, mm. The spacing is stretched so that a whole number of steps fits. An
+// open contour keeps both ends.
+// kInvalidArgument: a spacing <= 0; with the frame: fewer than 3 points (open: 2), a contour
+// without length, more than 1e6 points to make. kNotFinite: a point, with the frame.
 Result<Points> boundary_points(const Contour& contour, const AffineTransform& T_target_image,
                                double spacing_mm = kBoundarySpacing_mm);
 

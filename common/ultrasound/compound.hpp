@@ -2,11 +2,13 @@
 // Freehand compounding: tracked images pasted into a volume, pixel by pixel.
 //
 //   V(x) = sum_p w_p(x) I_p / sum_p w_p(x)      over all pixels p of all frames used
-//   kNearest: w = 1 for the voxel nearest to the pixel's place;  kLinear: w = the trilinear weights of its 8 voxels
+//   kNearest: w = 1 for the voxel nearest to the pixel's place
+//   kLinear:  w = the trilinear weights of the 8 voxels around it
 //
-// Voxels that no pixel reached have weight 0 and value 0; nothing is filled in.
-// Source: Trobaugh et al. 1994 (pixel nearest neighbour); Lasso et al., "PLUS: open-source toolkit for ultrasound-guided
-// intervention systems", IEEE TBME 61 (2014), whose volumes this is compared with.
+// Voxels that no pixel reached have weight 0 and value 0. Holes are not filled.
+// Sources: Trobaugh et al. 1994 (pixel nearest neighbour); Lasso et al., "PLUS: open-source
+// toolkit for ultrasound-guided intervention systems", IEEE TBME 61 (2014): tests/sensing compares
+// with its volumes.
 #pragma once
 
 #include <array>
@@ -26,16 +28,18 @@ struct VolumeGrid {
   Vec3 spacing_mm = Vec3::Ones();
 };
 
-// Pixels u in [left, left + width), v alike. Whatever lies outside of the image is ignored.
+// Pixels u in [left, left + width), v alike. The part outside of the image is ignored.
 struct PixelWindow {
   int left = 0, top = 0, width = 0, height = 0;
 };
 
-// Per frame of the recording, nothing where the frame is not used.
+// T_target_image (pixels to mm) of every frame of the recording, nothing where it is not used.
 using ImagePoses = std::vector<std::optional<AffineTransform>>;
 
-// The smallest grid that begins at the corner of the frames' bounding box and covers it. kEmptySet without a frame;
-// kInvalidArgument for a spacing that is not positive or more than 2^30 voxels.
+// The smallest grid that begins at the corner of the frames' bounding box and has its size,
+// rounded up to whole spacings.
+// kEmptySet: no frame has a pose. kInvalidArgument: a window outside the image, a spacing that is
+// not positive, more than 2^30 voxels.
 Result<VolumeGrid> enclosing_grid(const tracking::Recording& recording, const ImagePoses& poses,
                                   const PixelWindow& window, const Vec3& spacing_mm);
 
@@ -43,10 +47,11 @@ enum class Paste { kNearest, kLinear };
 
 struct CompoundedVolume {
   VoxelImage image;           // T_ras_voxel: to the poses' target frame, whichever that is
-  std::vector<float> weight;  // per voxel
+  std::vector<float> weight;  // per voxel, in pixels
 };
 
-// kInvalidArgument: poses and frames differ in number, a grid without voxels or above 2^30, a window outside the image.
+// kInvalidArgument: poses and frames differ in number, a grid without voxels or with more than
+// 2^30, a window outside the image.
 Result<CompoundedVolume> compound(const tracking::Recording& recording, const ImagePoses& poses,
                                   const PixelWindow& window, const VolumeGrid& grid,
                                   Paste paste = Paste::kLinear);

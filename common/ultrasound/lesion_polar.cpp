@@ -21,7 +21,8 @@ int greatest_step(const Eigen::MatrixXf& gain) {
       1, static_cast<int>(std::ceil(1.7 * angle * static_cast<double>(gain.cols()) / 2.0)));
 }
 
-// The best path from ray `start` round to it again: with `fixed` it begins and ends at that radius, else anywhere.
+// The best path from ray `start` round to it again. With fixed >= 0 it begins and ends at that
+// radius, else at any.
 std::vector<int> best_path(const Eigen::MatrixXf& gain, const std::vector<RadiusRange>& range,
                            double stiffness, std::size_t start, int fixed) {
   const std::size_t rays = range.size();

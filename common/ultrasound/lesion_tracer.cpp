@@ -59,15 +59,15 @@ int ring_end(const PolarImage& polar, int radius) {
                        radius + std::max(2 * kBlur + 2, radius / 2));
 }
 
-// What the path encloses on one ray, and the ring around it.
+// Adds the samples of one ray that the path encloses, and those of the ring around it.
 void add_sides(const PolarImage& polar, Eigen::Index ray, int radius, Moments& inside,
                Moments& ring) {
   for (int r = 0; r < radius - kBlur; ++r) inside.add(polar(ray, r));
   for (int r = radius + kBlur + 1; r <= ring_end(polar, radius); ++r) ring.add(polar(ray, r));
 }
 
-// 1 / n_inside + 1 / n_ring, n being areas in smoothed speckles: 4 pi sd^2 is the correlation area of white noise behind
-// a Gaussian, and a pixel more for the speckle's own size.
+// 1 / n_inside + 1 / n_ring, with n the areas in smoothed speckles. 4 pi sd^2 is the correlation
+// area of white noise behind a Gaussian; one pixel is added for the speckle's own size.
 double inverse_speckles(const PolarImage& polar, const std::vector<int>& path,
                         double smoothing_px) {
   double inside_px2 = 0.0, ring_px2 = 0.0;
@@ -149,7 +149,8 @@ std::vector<RadiusRange> whole_range(const TracerOptions& options) {
                                    static_cast<int>(options.max_radius_px)});
 }
 
-// Radii that a contour allows around its centroid: those of the former contour along each ray, give or take.
+// Radii that a contour allows around its centroid: those of the former contour along each ray,
+// plus and minus the allowed change.
 std::vector<RadiusRange> range_around(const Eigen::Matrix2Xd& contour,
                                       const Eigen::Vector2d& centre, const TracerOptions& options) {
   std::vector<RadiusRange> range = whole_range(options);

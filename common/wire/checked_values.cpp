@@ -13,7 +13,7 @@ namespace {
 
 using google::protobuf::RepeatedField;
 
-// A direction sent with three decimals passes; anything worse is no unit vector. Values are kept as sent.
+// A direction sent with three decimals passes. Values are kept as sent.
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kRotationTolerance = 1e-6;
 // Head meshes have 5.5 tetrahedra per node; 8 leaves room for any sound mesh.

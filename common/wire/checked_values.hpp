@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Protobuf fields <-> core values, with the checks that every received number must pass.
-// Private to common/wire.
+// Lengths are mm, directions and rotations have no unit, coordinates are patient RAS.
+// Private to common/wire: it includes the Protobuf header.
 #pragma once
 
 #include <google/protobuf/repeated_field.h>
@@ -22,35 +23,42 @@ namespace pb = brainshift::v1;
 template <int Rows>
 using IndexColumns = Eigen::Matrix<int, Rows, Eigen::Dynamic>;
 
-// Converts fields and remembers the first that is wrong; after that every conversion returns an empty
-// value. A decoder converts all fields and asks status() once.
+// Converts fields and remembers the first invalid one. A decoder converts all fields and asks
+// status() once; when it holds an error, the converted values mean nothing.
+// Every error names its field.
 class Checked {
  public:
-  // A finite number (kNotFinite otherwise), and one that is not negative (kProtocol).
+  // kNotFinite: the number is not finite.
   double number(double value, std::string_view field);
+  // kNotFinite as above; kProtocol: the number is negative.
   double non_negative(double value, std::string_view field);
-  // A count that fits the core's int.
+  // kProtocol: the count does not fit an int.
   int count(std::uint32_t value, std::string_view field);
 
+  // Three finite numbers; kProtocol: the length differs from 1 by more than 1e-3. Kept as sent.
   Vec3 unit_vector(const google::protobuf::RepeatedField<double>& xyz, std::string_view field);
+  // Mean of any sign, standard deviation not negative.
   MeanStd mean_std(const pb::MeanStd& value, std::string_view field);
+  // 9 + 3 finite numbers; kProtocol: R^T R differs from I by more than 1e-6, or a reflection.
   RigidTransform rigid(const pb::Rigid& value, std::string_view field);
 
-  // Multiple of 3 numbers, at most kMaxPoints points, all finite.
+  // 3 x n. A multiple of 3 numbers, at most kMaxPoints points, all finite.
   Points points(const pb::PointSet& value, std::string_view field);
   Points points(const google::protobuf::RepeatedField<float>& xyz, std::string_view field);
   // At most kMaxPoints finite numbers.
   VecX numbers(const google::protobuf::RepeatedField<float>& values, std::string_view field);
 
-  // Indices in [0, limit).
+  // 0-based indices in [0, limit), at most kMaxPoints.
   std::vector<int> indices(const google::protobuf::RepeatedField<std::int32_t>& values, int limit,
                            std::string_view field);
+  // The same, `Rows` to a column (triangles, tetrahedra).
   template <int Rows>
   IndexColumns<Rows> index_columns(const google::protobuf::RepeatedField<std::int32_t>& values,
                                    int limit, std::string_view field);
+  // Vertices, and triangles whose indices name them.
   TriangleSurface surface(const pb::Surface& value, std::string_view field);
 
-  // Any further condition; `detail` says what must hold.
+  // Any further condition. `detail` completes the sentence "<field>: ". Returns ok().
   bool require(bool holds, std::string_view field, std::string_view detail,
                ErrorCode code = ErrorCode::kProtocol);
 
@@ -65,6 +73,7 @@ class Checked {
   Status status_;
 };
 
+// Core values into Protobuf fields. Float fields round to 32 bits.
 void set(const Points& points, pb::PointSet* out);
 void set(const Points& points, google::protobuf::RepeatedField<float>* xyz);
 void set(const VecX& values, google::protobuf::RepeatedField<float>* out);

@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversion between core values and encoded Protobuf payloads; the only code that knows both.
+// Core values <-> encoded Protobuf payloads. No other code knows both.
 //
-// encode_* returns the payload (without frame header). decode_* checks counts (multiples of 3, equal
-// lengths, caps), finite numbers and index ranges, and fails with kProtocol or kNotFinite naming the field
-// (an unknown method or boundary in a session request: kInvalidArgument). What a value means (frame, case,
-// empty sets) is the session's business. Caps on fields, numbers and text: payload_scan.hpp; they hold
-// before anything is allocated.
+// encode() returns the payload without the frame header. decode_*() checks counts (multiples of 3,
+// equal lengths, caps), finite numbers and index ranges. Its errors name the field:
+//   kProtocol         malformed payload, a count, index or sign that is wrong
+//   kNotFinite        a number that is not finite
+//   kInvalidArgument  an unknown method or boundary in a session request
+// The caps of payload_scan.hpp on fields, numbers and text hold before anything is allocated.
+// The session checks what a value means: frame, case, empty sets.
 //
-// decode(encode(x)) == x, except: the displacement field, its sd and contact forces travel as 32-bit floats;
-// an update with an error carries no estimate; text that is not UTF-8 has the bad bytes replaced by '?'.
+// decode(encode(x)) == x, except that
+//   - the displacement field, its sd and the contact forces travel as 32-bit floats;
+//   - an update with an error carries no estimate;
+//   - BrainModel::tumour_distance and Estimate::prior_scales, min_volume_ratio, inverted_elements
+//     and rebuild_ms do not travel;
+//   - in text that is not UTF-8, '?' replaces every bad byte.
 // Protobuf headers stay private to this folder.
 #pragma once
 
@@ -17,14 +23,14 @@
 #include <string>
 #include <string_view>
 
-#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
 
 namespace brainshift::wire {
 
-// Caps on what a peer may send.
+// Most points, and most numbers of one field of floats, that a peer may send.
 inline constexpr int kMaxPoints = 2'000'000;
 
 struct DaemonStatus {
@@ -66,7 +72,7 @@ struct ObservationReceipt {
 struct UpdateMessage {
   std::uint64_t session_id = 0;
   Update update;
-  std::optional<Error> error;  // set when the observation could not be turned into an estimate
+  std::optional<Error> error;  // set when the observation gave no estimate
 };
 
 std::string encode(const DaemonStatus& status);
@@ -76,6 +82,11 @@ std::string encode(const BrainModel& model);
 std::string encode(const Observation& observation);
 std::string encode(const ObservationReceipt& receipt);
 std::string encode(const UpdateMessage& message);
+// The same in two steps, for an update that is to carry the time of its own encoding: the payload
+// without timings, and the timings behind it. The result decodes like that of encode(); Protobuf
+// does not prescribe the order of fields.
+std::string encode_without_timings(const UpdateMessage& message);
+void append_timings(const StageTimings& timings, std::string& payload);
 std::string encode(const Error& error);
 std::string encode_subscribe_reply(std::uint64_t session_id);
 

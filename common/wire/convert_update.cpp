@@ -120,7 +120,7 @@ SourceSummary get_source(const pb::SourceSummary& message, Checked& checked) {
 Estimate get_estimate(const pb::Update& message, Checked& checked) {
   Estimate estimate;
   const auto status = estimate_status_from(message.status());
-  checked.require(status.has_value(), "update.status", quoted(message.status()) + " is unknown");
+  checked.require(status.has_value(), "update.status", in_quotes(message.status()) + " is unknown");
   estimate.status = status.value_or(EstimateStatus::kNotRun);
   estimate.reason = message.reason();
   estimate.displacement =
@@ -151,11 +151,11 @@ Update get_envelope(const pb::Update& message, Checked& checked) {
   update.sequence = message.sequence();
   update.observation_sequence = message.observation_sequence();
   const auto method = method_from(message.method());
-  checked.require(method.has_value(), "update.method", quoted(message.method()) + " is unknown");
+  checked.require(method.has_value(), "update.method", in_quotes(message.method()) + " is unknown");
   update.method = method.value_or(Method::kPaper);
   const auto boundary = boundary_from(message.boundary());
   checked.require(boundary.has_value(), "update.boundary",
-                  quoted(message.boundary()) + " is unknown");
+                  in_quotes(message.boundary()) + " is unknown");
   update.boundary = boundary.value_or(Boundary::kContact);
   update.final = message.final();
   update.timings = get_timings(message.timings(), checked);
@@ -169,9 +169,8 @@ Update get_envelope(const pb::Update& message, Checked& checked) {
   return update;
 }
 
-}  // namespace
-
-std::string encode(const UpdateMessage& message) {
+// All but the timings.
+pb::Update to_message(const UpdateMessage& message) {
   const Update& update = message.update;
   pb::Update out;
   out.set_case_id(to_utf8(update.case_id));
@@ -189,7 +188,6 @@ std::string encode(const UpdateMessage& message) {
   } else {
     set_estimate(update.estimate, out);
   }
-  set_timings(update.timings, out.mutable_timings());
   if (update.T_undeformed_deformed.matrix() != RigidTransform::Identity().matrix()) {
     set(update.T_undeformed_deformed, out.mutable_t_undeformed_deformed());
   }
@@ -199,7 +197,30 @@ std::string encode(const UpdateMessage& message) {
     entry->set_reason(to_utf8(omission.reason));
     entry->set_estimated_error(to_utf8(omission.estimated_error));
   }
+  return out;
+}
+
+}  // namespace
+
+std::string encode(const UpdateMessage& message) {
+  pb::Update out = to_message(message);
+  set_timings(message.update.timings, out.mutable_timings());
   return out.SerializeAsString();
+}
+
+std::string encode_without_timings(const UpdateMessage& message) {
+  constexpr std::size_t kTimingsBytes = 64;  // five doubles and their tags take 49 at most
+  const pb::Update out = to_message(message);
+  std::string payload;
+  payload.reserve(out.ByteSizeLong() + kTimingsBytes);
+  out.AppendToString(&payload);
+  return payload;
+}
+
+void append_timings(const StageTimings& timings, std::string& payload) {
+  pb::Update only;
+  set_timings(timings, only.mutable_timings());
+  only.AppendToString(&payload);
 }
 
 Result<UpdateMessage> decode_update(std::string_view payload) {

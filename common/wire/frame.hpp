@@ -9,7 +9,7 @@
 //        8     4  payload size bytes, <= kMaxPayloadBytes
 //       12     4  CRC-32       of the payload (zlib polynomial)
 //       16     8  request id   chosen by the client, echoed in the reply; 0 for pushed updates
-// decode_frame refuses anything else with kProtocol and a sentence that names the field.
+// decode_frame rejects anything else: kProtocol, with the name of the header's field.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,8 @@ enum class MessageType : std::uint16_t {
 
 inline constexpr std::size_t kHeaderBytes = 24;
 inline constexpr std::uint16_t kVersion = 1;
-// 100k nodes need about 2 MiB per update and 8 MiB per model; anything near the cap is an attack or a bug.
+// 100k nodes need about 2 MiB per update and 8 MiB per model. Anything near the cap is an attack
+// or a bug.
 inline constexpr std::size_t kMaxPayloadBytes = 64u << 20;
 
 struct Frame {
@@ -47,8 +48,9 @@ struct Frame {
   std::string_view payload;  // view into the decoded bytes
 };
 
-// Header + payload in one buffer. Precondition: payload.size() <= kMaxPayloadBytes (asserted; a peer refuses
-// anything larger), so check what may grow with the mesh before framing it.
+// Header + payload in one buffer. Precondition: payload.size() <= kMaxPayloadBytes. It is
+// asserted, and a peer rejects anything larger, so a caller checks the size of what grows with the
+// mesh.
 std::string encode_frame(MessageType type, std::uint64_t request_id, std::string_view payload);
 
 // Fails with kProtocol on wrong magic, version, type, length, CRC, or an oversized payload.

@@ -10,7 +10,8 @@
 
 namespace brainshift::wire {
 
-// The enumerator in [first, last] whose to_string() is `name`; enumerators are contiguous.
+// The enumerator in [first, last] whose to_string() is `name`. Precondition: enumerators are
+// contiguous.
 template <typename Enum>
 std::optional<Enum> from_name(std::string_view name, Enum first, Enum last) {
   for (int i = static_cast<int>(first); i <= static_cast<int>(last); ++i) {
@@ -32,7 +33,8 @@ inline std::optional<EstimateStatus> estimate_status_from(std::string_view name)
   return from_name(name, EstimateStatus::kNotRun, EstimateStatus::kDeadline);
 }
 
-// What a peer reported. A code of a newer version is kept in the sentence.
+// The error that a peer reported, on one line. An unknown code (a newer version's) becomes
+// kInternal and stays in the sentence.
 Error make_error(std::string_view code, std::string_view message);
 
 }  // namespace brainshift::wire

@@ -12,7 +12,7 @@ namespace {
 
 namespace gp = google::protobuf;
 
-// Wire types of the Protobuf encoding; groups (3, 4) are obsolete and refused.
+// Wire types of the Protobuf encoding; groups (3, 4) are obsolete and rejected.
 enum WireType : std::uint32_t { kVarint = 0, kFixed64 = 1, kLength = 2, kFixed32 = 5 };
 constexpr int kMaxDepth = 8;  // deeper than any message of version 1
 
@@ -53,6 +53,13 @@ std::size_t count_packed(WireType type, std::string_view bytes) {
   }));
 }
 
+template <typename Count>
+std::string more_than(Count limit, std::string_view things) {
+  std::string text = "more than ";
+  text.append(std::to_string(limit)).append(things);
+  return text;
+}
+
 class Scanner {
  public:
   Status message(const gp::Descriptor& type, std::string_view bytes, int depth) {
@@ -64,7 +71,7 @@ class Scanner {
         return refuse(type.name(), "malformed field tag");
       }
       if (++fields_ > kMaxFields) {
-        return refuse(type.name(), "more than " + std::to_string(kMaxFields) + " fields");
+        return refuse(type.name(), more_than(kMaxFields, " fields"));
       }
       const auto wire = static_cast<WireType>(tag & 7u);
       const gp::FieldDescriptor* field = type.FindFieldByNumber(static_cast<int>(tag >> 3));
@@ -113,8 +120,7 @@ class Scanner {
         return refuse(field.full_name(), "truncated");
       numbers_ += count_packed(expected, value);
       if (numbers_ > kMaxNumbers) {
-        return refuse(field.full_name(),
-                      "more than " + std::to_string(kMaxNumbers) + " numbers in one payload");
+        return refuse(field.full_name(), more_than(kMaxNumbers, " numbers in one payload"));
       }
       return {};
     }
@@ -126,7 +132,7 @@ class Scanner {
         return refuse(field.full_name(), std::to_string(value.size()) + " bytes, must be at most " +
                                              std::to_string(kMaxTextBytes));
       }
-      // The parser would refuse it as well, but not without writing to stderr.
+      // The parser would reject it too, but it writes to stderr.
       if (!is_utf8(value)) return refuse(field.full_name(), "is not UTF-8");
     }
     return {};

@@ -10,8 +10,9 @@ bool in_range(unsigned char byte, unsigned low, unsigned high) {
   return byte >= low && byte <= high;
 }
 
-// Length of the well-formed UTF-8 sequence at the start of `text`, 0 if there is none. Only the second
-// byte has a range that depends on the first one (no overlong forms, no surrogates, at most U+10FFFF).
+// Length of the well-formed UTF-8 sequence at the start of `text`, 0 if there is none. Only the
+// range of the second byte depends on the first one (no overlong forms, no surrogates, at most
+// U+10FFFF).
 std::size_t sequence_length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
@@ -64,7 +65,7 @@ std::string one_line(std::string_view text) {
   return out;
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   std::string out = one_line(text);
   out.insert(out.begin(), '"');
   out.push_back('"');

@@ -9,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"
+#include "common/registration/alignment_data.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -16,8 +17,17 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
-// Welsch weight of a point more than two scales off: it lies on something else.
-constexpr double kLeastWeight = 0.1353;
+// Welsch weight exp(-r^2 / 2 s^2) of a point two scales off. A point with less lies on something else.
+const double kLeastWelschWeight = std::exp(-2.0);
+
+// The scale of a Welsch kernel in units of the median residual (2.7 standard deviations of a Gaussian,
+// whose median is 0.6745) and, at least, of the points' own standard deviation: either way the estimate
+// keeps 98 % of the efficiency that least squares has for Gaussian errors, (1 + 1/s^2)^-3
+// (1 + 2/s^2)^(3/2) (Holland & Welsch 1977, Comm. Stat. A6:813).
+constexpr double kScaleOverMedian = 4.0;
+constexpr double kScaleOverSd = 3.0;
+// A residual of seven scales. Welsch weights underflow far behind it, and a median does not need them.
+constexpr double kSmallestWelschWeight = 1e-12;
 
 // Ascending, so that neighbouring data stay neighbours; the same for the same number of points.
 std::vector<int> guiding_points(int available, int wanted) {
@@ -50,19 +60,19 @@ double datum_sd_mm(double observed_mm, const InversionConfig& config, Method met
   return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
 }
 
-// Of Welsch weights: four times the median residual, which is robust, and what the points' standard deviation allows.
+// The scale that fits points with these Welsch weights, never wider than the scale they came from.
 double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& options) {
   std::vector<double> residuals;
   for (const double weight : weights) {
     residuals.push_back(options.welsch_scale_mm *
-                        std::sqrt(-2.0 * std::log(std::max(weight, 1e-12))));
+                        std::sqrt(-2.0 * std::log(std::max(weight, kSmallestWelschWeight))));
   }
   const double median = percentile(residuals, 50.0);
-  return std::clamp(4.0 * median, std::min(3.0 * options.sd_mm, options.welsch_scale_mm),
-                    options.welsch_scale_mm);
+  const double least = std::min(kScaleOverSd * options.sd_mm, options.welsch_scale_mm);
+  return std::clamp(kScaleOverMedian * median, least, options.welsch_scale_mm);
 }
 
-// Aligned rigidly from the tracked pose: the points arrive in patient RAS, so it is the identity.
+// Aligned rigidly from the tracked pose, which is the identity: the points arrive in patient RAS.
 template <typename Surface>
 Result<RegisteredObservation> aligned(const Points& points, double observed_sd_mm,
                                       const Surface& surface, int guiding, const CaseConfig& config,
@@ -73,7 +83,8 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
   if (observed_sd_mm > 0.0) options.sd_mm = observed_sd_mm;
   auto icp = registration::align(points, surface, RigidTransform::Identity(), options);
   if (!icp) return tl::unexpected(icp.error());
-  // Again with a scale that fits these points: gross errors of a few millimetres then count for nothing.
+  // Again with a scale that fits these points, so that gross errors of a few millimetres count for
+  // nothing.
   options.welsch_scale_mm = fitting_scale_mm(icp->weights, options);
   icp = registration::align(points, surface, icp->T_surface_points, options);
   if (!icp) return tl::unexpected(icp.error());
@@ -81,7 +92,7 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
       points, *icp, datum_sd_mm(observed_sd_mm, config.inversion, method));
   std::vector<int> inliers;
   for (int i = 0; i < all.size(); ++i) {
-    if (icp->weights[i] >= kLeastWeight) inliers.push_back(i);
+    if (icp->weights[i] >= kLeastWelschWeight) inliers.push_back(i);
   }
   if (inliers.size() < 3) {
     return fail(
@@ -140,9 +151,6 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
     return fail(
         ErrorCode::kInvalidArgument,
         fmt::format("landmark_pairs: {} pairs, at least 3 are needed", pairs.undeformed.cols()));
-  }
-  if (!pairs.undeformed.allFinite() || !pairs.deformed.allFinite()) {
-    return fail(ErrorCode::kNotFinite, "landmark_pairs: a coordinate is not finite");
   }
   RegisteredObservation registered;
   registered.data.positions = pairs.undeformed;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What align() refuses, and how it says so.
+// The input that align() rejects, and its messages.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Alignment to interpolated distances and to measured clouds; covariance, weights and words of the result.
+// Alignment to interpolated distances and to measured clouds; covariance, weights and sentences of
+// the result.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -9,12 +10,15 @@
 #include "common/geometry/signed_distance_grid.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/icp.hpp"
+#include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-const Vec3 kCentre(35, -45, 20);
+using test::kCentre;
+using test::kDegree;
+using test::motion;
+using test::placement_error;
 
 TriangleSurface bumpy() {
   TriangleSurface surface = geometry::ellipsoid_surface(Vec3::Zero(), Vec3(17, 13, 10), 1.2);
@@ -31,22 +35,10 @@ geometry::DistanceVolume volume_of(const TriangleSurface& surface) {
   return geometry::DistanceVolume::create(geometry::signed_distance_grid(index).value()).value();
 }
 
-RigidTransform motion(Random& random, double translation_mm, double rotation_deg) {
-  Vec6 xi;
-  xi << rotation_deg * kDegree * random.direction(), translation_mm * random.direction();
-  return rigid_increment(xi, kCentre);
-}
-
 Points traced(const Points& on_surface, const RigidTransform& T, double noise_mm, Random& random) {
   Points points = (T.linear() * on_surface).colwise() + Vec3(T.translation());
   for (double& value : points.reshaped()) value += noise_mm * random.normal();
   return points;
-}
-
-double placement_error(const RigidTransform& a, const RigidTransform& b, const Points& points) {
-  double worst = 0.0;
-  for (const Vec3 x : points.colwise()) worst = std::max(worst, (a * x - b * x).norm());
-  return worst;
 }
 
 IcpOptions without_prior(double sd_mm) {
@@ -68,7 +60,8 @@ TEST(IcpOnDistances, EndsWhereSearchedTrianglesEnd) {
     const auto fast = align(points, volume, RigidTransform::Identity(), without_prior(0.3));
     ASSERT_TRUE(exact && fast);
     EXPECT_TRUE(fast->converged);
-    // Below what 500 points with 0.3 mm leave open: 0.3 sqrt(6 / 500) = 0.033 mm rms, more at the ends.
+    // Below the error of a pose from 500 points with 0.3 mm: 0.3 sqrt(6 / 500) = 0.033 mm rms,
+    // more at the ends.
     EXPECT_LT(placement_error(exact->T_surface_points, fast->T_surface_points, points), 0.04);
     EXPECT_NEAR(fast->rms_mm, exact->rms_mm, 1e-3);
     EXPECT_NEAR(fast->pose_covariance.trace(), exact->pose_covariance.trace(),
@@ -140,7 +133,7 @@ TEST(IcpOnDistances, OutliersEndWithoutWeight) {
   EXPECT_LT(placement_error(result->T_surface_points, T.inverse(), T * surface.vertices), 0.2);
 }
 
-// Errors of many repetitions against the covariance that each of them stated: the mean of xi^T C^-1 xi is 6.
+// Errors of many repetitions, each by its stated covariance: the mean of xi^T C^-1 xi is 6.
 TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
   const TriangleSurface surface = bumpy();
   const auto volume = volume_of(surface);
@@ -189,7 +182,8 @@ TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
     const auto result = align(points, *cloud, RigidTransform::Identity(), without_prior(0.2));
     ASSERT_TRUE(result);
     EXPECT_TRUE(result->converged);
-    // Planes over neighbourhoods of 1 mm miss a surface of 10 mm radius by some hundredths; noise adds to it.
+    // Planes over neighbourhoods of 1 mm miss a surface of 10 mm radius by some hundredths; noise
+    // adds to that.
     EXPECT_LT(placement_error(result->T_surface_points, T.inverse(), points), 0.3);
   }
 }

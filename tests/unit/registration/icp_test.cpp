@@ -11,6 +11,7 @@
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/rigid_increment.hpp"
+#include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {
 namespace {
@@ -21,9 +22,10 @@ Vec3 normal_vector(Random& random) {
 }
 
 using geometry::ClosestPointIndex;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-const Vec3 kCentre(35, -45, 20);
+using test::kCentre;
+using test::kDegree;
+using test::motion;
+using test::placement_error;
 
 ClosestPointIndex index_of(const TriangleSurface& surface) {
   auto index = ClosestPointIndex::build(surface);
@@ -44,22 +46,8 @@ TriangleSurface bumpy() {
   return surface;
 }
 
-// A motion of the given size about the tumour's centre.
-RigidTransform motion(Random& random, double translation_mm, double rotation_deg) {
-  Vec6 xi;
-  xi << rotation_deg * kDegree * random.direction(), translation_mm * random.direction();
-  return rigid_increment(xi, kCentre);
-}
-
 double rotation_error_deg(const RigidTransform& a, const RigidTransform& b) {
   return rotation_vector(a.linear() * b.linear().transpose()).norm() / kDegree;
-}
-
-// Largest distance between where the two transforms put the points.
-double placement_error(const RigidTransform& a, const RigidTransform& b, const Points& points) {
-  double worst = 0.0;
-  for (const Vec3 x : points.colwise()) worst = std::max(worst, (a * x - b * x).norm());
-  return worst;
 }
 
 IcpOptions without_prior() {
@@ -117,8 +105,8 @@ TEST(Icp, ErrorWithNoiseIsWithinItsStatistics) {
     sum_of_squares +=
         std::pow((result->T_surface_points * (T_points_surface * kCentre) - kCentre).norm(), 2);
   }
-  // Each translation axis sees a third of the points' information: variance 3 sd^2 / count per axis,
-  // a little more because rotation is estimated too.
+  // Each translation axis sees a third of the points' information: variance 3 sd^2 / count per
+  // axis, a little more because rotation is estimated too.
   const double expected = std::sqrt(3.0 * 3.0 / count) * noise;
   EXPECT_LT(std::sqrt(sum_of_squares / runs), 1.6 * expected);
   EXPECT_GT(std::sqrt(sum_of_squares / runs), 0.4 * expected);
@@ -212,7 +200,8 @@ TEST(Icp, SphereShowsNoRotationAndKeepsTheTrackedOne) {
 }
 
 TEST(Icp, HalfOfASphereShowsNoRotationEither) {
-  // The centroid lies off the centre: rotation about it is mixed with translation, yet equally unknown.
+  // The centroid is not the centre, so rotation about it is mixed with translation, yet equally
+  // unknown.
   const ClosestPointIndex index =
       index_of(geometry::ellipsoid_surface(kCentre, Vec3::Constant(13.8), 1.04));
   Random random(8);
@@ -362,42 +351,6 @@ TEST(Icp, StaysFiniteWhenEveryPointIsFarAway) {
   EXPECT_TRUE(std::isfinite(result->rms_mm));
 }
 
-TEST(SparseDataFromAlignment, LeadsFromTheUndeformedToTheTracedPlace) {
-  Random random(14);
-  Points points(3, 30);
-  for (auto x : points.colwise()) x = 20.0 * normal_vector(random);
-  IcpResult icp;
-  icp.T_surface_points = motion(random, 5.0, 8.0);
-  const RigidTransform& T = icp.T_surface_points;
-  const SparseData data = sparse_data_from_alignment(points, icp, 0.4);
-  ASSERT_EQ(data.size(), 30);
-  ASSERT_EQ(data.displacements.cols(), 30);
-  EXPECT_EQ(data.sd_mm, VecX::Constant(30, 0.4));
-  EXPECT_LT((data.positions + data.displacements - points).norm(), 1e-12);
-  for (int i = 0; i < 30; ++i)
-    EXPECT_LT((data.positions.col(i) - T * Vec3(points.col(i))).norm(), 1e-12);
-  EXPECT_EQ(sparse_data_from_alignment(Points(3, 0), icp, 0.4).size(), 0);
-}
-
-// The pose's translation, the prior's rotation and strains of kAlignmentStrainSd, as variances of a point's error.
-TEST(SparseDataFromAlignment, ItsCommonErrorsHaveTheVarianceOfPoseAndStrain) {
-  Points points(3, 2);
-  points << 10, -10, 0, 0, 0, 0;
-  IcpResult icp;
-  icp.pose_covariance.diagonal() << 1, 1, 1, 0.01, 0.04, 0.09;
-  const double rotation_sd_deg = 2.0, turn = 2.0 * std::numbers::pi / 180.0;
-  const SparseData data = sparse_data_from_alignment(points, icp, 0.4, rotation_sd_deg);
-  const Mat3 variance = data.common_error.topRows<3>() * data.common_error.topRows<3>().transpose();
-  const double s = kAlignmentStrainSd;
-  EXPECT_NEAR(variance(0, 0), 0.01 + 100.0 * s * s, 1e-12);
-  EXPECT_NEAR(variance(1, 1), 0.04 + 100.0 * (turn * turn + 0.5 * s * s), 1e-12);
-  EXPECT_NEAR(variance(2, 2), 0.09 + 100.0 * (turn * turn + 0.5 * s * s), 1e-12);
-  // Both points shift alike, and turn and stretch against each other.
-  const Mat3 between =
-      data.common_error.topRows<3>() * data.common_error.bottomRows<3>().transpose();
-  EXPECT_NEAR(between(1, 1), 0.04 - 100.0 * (turn * turn + 0.5 * s * s), 1e-12);
-}
-
 TEST(Icp, TranslationOnlyKeepsTheOrientationAndFindsATranslation) {
   const TriangleSurface surface = bumpy();
   const auto index = index_of(surface);
@@ -440,7 +393,8 @@ TEST(Icp, EstimateForRotationLeftOutBoundsTheTrueDifference) {
   EXPECT_GT(greatest, 1.0);
 }
 
-// A ball shows no rotation: the true motion may be anything that the prior allows, two standard deviations of it.
+// A ball shows no rotation. The true motion may be any that the prior allows, up to two standard
+// deviations of it.
 TEST(Icp, EstimateForUnobservableRotationBoundsRotationsWithinThePrior) {
   const TriangleSurface ball = geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 12), 1.5);
   const auto index = index_of(ball);

@@ -43,7 +43,7 @@ double error_mm(const RigidTransform& T_found, const RigidTransform& T_error) {
   return (test::moved(T_found * T_error, truth) - truth).colwise().norm().maxCoeff();
 }
 
-// Registers the samples, displaced by the known error and with their intensities as `remap` has them.
+// Registers the samples, displaced by the known error and with intensities changed by `remap`.
 template <typename Remap>
 ImageRegistration recover(const Remap& remap) {
   IntensitySamples displaced = samples();

@@ -73,8 +73,8 @@ TEST(PoseCovariance, AxesThatAreNotShownAreAtThePrior) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(held(k, k), 1.0 / 50.0, 1e-9);
 }
 
-// Rotation about z traded against translation along x, as for half of a sphere: the translation takes part in what
-// is not known of the rotation.
+// Rotation about z can be traded against translation along x, as for half of a sphere. The
+// translation shares the uncertainty of the rotation.
 TEST(PoseCovariance, KeepsWhatAnUnknownRotationLeavesOpenInTheTranslation) {
   Vec6 known;
   known << 4, 8, 16, 30, 60, 90;

@@ -71,7 +71,8 @@ TEST(DirectionGradient, IsTheDerivativeOfTheMovedPoint) {
 }
 
 TEST(DirectionGradient, IsTheDerivativeOfTheDistanceToASurface) {
-  // The closest point moves too, but along the surface: to first order the distance does not notice.
+  // The closest point moves too, but along the surface, so the distance is unchanged to first
+  // order.
   const auto surface = geometry::ClosestPointIndex::build(
       geometry::ellipsoid_surface(Vec3(1, 2, 3), Vec3(15, 12, 9), 2.0));
   ASSERT_TRUE(surface);

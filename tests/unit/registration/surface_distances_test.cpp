@@ -16,7 +16,8 @@ namespace {
 
 using testing::HasSubstr;
 
-// A cap of radius 60 mm about the z axis, 20 mm wide, as the cortex under a craniotomy; apex at (0, 0, 60).
+// A cap of radius 60 mm about the z axis, 20 mm wide, as the cortex under a craniotomy. Its apex
+// is at (0, 0, 60).
 double cap_height(double x, double y) { return std::sqrt(3600.0 - x * x - y * y); }
 
 SurfacePatch cap() {
@@ -69,7 +70,8 @@ TEST(SurfaceDistances, OfASunkenCortexAreTheDepthAlongItsNormal) {
     const Vec3 n = data.directions.col(i);
     EXPECT_NEAR(n.norm(), 1.0, 1e-12);
     EXPECT_GT(n.z(), 0.95);
-    // Along the normal of the undeformed surface, up to its curvature over what the foot point slides.
+    // Along the normal of the undeformed surface, up to its curvature over the slide of the foot
+    // point.
     EXPECT_NEAR(n.dot(data.displacements.col(i)), n.dot(sink), 0.02);
     EXPECT_LT((data.displacements.col(i) - n * n.dot(data.displacements.col(i))).norm(), 1e-12);
   }

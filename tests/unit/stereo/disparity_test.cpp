@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Disparities of pictures whose true disparity is known, and pairs that are none.
+// Disparities of pictures whose true disparity is known, and of pictures that are not a pair.
 #include "common/stereo/disparity.hpp"
 
 #include <gmock/gmock.h>
@@ -61,7 +61,8 @@ TEST(Match, AShiftedPictureHasThatDisparity) {
   }
 }
 
-// A near plate (disparity 24) before a far wall (4): a strip of the wall beside it is seen by the left camera only.
+// A near plate (disparity 24) before a far wall (4). Only the left camera sees a strip of the wall
+// beside the plate.
 TEST(Match, WhatOneCameraAloneSeesIsNotValid) {
   RectifiedPair pair{dots(220, 80, 0.0, 11), dots(220, 80, 4.0, 11), {}, {}};
   const GrayImage plate_left = dots(220, 80, 0.0, 12), plate_right = dots(220, 80, 24.0, 12);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From pictures of a known patch to its surface: as near as the disparity's error allows, turned the right way.
+// From pictures of a known patch to its surface: as near as the disparity's error allows, and
+// facing the camera.
 #include "common/stereo/reconstruct.hpp"
 
 #include <gmock/gmock.h>
@@ -69,8 +70,10 @@ TEST(Reconstruct, APatchIsFoundAsWellAsItsDisparityAllows) {
   const Errors errors = errors_of(*result, patch, some_pose());
   EXPECT_GT(result->surface.num_vertices(), 5000);
   // Z^2 / (f b) is 1.9 mm per px here.
+  // The error may be as large as the stated sd. It is smaller, because floor_px holds errors of
+  // real light and a vertex averages a block's pixels; below a quarter the sd would say nothing.
   EXPECT_LT(errors.rms_mm, result->median_sd_mm);
-  EXPECT_GT(errors.rms_mm, 1e-3) << "not exact by accident";
+  EXPECT_GT(errors.rms_mm, 0.25 * result->median_sd_mm);
   EXPECT_GT(errors.within_2_sd, 0.95);
   // The cap falls away by 50 mm towards the corners.
   EXPECT_GT(result->median_depth_mm, 250.0);

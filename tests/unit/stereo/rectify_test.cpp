@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After rectification a point lies in the same row of both pictures, and its disparity tells its depth.
+// After rectification a point lies in the same row of both pictures, and its disparity gives its
+// depth.
 #include "common/stereo/rectify.hpp"
 
 #include <gmock/gmock.h>
@@ -109,10 +110,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadCalibration{"Distortion", [](StereoCalibration& c) { c.left.distortion[4] = 1e5; },
                        "left.distortion[4] = 100000"},
         BadCalibration{"Scaled", [](StereoCalibration& c) { c.T_right_left.linear() *= 1.1; },
-                       "T_right_left is no rigid motion: R^T R differs from 1 by 0.2"},
+                       "T_right_left is no rigid motion: R^T R differs from I by 0.2"},
         BadCalibration{"Mirrored",
                        [](StereoCalibration& c) { c.T_right_left.linear().col(0) *= -1.0; },
-                       "mirror image"},
+                       "reflection"},
         BadCalibration{"NotFinite",
                        [](StereoCalibration& c) { c.T_right_left.translation().x() = NAN; },
                        "T_right_left has an entry that is not finite"},

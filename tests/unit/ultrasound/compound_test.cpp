@@ -11,7 +11,8 @@ namespace {
 using testing::HasSubstr;
 using tracking::Recording;
 
-// Images of 4 x 3 pixels whose grey value is a linear function of the place in space: f(x) = 10 + 3 x + 5 y + 7 z.
+// Images of 4 x 3 pixels whose grey value is a linear function of the place in space:
+// f(x) = 10 + 3 x + 5 y + 7 z.
 double field(const Vec3& x) { return 10.0 + x.dot(Vec3(3, 5, 7)); }
 
 struct Sweep {
@@ -65,7 +66,8 @@ TEST(Compound, OnTheGridPutsEveryPixelIntoItsVoxel) {
 }
 
 TEST(Compound, OffTheGridLinearSplatKeepsALinearFieldInside) {
-  // Pixels half-way between voxels: inside, weights are symmetric about the voxel, so that the mean is the field there.
+  // Pixels lie half-way between voxels. Inside, the weights are symmetric about the voxel, so the
+  // mean is the field there.
   const Sweep s = sweep(0.5);
   const VolumeGrid grid{{5, 4, 6}, Vec3::Zero(), Vec3::Ones()};
   const auto volume = compound(s.recording, s.poses, kAll, grid, Paste::kLinear);

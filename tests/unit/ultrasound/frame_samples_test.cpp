@@ -12,7 +12,8 @@ using testing::HasSubstr;
 
 constexpr int kWidth = 12, kHeight = 10;
 
-// Pixels left of column 4 are never seen; elsewhere u + 10 v, but for one dark spot in the first frame.
+// Pixels left of column 4 are never seen. Elsewhere the value is u + 10 v, except for one dark
+// spot in the first frame.
 tracking::Recording recording() {
   tracking::Recording made;
   made.width = kWidth;

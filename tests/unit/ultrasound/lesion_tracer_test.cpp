@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Synthetic images: a lesion of known outline in multiplicative noise, smoothed to the size of speckle.
+// Synthetic images: a lesion of known outline in multiplicative noise, which is smoothed to the
+// size of speckle.
 #include "common/ultrasound/lesion_tracer.hpp"
 
 #include <gmock/gmock.h>
@@ -29,7 +30,8 @@ struct Lesion {
   }
 };
 
-// Speckle: white noise averaged over 3 x 3 pixels, of the given standard deviation relative to the grey value.
+// Speckle: white noise averaged over 3 x 3 pixels, with the given standard deviation relative to
+// the grey value.
 Eigen::MatrixXd speckle(int height, int width, double sd, Random& random) {
   Eigen::MatrixXd white(height + 2, width + 2), noise(height, width);
   for (Eigen::Index i = 0; i < white.size(); ++i) white.data()[i] = 3.0 * sd * random.normal();
@@ -104,7 +106,8 @@ TEST(TraceLesion, NeverInventsAContourInNoise) {
     anything.min_confidence = 0.0;
     const Recording recording = images({none}, 0.3, 100 + seed);
     const auto found = trace_lesion(recording, {0, none.centre_px}, anything);
-    if (found) greatest = std::max(greatest, found->significance);
+    ASSERT_TRUE(found) << "seed " << seed;
+    greatest = std::max(greatest, found->significance);
     const auto traced = trace_lesion(recording, {0, none.centre_px});
     ASSERT_FALSE(traced) << "seed " << seed;
     EXPECT_EQ(traced.error().code, ErrorCode::kEmptySet);
@@ -112,19 +115,24 @@ TEST(TraceLesion, NeverInventsAContourInNoise) {
   }
   RecordProperty("greatest_significance_in_noise", std::to_string(greatest));
   EXPECT_LT(greatest, 6.0);
+  EXPECT_GT(greatest, 3.0) << "the best of many paths through noise; else nothing was searched";
 }
 
 TEST(TraceLesion, AnImageWithoutAnyGreyIsRefused) {
   Lesion none;
   none.inside = none.outside;
-  EXPECT_FALSE(trace_lesion(images({none}, 0.0, 1), {0, none.centre_px}));
+  const auto traced = trace_lesion(images({none}, 0.0, 1), {0, none.centre_px});
+  ASSERT_FALSE(traced);
+  EXPECT_EQ(traced.error().code, ErrorCode::kEmptySet);
 }
 
 TEST(TraceLesion, OfTheWrongEchogenicityIsRefused) {
   const Lesion lesion;
   TracerOptions dark;
   dark.echogenicity = Echogenicity::kDark;
-  EXPECT_FALSE(trace_lesion(images({lesion}, 0.3, 1), {0, lesion.centre_px}, dark));
+  const auto traced = trace_lesion(images({lesion}, 0.3, 1), {0, lesion.centre_px}, dark);
+  ASSERT_FALSE(traced);
+  EXPECT_EQ(traced.error().code, ErrorCode::kEmptySet);
 }
 
 TEST(TraceLesion, RefusesBadSeedsAndOptionsByName) {
@@ -157,6 +165,7 @@ TEST(TraceSweep, FollowsALesionThatMovesAndStopsWhereItEnds) {
   }
   const auto sweep = trace_sweep(images(lesions, 0.3, 5), {4, lesions[4].centre_px});
   ASSERT_TRUE(sweep) << sweep.error().message;
+  ASSERT_EQ(sweep->contours.size(), 11U);
   ASSERT_EQ(sweep->contours.front().contour.frame, 0);
   ASSERT_EQ(sweep->contours.back().contour.frame, 10);
   EXPECT_EQ(sweep->stopped_before, "");

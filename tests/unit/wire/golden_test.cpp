@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames written by a second, independent implementation (tests/data/wire/make_golden.py): decoding gives
-// the described values, and encoding the described values gives the same bytes.
+// Frames written by a second, independent implementation (tests/data/wire/make_golden.py):
+// decoding gives the described values, and encoding the described values gives the same bytes.
 #include <gtest/gtest.h>
 
 #include <filesystem>
