@@ -1,36 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// SparseData -> Estimate: one entry for every inversion method.
+// invert(): SparseData -> Estimate once, by any method. Repeated inversions take an Inverter.
 #pragma once
 
-#include <functional>
-#include <stop_token>
-
 #include "common/core/error.hpp"
+#include "common/inversion/contract/inversion_options.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
-#include "common/inversion/contract/moving_data.hpp"
-#include "common/inversion/prepared/prepared_model.hpp"
 
 namespace brainshift::inversion {
 
-// A slave counts as penetrating when it is deeper than this: a hundredth of the 1 mm gap. Penalty contact
-// leaves force / beta, some micrometres, at every slave that carries a force.
-inline constexpr double kPenetrationTolerance_mm = 0.01;
-
-struct InversionOptions {
-  Method method = Method::kPaper;
-  // Called after every iteration with the iterate so far (status kIterating); may be empty. The condensed methods
-  // have no field before the last iteration and do not call it.
-  std::function<void(const Estimate&)> on_iterate;
-  // Data that follow the deformation (method condensed); null: none do.
-  const MovingData* moving = nullptr;
-  // Checked once per iteration; a requested stop ends the inversion with kNotConverged.
-  std::stop_token stop;
-};
-
-// kInvalidArgument: fewer than 3 data, sizes that differ, sd <= 0, collinear positions, data outside the
-// brain by more than 5 mm (the sentence names the datum); kNotFinite: NaN or infinity in the data.
+// Prepares for this one inversion and makes it. The price is the preparation: methods kCondensed (the
+// default) and kCondensedExact solve for every slave and many modes first, some thousand solves, which
+// is seconds on a toy and a minute on a head. The model's own preparation is not repeated.
+// options.stop ends the preparation too (kUnavailable).
+//
+// Errors as Inverter::update and make_inverter. The data are checked before anything is prepared
+// (check_data: kInvalidArgument for fewer than 3 data, sizes that differ, sd <= 0, collinear positions;
+// kNotFinite), their place afterwards: data outside the brain by more than 5 mm are kInvalidArgument, and
+// the sentence names the datum.
 Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
-                        const InversionOptions& options = {});
+                        Method method = Method::kCondensed, const InversionOptions& options = {});
 
 }  // namespace brainshift::inversion

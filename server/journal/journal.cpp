@@ -4,9 +4,10 @@
 #include <fmt/format.h>
 
 #include <cctype>
-#include <exception>
 #include <system_error>
 #include <utility>
+
+#include "common/core/guarded.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -21,13 +22,10 @@ class SurgeryFileSink final : public RecordSink {
   io::SurgeryFile file_;
 };
 
+// A sink that throws ends its file, not the thread.
 template <typename Function>
-auto guarded(Function&& function) -> decltype(function()) {
-  try {
-    return function();
-  } catch (const std::exception& exception) {
-    return fail(ErrorCode::kWriteFailed, fmt::format("journal: {}", exception.what()));
-  }
+auto writing(Function&& function) {
+  return guarded(ErrorCode::kWriteFailed, "journal", std::forward<Function>(function));
 }
 
 }  // namespace
@@ -125,7 +123,7 @@ void Journal::write(Item item) {
   if (item.opening) {
     close_sink();
     writing_generation_ = item.opening->generation;
-    auto sink = guarded([&] { return options_.open(item.opening->path, item.opening->meta); });
+    auto sink = writing([&] { return options_.open(item.opening->path, item.opening->meta); });
     if (sink) {
       sink_ = std::move(*sink);
     } else {
@@ -134,17 +132,17 @@ void Journal::write(Item item) {
     return;
   }
   if (!sink_) return;  // this file has failed already
-  const auto status = guarded([&] { return sink_->append(item.record); });
+  const auto status = writing([&] { return sink_->append(item.record); });
   if (status) return;
   set_error(writing_generation_, status.error());
-  // A gap in a journal is worse than its end: nothing is appended after a failed record.
-  static_cast<void>(guarded([&] { return sink_->close(); }));
+  // A gap in a journal is worse than its end: the file ends with the last record before the failure.
+  static_cast<void>(writing([&] { return sink_->close(); }));
   sink_.reset();
 }
 
 void Journal::close_sink() {
   if (!sink_) return;
-  const auto status = guarded([&] { return sink_->close(); });
+  const auto status = writing([&] { return sink_->close(); });
   sink_.reset();
   if (!status) set_error(writing_generation_, status.error());
 }

@@ -12,7 +12,6 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,7 +24,7 @@
 
 namespace brainshift::server {
 
-using JournalMeta = std::map<std::string, std::string>;
+using JournalMeta = io::SurgeryMeta;
 
 // Where records go; a surgery file, or a stand-in that fails on purpose.
 class RecordSink {

@@ -6,19 +6,6 @@
 
 namespace brainshift::server {
 
-int exit_status(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kInvalidArgument:
-    case ErrorCode::kNotFound:
-    case ErrorCode::kUnreadable:
-    case ErrorCode::kDegenerateMesh:
-    case ErrorCode::kEmptySet:
-    case ErrorCode::kFloatingBody:
-    case ErrorCode::kNotFinite: return kExitBadInput;
-    default: return kExitFailure;
-  }
-}
-
 int print_error(const Error& error) {
   std::string line = error.message;
   std::replace(line.begin(), line.end(), '\n', ' ');

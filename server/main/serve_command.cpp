@@ -8,7 +8,7 @@
 #include <memory>
 #include <utility>
 
-#include "common/io/config/config_file.hpp"
+#include "common/io/config/daemon_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/logging.hpp"
@@ -54,8 +54,8 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.case_file = file->config.file;
   auto store =
       std::make_shared<ModelStore>(model, std::move(file->config), std::move(file->condensed));
-  options.prepare = [store](const wire::SessionRequest& request) {
-    return store->prepare(request);
+  options.make_model = [store](const wire::SessionRequest& request) {
+    return store->make(request);
   };
   return options;
 }

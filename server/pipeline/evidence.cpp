@@ -19,7 +19,7 @@ SparseData measured(const RegisteredObservation& observation, const Points& u) {
 
 void Evidence::clear() {
   newest_.clear();
-  last_.resize(3, 0);
+  cortex_.resize(3, 0);
 }
 
 void Evidence::put(RegisteredObservation observation) {
@@ -27,7 +27,7 @@ void Evidence::put(RegisteredObservation observation) {
   newest_.insert_or_assign(std::move(source), std::move(observation));
 }
 
-// A recording that begins again jumps back in time: as old as it is new.
+// A replay that begins again jumps back in time. The future then counts as much as the past.
 double Evidence::age_s(const RegisteredObservation& observation, std::int64_t now_ns) const {
   return std::abs(static_cast<double>(now_ns) - static_cast<double>(observation.acquired_ns)) / 1e9;
 }
@@ -54,8 +54,12 @@ std::vector<Omission> Evidence::stale(std::int64_t now_ns) const {
 }
 
 Points Evidence::cortex(const std::vector<NodeIndex>& nodes) const {
-  if (last_.cols() == 0) return Points::Zero(3, static_cast<Eigen::Index>(nodes.size()));
-  return last_(Eigen::all, nodes);
+  if (cortex_.cols() == 0) return Points::Zero(3, static_cast<Eigen::Index>(nodes.size()));
+  return cortex_;
+}
+
+void Evidence::remember(const Points& displacement, const std::vector<NodeIndex>& nodes) {
+  cortex_ = displacement(Eigen::all, nodes);
 }
 
 CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations,

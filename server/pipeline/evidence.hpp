@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Evidence: the newest registered observation of every source of a session, and what an update makes of them.
+// Evidence: the newest registered observation of every source of a session, and what an update makes of
+// them.
 //
-// Sources are used together: an update that the tumour's boundary asks for also uses the cortex as it was seen last, as
-// long as that is not older than sensing.max_age_s by the observations' own clock. Not thread-safe.
+// Sources are used together. An update that the tumour's boundary asks for also uses the newest view of
+// the cortex, as long as that view is not older than sensing.max_age_s by the observations' own clock.
+// Not thread-safe.
 #pragma once
 
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "common/values/estimate.hpp"
 #include "common/inversion/contract/moving_data.hpp"
+#include "common/values/estimate.hpp"
 #include "server/pipeline/registration_stage.hpp"
 
 namespace brainshift::server {
@@ -20,30 +21,32 @@ class Evidence {
  public:
   explicit Evidence(double max_age_s) : max_age_s_(max_age_s) {}
   void clear();
-  // Replaces what its source said before.
+  // Replaces the earlier observation of the same source.
   void put(RegisteredObservation observation);
-  // An observation that an update could not be made of is not used again.
+  // Forgets the source's observation: no estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
 
-  // Observations to be used with one of this time, in the order of their sources' names.
+  // Observations to use together with one of this time, in the order of their sources' names.
   std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
-  // Why the others are not, for Update::left_out.
+  // Why the others are not used, for Update::left_out.
   std::vector<Omission> stale(std::int64_t now_ns) const;
 
-  // Displacement of the cortex in the last estimate, 3 x nodes; zero before the first.
+  // Displacement of the cortex in the last estimate, 3 x nodes; zero before the first one.
   Points cortex(const std::vector<NodeIndex>& nodes) const;
-  void remember(const Points& displacement) { last_ = displacement; }
+  // Keeps the displacement (3 x n) at these nodes of the cortex.
+  void remember(const Points& displacement, const std::vector<NodeIndex>& nodes);
 
  private:
   double age_s(const RegisteredObservation& observation, std::int64_t now_ns) const;
 
   double max_age_s_;
   std::map<std::string, RegisteredObservation> newest_;
-  Points last_;  // 3 x n, or no columns
+  Points cortex_;  // 3 x nodes of the craniotomy, or no columns
 };
 
-// Data of several observations as one. Those that follow the deformation are measured for the displacement `u_of` of
-// their nodes.
+// Data of several observations as one. Data that follow the deformation are measured for the
+// displacement of the cortex in the last estimate, and anew whenever the inversion asks with another
+// one.
 class CombinedData {
  public:
   CombinedData(std::vector<const RegisteredObservation*> observations, const Evidence& evidence);
@@ -51,7 +54,8 @@ class CombinedData {
   const SparseData& data() const { return data_; }
   // Null when nothing moves. Valid as long as this object.
   const inversion::MovingData* moving() const { return surfaces_.empty() ? nullptr : &moving_; }
-  // Fills observation_sequence and age of the estimate's sources.
+  // Fills observation_sequence and age of the estimate's sources, and adds the outliers of their
+  // alignment.
   void describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const;
 
   CombinedData(const CombinedData&) = delete;

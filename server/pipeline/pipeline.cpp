@@ -1,111 +1,110 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/pipeline/pipeline.hpp"
 
-#include <chrono>
+#include <iterator>
 #include <utility>
 
+#include "common/core/stopwatch.hpp"
 #include "server/pipeline/left_out.hpp"
-#include "server/pipeline/registration_stage.hpp"
 
 namespace brainshift::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+void append(std::vector<Omission> omissions, Update& update) {
+  update.left_out.insert(update.left_out.end(), std::make_move_iterator(omissions.begin()),
+                         std::make_move_iterator(omissions.end()));
 }
 
 }  // namespace
 
-Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                   Boundary boundary, InvertFunction invert, OmissionFunction omissions,
+Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Method method,
+                   Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
                    RegistrationTargets targets)
     : model_(std::move(model)),
       config_(config),
+      method_(method),
       boundary_(boundary),
-      invert_(std::move(invert)),
-      omissions_(std::move(omissions)),
-      targets_(std::move(targets)) {
-  for (const Method method : kAllMethods) {
-    model_omissions_.emplace(method, model_omissions(*model_, config_, method, boundary_));
-  }
-}
+      targets_(std::move(targets)),
+      model_omissions_(model_omissions(*model_, config_, method_, boundary_)),
+      evidence_(config_.sensing.max_age_s),
+      inverter_(std::move(inverter)) {}
 
 Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                                 Boundary boundary, InvertFunction invert,
-                                 OmissionFunction omissions) {
+                                 Method method, Boundary boundary,
+                                 std::unique_ptr<inversion::Inverter> inverter) {
   auto targets = RegistrationTargets::build(*model);
   if (!targets) return tl::unexpected(targets.error());
-  return Pipeline(std::move(model), config, boundary, std::move(invert), std::move(omissions),
+  return Pipeline(std::move(model), config, method, boundary, std::move(inverter),
                   std::move(*targets));
 }
 
-Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) const {
-  Evidence alone(config_.sensing.max_age_s);
-  return run(observation, options, alone);
+void Pipeline::reset() {
+  evidence_.clear();
+  inverter_->reset();
 }
 
-Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options,
-                             Evidence& evidence) const {
-  const auto start = Clock::now();
-  auto registered = register_observation(observation, targets_, config_, options.method);
-  if (!registered) return tl::unexpected(registered.error());
-
+Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) {
   Update update;
   update.case_id = model_->case_id;
   update.model_id = model_->model_id;
   update.observation_sequence = observation.sequence;
-  update.method = options.method;
+  update.method = method_;
   update.boundary = boundary_;
-  update.left_out = model_omissions_.at(options.method);
-  if (registered->icp) {
-    update.T_undeformed_deformed = registered->icp->T_surface_points;
-    for (auto& omission : registration_omissions(*registered->icp, config_.scene.rotation,
-                                                 registration::IcpOptions{}.rotation_sd_deg)) {
-      update.left_out.push_back(std::move(omission));
-    }
+  update.left_out = model_omissions_;
+  if (auto status = register_into(observation, update); !status) {
+    return tl::unexpected(status.error());
   }
-  evidence.put(std::move(*registered));
-  for (auto& omission : evidence.stale(observation.acquired_ns)) {
-    update.left_out.push_back(std::move(omission));
+  if (auto status = estimate_into(observation, options, update); !status) {
+    evidence_.drop(observation.source);
+    return tl::unexpected(status.error());
   }
-  update.timings.register_ms = milliseconds_since(start);
-  auto result = estimate(observation, options, evidence, std::move(update));
-  if (!result) evidence.drop(observation.source);
-  return result;
+  return update;
 }
 
-Result<Update> Pipeline::estimate(const Observation& observation, const RunOptions& options,
-                                  Evidence& evidence, Update update) const {
-  const auto start = Clock::now();
-  const CombinedData combined(evidence.fresh(observation.acquired_ns), evidence);
-  inversion::InversionOptions inversion_options;
-  inversion_options.method = options.method;
-  inversion_options.stop = options.stop;
-  inversion_options.moving = combined.moving();
+// Observation -> SparseData, into the evidence.
+Status Pipeline::register_into(const Observation& observation, Update& update) {
+  const Stopwatch watch;
+  auto registered = register_observation(observation, targets_, config_, method_);
+  if (!registered) return tl::unexpected(registered.error());
+  if (registered->icp) {
+    update.T_undeformed_deformed = registered->icp->T_surface_points;
+    append(registration_omissions(*registered->icp, config_.scene.rotation,
+                                  registration::IcpOptions{}.rotation_sd_deg),
+           update);
+  }
+  evidence_.put(std::move(*registered));
+  append(evidence_.stale(observation.acquired_ns), update);
+  update.timings.register_ms = watch.milliseconds();
+  return {};
+}
+
+// The evidence's SparseData -> Estimate.
+Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
+                               Update& update) {
+  const Stopwatch watch;
+  const CombinedData combined(evidence_.fresh(observation.acquired_ns), evidence_);
+  inversion::InversionOptions asked;
+  asked.stop = options.stop;
+  asked.moving = combined.moving();
   if (options.on_iterate) {
-    inversion_options.on_iterate = [&](const Estimate& iterate) {
-      update.final = false;
-      update.estimate = iterate;
-      update.timings.invert_ms = milliseconds_since(start);
-      options.on_iterate(update);
+    asked.on_iterate = [&](const Estimate& iterate) {
+      Update partial = update;  // its estimate is empty so far
+      partial.final = false;
+      partial.estimate = iterate;
+      partial.timings.invert_ms = watch.milliseconds();
+      options.on_iterate(std::move(partial));
     };
   }
-  auto inverted = invert_(combined.data(), inversion_options);
-  if (!inverted) return tl::unexpected(inverted.error());
-  update.final = true;
-  update.estimate = std::move(*inverted);
-  combined.describe(observation.acquired_ns, update.estimate.sources);
-  evidence.remember(update.estimate.displacement);
-  if (omissions_) {
-    for (auto& omission : omissions_(update.estimate)) {
-      update.left_out.push_back(std::move(omission));
-    }
+  Estimate& estimate = update.estimate;
+  if (auto status = inverter_->update(combined.data(), asked, estimate); !status) return status;
+  combined.describe(observation.acquired_ns, estimate.sources);
+  evidence_.remember(estimate.displacement, targets_.craniotomy.nodes);
+  if (const auto errors = inverter_->omission_errors()) {
+    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
   }
-  update.timings.rebuild_ms = update.estimate.rebuild_ms;
-  update.timings.invert_ms = milliseconds_since(start) - update.timings.rebuild_ms;
-  return update;
+  update.timings.rebuild_ms = estimate.rebuild_ms;
+  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
+  return {};
 }
 
 }  // namespace brainshift::server

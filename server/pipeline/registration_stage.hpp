@@ -1,21 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // First stage: Observation -> SparseData.
 //
-//   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then a random
-//                    subset of inversion.sparse_points boundary points (paper 2.6), always the same one for
-//                    the same number of points. scene.rotation = off: translation only; on: about every axis,
-//                    however little the points show of it
+//   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then a
+//                    random subset of inversion.sparse_points boundary points (paper 2.6), always the
+//                    same one for the same number of points. scene.rotation = off: translation only;
+//                    on: about every axis, however little the points show of it
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
-//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise, and by sensing.surface:
+//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise, and by
+//                    sensing.surface:
 //                    distances  along the normal of the model's cortex, made anew for every estimate
 //                               (registration/surface_distances.hpp; method condensed)
-//                    rigid      ICP to the undeformed cortex under the craniotomy, as for the tumour (other methods)
-//                    Refused: what check_cortical_surface refuses (units, place, orientation); scene.surface = off
-//   PatientPose      refused: not assimilated in this version
+//                    rigid      ICP to the undeformed cortex under the craniotomy, as for the tumour
+//                               (other methods)
+//                    Rejected: scene.surface = off, and what check_cortical_surface rejects (units,
+//                    place, orientation)
+//   PatientPose      rejected: not assimilated in this version
 //
-// Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the observation's own
-// where that is larger; the paper's method and its variants take the former whatever the observation says.
-// Points that ICP takes for outliers guide nothing. Errors that aligned points have in common: registration::sparse_data_from_alignment.
+// Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the
+// observation's own where that is larger. The paper's method and its variants take the former whatever
+// the observation says.
+// Points that ICP takes for outliers guide nothing. Errors that aligned points have in common:
+// registration::sparse_data_from_alignment.
 #pragma once
 
 #include <optional>
@@ -46,18 +51,20 @@ struct RegisteredObservation {
 
 // What observations are registered to: the undeformed patient.
 struct RegistrationTargets {
-  // kEmptySet / kNotFinite when the model has no usable tumour surface.
+  // kEmptySet or kNotFinite when the model has no usable tumour surface.
   static Result<RegistrationTargets> build(const BrainModel& model);
 
   geometry::ClosestPointIndex tumour;
-  // The same by interpolation, some thirty times faster; models whose tumour is not closed have none.
+  // The same by interpolation, some thirty times faster. Models whose tumour is not closed have none.
   std::optional<geometry::DistanceVolume> tumour_distance;
   registration::SurfacePatch craniotomy;
   std::optional<geometry::CorticalSite> site;  // none: no cortical surface is taken
 };
 
-// kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3 points;
-// kNotFinite: NaN or infinity. The sentence names the observation's source and the count.
+// kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3 points.
+// The sentence names the observation and the count. Precondition: the observation's numbers are finite,
+// as wire::decode_observation gives them. (Data that are not are rejected further on, by check_data or by
+// registration, with kNotFinite.)
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config,

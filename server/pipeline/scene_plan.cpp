@@ -15,7 +15,7 @@ tl::unexpected<Error> refused(const char* part, const char* value, const std::st
 
 }  // namespace
 
-Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, anatomy::Boundary boundary) {
+Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary boundary) {
   const SceneConfig& scene = config.scene;
   const std::string name(to_string(method));
   const bool condensed = method == Method::kCondensed;
@@ -24,7 +24,7 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, anatomy::B
   if (scene.pressure == Carry::kOn && method == Method::kIterativeSolver) {
     return refused("pressure", "on", "method " + name + " has no solver for pore pressure");
   }
-  if (scene.contact == Carry::kOn && boundary == anatomy::Boundary::kFixed) {
+  if (scene.contact == Carry::kOn && boundary == Boundary::kFixed) {
     return refused("contact", "on", "the fixed boundary has no contact");
   }
   if (scene.uncertainty == Carry::kOn && !condensed) {
@@ -34,7 +34,7 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, anatomy::B
     return refused("gravity_modes", "on",
                    "prior.gravity_mode_sd and prior.gravity_levels_mm leave none");
   }
-  if (scene.contact == Carry::kOff && !condensed && boundary == anatomy::Boundary::kContact) {
+  if (scene.contact == Carry::kOff && !condensed && boundary == Boundary::kContact) {
     return refused("contact", "off", "method " + name + " always carries contact");
   }
   if (scene.gravity_modes == Carry::kOff && !condensed && has_modes) {
@@ -43,7 +43,7 @@ Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, anatomy::B
   }
   ScenePlan plan;
   plan.pressure = scene.pressure == Carry::kOn;
-  plan.contact = boundary == anatomy::Boundary::kContact && scene.contact != Carry::kOff;
+  plan.contact = boundary == Boundary::kContact && scene.contact != Carry::kOff;
   plan.uncertainty = condensed && scene.uncertainty != Carry::kOff;
   plan.gravity_modes = has_modes && scene.gravity_modes != Carry::kOff;
   plan.far_field = !condensed || scene.far_field != Carry::kOff;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ScenePlan: which parts of the work a session carries, from the case, the method and the boundary.
 //
-// What depends on an observation is decided with it: contact (carried when a slave would penetrate) and rotation
-// (about the axes that the points show). What is left out is listed in every Update, server/pipeline/left_out.hpp.
+// What depends on an observation is decided with it: contact (carried when a slave would penetrate) and
+// rotation (about the axes that the points show). Every Update lists what is left out,
+// server/pipeline/left_out.hpp.
 #pragma once
 
 #include <vector>
@@ -22,13 +23,14 @@ struct ScenePlan {
   bool far_field = true;
 };
 
-// Fails with kInvalidArgument for a part that is forced on but not available (scene.surface;
-// scene.pressure with method pcg; scene.contact under the fixed boundary; scene.uncertainty with a method without covariance;
-// scene.gravity_modes without modes in the prior), and for one that is forced off but that the method always
-// carries. The sentence names the key.
-Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, anatomy::Boundary boundary);
+// kInvalidArgument for a part that is forced on but not available (scene.pressure with method pcg;
+// scene.contact under the fixed boundary; scene.uncertainty with a method without covariance;
+// scene.gravity_modes without modes in the prior), and for a part that is forced off but that the method
+// always carries. The sentence names the key.
+Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary boundary);
 
-// Nodes inside the tumour or within margin_mm of its surface; sorted. Empty without a usable surface.
+// The nodes where an answer is wanted when the far field is left out: inside the tumour or within
+// margin_mm of its surface; sorted. Empty without a usable surface.
 std::vector<NodeIndex> region_of_interest(const BrainModel& model, double margin_mm);
 
 }  // namespace brainshift::server

@@ -1,24 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/service/service.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <ctime>
 #include <utility>
 
+#include "common/core/utc_time.hpp"
 #include "server/session/observation_rules.hpp"
 
 namespace brainshift::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using wire::MessageType;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 Reply error_reply(const Error& error) {
   return {MessageType::kErrorReply, wire::encode(error), false};
@@ -26,19 +20,15 @@ Reply error_reply(const Error& error) {
 
 Reply model_not_ready() { return error_reply({ErrorCode::kModelNotReady, "no model is loaded"}); }
 
-std::string utc_now(const char* format) {
-  return fmt::format(fmt::runtime(format), fmt::gmtime(std::time(nullptr)));
-}
-
-io::SurgeryRecord record(const char* kind, std::uint64_t sequence, std::string payload) {
-  return {kind, sequence, Clock::now().time_since_epoch() / std::chrono::nanoseconds(1),
-          std::move(payload)};
+io::SurgeryRecord record(io::RecordKind kind, std::uint64_t sequence, std::string payload) {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return {kind, sequence, now / std::chrono::nanoseconds(1), std::move(payload)};
 }
 
 }  // namespace
 
 Service::Service(ServiceOptions options, Outbox& outbox)
-    : options_(std::move(options)), outbox_(outbox), started_(Clock::now()) {
+    : options_(std::move(options)), outbox_(outbox) {
   if (!options_.journal_dir.empty()) {
     Journal::Options journal;
     journal.open = options_.open_journal;
@@ -47,7 +37,7 @@ Service::Service(ServiceOptions options, Outbox& outbox)
   }
   if (options_.model) {
     SessionHooks hooks;
-    hooks.prepare = options_.prepare;
+    hooks.make_model = options_.make_model;
     hooks.on_ready = [this](const auto& request, const auto& info) {
       begin_journal(request, info);
     };
@@ -109,7 +99,10 @@ Reply Service::observe(const wire::Frame& frame) {
   const std::uint64_t sequence = observation->sequence;
   // Queued before the worker can answer it, so that the journal holds cause before effect.
   const auto receipt = session_->submit(std::move(*observation), [&] {
-    if (journal_) journal_->append(record("observation", sequence, std::string(frame.payload)));
+    if (!journal_) return;
+    const Stopwatch watch;
+    journal_->append(record(io::RecordKind::kObservation, sequence, std::string(frame.payload)));
+    journal_ms_ = watch.milliseconds();
   });
   if (!receipt) {
     spdlog::debug("observation refused sequence={} code={} reason=\"{}\"", sequence,
@@ -122,7 +115,7 @@ Reply Service::observe(const wire::Frame& frame) {
 wire::DaemonStatus Service::status() const {
   wire::DaemonStatus status;
   status.version = options_.version;
-  status.uptime_ms = static_cast<std::uint64_t>(milliseconds_since(started_));
+  status.uptime_ms = static_cast<std::uint64_t>(uptime_.milliseconds());
   if (!session_) return status;
   const Session::State state = session_->state();
   status.model_ready = true;
@@ -135,17 +128,17 @@ wire::DaemonStatus Service::status() const {
 
 void Service::begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info) {
   if (!journal_) return;
-  const auto path =
-      journal_path(options_.journal_dir, request.case_id,
-                   fmt::format("{}-{}", utc_now("{:%Y%m%dT%H%M%SZ}"), info.session_id));
-  journal_->begin(path, {{"case_id", request.case_id},
-                         {"model_id", info.model_id},
-                         {"case_file", options_.case_file.string()},
-                         {"scenario", "recorded"},
-                         {"method", std::string(to_string(request.method))},
-                         {"boundary", std::string(to_string(request.boundary))},
-                         {"created_utc", utc_now("{:%Y-%m-%dT%H:%M:%SZ}")},
-                         {"software", "brainshiftd " + options_.version}});
+  const auto path = journal_path(options_.journal_dir, request.case_id,
+                                 fmt::format("{}-{}", utc_now("%Y%m%dT%H%M%SZ"), info.session_id));
+  journal_->begin(path, {.case_id = request.case_id,
+                         .model_id = info.model_id,
+                         .case_file = options_.case_file.string(),
+                         .scenario = "recorded",
+                         .seed = std::nullopt,
+                         .method = std::string(to_string(request.method)),
+                         .boundary = std::string(to_string(request.boundary)),
+                         .created_utc = utc_now(),
+                         .software = "brainshiftd " + options_.version});
   spdlog::info("journal {}", path.string());
 }
 
@@ -158,23 +151,22 @@ void Service::publish(wire::UpdateMessage message) {
                                  "none in the estimate: this update is not recorded"});
     }
   }
-  const auto encode_start = Clock::now();
-  std::string payload = wire::encode(message);
+  const Stopwatch encoding;
+  std::string payload = wire::encode_without_timings(message);
   if (estimated) {
-    // The message carries the times of its own encoding and journalling, so it is encoded once more.
-    update.timings.encode_ms = milliseconds_since(encode_start);
-    const auto journal_start = Clock::now();
-    if (journal_) journal_->append(record("update", update.sequence, payload));
-    update.timings.journal_ms = milliseconds_since(journal_start);
-    payload = wire::encode(message);
+    update.timings.encode_ms = encoding.milliseconds();
+    update.timings.journal_ms = journal_ms_;
+  }
+  wire::append_timings(update.timings, payload);
+  auto frame = std::make_shared<const std::string>(
+      wire::encode_frame(MessageType::kUpdate, 0, payload));
+  if (estimated && journal_) {
+    journal_->append(record(io::RecordKind::kUpdate, update.sequence, std::move(payload)));
   }
   const Delivery delivery = message.error  ? Delivery::kFailure
                             : update.final ? Delivery::kFinal
                                            : Delivery::kIterate;
-  outbox_.post(
-      {delivery,
-       {},
-       std::make_shared<const std::string>(wire::encode_frame(MessageType::kUpdate, 0, payload))});
+  outbox_.post({delivery, {}, std::move(frame)});
 }
 
 }  // namespace brainshift::server

@@ -3,59 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 namespace brainshift::server {
 namespace {
 
 constexpr std::size_t kMaxSourceLength = 64;
 constexpr std::size_t kMaxQuoted = 64;
-
-Status check_sd(const char* body, double sd_mm) {
-  if (std::isfinite(sd_mm) && sd_mm >= 0.0) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("{}.sd_mm = {}: must be finite and not negative", body, sd_mm));
-}
-
-Status check_points(const char* field, const Points& points) {
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    if (!points.col(i).allFinite()) {
-      return fail(ErrorCode::kNotFinite, fmt::format("{}: point {} is not finite", field, i));
-    }
-  }
-  return {};
-}
-
-struct CheckBody {
-  Status operator()(const TumourBoundary& body) const {
-    if (auto status = check_points("tumour_boundary.points", body.points); !status) return status;
-    return check_sd("tumour_boundary", body.sd_mm);
-  }
-  Status operator()(const CorticalSurface& body) const {
-    if (auto status = check_points("cortical_surface.surface", body.surface.vertices); !status) {
-      return status;
-    }
-    return check_sd("cortical_surface", body.sd_mm);
-  }
-  Status operator()(const LandmarkPairs& body) const {
-    if (auto status = check_points("landmark_pairs.undeformed", body.undeformed); !status) {
-      return status;
-    }
-    if (auto status = check_points("landmark_pairs.deformed", body.deformed); !status) {
-      return status;
-    }
-    return check_sd("landmark_pairs", body.sd_mm);
-  }
-  Status operator()(const PatientPose& body) const {
-    if (!body.gravity_direction.allFinite()) {
-      return fail(ErrorCode::kNotFinite, "patient_pose.gravity_direction is not finite");
-    }
-    if (body.fluid_level_mm && !std::isfinite(*body.fluid_level_mm)) {
-      return fail(ErrorCode::kNotFinite, "patient_pose.fluid_level_mm is not finite");
-    }
-    return {};
-  }
-};
 
 }  // namespace
 
@@ -80,7 +32,7 @@ Status check_observation(const Observation& observation, std::string_view case_i
                 fmt::format("observation.sequence = {}: must be above {}, the last one accepted",
                             observation.sequence, last_sequence));
   }
-  return std::visit(CheckBody{}, observation.body);
+  return {};
 }
 
 std::string in_quotes(std::string_view text) {

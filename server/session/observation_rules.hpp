@@ -11,9 +11,10 @@
 
 namespace brainshift::server {
 
-// Ok, or: kInvalidArgument for another case, a frame other than "ras", an empty or overlong source, a
-// sequence number that is not above `last_sequence`, a negative standard deviation; kNotFinite for a
-// coordinate. The sentence names the field and its value.
+// Ok, or kInvalidArgument for another case, a frame other than "ras", an empty or overlong source, or a
+// sequence number that is not above `last_sequence`. The sentence names the field and its value.
+// The numbers of the body are not looked at: wire::decode_observation has tested that they are finite and
+// that standard deviations are not negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          std::uint64_t last_sequence);
 

@@ -4,23 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
+#include "common/core/guarded.hpp"
 #include "server/session/observation_rules.hpp"
 
 namespace brainshift::server {
 namespace {
 
 // A throwing library must cost one observation, not the daemon.
-template <typename Function>
-auto guarded(Function&& function) -> decltype(function()) {
-  try {
-    return function();
-  } catch (const std::exception& exception) {
-    return fail(ErrorCode::kInternal, fmt::format("unexpected failure: {}", exception.what()));
-  }
-}
+constexpr const char* kUnexpected = "unexpected failure";
 
 }  // namespace
 
@@ -136,29 +129,28 @@ void Session::work(const std::stop_token& stop) {
         boxes_.erase(oldest);
       }
     }
-    if (start) begin(std::move(*start));
+    if (start) make_ready(std::move(*start));
     if (observation) process(*observation);
   }
 }
 
-Result<std::shared_ptr<const Prepared>> Session::prepared_for(const wire::SessionRequest& request) {
+Result<SessionModel*> Session::model_for(const wire::SessionRequest& request) {
   const std::tuple key{request.boundary, request.method, request.measure_full_solve};
-  if (const auto found = cache_.find(key); found != cache_.end()) return found->second;
-  auto prepared = guarded([&] { return hooks_.prepare(request); });
-  if (!prepared) return tl::unexpected(prepared.error());
-  auto shared = std::make_shared<const Prepared>(std::move(*prepared));
-  cache_.emplace(key, shared);
-  return shared;
+  if (const auto found = models_.find(key); found != models_.end()) return found->second.get();
+  auto made =
+      guarded(ErrorCode::kInternal, kUnexpected, [&] { return hooks_.make_model(request); });
+  if (!made) return tl::unexpected(made.error());
+  return models_.emplace(key, std::move(*made)).first->second.get();
 }
 
-void Session::begin(PendingStart start) {
-  const auto prepared = prepared_for(start.request);
-  if (!prepared) {
-    start.done(tl::unexpected(prepared.error()));
+void Session::make_ready(PendingStart start) {
+  const auto model = model_for(start.request);
+  if (!model) {
+    start.done(tl::unexpected(model.error()));
     return;
   }
-  if ((*prepared)->begin) (*prepared)->begin();
-  wire::SessionInfo info = (*prepared)->info;
+  (*model)->pipeline.reset();
+  wire::SessionInfo info = (*model)->info;
   {
     const std::lock_guard lock(mutex_);
     info.session_id = ++last_session_id_;
@@ -168,7 +160,7 @@ void Session::begin(PendingStart start) {
   {
     const std::lock_guard lock(mutex_);
     superseded = stopped_ || pending_start_.has_value();
-    if (!superseded) running_ = Running{info.session_id, start.request, *prepared, 0, 0};
+    if (!superseded) running_ = Running{info.session_id, start.request, *model, 0, 0};
   }
   if (superseded) {
     start.done(fail(ErrorCode::kUnavailable, "another session was started before this one"));
@@ -187,25 +179,24 @@ void Session::process(const Observation& observation) {
     session = *running_;
     options.stop = run_stop_.get_token();
   }
-  options.method = session.request.method;
-  if (session.request.publish_iterates) {
-    options.on_iterate = [&](const Update& iterate) {
-      wire::UpdateMessage message{session.session_id, iterate, std::nullopt};
-      message.update.sequence = session.published;
-      hooks_.publish(std::move(message));
-    };
-  }
-  auto result = guarded([&] { return session.prepared->run(observation, options); });
-  if (options.stop.stop_requested()) return;
-
   wire::UpdateMessage message;
   message.session_id = session.session_id;
+  if (session.request.publish_iterates) {
+    options.on_iterate = [&](Update iterate) {
+      iterate.sequence = session.published;
+      hooks_.publish({session.session_id, std::move(iterate), std::nullopt});
+    };
+  }
+  auto result = guarded(ErrorCode::kInternal, kUnexpected,
+                        [&] { return session.model->pipeline.run(observation, options); });
+  if (options.stop.stop_requested()) return;
+
   if (result) {
     message.update = std::move(*result);
   } else {
     message.error = result.error();
     message.update.case_id = case_id_;
-    message.update.model_id = session.prepared->info.model_id;
+    message.update.model_id = session.model->info.model_id;
     message.update.observation_sequence = observation.sequence;
     message.update.method = session.request.method;
     message.update.boundary = session.request.boundary;

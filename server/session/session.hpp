@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Session: one case under one boundary and method, worked on by one thread.
 //
-//   start()   ends the running session and prepares the next one on the worker (seconds, once per boundary)
+//   start()   ends the running session and makes the next one ready on the worker (seconds, once per
+//             boundary and method)
 //   submit()  checks an observation and leaves it in the box of its source; never waits
 //   worker    takes the oldest waiting observation, runs the pipeline, hands the message to `publish`
 //
-// Every source has a box for one observation: a newer one replaces an older one that has not started, so a
-// slow inversion never works through a backlog. A running inversion is ended early only by a new session or
-// by stop(); its result is then not published. After an error the previous estimate stays the valid one.
+// Every source has a box for one observation: a newer one replaces an older one that has not started, so
+// a slow inversion never works through a backlog. Only a new session and stop() end a running inversion
+// early, whatever its method: their stop token reaches every iteration and every contact set. The result
+// of such an inversion is not published. After an error the previous estimate stays the valid one.
 // All members may be called from any thread, except inside the hooks.
 #pragma once
 
@@ -30,17 +32,18 @@
 
 namespace brainshift::server {
 
-// A boundary condition made ready: what clients are told, and the pipeline as a function.
-struct Prepared {
+// All that a session of one method and boundary needs: what its clients are told, and the pipeline with
+// its state. The session keeps it for the next session of the same kind, and resets it then.
+struct SessionModel {
   wire::SessionInfo info;  // session_id is filled in by the session
-  // A session begins: nothing of an earlier one may be remembered. May be empty.
-  std::function<void()> begin;
-  std::function<Result<Update>(const Observation&, const RunOptions&)> run;
+  Pipeline pipeline;
 };
+using MakeSessionModel =
+    std::function<Result<std::unique_ptr<SessionModel>>(const wire::SessionRequest&)>;
 
 // Called on the worker thread, one at a time.
 struct SessionHooks {
-  std::function<Result<Prepared>(const wire::SessionRequest&)> prepare;
+  MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
   std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
   // An iterate, a final update, or the error that an observation ended in.
@@ -53,7 +56,7 @@ class Session {
 
   struct State {
     std::uint64_t session_id = 0;  // 0: none is running
-    bool busy = false;             // preparing or inverting
+    bool busy = false;             // making a session ready, or inverting
     std::uint64_t updates = 0;     // final updates of all sessions
   };
 
@@ -69,6 +72,7 @@ class Session {
   // kModelNotReady without a running session; the errors of check_observation; kUnavailable when
   // kMaxSources other sources wait. `on_accepted` is called once before the worker can see an accepted
   // observation; it must be quick and must not call back.
+  // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
                                           const std::function<void()>& on_accepted = {});
 
@@ -87,20 +91,20 @@ class Session {
   struct Running {
     std::uint64_t session_id = 0;
     wire::SessionRequest request;
-    std::shared_ptr<const Prepared> prepared;
+    SessionModel* model = nullptr;  // in models_
     std::uint64_t last_sequence = 0;
     std::uint64_t published = 0;  // number of the last message's update
   };
 
   void work(const std::stop_token& stop);
-  void begin(PendingStart start);
-  Result<std::shared_ptr<const Prepared>> prepared_for(const wire::SessionRequest& request);
+  void make_ready(PendingStart start);
+  Result<SessionModel*> model_for(const wire::SessionRequest& request);
   void process(const Observation& observation);
 
   const std::string case_id_;
   const SessionHooks hooks_;
   // By boundary, method and whether a full solve was measured; worker only.
-  std::map<std::tuple<Boundary, Method, bool>, std::shared_ptr<const Prepared>> cache_;
+  std::map<std::tuple<Boundary, Method, bool>, std::unique_ptr<SessionModel>> models_;
 
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;

@@ -1,33 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/condensed/condensed_exact.hpp"
 
-#include <algorithm>
-#include <chrono>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/contact/set_search.hpp"
 #include "common/core/statistics.hpp"
-#include "common/linalg/blas.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/inversion/condensed/find_contact_set.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/contract/penetration.hpp"
 #include "common/inversion/prepared/output_operators.hpp"
-#include "common/contact/set_search.hpp"
+#include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
-namespace blas = fem::blas;
+namespace blas = linalg::blas;
 using Eigen::MatrixXd;
-using Clock = std::chrono::steady_clock;
 
-// A datum on a face or at a node: weights below this are rounding of its location.
-constexpr double kLeastWeight = 1e-12;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
+// The location of a datum on a face or at a node has barycentric weights of rounding size, 1e-16 times
+// a mesh of some hundred elements across. Less than this is 0.
+constexpr double kLeastBarycentric = 1e-12;
 
 // A over the rows of the data region.
 struct RegionSampling {
@@ -59,7 +56,7 @@ struct CondensedExact::Impl {
         slaves(model.forward().contact().num_slaves()),
         beta(model.forward().contact().beta()),
         initial_penetration(slaves),
-        compliance_diagonal(outputs.compliance.diagonal().tail(slaves)),
+        diagonal(outputs.compliance.diagonal().tail(slaves)),
         place(static_cast<std::size_t>(model.model().mesh.num_nodes()), -1),
         search(slaves, model.config().condensed.max_contact_iterations) {
     for (int i = 0; i < slaves; ++i) {
@@ -78,7 +75,21 @@ struct CondensedExact::Impl {
   Status locate(const SparseData& data);
   void sample(const SparseData& data);
   Status solve_for_set(const contact::ActiveSet& set);
-  void record(int iteration, Clock::time_point start);
+  void record();
+
+  // What find_contact_set() asks of a method.
+  Status evaluate(const contact::ActiveSet& set) {
+    if (auto status = solve_for_set(set); !status) return status;
+    record();
+    return {};
+  }
+  void keep() {}
+  void leave_cycle() { search.pivot(forces_of_all, depth, diagonal); }
+  const VecX& all_forces() const { return forces_of_all; }
+  const VecX& penetration() const { return depth; }
+  const VecX& compliance_diagonal() const { return diagonal; }
+  static bool out_of_time() { return false; }
+
   Status rebuild(Points& u) const;
   void finish(const SparseData& data, EstimateStatus outcome, Estimate& estimate);
 
@@ -87,7 +98,7 @@ struct CondensedExact::Impl {
   OutputOperators outputs;
   int slaves;
   double beta;
-  VecX initial_penetration, compliance_diagonal;
+  VecX initial_penetration, diagonal;  // diagonal: of the slaves' compliance
   std::vector<int> place;  // per node: in the region, or -1
   contact::SetSearch search;
 
@@ -103,8 +114,9 @@ struct CondensedExact::Impl {
   VecX mu;             // 3m
   VecX slave_weights;  // -Z^T mu, k
   VecX forces;         // k
-  VecX all_forces;     // s, 0 when open
-  VecX penetration;    // s
+  VecX forces_of_all;  // s, 0 when open
+  VecX depth;          // penetration, s
+  Stopwatch watch;     // of the update
   std::vector<IterationRecord> history;
 };
 
@@ -122,7 +134,7 @@ Status CondensedExact::Impl::locate(const SparseData& data) {
       return fail(ErrorCode::kInvalidArgument, text.str());
     }
     for (int k = 0; k < 4; ++k) {
-      if (std::abs(location.weights[k]) < kLeastWeight) continue;
+      if (std::abs(location.weights[k]) < kLeastBarycentric) continue;
       const int row = place[static_cast<std::size_t>(location.nodes[k])];
       if (row < 0) {
         text << "outside the prepared region, the surroundings of tumour and craniotomy";
@@ -201,27 +213,26 @@ Status CondensedExact::Impl::solve_for_set(const contact::ActiveSet& set) {
   if (k > 0) free.noalias() += slave_covariance()(Eigen::all, active) * slave_weights;
   forces = initial_penetration(active) - free(active);
   solve_d(forces);
-  penetration = initial_penetration - free;
-  if (k > 0) penetration.noalias() -= slave_compliance()(Eigen::all, active) * forces;
-  all_forces.setZero(slaves);
-  all_forces(active) = forces;
-  penetration(active) = forces / beta;  // by construction; the sum has it up to rounding
+  depth = initial_penetration - free;
+  if (k > 0) depth.noalias() -= slave_compliance()(Eigen::all, active) * forces;
+  forces_of_all.setZero(slaves);
+  forces_of_all(active) = forces;
+  depth(active) = forces / beta;  // by construction; the sum has it up to rounding
   return {};
 }
 
-void CondensedExact::Impl::record(int iteration, Clock::time_point start) {
+void CondensedExact::Impl::record() {
   // d - A u = R mu, by the equation for mu.
   VecX residual = variance.cwiseProduct(mu);
   if (common.rows() > 0) residual.noalias() += common * (common.transpose() * mu);
   IterationRecord entry;
-  entry.iteration = iteration;
+  entry.iteration = static_cast<int>(history.size()) + 1;
   entry.misfit_mm =
       mean_std_of_norms(Eigen::Map<const Points>(residual.data(), 3, residual.size() / 3));
-  for (Eigen::Index i = 0; i < penetration.size(); ++i) {
-    if (penetration[i] > kPenetrationTolerance_mm) ++entry.penetrating;
-    entry.max_penetration_mm = std::max(entry.max_penetration_mm, penetration[i]);
-  }
-  entry.elapsed_ms = milliseconds_since(start);
+  const PenetrationSummary summary = summarise_penetration(depth);
+  entry.penetrating = summary.penetrating;
+  entry.max_penetration_mm = summary.max_mm;
+  entry.elapsed_ms = watch.milliseconds();
   history.push_back(entry);
 }
 
@@ -268,6 +279,8 @@ void CondensedExact::Impl::finish(const SparseData& data, EstimateStatus outcome
   for (const int slave : active) estimate.active_slaves.push_back(pair(slave).slave);
   estimate.contact_force_n = forces;
   estimate.history = history;
+  estimate.prior_scales.fill(1.0);
+  estimate.sources.clear();
 }
 
 CondensedExact::CondensedExact(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -275,8 +288,8 @@ CondensedExact::CondensedExact(CondensedExact&&) noexcept = default;
 CondensedExact& CondensedExact::operator=(CondensedExact&&) noexcept = default;
 CondensedExact::~CondensedExact() = default;
 
-Result<CondensedExact> CondensedExact::prepare(const PreparedModel& model,
-                                               const CondensedExactOptions& options) {
+Result<CondensedExact> CondensedExact::build(const PreparedModel& model,
+                                             const CondensedExactOptions& options) {
   auto outputs = output_operators(model, options.progress, options.stop, options.threads);
   if (!outputs) return tl::unexpected(outputs.error());
   return CondensedExact(std::make_unique<Impl>(model, options, std::move(*outputs)));
@@ -291,49 +304,32 @@ std::uint64_t CondensedExact::bytes() const {
 }
 
 Status CondensedExact::update(const SparseData& data, Estimate& estimate,
-                              const std::stop_token& stop) {
-  const auto start = Clock::now();
+                              const InversionOptions& asked) {
   Impl& impl = *impl_;
+  impl.watch = Stopwatch();
   if (auto status = check_data(data); !status) return status;
   if (auto status = check_whole(data); !status) return status;
   if (auto status = impl.locate(data); !status) return status;
   impl.sample(data);
 
-  contact::SetSearch& search = impl.search;
-  if (!impl.options.warm_start) search.forget();
-  search.begin();
+  if (!impl.options.warm_start) impl.search.forget();
   impl.history.clear();
-  contact::SetSearch::Step step = contact::SetSearch::Step::kContinue;
-  while (step == contact::SetSearch::Step::kContinue || step == contact::SetSearch::Step::kCycling) {
-    if (stop.stop_requested()) {
-      return fail(ErrorCode::kNotConverged,
-                  "inversion was stopped at iteration " + std::to_string(search.iteration() + 1));
-    }
-    if (auto status = impl.solve_for_set(search.current()); !status) return status;
-    impl.record(search.iteration() + 1, start);
-    step = search.next(impl.all_forces, impl.penetration, impl.compliance_diagonal);
-    if (step == contact::SetSearch::Step::kCycling) {
-      search.pivot(impl.all_forces, impl.penetration, impl.compliance_diagonal);
-    }
-  }
-  const bool solved = step == contact::SetSearch::Step::kSolved;
-  if (!solved) {  // the best set seen, evaluated once more
-    if (auto status = impl.solve_for_set(search.best()); !status) return status;
-    impl.record(search.iteration() + 1, start);
-    search.adopt_best();
-  }
-  const auto rebuild_start = Clock::now();
+  const auto end = find_contact_set(impl.search, impl, asked.stop);
+  if (!end) return tl::unexpected(end.error());
+  const Stopwatch rebuilding;
   Points displacement;
   if (auto status = impl.rebuild(displacement); !status) return status;
   if (!displacement.allFinite() || !impl.forces.allFinite()) {
-    search.forget();
+    impl.search.forget();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
   estimate.displacement = std::move(displacement);
-  estimate.rebuild_ms = milliseconds_since(rebuild_start);
-  impl.finish(data, solved ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit,
+  estimate.rebuild_ms = rebuilding.milliseconds();
+  impl.finish(data,
+              *end == SearchEnd::kSolved ? EstimateStatus::kConverged
+                                         : EstimateStatus::kIterationLimit,
               estimate);
-  return check_estimate(impl.model, estimate);
+  return check_estimate(impl.model.model().mesh, impl.model.config().material, estimate);
 }
 
 }  // namespace brainshift::inversion

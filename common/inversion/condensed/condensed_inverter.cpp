@@ -2,47 +2,45 @@
 #include "common/inversion/condensed/condensed_inverter.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "common/contact/set_search.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "common/inversion/condensed/contact_reduction.hpp"
-#include "common/inversion/contract/data_check.hpp"
-#include "common/inversion/contract/estimate_check.hpp"
+#include "common/inversion/condensed/contradictions.hpp"
 #include "common/inversion/condensed/field_rebuild.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/condensed/find_contact_set.hpp"
 #include "common/inversion/condensed/mode_posterior.hpp"
+#include "common/inversion/condensed/omission_estimates.hpp"
 #include "common/inversion/condensed/prior_scales.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
-#include "common/contact/set_search.hpp"
+#include "common/inversion/contract/data_check.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
+#include "common/inversion/contract/penetration.hpp"
+#include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-// From here on the reason says that the data are not explained. 600 independent residuals exceed it by chance never.
+// A greater misfit ratio is named in the reason. 600 independent residuals never exceed it by chance.
 constexpr double kUnexplained = 1.5;
 
-// Contact, scales, robust weights and places of moving data settle in turn; twice is the rule when a surgery begins,
-// once later.
+// Contact, scales, robust weights and places of moving data settle in turn. Two rounds are the rule when
+// a surgery begins, one later.
 constexpr int kMaxRounds = 6;
 
+// Sets of a cycle from whose mean of loads the search tries to leave it.
 constexpr int kMaxRelaxations = 10;
 
 // Into memory that `reason` has already.
-void set_reason(EstimateStatus outcome, const contact::SetSearch& search, const CondensedConfig& config,
-                double misfit_ratio, std::string& reason) {
+void set_reason(EstimateStatus outcome, const contact::SetSearch& search,
+                const CondensedConfig& config, double misfit_ratio, std::string& reason) {
   char text[240];
   switch (outcome) {
     case EstimateStatus::kConverged:
@@ -69,7 +67,7 @@ void set_reason(EstimateStatus outcome, const contact::SetSearch& search, const 
   }
 }
 
-// What single data and single sources are worth beside the others.
+// Outliers, and sources that contradict the others.
 void append_sources(Estimate& estimate) {
   for (const SourceSummary& source : estimate.sources) {
     char text[240];
@@ -87,6 +85,15 @@ void append_sources(Estimate& estimate) {
       estimate.reason.append(text);
     }
   }
+}
+
+// Of data without named sources.
+void append_outliers(const RobustWeights& weights, int data, std::string& reason) {
+  const int outliers = weights.outliers(0, data);
+  if (outliers == 0) return;
+  char text[80];
+  std::snprintf(text, sizeof text, "; %d of %d data count less as outliers", outliers, data);
+  reason.append(text);
 }
 
 }  // namespace
@@ -129,6 +136,7 @@ struct CondensedInverter::Impl {
     posterior.reserve(data);
     sampled.reserve(data);
     weights.reserve(data);
+    contradictions.reserve(data);
     norms.resize(data);
   }
 
@@ -148,17 +156,25 @@ struct CondensedInverter::Impl {
   }
   // Checks and places data that are new.
   Status accept(const SparseData& data);
-  // Contact, scales, weights and moving data in turn, until nothing changes. `data` follows `moving`.
-  Result<EstimateStatus> settle(const SparseData*& data, const MovingData* moving,
-                                Clock::time_point start);
-  // Contact for the present scales and weights, from the last set on: kConverged, kIterationLimit or kDeadline.
-  Result<EstimateStatus> settle_contact(const SparseData& data, Clock::time_point start);
-  // Posterior mean of z and the contact forces for the set of `reduction`; fills penetration of every slave.
-  Status estimate_for_set();
-  void relax();
+  // Contact, scales, weights and moving data in turn, until nothing changes. `data` follows
+  // `moving`. Errors of evaluate(), of moving data that are not fit, and stopped().
+  Result<EstimateStatus> settle(const SparseData*& data, const InversionOptions& asked);
+  // Contact for the present scales and weights, from the last set on: kConverged, kIterationLimit
+  // or kDeadline.
+  Result<EstimateStatus> settle_contact(const std::stop_token& stop);
+
+  // What find_contact_set() asks of a method.
+  Status evaluate(const contact::ActiveSet& set);
+  const VecX& all_forces() const { return reduction.all_forces(); }
+  const VecX& penetration() const { return reduction.penetration(); }
+  const VecX& compliance_diagonal() const { return reduction.compliance_diagonal(); }
+  void keep();
+  void leave_cycle();
+  bool out_of_time() const { return watch.milliseconds() > condensed.deadline_ms; }
+
   bool reweigh(const SparseData& data);
   Result<bool> relocate(const SparseData& data, const MovingData& moving);
-  void record(const SparseData& data, Clock::time_point start);
+  void record();
   Status finish(const SparseData& data, Estimate& estimate);
   void estimate_omissions();
   void summarise_sources(const SparseData& data, Estimate& estimate);
@@ -177,9 +193,11 @@ struct CondensedInverter::Impl {
   PriorScales scales;
   bool estimate_scales;
   RobustWeights weights;
+  Contradictions contradictions;
   bool robust;
   contact::SetSearch search;
 
+  Stopwatch watch;                  // of the update
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   int relaxations = 0;
   VecX relaxed;      // modes between those of the last sets, once they cycle
@@ -196,14 +214,22 @@ Status CondensedInverter::Impl::accept(const SparseData& data) {
   return sampled.locate(data);
 }
 
-Status CondensedInverter::Impl::estimate_for_set() {
+// Posterior mean of z and the contact forces for the set; penetration of every slave.
+Status CondensedInverter::Impl::evaluate(const contact::ActiveSet& set) {
+  if (auto status = reduction.activate(set); !status) return status;
   if (auto status = posterior.solve(sampled, reduction, scales, team); !status) return status;
   reduction.update_forces(posterior.z());
+  record();
   return {};
 }
 
-// Contact of a point between the last sets' estimates calls for the next set.
-void CondensedInverter::Impl::relax() {
+void CondensedInverter::Impl::keep() {
+  relaxed = posterior.z();
+  relaxations = 0;
+}
+
+// The contact set at a point between the last sets' estimates: the mean of their loads.
+void CondensedInverter::Impl::leave_cycle() {
   for (int k = 0; k < kMaxRelaxations; ++k) {
     relaxed += (posterior.z() - relaxed) / static_cast<double>(++relaxations + 1);
     reduction.update_forces(relaxed);
@@ -229,18 +255,17 @@ Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const Mov
 }
 
 Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
-                                                       const MovingData* moving,
-                                                       Clock::time_point start) {
+                                                       const InversionOptions& asked) {
   bool sample = true;
   for (int round = 0;; ++round) {
     if (sample) sampled.sample(*data, scales.of_other(), weights.values());
-    const auto settled = settle_contact(*data, start);
+    const auto settled = settle_contact(asked.stop);
     if (!settled || *settled != EstimateStatus::kConverged || round == kMaxRounds) return settled;
     const bool rescaled = estimate_scales && scales.fit(posterior.gram(), posterior.right());
     const bool reweighed = reweigh(*data);
     bool relocated = false;
-    if (moving != nullptr) {
-      const auto changed = relocate(*data, *moving);
+    if (asked.moving != nullptr) {
+      const auto changed = relocate(*data, *asked.moving);
       if (!changed) return tl::unexpected(changed.error());
       relocated = *changed;
       if (relocated) data = &moved;
@@ -250,45 +275,20 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   }
 }
 
-Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const SparseData& data,
-                                                               Clock::time_point start) {
-  search.begin();
-  EstimateStatus outcome = EstimateStatus::kIterating;
-  while (outcome == EstimateStatus::kIterating) {
-    if (auto status = reduction.activate(search.current()); !status) {
-      return tl::unexpected(status.error());
-    }
-    if (auto status = estimate_for_set(); !status) return tl::unexpected(status.error());
-    record(data, start);
-    switch (search.next(reduction.all_forces(), reduction.penetration(),
-                        reduction.compliance_diagonal())) {
-      case contact::SetSearch::Step::kSolved: outcome = EstimateStatus::kConverged; break;
-      case contact::SetSearch::Step::kExhausted: outcome = EstimateStatus::kIterationLimit; break;
-      case contact::SetSearch::Step::kContinue:
-        relaxed = posterior.z();
-        relaxations = 0;
-        break;
-      case contact::SetSearch::Step::kCycling: relax(); break;
-    }
-    if (outcome == EstimateStatus::kIterating &&
-        (options.stop.stop_requested() || milliseconds_since(start) > condensed.deadline_ms)) {
-      outcome = EstimateStatus::kDeadline;
-    }
+Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const std::stop_token& stop) {
+  const auto end = find_contact_set(search, *this, stop);
+  if (!end) return tl::unexpected(end.error());
+  switch (*end) {
+    case SearchEnd::kSolved: return EstimateStatus::kConverged;
+    case SearchEnd::kDeadline: return EstimateStatus::kDeadline;
+    case SearchEnd::kExhausted: break;
   }
-  if (outcome == EstimateStatus::kConverged) return outcome;
-  // The best set seen, evaluated once more.
-  if (auto status = reduction.activate(search.best()); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (auto status = estimate_for_set(); !status) return tl::unexpected(status.error());
-  record(data, start);
-  search.adopt_best();
-  const bool holds = search.best_violation_mm() <= contact::kHolds_mm;
-  return outcome == EstimateStatus::kIterationLimit && holds ? EstimateStatus::kConverged : outcome;
+  return search.best_violation_mm() <= contact::kHolds_mm ? EstimateStatus::kConverged
+                                                          : EstimateStatus::kIterationLimit;
 }
 
-void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point start) {
-  const int m = data.size();
+void CondensedInverter::Impl::record() {
+  const int m = sampled.size();
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < m; ++i) {
     const double norm = posterior.misfit(sampled, i) * sampled.sd(i);
@@ -299,22 +299,20 @@ void CondensedInverter::Impl::record(const SparseData& data, Clock::time_point s
   entry.iteration = static_cast<int>(history.size()) + 1;
   entry.misfit_mm.mean = sum / m;
   entry.misfit_mm.std = m > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / m) / (m - 1))) : 0.0;
-  const VecX& penetration = reduction.penetration();
-  for (Eigen::Index i = 0; i < penetration.size(); ++i) {
-    if (penetration[i] > kPenetrationTolerance_mm) ++entry.penetrating;
-    entry.max_penetration_mm = std::max(entry.max_penetration_mm, penetration[i]);
-  }
-  entry.elapsed_ms = milliseconds_since(start);
+  const PenetrationSummary summary = summarise_penetration(reduction.penetration());
+  entry.penetrating = summary.penetrating;
+  entry.max_penetration_mm = summary.max_mm;
+  entry.elapsed_ms = watch.milliseconds();
   history.push_back(entry);
 }
 
 Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
-  const auto start = Clock::now();
+  const Stopwatch rebuilding;
   if (options.uncertainty) {
     rebuild.standard_deviation(team, reduction,
                                posterior.factor().bottomRightCorner(window.count, window.count),
                                scales.of_other() * scales.of_other(), estimate.sd_mm);
-    // Data that lie farther off than their standard deviations say: so may the estimate (Birge 1932).
+    // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
     if (posterior.misfit_ratio() > 1.0) estimate.sd_mm *= posterior.misfit_ratio();
   } else {
     estimate.sd_mm.resize(0);
@@ -327,7 +325,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   }
   const auto measured = deformation.measure(estimate.displacement);
   if (auto status = check_deformation(measured, estimate); !status) return status;
-  estimate.rebuild_ms = milliseconds_since(start);
+  estimate.rebuild_ms = rebuilding.milliseconds();
   estimate_omissions();
 
   const IterationRecord& last = history.back();
@@ -403,16 +401,19 @@ void CondensedInverter::reset() { impl_->reset(); }
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
 
 Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
-                                 const MovingData* moving) {
-  const auto start = Clock::now();
+                                 const InversionOptions& asked) {
   Impl& impl = *impl_;
+  impl.watch = Stopwatch();
   if (!impl.options.warm_start) impl.reset();
   impl.history.clear();
   if (auto status = impl.accept(given); !status) return status;
   impl.weights.reset(given.size());
   const SparseData* data = &given;
-  const auto outcome = impl.settle(data, moving, start);
-  if (!outcome) return tl::unexpected(outcome.error());
+  const auto outcome = impl.settle(data, asked);
+  if (!outcome) {
+    impl.reset();
+    return tl::unexpected(outcome.error());
+  }
   if (!impl.posterior.z().allFinite() || !impl.reduction.forces().allFinite()) {
     impl.reset();
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
@@ -425,6 +426,8 @@ Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
   estimate.status = *outcome;
   set_reason(*outcome, impl.search, impl.condensed, impl.posterior.misfit_ratio(), estimate.reason);
   append_sources(estimate);
+  if (data->sources.empty()) append_outliers(impl.weights, data->size(), estimate.reason);
+  append_contradiction(impl.contradictions.find(*data), *data, estimate.reason);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};
 }

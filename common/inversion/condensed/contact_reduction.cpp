@@ -7,7 +7,7 @@
 
 namespace brainshift::inversion {
 
-namespace blas = fem::blas;
+namespace blas = linalg::blas;
 
 ContactReduction::ContactReduction(const CondensedOperators& operators, ModeWindow window,
                                    double beta, ThreadTeam& team)

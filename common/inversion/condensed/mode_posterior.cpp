@@ -7,7 +7,7 @@
 
 namespace brainshift::inversion {
 
-namespace blas = fem::blas;
+namespace blas = linalg::blas;
 
 ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
   const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;

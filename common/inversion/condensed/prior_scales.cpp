@@ -8,7 +8,7 @@
 namespace brainshift::inversion {
 namespace {
 
-namespace blas = fem::blas;
+namespace blas = linalg::blas;
 
 // Gains in ln p. Below the first the present scales will do: they are those of the update before, as a rule, and
 // new ones cost another search for the contact set. The second is one that no estimate shows.

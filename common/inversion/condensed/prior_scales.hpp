@@ -43,7 +43,7 @@ class PriorScales {
   // Maximises from the present scales. gram: J^T R^-1 J of [common errors | modes], lower triangle, without the
   // prior; right: J^T R^-1 (d - ...). False when nothing better was found: the scales stay, because what is left to
   // gain in ln p is below kWorthwhile, or because the normal equations are not positive definite.
-  bool fit(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
+  bool fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
 
  private:
   static constexpr int kParts = kPriorParts;
@@ -53,7 +53,7 @@ class PriorScales {
     Eigen::Matrix<double, kParts, kParts> information;
   };
   int part(int mode) const { return static_cast<int>(prior::prior_part(window_.first + mode, counts_)); }
-  bool slope(const fem::blas::In<double>& gram, const Eigen::Ref<const VecX>& right, Slope& out);
+  bool slope(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right, Slope& out);
 
   prior::LoadModeCounts counts_;
   ModeWindow window_;

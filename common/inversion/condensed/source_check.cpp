@@ -6,7 +6,7 @@
 namespace brainshift::inversion {
 namespace {
 
-namespace blas = fem::blas;
+namespace blas = linalg::blas;
 
 // A direction of which the source knows a hundredth of what the others do is damped by half.
 constexpr double kDamping = 0.01;

@@ -25,10 +25,10 @@ Status check_spread(const Points& positions) {
                   (variances[1] > limit ? "in one plane" : "on one line or in one point"));
 }
 
-// Neighbours that would have to tear apart. Thinned beyond some thousand data: all pairs are looked at.
+// Neighbours that would have to tear apart. All pairs are compared, of a subset beyond 2000 data.
 Status check_agreement(const SparseData& data) {
-  constexpr int kMostPairs = 2000;
-  const int step = 1 + (data.size() - 1) / kMostPairs;
+  constexpr int kMostCompared = 2000;
+  const int step = 1 + (data.size() - 1) / kMostCompared;
   for (int i = 0; i < data.size(); i += step) {
     if (data.along_direction(i)) continue;
     for (int j = i + step; j < data.size(); j += step) {
@@ -64,7 +64,7 @@ Status check_directions(const SparseData& data) {
   return {};
 }
 
-// One after the other, nothing left out.
+// Sources must follow one another and cover all data.
 Status check_sources(const SparseData& data) {
   int next = 0;
   for (const DataSource& source : data.sources) {

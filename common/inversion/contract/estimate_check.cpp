@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/fem/elasticity.hpp"
+
 namespace brainshift::inversion {
 
 Status check_equilibrium(const CondensedOperators& operators, const std::vector<int>& slaves,
@@ -56,10 +58,10 @@ void append_warnings(const Estimate& estimate, double poisson_ratio, std::string
   }
 }
 
-Status check_estimate(const PreparedModel& model, Estimate& estimate) {
-  const auto deformation = fem::measure_deformation(model.model().mesh, estimate.displacement);
+Status check_estimate(const TetMesh& mesh, const Material& material, Estimate& estimate) {
+  const auto deformation = fem::measure_deformation(mesh, estimate.displacement);
   if (auto status = check_deformation(deformation, estimate); !status) return status;
-  append_warnings(estimate, largest_poisson_ratio(model.config().material), estimate.reason);
+  append_warnings(estimate, largest_poisson_ratio(material), estimate.reason);
   return {};
 }
 

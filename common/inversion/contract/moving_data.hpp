@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Data that depend on where the brain is: distances to a measured surface, whose closest points move with it.
+// MovingData: data that depend on where the brain is, such as distances to a measured surface, whose
+// closest points move with the estimate.
 #pragma once
 
 #include <functional>
@@ -9,10 +10,11 @@
 
 namespace brainshift::inversion {
 
-// The data are measured anew for an estimate until they stay where they are.
+// The inversion measures the data anew for every estimate until they stay where they are.
 struct MovingData {
-  std::vector<NodeIndex> nodes;  // whose displacement relocate() is given
-  // u: 3 x nodes, mm. Replaces `data` and returns true, or returns false when they have not moved enough to matter.
+  std::vector<NodeIndex> nodes;  // relocate() is given the displacement of these nodes
+  // u: 3 x nodes, mm. Replaces `data` and returns true; returns false when the data have not moved
+  // enough to matter.
   std::function<bool(const Points& u, SparseData& data)> relocate;
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/inversion/descent/descent_log.hpp"
+#include "common/inversion/descent/gradient.hpp"
 #include "common/inversion/descent/line_search.hpp"
 #include "common/inversion/descent/misfit.hpp"
 
@@ -53,6 +54,7 @@ Result<Estimate> conjugate_gradients(const PreparedModel& model, const SparseDat
   Points b = w;
   Points u;
   Points lambda;
+  Points r;
   Points z;
   Direction direction;
   if (auto s = system.solve_with_gaps(b, u); !s) return tl::unexpected(s.error());
@@ -63,10 +65,10 @@ Result<Estimate> conjugate_gradients(const PreparedModel& model, const SparseDat
     const Points e = misfit->residual(u);
     if (log.record(u, e, system)) break;
 
-    if (auto s = system.solve(2.0 * misfit->adjoint(e), lambda); !s) {
+    if (auto s = negative_gradient(system, *misfit, e, w, lambda, r); !s) {
       return tl::unexpected(s.error());
     }
-    direction.update(model.prior(), lambda - 2.0 * w, *changed);
+    direction.update(model.prior(), r, *changed);
     if (auto s = system.solve(direction.s(), z); !s) return tl::unexpected(s.error());
     const auto alpha = exact_step(*misfit, e, misfit->sample(z), b, direction.s(), direction.dw());
     if (!alpha) return tl::unexpected(alpha.error());

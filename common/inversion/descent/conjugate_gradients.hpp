@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paper's inversion with conjugate gradients in place of steepest descent: same objective Omega, prior, penalty
-// contact and stop rule as steepest_descent.hpp.
+// The paper's inversion with conjugate gradients in place of steepest descent: same objective Omega,
+// prior, penalty contact and stop rule as steepest_descent.hpp.
 //
-// For a fixed active set Omega is quadratic in b, and Sigma, about the inverse of its Hessian where data say
-// nothing, preconditions it. With the negative gradient r = lambda - 2 w and b = Sigma w:
+// For a fixed active set Omega is quadratic in b. Sigma, which is about the inverse of its Hessian where
+// there are no data, preconditions it. With the negative gradient r = lambda - 2 w and b = Sigma w:
 //   direction     dw = r + gamma dw',  s = Sigma dw = Sigma r + gamma s'          ('): of the iteration before
 //                 gamma = r . Sigma (r - r') / r' . Sigma r', at least 0             (Polak & Ribiere 1969)
 //   line search   exact for the active set, z = K_p^-1 s
@@ -14,7 +14,7 @@
 
 #include "common/core/error.hpp"
 #include "common/values/sparse_data.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/contract/inversion_options.hpp"
 #include "common/contact/penalised_system.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/descent/descent_log.hpp"
 
-#include <algorithm>
 #include <sstream>
 #include <utility>
+#include <vector>
+
+#include "common/inversion/contract/penetration.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -12,21 +14,18 @@ namespace {
 void summarise_contact(const contact::PenalisedSystem& system, Estimate& estimate) {
   const contact::PenaltyContact& contact = system.forward().contact();
   const VecX penetration = contact.penetration(estimate.displacement);
-  estimate.contact = {};
+  const PenetrationSummary summary = summarise_penetration(penetration);
   estimate.active_slaves.clear();
   std::vector<double> forces;
   for (int i = 0; i < contact.num_slaves(); ++i) {
-    if (penetration[i] > kPenetrationTolerance_mm) ++estimate.contact.penetrating;
-    estimate.contact.max_penetration_mm =
-        std::max(estimate.contact.max_penetration_mm, penetration[i]);
     if (!system.active()[i]) continue;
     estimate.active_slaves.push_back(contact.pairs()[i].slave);
     forces.push_back(contact.beta() * penetration[i]);
   }
   estimate.contact_force_n =
       Eigen::Map<const VecX>(forces.data(), static_cast<Eigen::Index>(forces.size()));
-  estimate.contact.active = static_cast<int>(forces.size());
-  estimate.contact.iterations = system.changes();
+  estimate.contact = {static_cast<int>(forces.size()), summary.penetrating, summary.max_mm,
+                      system.changes()};
 }
 
 }  // namespace
@@ -35,15 +34,13 @@ DescentLog::DescentLog(const InversionConfig& config, const InversionOptions& op
                        const SparseData& data)
     : config_(config),
       options_(options),
-      start_(std::chrono::steady_clock::now()),
       previous_misfit_(3, 0) {
   estimate_.initial_misfit_mm = mean_std_of_norms(data.displacements);
 }
 
 Status DescentLog::check_stop() const {
   if (!options_.stop.stop_requested()) return {};
-  return fail(ErrorCode::kNotConverged,
-              "inversion was stopped at iteration " + std::to_string(estimate_.history.size() + 1));
+  return stopped(static_cast<int>(estimate_.history.size()) + 1);
 }
 
 // Never at the first iteration.
@@ -55,14 +52,12 @@ bool DescentLog::settled(const Points& misfit) const {
 
 bool DescentLog::record(const Points& displacement, const Points& misfit,
                         const contact::PenalisedSystem& system) {
-  const double elapsed_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
   const int k = static_cast<int>(estimate_.history.size()) + 1;
   estimate_.displacement = displacement;
   estimate_.misfit_mm = mean_std_of_norms(misfit);
   summarise_contact(system, estimate_);
   estimate_.history.push_back({k, estimate_.misfit_mm, estimate_.contact.penetrating,
-                               estimate_.contact.max_penetration_mm, elapsed_ms});
+                               estimate_.contact.max_penetration_mm, watch_.milliseconds()});
   estimate_.status = EstimateStatus::kIterating;
   if (options_.on_iterate) options_.on_iterate(estimate_);
 

@@ -2,13 +2,11 @@
 #include "common/inversion/descent/steepest_descent.hpp"
 
 #include "common/inversion/descent/descent_log.hpp"
+#include "common/inversion/descent/gradient.hpp"
 #include "common/inversion/descent/line_search.hpp"
 #include "common/inversion/descent/misfit.hpp"
-#include "common/contact/refactorised_system.hpp"
 
 namespace brainshift::inversion {
-
-using contact::ActiveSet;
 
 Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& data,
                                   const InversionOptions& options, contact::PenalisedSystem& system) {
@@ -20,6 +18,7 @@ Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& 
   Points b = w;
   Points u;
   Points lambda;
+  Points dw;
   Points z;
   while (true) {
     if (auto s = log.check_stop(); !s) return tl::unexpected(s.error());
@@ -28,10 +27,9 @@ Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& 
     const Points e = misfit->residual(u);
     if (log.record(u, e, system)) break;
 
-    if (auto s = system.solve(2.0 * misfit->adjoint(e), lambda); !s) {
+    if (auto s = negative_gradient(system, *misfit, e, w, lambda, dw); !s) {
       return tl::unexpected(s.error());
     }
-    const Points dw = lambda - 2.0 * w;
     const Points s = model.prior().apply(dw);
     if (auto status = system.solve(s, z); !status) return tl::unexpected(status.error());
     const auto alpha = exact_step(*misfit, e, misfit->sample(z), b, s, dw);
@@ -44,24 +42,6 @@ Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& 
     b += *alpha * s;
   }
   return log.finish();
-}
-
-Result<Objective> evaluate_objective(const PreparedModel& model, const SparseData& data,
-                                     const Points& w, const ActiveSet& active) {
-  const auto misfit = Misfit::build(model, data);
-  if (!misfit) return tl::unexpected(misfit.error());
-  contact::RefactorisedSystem system(model.forward());
-  if (auto status = system.activate(active); !status) return tl::unexpected(status.error());
-  const Points b = model.prior().apply(w);
-  Points u;
-  if (auto s = system.solve_with_gaps(b, u); !s) return tl::unexpected(s.error());
-  const Points e = misfit->residual(u);
-  Points lambda;
-  if (auto s = system.solve(2.0 * misfit->adjoint(e), lambda); !s) return tl::unexpected(s.error());
-  Objective objective;
-  objective.value = misfit->inner(e, e) + inner(b, w);
-  objective.gradient = 2.0 * w - lambda;
-  return objective;
 }
 
 }  // namespace brainshift::inversion

@@ -12,6 +12,7 @@
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/control_nodes.hpp"
 #include "common/inversion/prepared/data_region.hpp"
+#include "common/inversion/prepared/memory_limit.hpp"
 #include "common/prior/load_modes.hpp"
 
 namespace brainshift::inversion {
@@ -29,8 +30,9 @@ constexpr int kOversampling = 192;
 constexpr double kSlaveWeight = 0.1;
 // Control nodes at which diag(C) is computed; it is smooth, and interpolated to the others.
 constexpr int kVarianceNodes = 128;
-// Below it a neighbour does not count: at a probe its own weight is all but 1.
-constexpr float kLeastWeight = 1e-4F;
+// A control node with less weight in the interpolation at a node has no say there. At a control node
+// its own weight is all but 1.
+constexpr float kLeastControlWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
 // Step 1: G and Phi.
@@ -140,7 +142,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
   if (!status) return status;
 
   MatrixXd core(tested, tested);
-  fem::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
+  linalg::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
   core = (0.5 * (core + core.transpose())).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
@@ -157,7 +159,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
   }
   MatrixXd modes(rows, loads + rank);
   modes.leftCols(loads) = load_columns;
-  fem::blas::multiply(1.0, sketch, scaled, 0.0, modes.rightCols(rank));
+  linalg::blas::multiply(1.0, sketch, scaled, 0.0, modes.rightCols(rank));
   const prior::LoadModeCounts counts = prior::load_mode_counts(model.config().prior);
   result.gravity_modes = counts.gravity;
   result.swelling_modes = counts.swelling;
@@ -213,7 +215,7 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
   result.truncated_variance_mm2.setZero(control.cols());
   for (Eigen::Index i = 0; i < control.cols(); ++i) {
     for (int k = 0; k < 4; ++k) {
-      if (to_control.weights(k, i) < kLeastWeight) continue;
+      if (to_control.weights(k, i) < kLeastControlWeight) continue;
       result.truncated_variance_mm2[i] =
           std::max(result.truncated_variance_mm2[i], left_out[to_control.neighbours(k, i)]);
     }
@@ -241,12 +243,8 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
                           ? options.threads
                           : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const int nodes = model.model().mesh.num_nodes();
-  const std::uint64_t needed =
-      model.timings().bytes + condense_memory_bytes(nodes, slaves, model.config(), threads);
-  const double limit_gib = model.config().condensed.memory_limit_gib;
-  if (auto status = check_memory(needed, limit_gib, slaves, nodes); !status) {
-    return tl::unexpected(status.error());
-  }
+  const std::uint64_t bytes = condense_memory_bytes(nodes, slaves, model.config(), threads);
+  if (auto status = check_memory(model, bytes); !status) return tl::unexpected(status.error());
   CondensedOperators result;
   result.boundary = model.boundary();
   result.model_id = model.model().model_id;

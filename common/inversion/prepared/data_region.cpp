@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/data_region.hpp"
 
-#include <sstream>
-
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/tet_locator.hpp"
 
@@ -38,17 +36,6 @@ std::vector<NodeIndex> data_region(const BrainModel& model) {
     if (near[static_cast<std::size_t>(i)] != 0) region.push_back(i);
   }
   return region;
-}
-
-Status check_memory(std::uint64_t bytes, double limit_gib, int slaves, int nodes) {
-  const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
-  if (needed_gib <= limit_gib) return {};
-  std::ostringstream text;
-  text.precision(3);
-  text << "condensed.memory_limit_gib = " << limit_gib << ": the preparation needs " << needed_gib
-       << " GiB (" << slaves << " slaves, " << nodes
-       << " nodes); raise the limit or coarsen the mesh";
-  return fail(ErrorCode::kInvalidArgument, text.str());
 }
 
 }  // namespace brainshift::inversion

@@ -7,6 +7,7 @@
 #include "common/linalg/blas_threads.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/data_region.hpp"
+#include "common/inversion/prepared/memory_limit.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -55,10 +56,7 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   const int nodes = model.model().mesh.num_nodes(), h = static_cast<int>(outputs.size());
   const int used_threads =
       threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  if (auto status = check_memory(
-          model.timings().bytes + output_operators_bytes(nodes, h, used_threads),
-          model.config().condensed.memory_limit_gib, model.forward().contact().num_slaves(), nodes);
-      !status) {
+  if (auto status = check_memory(model, output_operators_bytes(nodes, h, used_threads)); !status) {
     return tl::unexpected(status.error());
   }
 
@@ -87,7 +85,7 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   const auto covariance_block = [&](int first, int count, fem::BlockSolver&) -> Status {
     MatrixXd forces;
     model.prior().apply_kernel(x.middleCols(first, count), forces);
-    fem::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
+    linalg::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
                                    result.covariance.block(first, first, h - first, count));
     return {};
   };
@@ -96,9 +94,9 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   if (!status) return tl::unexpected(status.error());
   if (const MatrixXd& modes = model.prior().modes(); modes.cols() > 0) {
     MatrixXd seen(h, modes.cols()), transposed;
-    fem::blas::multiply_transposed(1.0, x, modes, 0.0, seen);
+    linalg::blas::multiply_transposed(1.0, x, modes, 0.0, seen);
     transposed = seen.transpose();
-    fem::blas::multiply(1.0, seen, transposed, 1.0, result.covariance);
+    linalg::blas::multiply(1.0, seen, transposed, 1.0, result.covariance);
   }
   copy_lower_to_upper(result.compliance);
   copy_lower_to_upper(result.covariance);

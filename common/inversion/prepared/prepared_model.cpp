@@ -1,36 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/prepared_model.hpp"
 
-#include <chrono>
 #include <utility>
-#include <vector>
 
-#include "common/core/statistics.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/core/units.hpp"
 #include "common/prior/load_modes.hpp"
 
 namespace brainshift::inversion {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-// Median of single solves, the unit of every speed figure.
-double measure_full_solve_ms(const contact::ForwardModel& forward) {
-  constexpr int kRepetitions = 15;
-  const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
-  VecX x = forward.factor().solve(b);  // warm-up: allocates the workspace
-  std::vector<double> times_ms;
-  for (int i = 0; i < kRepetitions; ++i) {
-    const auto start = Clock::now();
-    forward.factor().solve(b, x);
-    times_ms.push_back(1e3 * seconds_since(start));
-  }
-  return percentile(times_ms, 50.0);
-}
 
 prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config,
                               Eigen::MatrixXd modes) {
@@ -63,26 +41,24 @@ PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig
 Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> model,
                                              const CaseConfig& config, Boundary boundary,
                                              const Progress& progress) {
-  const auto start = Clock::now();
+  const Stopwatch whole;
   auto forward = contact::ForwardModel::build(*model, config, boundary, progress);
   if (!forward) return tl::unexpected(forward.error());
-  const auto prior_start = Clock::now();
+  const Stopwatch prior_watch;
   report(progress, "prior", 0.0);
   prior::ForcePrior prior = build_prior(*model, config.prior, prior::load_modes(*model, config));
-  const double prior_s = seconds_since(prior_start);
+  const double prior_s = prior_watch.seconds();
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));
   const fem::StiffnessFactor& factor = prepared.forward_.factor();
-  report(progress, "measure", 0.0);
   PrepareTimings& timings = prepared.timings_;
   timings.assemble_s = prepared.forward_.assemble_seconds();
   timings.analyse_s = factor.analyse_seconds();
   timings.factor_s = factor.factor_seconds();
   timings.prior_s = prior_s;
-  timings.full_solve_ms = measure_full_solve_ms(prepared.forward_);
   timings.factor_nonzeros = factor.nonzeros();
   timings.bytes = prepared.forward_.bytes() + prepared.prior_.bytes();
-  timings.total_s = seconds_since(start);
+  timings.total_s = whole.seconds();
   report(progress, "ready", 1.0);
   return prepared;
 }

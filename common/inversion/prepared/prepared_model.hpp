@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PreparedModel: everything about a patient that does not depend on what is measured during surgery.
-// Built once per boundary condition (contact or fixed); inversions only read it.
+// PreparedModel: forward model, factorised, and prior of a patient: all that the methods which solve with
+// the factor need and that does not depend on what is measured during surgery. Built once per boundary
+// condition (contact or fixed); inversions only read it. The condensed method prepares more, from it:
+// condense.hpp.
 //
 // Not thread-safe: solves share the factor's workspace. One PreparedModel serves one thread at a time.
 #pragma once
@@ -25,14 +27,13 @@ struct PrepareTimings {
   double factor_s = 0.0;
   double prior_s = 0.0;
   double total_s = 0.0;
-  double full_solve_ms = 0.0;         // t_solve: median of single solves K x = b in this process
   std::uint64_t factor_nonzeros = 0;  // of L
   std::uint64_t bytes = 0;            // memory of factor, matrix and prior
 };
 
 class PreparedModel {
  public:
-  // kFloatingBody / kSingularMatrix / kEmptySet / kNotFinite name the cause.
+  // kFloatingBody, kSingularMatrix, kEmptySet or kNotFinite names the cause.
   static Result<PreparedModel> prepare(std::shared_ptr<const BrainModel> model,
                                        const CaseConfig& config, Boundary boundary,
                                        const Progress& progress = {});

@@ -3,23 +3,26 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
-#include "common/values/estimate.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/observation.hpp"
 
 namespace brainshift::server {
 
 inline constexpr const char* kCase = "test-case";
+inline constexpr const char* kModelId = "0123456789abcdef";
 
-// Four landmark pairs, each moved by 1 mm along x.
-inline Observation landmarks(std::uint64_t sequence, const std::string& source = "pointer") {
+// Four landmark pairs, each moved by `shift_mm` along x.
+inline Observation landmarks(std::uint64_t sequence, const std::string& source = "pointer",
+                             double shift_mm = 1.0) {
   LandmarkPairs pairs;
   pairs.undeformed.resize(3, 4);
   pairs.undeformed << 0, 10, 0, 0,  //
       0, 0, 10, 0,                  //
       0, 0, 0, 10;
-  pairs.deformed = pairs.undeformed.colwise() + Vec3(1, 0, 0);
+  pairs.deformed = pairs.undeformed.colwise() + Vec3(shift_mm, 0, 0);
   pairs.sd_mm = 0.3;
   Observation observation;
   observation.case_id = kCase;
@@ -29,17 +32,23 @@ inline Observation landmarks(std::uint64_t sequence, const std::string& source =
   return observation;
 }
 
-// What a pipeline would answer; every node moves by the observation's sequence number along x.
-inline Update answer(const Observation& observation, int nodes = 5) {
-  Update update;
-  update.case_id = observation.case_id;
-  update.model_id = "0123456789abcdef";
-  update.observation_sequence = observation.sequence;
-  update.estimate.status = EstimateStatus::kConverged;
-  update.estimate.reason = "test";
-  update.estimate.displacement = Points::Zero(3, nodes);
-  update.estimate.displacement.row(0).setConstant(static_cast<double>(observation.sequence));
-  return update;
+// One tetrahedron that is brain and tumour: enough to register to.
+inline std::shared_ptr<const BrainModel> small_model() {
+  auto model = std::make_shared<BrainModel>();
+  model->case_id = kCase;
+  model->model_id = kModelId;
+  model->mesh.nodes.resize(3, 4);
+  model->mesh.nodes << 0, 1, 0, 0,  //
+      0, 0, 1, 0,                   //
+      0, 0, 0, 1;
+  model->mesh.tets.resize(4, 1);
+  model->mesh.tets << 0, 1, 2, 3;
+  model->tumour.vertices = model->mesh.nodes;
+  model->tumour.triangles.resize(3, 4);
+  model->tumour.triangles << 0, 0, 0, 1,  //
+      2, 1, 3, 2,                         //
+      1, 3, 2, 3;
+  return model;
 }
 
 }  // namespace brainshift::server

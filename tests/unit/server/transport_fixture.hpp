@@ -20,24 +20,12 @@
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
 #include "server/service/service.hpp"
+#include "tests/unit/server/fake_session.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
 namespace brainshift::server {
 
 using wire::MessageType;
-
-inline std::shared_ptr<const BrainModel> small_model() {
-  auto model = std::make_shared<BrainModel>();
-  model->case_id = kCase;
-  model->model_id = "0123456789abcdef";
-  model->mesh.nodes.resize(3, 4);
-  model->mesh.nodes << 0, 1, 0, 0,  //
-      0, 0, 1, 0,                   //
-      0, 0, 0, 1;
-  model->mesh.tets.resize(4, 1);
-  model->mesh.tets << 0, 1, 2, 3;
-  return model;
-}
 
 struct Received {
   MessageType type = MessageType::kErrorReply;
@@ -127,14 +115,8 @@ class TransportTest : public testing::Test {
     ServiceOptions options;
     options.version = "1.2.3";
     options.model = small_model();
-    options.prepare = [nodes](const wire::SessionRequest&) -> Result<Prepared> {
-      Prepared prepared;
-      prepared.info.model_id = "0123456789abcdef";
-      prepared.info.nodes = nodes;
-      prepared.run = [nodes](const Observation& observation, const RunOptions&) {
-        return Result<Update>(answer(observation, nodes));
-      };
-      return prepared;
+    options.make_model = [nodes](const wire::SessionRequest& request) {
+      return fake_session(std::make_unique<FakeInverter>(nodes), request);
     };
     return options;
   }

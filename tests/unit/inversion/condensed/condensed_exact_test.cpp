@@ -16,7 +16,7 @@ using testing::HasSubstr;
 class CondensedExactly : public Condensed {
  protected:
   static CondensedExact exact(Boundary boundary, const CondensedExactOptions& options = {}) {
-    auto made = CondensedExact::prepare(prepared(boundary), options);
+    auto made = CondensedExact::build(prepared(boundary), options);
     EXPECT_TRUE(made.has_value());
     return std::move(*made);
   }
@@ -100,9 +100,7 @@ TEST_P(CondensedExactly, ForcesPenetrationAndMisfitAreThoseOfTheField) {
 
 TEST_P(CondensedExactly, OneShotAndRepeatedRunsAreBitIdentical) {
   const SparseData data = sagging_data(GetParam(), 0.3);
-  InversionOptions options;
-  options.method = Method::kCondensedExact;
-  const auto once = invert(prepared(GetParam()), data, options);
+  const auto once = invert(prepared(GetParam()), data, Method::kCondensedExact);
   ASSERT_TRUE(once.has_value());
   CondensedExactOptions three_threads;
   three_threads.threads = 3;
@@ -140,7 +138,7 @@ TEST_F(CondensedExactly, IterationLimitReturnsTheBestIterateAndSaysSo) {
   hurried.condensed.max_contact_iterations = 1;
   const auto model = PreparedModel::prepare(patient(), hurried, Boundary::kContact);
   ASSERT_TRUE(model.has_value());
-  auto inverter = CondensedExact::prepare(*model);
+  auto inverter = CondensedExact::build(*model);
   ASSERT_TRUE(inverter.has_value());
   Estimate estimate;
   ASSERT_TRUE(inverter->update(sagging_data(Boundary::kContact, 0.3), estimate));
@@ -182,7 +180,7 @@ TEST_F(CondensedExactly, MemoryBeyondTheLimitIsRefusedBeforeTheWork) {
   bool worked = false;
   CondensedExactOptions options;
   options.progress = [&](std::string_view, double) { worked = true; };
-  const auto refused = CondensedExact::prepare(*model, options);
+  const auto refused = CondensedExact::build(*model, options);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(refused.error().message, HasSubstr("condensed.memory_limit_gib = 0.0001"));
@@ -194,15 +192,17 @@ TEST_F(CondensedExactly, StoppingEndsPreparationAndUpdate) {
   source.request_stop();
   CondensedExactOptions options;
   options.stop = source.get_token();
-  const auto refused = CondensedExact::prepare(prepared(Boundary::kContact), options);
+  const auto refused = CondensedExact::build(prepared(Boundary::kContact), options);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
   auto inverter = exact(Boundary::kContact);
   Estimate estimate;
-  const auto status =
-      inverter.update(sagging_data(Boundary::kContact, 0.3), estimate, source.get_token());
+  InversionOptions asked;
+  asked.stop = source.get_token();
+  const auto status = inverter.update(sagging_data(Boundary::kContact, 0.3), estimate, asked);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kNotConverged);
+  EXPECT_EQ(status.error().message, "inversion was stopped at iteration 1");
 }
 
 }  // namespace

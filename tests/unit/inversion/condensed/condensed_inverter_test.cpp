@@ -127,6 +127,8 @@ TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
   int calls = 0;
   Points last;
   MovingData moving;
+  InversionOptions asked;
+  asked.moving = &moving;
   moving.nodes = {node};
   moving.relocate = [&](const Points& u, SparseData& data) {
     ++calls;
@@ -136,7 +138,7 @@ TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
     return moved;
   };
   Estimate estimate;
-  ASSERT_TRUE(Condensed::inverter(GetParam()).update(start, estimate, &moving));
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(start, estimate, asked));
   EXPECT_GE(calls, 2);
   EXPECT_LT((last.col(0) - estimate.displacement.col(node)).norm(), 2e-3);
   // What a still inverter makes of the data where they ended.
@@ -150,13 +152,15 @@ TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
 TEST_P(Condensed, MovingDataThatBecomeUselessAreRefused) {
   const SparseData start = sagging_data(GetParam(), 0.2);
   MovingData moving;
+  InversionOptions asked;
+  asked.moving = &moving;
   moving.nodes = {0};
   moving.relocate = [](const Points&, SparseData& data) {
     data.positions(0, 0) = std::numeric_limits<double>::quiet_NaN();
     return true;
   };
   Estimate estimate;
-  const Status status = Condensed::inverter(GetParam()).update(start, estimate, &moving);
+  const Status status = Condensed::inverter(GetParam()).update(start, estimate, asked);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
 }
@@ -239,6 +243,31 @@ TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
   }
 }
 
+// With estimated scales, the default, the scales and the contact set settle in turn: a warm start may
+// settle elsewhere. See kWarmScales.
+TEST_P(Condensed, WarmStartWithEstimatedScalesStaysNearAColdStart) {
+  CaseConfig with = config();
+  with.prior.estimate_scales = true;
+  auto warm = Condensed::inverter(GetParam(), {}, with);
+  CondensedOptions from_nothing;
+  from_nothing.warm_start = false;
+  auto cold = Condensed::inverter(GetParam(), from_nothing, with);
+  Estimate a, b;
+  double worst = 0.0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SparseData data = sagging_data(GetParam(), 0.3, seed);
+    data.displacements *= 0.05 * static_cast<double>(seed);  // the brain sinks, scale by scale
+    ASSERT_TRUE(warm.update(data, a));
+    ASSERT_TRUE(cold.update(data, b));
+    const double largest_mm = b.displacement.colwise().norm().maxCoeff();
+    worst = std::max(worst,
+                     (a.displacement - b.displacement).colwise().norm().maxCoeff() / largest_mm);
+  }
+  RecordProperty("worst", std::to_string(worst));
+  std::printf("warm against cold: %g of the largest displacement\n", worst);
+  EXPECT_LT(worst, 0.1);
+}
+
 TEST_P(Condensed, ResetMakesRunsBitIdentical) {
   auto inverter = Condensed::inverter(GetParam());
   std::vector<Estimate> first(3), second(3);
@@ -294,6 +323,53 @@ TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
   EXPECT_TRUE(estimate.displacement.allFinite());
 }
 
+// A stop is not a deadline, whatever the deadline is: no estimate, and the reason says "stopped".
+TEST_P(Condensed, AStopBeforeTheFirstSetEndsTheUpdateAtOnce) {
+  CaseConfig hurried = config();
+  hurried.condensed.deadline_ms = 1e-9;
+  auto inverter = Condensed::inverter(GetParam(), {}, hurried);
+  std::stop_source source;
+  source.request_stop();
+  InversionOptions asked;
+  asked.stop = source.get_token();
+  Estimate estimate;
+  const Status status = inverter.update(sagging_data(GetParam(), 0.3), estimate, asked);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kNotConverged);
+  EXPECT_EQ(status.error().message, "inversion was stopped at iteration 1");
+  EXPECT_EQ(estimate.status, EstimateStatus::kNotRun);
+  EXPECT_EQ(estimate.displacement.cols(), 0);
+}
+
+TEST_P(Condensed, AStopDuringAnUpdateEndsItBeforeTheNextSetAndTheNextUpdateIsACleanOne) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  auto inverter = Condensed::inverter(GetParam());
+  std::stop_source source;
+  InversionOptions asked;
+  asked.stop = source.get_token();
+  // Data that move for ever: without the stop the update would search on, kMaxRounds times.
+  int measured = 0;
+  MovingData moving;
+  moving.nodes = {0};
+  moving.relocate = [&](const Points&, SparseData& now) {
+    now.displacements.col(0).x() += 1e-3;
+    if (++measured == 2) source.request_stop();
+    return true;
+  };
+  asked.moving = &moving;
+  Estimate estimate;
+  const Status status = inverter.update(data, estimate, asked);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(measured, 2);
+  EXPECT_THAT(status.error().message, HasSubstr("stopped at iteration"));
+  EXPECT_THAT(status.error().message, testing::Not(HasSubstr("deadline")));
+
+  Estimate after, clean;
+  ASSERT_TRUE(inverter.update(data, after));
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(data, clean));
+  EXPECT_TRUE(after.displacement == clean.displacement);
+}
+
 TEST_F(Condensed, IterationLimitReturnsTheBestIterateAndSaysSo) {
   CaseConfig hurried = config();
   hurried.condensed.max_contact_iterations = 1;
@@ -320,15 +396,50 @@ TEST_F(Condensed, DataOutsideTheRegionAreRefusedWhereTheCaseSaysSo) {
   EXPECT_TRUE(estimate.displacement == before);
 }
 
+// condensed.outside_region = extend: a datum away from the region is sampled from the whole arrays, and
+// the variance that the modes leave out of the prior there is added to its own.
 TEST_F(Condensed, DataFarFromTheRegionAreBelievedLess) {
-  SparseData data = sagging_data(Boundary::kContact, 0.0);
   CondensedOptions few;
   few.rank = 12;
-  auto inverter = Condensed::inverter(Boundary::kContact, few);
-  Estimate estimate;
-  data.positions.col(0) = Vec3(5, 5, 5);  // far from tumour and craniotomy
-  ASSERT_TRUE(inverter.update(data, estimate));
-  EXPECT_TRUE(estimate.displacement.allFinite());
+  SparseData data = sagging_data(Boundary::kContact, 0.0);
+  const Vec3 far(5, 5, 5);  // from tumour and craniotomy
+  data.positions.col(0) = far;
+  Estimate extended;
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact, few).update(data, extended));
+
+  const auto& given = *operators(Boundary::kContact);
+  const geometry::TetLocation at = prepared(Boundary::kContact).locator().locate(far);
+  double left_out_mm2 = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    const int node = at.nodes[k];
+    if (std::binary_search(given.region.begin(), given.region.end(), node)) continue;
+    for (int c = 0; c < 4; ++c) {
+      left_out_mm2 += at.weights[k] * given.control_weights(c, node) *
+                      given.truncated_variance_mm2[given.control_neighbours(c, node)];
+    }
+  }
+  ASSERT_GT(std::sqrt(left_out_mm2), data.sd_mm[0]) << "the test shows nothing";
+
+  // Operators that leave nothing out, and a datum that says itself how little it is worth.
+  auto complete = given;
+  complete.truncated_variance_mm2.setZero();
+  const auto update_complete = [&](const SparseData& with) {
+    auto inverter = CondensedInverter::build(
+        std::make_shared<const CondensedOperators>(complete),
+        std::make_shared<const geometry::TetLocator>(patient()->mesh), config(), few);
+    Estimate estimate;
+    EXPECT_TRUE(inverter->update(with, estimate));
+    return estimate;
+  };
+  SparseData worth_less = data;
+  worth_less.sd_mm[0] = std::sqrt(data.sd_mm[0] * data.sd_mm[0] + left_out_mm2);
+  const double scale_mm = extended.displacement.cwiseAbs().maxCoeff();
+  // The same equations in another order of sums.
+  EXPECT_LT((update_complete(worth_less).displacement - extended.displacement).cwiseAbs().maxCoeff(),
+            1e-6 * scale_mm);
+  // Believed as it stands, the datum would move the estimate.
+  EXPECT_GT((update_complete(data).displacement - extended.displacement).cwiseAbs().maxCoeff(),
+            0.01 * scale_mm);
 }
 
 class RefusedData : public Condensed {

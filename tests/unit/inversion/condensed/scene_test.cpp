@@ -2,7 +2,7 @@
 // What a scene leaves out costs no more than the update says: true differences on many scenes of the toy patient.
 #include <gmock/gmock.h>
 
-#include "common/inversion/condensed/omission_errors.hpp"
+#include "common/inversion/condensed/omission_estimates.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -104,6 +104,8 @@ class Scene : public ::testing::Test {
   }
   // Single precision of the sums, and what the contact search tolerates.
   static constexpr double kRounding_mm = 2e-3;
+  // The promise of field_rebuild.hpp; a millimetre in single precision is rounded by 6e-8.
+  static constexpr double kSameField_mm = 1e-9;
 
   static std::vector<NodeIndex> near_tumour(double distance_mm) {
     std::vector<NodeIndex> near;
@@ -136,7 +138,9 @@ TEST_F(Scene, EstimateForTheFarFieldBoundsTheTrueDifference) {
   }
 }
 
-TEST_F(Scene, RegionOfInterestIsRebuiltExactly) {
+// What field_rebuild.hpp promises: a node of the region has the displacement that it has in the whole
+// field, whatever the shape of the arrays that it is summed in.
+TEST_F(Scene, RegionOfInterestIsRebuiltAsInTheWholeField) {
   CondensedOptions options;
   options.region_of_interest = near_tumour(20.0);
   auto everything = inverter(), near = inverter(options);
@@ -145,10 +149,26 @@ TEST_F(Scene, RegionOfInterestIsRebuiltExactly) {
   ASSERT_TRUE(everything.update(one, full));
   ASSERT_TRUE(near.update(one, part));
   for (const NodeIndex node : options.region_of_interest) {
-    EXPECT_TRUE(part.displacement.col(node) == full.displacement.col(node)) << node;
+    EXPECT_LT((part.displacement.col(node) - full.displacement.col(node)).norm(), kSameField_mm)
+        << node;
   }
-  EXPECT_GT(difference(full, part), 0.0);
-  EXPECT_TRUE(part.sd_mm == full.sd_mm);
+  EXPECT_GT(difference(full, part), 0.0) << "the far field is interpolated";
+  EXPECT_LT((part.sd_mm - full.sd_mm).cwiseAbs().maxCoeff(), kSameField_mm);
+}
+
+// The other half of the promise: the same build, machine and kernel repeat every bit.
+TEST_F(Scene, RepeatedUpdatesAreBitIdentical) {
+  CondensedOptions options;
+  options.region_of_interest = near_tumour(20.0);
+  auto one = inverter(options), two = inverter(options);
+  Estimate first, second;
+  for (const SparseData& each : scenes()) {
+    ASSERT_TRUE(one.update(each, first));
+    ASSERT_TRUE(two.update(each, second));
+    EXPECT_TRUE(first.displacement == second.displacement);
+    EXPECT_TRUE(first.sd_mm == second.sd_mm);
+    EXPECT_TRUE(first.contact_force_n == second.contact_force_n);
+  }
 }
 
 TEST_F(Scene, RegionOfAllNodesLeavesNothingOut) {
@@ -159,7 +179,7 @@ TEST_F(Scene, RegionOfAllNodesLeavesNothingOut) {
   const SparseData one = data({40.0, Vec3(0.3, 0, 0), true}, 5);
   ASSERT_TRUE(everything.update(one, full));
   ASSERT_TRUE(all.update(one, part));
-  EXPECT_TRUE(part.displacement == full.displacement);
+  EXPECT_LT(difference(full, part), kSameField_mm);
   EXPECT_EQ(all.omission_errors().far_field_mm, 0.0);
 }
 

@@ -93,7 +93,7 @@ TEST_F(EstimateCheck, LinearElementsNearIncompressibilityAreSaidToLock) {
 
   const auto model = PreparedModel::prepare(patient(), nearly, Boundary::kContact);
   ASSERT_TRUE(model.has_value());
-  const auto paper = invert(*model, data);
+  const auto paper = invert(*model, data, Method::kPaper);
   ASSERT_TRUE(paper.has_value());
   EXPECT_NE(paper->reason.find("lock"), std::string::npos) << paper->reason;
   EXPECT_FALSE(std::isnan(paper->min_volume_ratio));

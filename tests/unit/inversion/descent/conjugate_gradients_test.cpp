@@ -12,9 +12,7 @@ namespace brainshift::inversion {
 namespace {
 
 Result<Estimate> run(const PreparedModel& model, const SparseData& data, Method method) {
-  InversionOptions options;
-  options.method = method;
-  return invert(model, data, options);
+  return invert(model, data, method);
 }
 
 CaseConfig tight_config(int max_iterations) {
@@ -43,14 +41,13 @@ TEST(ConjugateGradients, NeedFewerIterationsThanSteepestDescentForTheSameError) 
     int needed = 0;
     std::stop_source source;
     InversionOptions options;
-    options.method = method;
     options.stop = source.get_token();
     options.on_iterate = [&](const Estimate& iterate) {
       if ((flat(iterate.displacement) - expected).cwiseAbs().maxCoeff() > error_mm) return;
       if (needed == 0) needed = static_cast<int>(iterate.history.size());
       source.request_stop();
     };
-    (void)invert(model, data, options);
+    (void)invert(model, data, method, options);
     return needed == 0 ? 1000 : needed;
   };
   const int conjugate = iterations_to(0.05, Method::kConjugateGradients);

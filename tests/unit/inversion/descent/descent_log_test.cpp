@@ -13,10 +13,9 @@ namespace {
 
 class DescentMethods : public ::testing::TestWithParam<Method> {
  protected:
-  static InversionOptions options() {
-    InversionOptions options;
-    options.method = GetParam();
-    return options;
+  static Result<Estimate> run(const PreparedModel& model, const SparseData& data,
+                              const InversionOptions& options = {}) {
+    return invert(model, data, GetParam(), options);
   }
 };
 
@@ -31,7 +30,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, DescentMethods,
 
 TEST_P(DescentMethods, PublishEveryIterateAndConverge) {
   const PreparedModel model = prepare(Boundary::kContact);
-  InversionOptions options = DescentMethods::options();
+  InversionOptions options;
   std::size_t iterates = 0;
   options.on_iterate = [&](const Estimate& iterate) {
     ++iterates;
@@ -39,7 +38,7 @@ TEST_P(DescentMethods, PublishEveryIterateAndConverge) {
     EXPECT_EQ(iterate.history.size(), iterates);
     EXPECT_EQ(iterate.history.back().iteration, static_cast<int>(iterates));
   };
-  const auto estimate = invert(model, sagging_data(model, 0.1), options);
+  const auto estimate = run(model, sagging_data(model, 0.1), options);
   ASSERT_TRUE(estimate.has_value()) << estimate.error().message;
   EXPECT_EQ(estimate->history.size(), iterates);
   EXPECT_EQ(estimate->status, EstimateStatus::kConverged);
@@ -54,7 +53,7 @@ TEST_P(DescentMethods, KeepTheLastIterateAtTheIterationLimit) {
   CaseConfig config = test_support::toy_config();
   config.inversion.max_iterations = 2;
   const PreparedModel model = prepare(Boundary::kContact, config);
-  const auto estimate = invert(model, sagging_data(model, 0.1), options());
+  const auto estimate = run(model, sagging_data(model, 0.1));
   ASSERT_TRUE(estimate.has_value()) << estimate.error().message;
   EXPECT_EQ(estimate->status, EstimateStatus::kIterationLimit);
   EXPECT_EQ(estimate->history.size(), 2u);
@@ -65,12 +64,12 @@ TEST_P(DescentMethods, KeepTheLastIterateAtTheIterationLimit) {
 TEST_P(DescentMethods, StopWhenAsked) {
   const PreparedModel model = prepare(Boundary::kContact);
   std::stop_source source;
-  InversionOptions options = DescentMethods::options();
+  InversionOptions options;
   options.stop = source.get_token();
   options.on_iterate = [&](const Estimate& iterate) {
     if (iterate.history.size() == 2) source.request_stop();
   };
-  const auto estimate = invert(model, sagging_data(model, 0.1), options);
+  const auto estimate = run(model, sagging_data(model, 0.1), options);
   ASSERT_FALSE(estimate.has_value());
   EXPECT_EQ(estimate.error().code, ErrorCode::kNotConverged);
   EXPECT_NE(estimate.error().message.find("iteration 3"), std::string::npos)
@@ -81,7 +80,7 @@ TEST_P(DescentMethods, RefuseBadData) {
   const PreparedModel model = prepare(Boundary::kContact);
   SparseData data = sagging_data(model, 0.1);
   data.displacements(1, 0) = std::numeric_limits<double>::infinity();
-  const auto estimate = invert(model, data, options());
+  const auto estimate = run(model, data);
   ASSERT_FALSE(estimate.has_value());
   EXPECT_EQ(estimate.error().code, ErrorCode::kNotFinite);
 }
@@ -90,7 +89,7 @@ TEST_P(DescentMethods, AreAtTheMinimumWhenNothingMoved) {
   const PreparedModel model = prepare(Boundary::kContact);
   SparseData data = sagging_data(model, 0.0);
   data.displacements.setZero();
-  const auto estimate = invert(model, data, options());
+  const auto estimate = run(model, data);
   ASSERT_TRUE(estimate.has_value()) << estimate.error().message;
   EXPECT_EQ(estimate->status, EstimateStatus::kConverged);
   EXPECT_NE(estimate->reason.find("gradient is zero"), std::string::npos) << estimate->reason;

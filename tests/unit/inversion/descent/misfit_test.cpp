@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "common/inversion/descent/line_search.hpp"
-#include "common/inversion/descent/steepest_descent.hpp"
+#include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {

@@ -59,7 +59,8 @@ Journal::Options fake_options(SinkLog& log, std::vector<std::string>& errors) {
   return options;
 }
 
-io::SurgeryRecord record(std::uint64_t sequence, const char* kind = "observation") {
+io::SurgeryRecord record(std::uint64_t sequence,
+                         io::RecordKind kind = io::RecordKind::kObservation) {
   return {kind, sequence, 0, "payload " + std::to_string(sequence)};
 }
 
@@ -67,24 +68,24 @@ TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "a.surgery";
   Journal journal({});
-  journal.begin(path, {{"case_id", "c"}, {"model_id", "m"}});
+  journal.begin(path, io::SurgeryMeta{"c", "m"});
   for (std::uint64_t i = 1; i <= 20; ++i) {
     journal.append(record(i));
-    journal.append(record(i, "update"));
+    journal.append(record(i, io::RecordKind::kUpdate));
   }
   journal.stop();
   EXPECT_TRUE(journal.status().has_value());
   const auto file = io::SurgeryFile::open(path);
   ASSERT_TRUE(file.has_value());
-  EXPECT_EQ(file->meta().at("case_id"), "c");
-  const auto observations = file->records("observation");
+  EXPECT_EQ(file->meta().case_id, "c");
+  const auto observations = file->records(io::RecordKind::kObservation);
   ASSERT_TRUE(observations.has_value());
   ASSERT_EQ(observations->size(), 20u);
   for (std::uint64_t i = 0; i < 20; ++i) {
     EXPECT_EQ((*observations)[i].sequence, i + 1);
     EXPECT_EQ((*observations)[i].payload, "payload " + std::to_string(i + 1));
   }
-  EXPECT_EQ(file->records("update")->size(), 20u);
+  EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 20u);
 }
 
 TEST(Journal, AppendsNothingAfterAFailedRecordAndSaysSoOnce) {
@@ -193,9 +194,9 @@ TEST(Journal, BytesInTheQueueAreBoundedToo) {
   Journal journal(options);
   journal.begin("x", {});
   opening.get_future().wait();
-  journal.append({"update", 1, 0, std::string(60, 'a')});
+  journal.append({io::RecordKind::kUpdate, 1, 0, std::string(60, 'a')});
   EXPECT_TRUE(journal.status().has_value());
-  journal.append({"update", 2, 0, std::string(60, 'a')});
+  journal.append({io::RecordKind::kUpdate, 2, 0, std::string(60, 'a')});
   EXPECT_FALSE(journal.status().has_value());
   resume.set_value();
 }
@@ -204,11 +205,11 @@ TEST(Journal, BytesInTheQueueAreBoundedToo) {
 void journal_on_a_full_disk(const std::filesystem::path& path) {
   std::signal(SIGXFSZ, SIG_IGN);
   Journal journal({});
-  journal.begin(path, {{"case_id", "c"}});
+  journal.begin(path, io::SurgeryMeta{"c"});
   journal.append(record(1));
   const rlimit limit{128 * 1024, 128 * 1024};
   setrlimit(RLIMIT_FSIZE, &limit);
-  journal.append({"update", 2, 0, std::string(1 << 20, 'a')});
+  journal.append({io::RecordKind::kUpdate, 2, 0, std::string(1 << 20, 'a')});
   journal.stop();
   std::exit(journal.status() ? 0 : 42);
 }
@@ -223,8 +224,8 @@ TEST(JournalDeathTest, AFullDiskIsReportedAndLeavesAReadableFile) {
   EXPECT_EXIT(journal_on_a_full_disk(path), testing::ExitedWithCode(42), "");
   const auto file = io::SurgeryFile::open(path);
   ASSERT_TRUE(file.has_value()) << file.error().message;
-  EXPECT_EQ(file->records("observation")->size(), 1u);
-  EXPECT_EQ(file->records("update")->size(), 0u);
+  EXPECT_EQ(file->records(io::RecordKind::kObservation)->size(), 1u);
+  EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 0u);
 }
 
 TEST(JournalPath, KeepsTheCaseIdInsideTheFolder) {

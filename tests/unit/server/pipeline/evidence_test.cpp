@@ -7,6 +7,7 @@
 #include "common/core/random.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/support/toy_patient.hpp"
+#include "tests/unit/server/fake_inverter.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -29,7 +30,8 @@ Observation observation(std::uint64_t sequence, const char* source, double time_
   return made;
 }
 
-Observation landmarks(std::uint64_t sequence, const char* source, double time_s, double shift = 1) {
+Observation landmarks_at(std::uint64_t sequence, const char* source, double time_s,
+                         double shift = 1) {
   Observation made = observation(sequence, source, time_s);
   LandmarkPairs pairs;
   pairs.undeformed.resize(3, 4);
@@ -53,60 +55,61 @@ Observation cortex(std::uint64_t sequence, double time_s) {
   return made;
 }
 
-// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers with it.
+// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers with
+// it.
 struct FakeInversion {
-  std::shared_ptr<SparseData> seen = std::make_shared<SparseData>();
-  std::shared_ptr<bool> fails = std::make_shared<bool>(false);
-  Result<Estimate> operator()(const SparseData& data,
-                              const inversion::InversionOptions& options) const {
-    if (*fails) return fail(ErrorCode::kNotConverged, "no");
-    *seen = data;
-    Estimate estimate;
+  SparseData seen;
+  bool fails = false;
+  Status operator()(int, const SparseData& data, const inversion::InversionOptions& options,
+                    Estimate& estimate) {
+    if (fails) return fail(ErrorCode::kNotConverged, "no");
+    seen = data;
     estimate.displacement = Points(Vec3(0, 0, -1).replicate(1, patient()->mesh.num_nodes()));
     if (options.moving != nullptr) {
       const Points u = estimate.displacement(Eigen::all, options.moving->nodes);
-      while (options.moving->relocate(u, *seen)) {
+      while (options.moving->relocate(u, seen)) {
       }
     }
-    for (const DataSource& source : seen->sources) {
+    for (const DataSource& source : seen.sources) {
       estimate.sources.emplace_back();
       estimate.sources.back().source = source.name;
     }
-    return estimate;
+    return {};
   }
 };
 
 class Sources : public testing::Test {
  protected:
-  Sources() : pipeline_(*Pipeline::build(patient(), config_, Boundary::kContact, inversion_)) {}
-
-  Result<Update> run(const Observation& one) {
-    RunOptions options;
-    options.method = Method::kCondensed;
-    return pipeline_.run(one, options, evidence_);
+  Pipeline pipeline(Method method) {
+    return std::move(*Pipeline::build(
+        patient(), config_, method, Boundary::kContact,
+        std::make_unique<FakeInverter>([this](int call, const SparseData& data, const auto& options,
+                                              Estimate& estimate) {
+          return inversion_(call, data, options, estimate);
+        })));
   }
+  Result<Update> run(const Observation& one) { return pipeline_.run(one); }
   std::vector<std::string> used() const {
     std::vector<std::string> names;
-    for (const DataSource& source : inversion_.seen->sources) names.push_back(source.name);
+    for (const DataSource& source : inversion_.seen.sources) names.push_back(source.name);
     return names;
   }
 
   CaseConfig config_ = test_support::toy_config();
   FakeInversion inversion_;
-  Evidence evidence_{config_.sensing.max_age_s};
-  Pipeline pipeline_;
+  Pipeline pipeline_ = pipeline(Method::kCondensed);
 };
 
 TEST_F(Sources, AreUsedTogetherTheNewestOfEach) {
-  ASSERT_TRUE(run(landmarks(1, "ius", 0, 1.0)));
-  ASSERT_TRUE(run(landmarks(2, "pointer", 10, 2.0)));
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0, 1.0)));
+  ASSERT_TRUE(run(landmarks_at(2, "pointer", 10, 2.0)));
   EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer"}));
-  EXPECT_EQ(inversion_.seen->size(), 8);
-  const auto update = run(landmarks(3, "ius", 20, 3.0));
+  EXPECT_EQ(inversion_.seen.size(), 8);
+  const auto update = run(landmarks_at(3, "ius", 20, 3.0));
   ASSERT_TRUE(update);
-  EXPECT_EQ(inversion_.seen->size(), 8);
-  EXPECT_EQ(inversion_.seen->displacements(0, 0), 3.0);  // the first one of "ius" is gone
-  EXPECT_EQ(inversion_.seen->displacements(0, 4), 2.0);
+  EXPECT_EQ(inversion_.seen.size(), 8);
+  EXPECT_EQ(inversion_.seen.displacements(0, 0), 3.0);  // the first one of "ius" is gone
+  EXPECT_EQ(inversion_.seen.displacements(0, 4), 2.0);
   ASSERT_EQ(update->estimate.sources.size(), 2u);
   EXPECT_EQ(update->estimate.sources[0].observation_sequence, 3u);
   EXPECT_EQ(update->estimate.sources[1].observation_sequence, 2u);
@@ -114,10 +117,10 @@ TEST_F(Sources, AreUsedTogetherTheNewestOfEach) {
 }
 
 TEST_F(Sources, OlderThanTheLimitAreLeftOutAndTheUpdateSaysSo) {
-  ASSERT_TRUE(run(landmarks(1, "pointer", 0)));
-  ASSERT_TRUE(run(landmarks(2, "ius", config_.sensing.max_age_s)));
-  EXPECT_EQ(inversion_.seen->size(), 8);
-  const auto update = run(landmarks(3, "ius", config_.sensing.max_age_s + 1.0));
+  ASSERT_TRUE(run(landmarks_at(1, "pointer", 0)));
+  ASSERT_TRUE(run(landmarks_at(2, "ius", config_.sensing.max_age_s)));
+  EXPECT_EQ(inversion_.seen.size(), 8);
+  const auto update = run(landmarks_at(3, "ius", config_.sensing.max_age_s + 1.0));
   ASSERT_TRUE(update);
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
   const auto& omissions = update->left_out;
@@ -129,32 +132,32 @@ TEST_F(Sources, OlderThanTheLimitAreLeftOutAndTheUpdateSaysSo) {
 
 // A replay in a cycle begins again at time 0.
 TEST_F(Sources, FromTheFutureAreAsOldAsTheyAreNew) {
-  ASSERT_TRUE(run(landmarks(1, "pointer", 500)));
-  ASSERT_TRUE(run(landmarks(2, "ius", 0)));
+  ASSERT_TRUE(run(landmarks_at(1, "pointer", 500)));
+  ASSERT_TRUE(run(landmarks_at(2, "ius", 0)));
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 
 TEST_F(Sources, AnObservationWithoutAnEstimateIsForgotten) {
-  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
-  *inversion_.fails = true;
-  EXPECT_FALSE(run(landmarks(2, "pointer", 1)));
-  *inversion_.fails = false;
-  ASSERT_TRUE(run(landmarks(3, "ius", 2)));
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
+  inversion_.fails = true;
+  EXPECT_FALSE(run(landmarks_at(2, "pointer", 1)));
+  inversion_.fails = false;
+  ASSERT_TRUE(run(landmarks_at(3, "ius", 2)));
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 
 TEST_F(Sources, OfAnEarlierSessionAreForgotten) {
-  ASSERT_TRUE(run(landmarks(1, "pointer", 0)));
-  evidence_.clear();
-  ASSERT_TRUE(run(landmarks(2, "ius", 1)));
-  EXPECT_EQ(inversion_.seen->size(), 4);
+  ASSERT_TRUE(run(landmarks_at(1, "pointer", 0)));
+  pipeline_.reset();
+  ASSERT_TRUE(run(landmarks_at(2, "ius", 1)));
+  EXPECT_EQ(inversion_.seen.size(), 4);
 }
 
 TEST_F(Sources, ASurfaceIsMeasuredAnewForTheEstimate) {
-  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
   ASSERT_TRUE(run(cortex(2, 5)));
   EXPECT_EQ(used(), (std::vector<std::string>{"ius", "stereopsis"}));
-  const SparseData& data = *inversion_.seen;
+  const SparseData& data = inversion_.seen;
   ASSERT_GT(data.size(), 100);
   EXPECT_FALSE(data.along_direction(0));
   for (int i = 4; i < data.size(); ++i) {
@@ -166,24 +169,34 @@ TEST_F(Sources, ASurfaceIsMeasuredAnewForTheEstimate) {
   EXPECT_EQ(data.common_error.cols(), 6);  // the camera's pose
 }
 
+TEST(EvidenceMemory, KeepsTheCortexOfTheLastEstimateOnly) {
+  Evidence evidence(10.0);
+  const std::vector<NodeIndex> nodes = {1, 3};
+  EXPECT_EQ(evidence.cortex(nodes), Points::Zero(3, 2));
+  Points u(3, 4);
+  u << 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12;
+  evidence.remember(u, nodes);
+  EXPECT_EQ(evidence.cortex(nodes).col(1), Vec3(4, 8, 12));
+  evidence.clear();
+  EXPECT_EQ(evidence.cortex(nodes), Points::Zero(3, 2));
+}
+
 TEST_F(Sources, ASurfaceGuidesOtherMethodsByARigidAlignment) {
-  RunOptions options;
-  options.method = Method::kPaper;
-  ASSERT_TRUE(pipeline_.run(cortex(1, 0), options));
-  for (int i = 0; i < inversion_.seen->size(); ++i) {
-    EXPECT_FALSE(inversion_.seen->along_direction(i));
-    EXPECT_NEAR(inversion_.seen->displacements(2, i), -2.0, 0.01);
+  ASSERT_TRUE(pipeline(Method::kPaper).run(cortex(1, 0)));
+  for (int i = 0; i < inversion_.seen.size(); ++i) {
+    EXPECT_FALSE(inversion_.seen.along_direction(i));
+    EXPECT_NEAR(inversion_.seen.displacements(2, i), -2.0, 0.01);
   }
 }
 
 TEST_F(Sources, ASurfaceInMetresIsRefusedAndTheOthersGoOn) {
-  ASSERT_TRUE(run(landmarks(1, "ius", 0)));
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
   Observation metres = cortex(2, 1);
   std::get<CorticalSurface>(metres.body).surface.vertices *= 1e-3;
   const auto refused = run(metres);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("metres"));
-  ASSERT_TRUE(run(landmarks(3, "ius", 2)));
+  ASSERT_TRUE(run(landmarks_at(3, "ius", 2)));
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 
@@ -196,8 +209,8 @@ TEST_F(Sources, PointsThatTheAlignmentLeavesAsideGuideNothing) {
   boundary.body = body;
   const auto update = run(boundary);
   ASSERT_TRUE(update) << update.error().message;
-  EXPECT_LT(inversion_.seen->displacements.colwise().norm().maxCoeff(), 0.6);
-  EXPECT_LT((inversion_.seen->positions.row(2).array() - 40.0).maxCoeff(), 11.0);
+  EXPECT_LT(inversion_.seen.displacements.colwise().norm().maxCoeff(), 0.6);
+  EXPECT_LT((inversion_.seen.positions.row(2).array() - 40.0).maxCoeff(), 11.0);
   EXPECT_EQ(update->estimate.sources.at(0).outliers, (body.points.cols() + 9) / 10);
 }
 

@@ -6,7 +6,10 @@
 #include <chrono>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
@@ -24,7 +27,7 @@ TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {
   subscribe(sender);
   subscribe(watcher);
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
-    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence, "pointer", static_cast<double>(sequence))));
     for (RawPeer* peer : {&sender, &watcher}) {
       const auto message = next_update(*peer);
       EXPECT_EQ(message.update.observation_sequence, sequence);
@@ -48,15 +51,14 @@ TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
 
 TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   ServiceOptions options = with_model();
-  options.prepare = [](const wire::SessionRequest&) -> Result<Prepared> {
-    Prepared prepared;
-    prepared.run = [](const Observation& observation, const RunOptions&) {
-      if (observation.sequence == 2) {
-        return Result<Update>(fail(ErrorCode::kNotConverged, "no luck"));
-      }
-      return Result<Update>(answer(observation));
-    };
-    return prepared;
+  options.make_model = [](const wire::SessionRequest& request) {
+    return fake_session(
+        std::make_unique<FakeInverter>(
+            [](int call, const SparseData& data, const auto&, Estimate& estimate) -> Status {
+              if (call == 2) return fail(ErrorCode::kNotConverged, "no luck");
+              return follow_the_data(data, estimate, 4);
+            }),
+        request);
   };
   serve(std::move(options));
   RawPeer peer(endpoint_);
@@ -122,6 +124,60 @@ TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
   EXPECT_EQ(answered, MessageType::kStatusReply);
 }
 
+// Keeps what would be written.
+struct KeptRecords {
+  std::mutex mutex;
+  std::vector<io::SurgeryRecord> records;
+};
+class KeepingSink final : public RecordSink {
+ public:
+  explicit KeepingSink(std::shared_ptr<KeptRecords> kept) : kept_(std::move(kept)) {}
+  Status append(const io::SurgeryRecord& record) override {
+    const std::lock_guard lock(kept_->mutex);
+    kept_->records.push_back(record);
+    return {};
+  }
+  Status close() override { return {}; }
+
+ private:
+  std::shared_ptr<KeptRecords> kept_;
+};
+
+TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
+  ServiceOptions options = with_model();
+  const test_support::TemporaryFolder folder;
+  const auto kept = std::make_shared<KeptRecords>();
+  options.journal_dir = folder.path();
+  options.open_journal = [kept](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
+    return std::make_unique<KeepingSink>(kept);
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  subscribe(peer);
+  std::vector<std::string> published;
+  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    const std::string observation = wire::encode(landmarks(sequence));
+    peer.request(MessageType::kObservation, observation);
+    Received received = peer.receive();
+    while (received.type != MessageType::kUpdate) received = peer.receive();
+    published.push_back(observation);
+    published.push_back(received.payload);
+    const auto message = wire::decode_update(received.payload);
+    ASSERT_TRUE(message.has_value()) << message.error().message;
+    // The bytes carry the times of their own encoding and of their observation's journalling.
+    EXPECT_GT(message->update.timings.encode_ms, 0.0);
+    EXPECT_GT(message->update.timings.journal_ms, 0.0);
+  }
+  stop();  // writes the journal out
+  ASSERT_EQ(kept->records.size(), published.size());
+  for (std::size_t i = 0; i < published.size(); ++i) {
+    EXPECT_EQ(kept->records[i].kind,
+              i % 2 == 0 ? io::RecordKind::kObservation : io::RecordKind::kUpdate);
+    EXPECT_TRUE(kept->records[i].payload == published[i]) << "record " << i;
+  }
+}
+
 TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
   ServiceOptions options = with_model();
   const test_support::TemporaryFolder folder;
@@ -147,16 +203,16 @@ TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
   ServiceOptions options = with_model();
   auto entered = std::make_shared<std::promise<void>>();
-  options.prepare = [entered](const wire::SessionRequest&) -> Result<Prepared> {
-    Prepared prepared;
-    prepared.run = [entered](const Observation&, const RunOptions& run) {
-      std::promise<void> stopped;
-      const std::stop_callback wake(run.stop, [&] { stopped.set_value(); });
-      entered->set_value();
-      stopped.get_future().wait();
-      return Result<Update>(fail(ErrorCode::kNotConverged, "stopped"));
-    };
-    return prepared;
+  options.make_model = [entered](const wire::SessionRequest& request) {
+    return fake_session(std::make_unique<FakeInverter>([entered](int, const SparseData&,
+                                                                 const auto& asked, Estimate&) {
+                          std::promise<void> stopped;
+                          const std::stop_callback wake(asked.stop, [&] { stopped.set_value(); });
+                          entered->set_value();
+                          stopped.get_future().wait();
+                          return Status(fail(ErrorCode::kNotConverged, "stopped"));
+                        }),
+                        request);
   };
   serve(std::move(options));
   RawPeer peer(endpoint_);

@@ -35,24 +35,23 @@ class SceneSession : public ::testing::Test {
     }();
     return made;
   }
-  static Result<Prepared> session(const CaseConfig& config, Method method = Method::kCondensed) {
+  static Result<std::unique_ptr<SessionModel>> session(const CaseConfig& config,
+                                                       Method method = Method::kCondensed) {
     ModelStore store(patient(), config, {operators()});
     wire::SessionRequest request;
     request.case_id = "toy";
     request.method = method;
-    return store.prepare(request);
+    return store.make(request);
   }
   static Update run(const CaseConfig& config, const Vec3& shift) {
-    const auto prepared = session(config);
-    EXPECT_TRUE(prepared.has_value());
+    const auto made = session(config);
+    EXPECT_TRUE(made.has_value());
     LandmarkPairs pairs;
     pairs.undeformed = patient()->tumour.vertices;
     pairs.deformed = pairs.undeformed.colwise() + shift;
     Observation observation = landmarks(1);
     observation.body = pairs;
-    RunOptions options;
-    options.method = Method::kCondensed;
-    auto update = prepared->run(observation, options);
+    auto update = (*made)->pipeline.run(observation);
     EXPECT_TRUE(update.has_value()) << update.error().message;
     return std::move(*update);
   }

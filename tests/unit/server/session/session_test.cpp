@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/unit/server/sample_values.hpp"
+#include "tests/unit/server/fake_session.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -40,32 +40,36 @@ class Published {
   std::vector<wire::UpdateMessage> messages_;
 };
 
-// A gate that a fake run waits at.
+// A gate that a fake inversion waits at.
 struct Gate {
   std::promise<void> entered;
   std::promise<void> leave;
 };
 
+// Waits until a stop is requested.
+void wait_for_stop(const inversion::InversionOptions& options, std::promise<void>& entered) {
+  std::promise<void> stopped;
+  const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+  entered.set_value();
+  stopped.get_future().wait();
+}
+
 class SessionTest : public testing::Test {
  protected:
-  using Run = std::function<Result<Update>(const Observation&, const RunOptions&)>;
-
-  SessionHooks hooks(Run run) {
+  // One fake inverter per preparation.
+  SessionHooks hooks(FakeInverter::Update update) {
     SessionHooks hooks;
-    hooks.prepare =
-        [this, run = std::move(run)](const wire::SessionRequest& request) -> Result<Prepared> {
+    hooks.make_model = [this, update = std::move(update)](const wire::SessionRequest& request) {
       prepared_boundaries_.push_back(request.boundary);
-      Prepared prepared;
-      prepared.info.model_id = "0123456789abcdef";
-      prepared.run = run;
-      return prepared;
+      return fake_session(std::make_unique<FakeInverter>(update), request);
     };
     hooks.publish = [this](wire::UpdateMessage message) { published_.push(std::move(message)); };
     return hooks;
   }
 
-  static Result<Update> echo(const Observation& observation, const RunOptions&) {
-    return answer(observation);
+  static Status echo(int, const SparseData& data, const inversion::InversionOptions&,
+                     Estimate& estimate) {
+    return follow_the_data(data, estimate, 4);
   }
 
   static Result<wire::SessionInfo> start(Session& session, Boundary boundary = Boundary::kContact,
@@ -150,14 +154,41 @@ TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
   EXPECT_EQ(messages[1].session_id, 2u);
 }
 
+// What an earlier session observed and estimated is not used in the next one.
+TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
+  std::vector<std::size_t> sources;
+  FakeInverter* inverter = nullptr;
+  SessionHooks watched = hooks(echo);
+  watched.make_model = [&](const wire::SessionRequest& request) {
+    auto made = std::make_unique<FakeInverter>(
+        [&](int, const SparseData& data, const auto&, Estimate& out) {
+          sources.push_back(data.sources.size());
+          return follow_the_data(data, out, 4);
+        });
+    inverter = made.get();
+    return fake_session(std::move(made), request);
+  };
+  Session session(kCase, std::move(watched));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
+  published_.wait_for(1);
+  ASSERT_TRUE(session.submit(landmarks(2, "pointer")).has_value());
+  published_.wait_for(2);
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1, "pointer")).has_value());
+  ASSERT_EQ(published_.wait_for(3).size(), 3u);
+  EXPECT_THAT(sources, ElementsAre(1u, 2u, 1u));
+  EXPECT_EQ(inverter->resets, 2);  // one model for both sessions
+}
+
 TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
   Gate gate;
-  Session session(kCase, hooks([&](const Observation& observation, const RunOptions&) {
-                    if (observation.sequence == 1) {
+  Session session(kCase, hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
+                    if (call == 1) {
                       gate.entered.set_value();
                       gate.leave.get_future().wait();
                     }
-                    return Result<Update>(answer(observation));
+                    return follow_the_data(data, out, 4);
                   }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
@@ -177,12 +208,12 @@ TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
 
 TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
   Gate gate;
-  Session session(kCase, hooks([&](const Observation& observation, const RunOptions&) {
-                    if (observation.sequence == 1) {
+  Session session(kCase, hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
+                    if (call == 1) {
                       gate.entered.set_value();
                       gate.leave.get_future().wait();
                     }
-                    return Result<Update>(answer(observation));
+                    return follow_the_data(data, out, 4);
                   }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
@@ -197,12 +228,11 @@ TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
 }
 
 TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
-  Session session(kCase, hooks([](const Observation& observation, const RunOptions&) {
-                    if (observation.sequence == 1) {
-                      return Result<Update>(fail(ErrorCode::kNotConverged, "no luck"));
-                    }
-                    return Result<Update>(answer(observation));
-                  }));
+  Session session(
+      kCase, hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
+        if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
+        return follow_the_data(data, out, 4);
+      }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   const auto failed = published_.wait_for(1);
@@ -219,10 +249,9 @@ TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
 }
 
 TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
-  Session session(kCase,
-                  hooks([](const Observation& observation, const RunOptions&) -> Result<Update> {
-                    if (observation.sequence == 1) throw std::runtime_error("thrown");
-                    return answer(observation);
+  Session session(kCase, hooks([](int call, const SparseData& data, const auto&, Estimate& out) {
+                    if (call == 1) throw std::runtime_error("thrown");
+                    return follow_the_data(data, out, 4);
                   }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
@@ -236,15 +265,11 @@ TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
 
 TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished) {
   std::promise<void> entered;
-  Session session(kCase, hooks([&](const Observation& observation, const RunOptions& options) {
-                    if (observation.sequence == 1) {
-                      std::promise<void> stopped;
-                      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
-                      entered.set_value();
-                      stopped.get_future().wait();
-                    }
-                    return Result<Update>(answer(observation));
-                  }));
+  Session session(
+      kCase, hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
+        if (call == 1) wait_for_stop(options, entered);
+        return follow_the_data(data, out, 4);
+      }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
@@ -257,13 +282,11 @@ TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished)
 
 TEST_F(SessionTest, StopEndsARunningInversion) {
   std::promise<void> entered;
-  Session session(kCase, hooks([&](const Observation&, const RunOptions& options) {
-                    std::promise<void> stopped;
-                    const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
-                    entered.set_value();
-                    stopped.get_future().wait();
-                    return Result<Update>(fail(ErrorCode::kNotConverged, "stopped"));
-                  }));
+  Session session(
+      kCase, hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
+        wait_for_stop(options, entered);
+        return fail(ErrorCode::kNotConverged, "stopped");
+      }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
@@ -284,10 +307,10 @@ TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
 TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   int attempts = 0;
   SessionHooks failing = hooks(echo);
-  failing.prepare =
-      [&, prepare = failing.prepare](const wire::SessionRequest& boundary) -> Result<Prepared> {
+  failing.make_model = [&, make = failing.make_model](const wire::SessionRequest& request)
+      -> Result<std::unique_ptr<SessionModel>> {
     if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
-    return prepare(boundary);
+    return make(request);
   };
   Session session(kCase, std::move(failing));
   const auto first = start(session);
@@ -302,12 +325,12 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   std::promise<void> leave;
   SessionHooks slow = hooks(echo);
   bool first = true;
-  slow.prepare = [&, prepare = slow.prepare](const wire::SessionRequest& boundary) {
+  slow.make_model = [&, make = slow.make_model](const wire::SessionRequest& request) {
     if (std::exchange(first, false)) {
       entered.set_value();
       leave.get_future().wait();
     }
-    return prepare(boundary);
+    return make(request);
   };
   Session session(kCase, std::move(slow));
   std::promise<Result<wire::SessionInfo>> preparing;
@@ -326,12 +349,12 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
 }
 
 TEST_F(SessionTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
-  const auto iterating = [](const Observation& observation, const RunOptions& options) {
-    Update update = answer(observation);
-    update.final = false;
-    if (options.on_iterate) options.on_iterate(update);
-    update.final = true;
-    return Result<Update>(update);
+  const auto iterating = [](int, const SparseData& data, const auto& options, Estimate& out) {
+    Estimate iterate;
+    (void)follow_the_data(data, iterate, 4);
+    iterate.status = EstimateStatus::kIterating;
+    if (options.on_iterate) options.on_iterate(iterate);
+    return follow_the_data(data, out, 4);
   };
   Session session(kCase, hooks(iterating));
   ASSERT_TRUE(start(session).has_value());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/condensed/omission_errors.hpp"
+#include "common/inversion/condensed/omission_estimates.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -25,8 +25,8 @@ double gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction&
   if (contact.size() > 0) gravity -= sampled.contact(contact.active()) * forces;
   const MatrixXd coupling = jacobian.transpose() * gravity;
   MatrixXd explained = coupling;
-  fem::blas::solve_lower(normal_factor, explained);
-  fem::blas::solve_lower_transposed(normal_factor, explained);
+  linalg::blas::solve_lower(normal_factor, explained);
+  linalg::blas::solve_lower_transposed(normal_factor, explained);
   MatrixXd schur = gravity.transpose() * gravity - coupling.transpose() * explained;
   schur.diagonal().array() += 1.0;
   const VecX dg = schur.ldlt().solve(gravity.transpose() * residual);

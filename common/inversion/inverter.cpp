@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/inverter.hpp"
+
+#include <utility>
+
+#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/inversion/contract/data_check.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
+#include "common/inversion/descent/descend.hpp"
+#include "common/inversion/prepared/condense.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+class Condensed final : public Inverter {
+ public:
+  Condensed(CondensedInverter inverter, std::uint64_t bytes)
+      : inverter_(std::move(inverter)), bytes_(bytes) {}
+  Status update(const SparseData& data, const InversionOptions& options,
+                Estimate& estimate) override {
+    return inverter_.update(data, estimate, options);
+  }
+  void reset() override { inverter_.reset(); }
+  std::optional<OmissionErrors> omission_errors() const override {
+    return inverter_.omission_errors();
+  }
+  std::uint64_t bytes() const override { return bytes_; }
+
+ private:
+  CondensedInverter inverter_;
+  std::uint64_t bytes_;  // of the operators, which the inverter shares
+};
+
+class Exact final : public Inverter {
+ public:
+  Exact(std::shared_ptr<const PreparedModel> model, CondensedExact inverter)
+      : model_(std::move(model)), inverter_(std::move(inverter)) {}
+  Status update(const SparseData& data, const InversionOptions& options,
+                Estimate& estimate) override {
+    return inverter_.update(data, estimate, options);
+  }
+  void reset() override { inverter_.reset(); }
+  std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
+  std::uint64_t bytes() const override { return model_->timings().bytes + inverter_.bytes(); }
+
+ private:
+  std::shared_ptr<const PreparedModel> model_;  // the inverter refers to it
+  CondensedExact inverter_;
+};
+
+// Every descent starts from nothing: there is no state beside the model.
+class Descent final : public Inverter {
+ public:
+  Descent(std::shared_ptr<const PreparedModel> model, Method method)
+      : model_(std::move(model)), method_(method) {}
+  Status update(const SparseData& data, const InversionOptions& options,
+                Estimate& estimate) override {
+    if (auto status = check_data(data); !status) return status;
+    if (auto status = check_whole(data); !status) return status;
+    auto made = descend(*model_, method_, data, options);
+    if (!made) return tl::unexpected(made.error());
+    estimate = std::move(*made);
+    return check_estimate(model_->model().mesh, model_->config().material, estimate);
+  }
+  void reset() override {}
+  std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
+  std::uint64_t bytes() const override { return model_->timings().bytes; }
+
+ private:
+  std::shared_ptr<const PreparedModel> model_;
+  Method method_;
+};
+
+Result<std::unique_ptr<Inverter>> condense_and_build(const PreparedModel& model,
+                                                     const std::stop_token& stop) {
+  CondenseOptions options;
+  options.stop = stop;
+  auto operators = condense(model, options);
+  if (!operators) return tl::unexpected(operators.error());
+  return condensed_inverter(
+      std::make_shared<const CondensedOperators>(std::move(*operators)),
+      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config());
+}
+
+Result<std::unique_ptr<Inverter>> build_exact(std::shared_ptr<const PreparedModel> model,
+                                              const std::stop_token& stop) {
+  CondensedExactOptions options;
+  options.stop = stop;
+  auto inverter = CondensedExact::build(*model, options);
+  if (!inverter) return tl::unexpected(inverter.error());
+  return std::make_unique<Exact>(std::move(model), std::move(*inverter));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Inverter>> condensed_inverter(
+    std::shared_ptr<const CondensedOperators> operators,
+    std::shared_ptr<const geometry::TetLocator> locator, const CaseConfig& config,
+    const CondensedOptions& options) {
+  const std::uint64_t bytes = operators->bytes();
+  auto inverter =
+      CondensedInverter::build(std::move(operators), std::move(locator), config, options);
+  if (!inverter) return tl::unexpected(inverter.error());
+  return std::make_unique<Condensed>(std::move(*inverter), bytes);
+}
+
+Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedModel> model,
+                                                Method method, const std::stop_token& stop) {
+  switch (method) {
+    case Method::kCondensed: return condense_and_build(*model, stop);
+    case Method::kCondensedExact: return build_exact(std::move(model), stop);
+    default: return std::make_unique<Descent>(std::move(model), method);
+  }
+}
+
+}  // namespace brainshift::inversion

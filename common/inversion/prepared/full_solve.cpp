@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/prepared/full_solve.hpp"
+
+#include <vector>
+
+#include "common/core/statistics.hpp"
+#include "common/core/stopwatch.hpp"
+
+namespace brainshift::inversion {
+
+double measure_full_solve_ms(const PreparedModel& model) {
+  constexpr int kRepetitions = 15;
+  const contact::ForwardModel& forward = model.forward();
+  const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
+  VecX x = forward.factor().solve(b);  // allocates the workspace
+  std::vector<double> times_ms;
+  for (int i = 0; i < kRepetitions; ++i) {
+    const Stopwatch watch;
+    forward.factor().solve(b, x);
+    times_ms.push_back(watch.milliseconds());
+  }
+  return percentile(times_ms, 50.0);
+}
+
+}  // namespace brainshift::inversion

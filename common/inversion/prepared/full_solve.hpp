@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// t_solve: the time of one full solve K x = b on this machine, the unit of every speed figure.
+#pragma once
+
+#include "common/inversion/prepared/prepared_model.hpp"
+
+namespace brainshift::inversion {
+
+// Median of 15 single solves after one that warms up, ms. Takes 16 solves of time: about half a second
+// on the default head.
+double measure_full_solve_ms(const PreparedModel& model);
+
+}  // namespace brainshift::inversion

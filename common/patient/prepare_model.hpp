@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// prepare_model(): everything that is done before surgery, CaseConfig -> ModelFile.
+//
+//   read       the files that the case names, and what they are told by later (io/model/model_inputs.hpp)
+//   build      mesh, surfaces, node sets (anatomy)
+//   factorise  under each boundary condition; a model that cannot be solved ends here
+//   condense   the operators of each boundary condition; minutes on a head
+// With a checkpoint file, the contact columns survive an interruption and are not solved again.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <stop_token>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
+#include "common/io/model/checkpoint_file.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/values/case_config.hpp"
+
+namespace brainshift::patient {
+
+// In the order of ModelFile::condensed.
+inline constexpr std::array kPreparedBoundaries = {Boundary::kContact, Boundary::kFixed};
+
+struct PrepareOptions {
+  Progress progress;     // stages "read images", those of the builder, "contact: factor", ...
+  std::stop_token stop;  // checked between the steps above and between blocks of columns
+  std::filesystem::path checkpoint;  // empty: an interrupted preparation starts afresh
+  // Called when the checkpoint holds blocks of an interrupted preparation; may be empty.
+  std::function<void()> on_resume;
+  // Threads that condense; 0: as many as cores.
+  int threads = 0;
+};
+
+struct BoundaryReport {
+  inversion::PrepareTimings timings;  // of the factorisation
+  double full_solve_ms = 0.0;         // inversion::measure_full_solve_ms
+};
+
+struct PreparedPatient {
+  io::ModelFile file;
+  double read_s = 0.0;
+  double mesh_s = 0.0;
+  std::array<BoundaryReport, kPreparedBoundaries.size()> boundaries;
+  // For the caller to remove() once the model is safe on disk; empty without a checkpoint.
+  std::optional<io::CheckpointFile> checkpoint;
+};
+
+// Errors: of io::record_inputs, io::load_case_inputs, anatomy::build_brain_model, PreparedModel::prepare
+// and condense(), which name a key or file; of CheckpointFile; kUnavailable when stopped. An error
+// leaves the blocks that are finished in the checkpoint.
+Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOptions& options = {});
+
+}  // namespace brainshift::patient

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What every inverter owes its caller, whatever its method.
+#include "common/inversion/inverter.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/prepared/data_region.hpp"
+#include "tests/unit/inversion/toy_inversion.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using testing::HasSubstr;
+
+class Inverters : public ::testing::TestWithParam<Method> {
+ protected:
+  static std::shared_ptr<const PreparedModel> model() {
+    static const auto shared =
+        std::make_shared<const PreparedModel>(prepare(Boundary::kContact, config()));
+    return shared;
+  }
+  static CaseConfig config() {
+    CaseConfig config = test_support::toy_config();
+    config.condensed.max_rank = 60;
+    config.condensed.uncertainty_nodes = 40;
+    return config;
+  }
+  // At nodes of the data region, which method condensed-exact needs.
+  static SparseData data() {
+    const SparseData sampled = sagging_data(*model(), 0.1);
+    const auto region = data_region(*patient());
+    SparseData data;
+    data.positions = patient()->mesh.nodes(Eigen::all, region);
+    data.displacements = Points(3, data.positions.cols());
+    for (Eigen::Index i = 0; i < data.positions.cols(); ++i) {
+      Eigen::Index nearest = 0;
+      (sampled.positions.colwise() - data.positions.col(i)).colwise().norm().minCoeff(&nearest);
+      data.displacements.col(i) = sampled.displacements.col(nearest);
+    }
+    data.sd_mm = VecX::Constant(data.positions.cols(), 0.5);
+    return data;
+  }
+  static std::unique_ptr<Inverter> inverter() {
+    auto made = make_inverter(model(), GetParam());
+    EXPECT_TRUE(made.has_value());
+    return std::move(*made);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Methods, Inverters, ::testing::ValuesIn(kAllMethods),
+                         [](const auto& each) {
+                           std::string name(to_string(each.param));
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+TEST_P(Inverters, FillEveryMemberOfAnEstimateThatHeldAnother) {
+  auto made = inverter();
+  Estimate fresh, used;
+  ASSERT_TRUE(made->update(data(), {}, fresh));
+  EXPECT_NE(fresh.status, EstimateStatus::kNotRun);
+  EXPECT_FALSE(fresh.reason.empty());
+  EXPECT_FALSE(std::isnan(fresh.min_volume_ratio));
+  EXPECT_GT(made->bytes(), 0u);
+  EXPECT_EQ(made->omission_errors().has_value(), GetParam() == Method::kCondensed);
+  // Somebody else's numbers must not shine through.
+  used.prior_scales.fill(7.0);
+  used.sources.resize(3);
+  used.sd_mm = VecX::Ones(5);
+  used.active_slaves = {1, 2, 3};
+  used.history.resize(9);
+  used.rebuild_ms = -1.0;
+  made->reset();
+  ASSERT_TRUE(made->update(data(), {}, used));
+  EXPECT_EQ(used.prior_scales, fresh.prior_scales);
+  EXPECT_EQ(used.sources.size(), fresh.sources.size());
+  EXPECT_EQ(used.sd_mm.size(), fresh.sd_mm.size());
+  EXPECT_EQ(used.active_slaves, fresh.active_slaves);
+  EXPECT_EQ(used.history.size(), fresh.history.size());
+  EXPECT_GE(used.rebuild_ms, 0.0);
+  EXPECT_TRUE(used.displacement == fresh.displacement) << "reset() did not forget";
+}
+
+TEST_P(Inverters, AStopEndsTheUpdateWithItsOwnReason) {
+  auto made = inverter();
+  std::stop_source source;
+  source.request_stop();
+  InversionOptions asked;
+  asked.stop = source.get_token();
+  Estimate estimate;
+  const Status status = made->update(data(), asked, estimate);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().message, "inversion was stopped at iteration 1");
+  EXPECT_TRUE(made->update(data(), {}, estimate)) << "the next update must work";
+}
+
+TEST_P(Inverters, RejectDataThatAreNotFinite) {
+  auto made = inverter();
+  SparseData bad = data();
+  bad.displacements(1, 3) = std::numeric_limits<double>::quiet_NaN();
+  Estimate estimate;
+  const Status status = made->update(bad, {}, estimate);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
+  EXPECT_THAT(status.error().message, HasSubstr("point 3"));
+}
+
+TEST_P(Inverters, OnlyMethodCondensedTakesDataAlongADirection) {
+  auto made = inverter();
+  SparseData along = data();
+  along.directions = Points::Zero(3, along.size());
+  along.directions.col(2) = Vec3::UnitZ();
+  Estimate estimate;
+  EXPECT_EQ(made->update(along, {}, estimate).has_value(), GetParam() == Method::kCondensed);
+}
+
+TEST_F(Inverters, CondensedOverGivenOperatorsIsTheOneThatCondenses) {
+  auto operators = std::make_shared<const CondensedOperators>(std::move(*condense(*model())));
+  const auto given = condensed_inverter(
+      operators, std::make_shared<const geometry::TetLocator>(patient()->mesh), config());
+  ASSERT_TRUE(given.has_value());
+  EXPECT_EQ((*given)->bytes(), operators->bytes());
+  const auto made = make_inverter(model(), Method::kCondensed);
+  ASSERT_TRUE(made.has_value());
+  Estimate a, b;
+  ASSERT_TRUE((*given)->update(data(), {}, a));
+  ASSERT_TRUE((*made)->update(data(), {}, b));
+  EXPECT_TRUE(a.displacement == b.displacement);
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/prepared/full_solve.hpp"
+
+#include "common/core/stopwatch.hpp"
+#include "tests/unit/inversion/toy_inversion.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+TEST(FullSolve, IsPositiveAndShorterThanAllItsSolvesTogether) {
+  const PreparedModel model = prepare(Boundary::kContact);
+  const Stopwatch watch;
+  const double solve_ms = measure_full_solve_ms(model);
+  EXPECT_GT(solve_ms, 0.0);
+  EXPECT_LT(8.0 * solve_ms, watch.milliseconds());  // half of its 15 solves take the median or more
+}
+
+}  // namespace
+}  // namespace brainshift::inversion

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/patient/prepare_model.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "common/patient/read_patient.hpp"
+#include "tests/unit/patient/box_case.hpp"
+
+namespace brainshift::patient {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+TEST_F(BoxCase, IsPreparedUnderBothBoundaries) {
+  std::vector<std::string> stages;
+  PrepareOptions options;
+  options.progress = [&](std::string_view stage, double) {
+    if (stages.empty() || stages.back() != stage) stages.emplace_back(stage);
+  };
+  const auto prepared = prepare_model(config(), options);
+  ASSERT_TRUE(prepared.has_value()) << prepared.error().message;
+  const io::ModelFile& file = prepared->file;
+  EXPECT_EQ(file.model.model_id, read_patient(case_file_)->model.model_id);
+  ASSERT_EQ(file.condensed.size(), kPreparedBoundaries.size());
+  for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {
+    EXPECT_EQ(file.condensed[i].boundary, kPreparedBoundaries[i]);
+    EXPECT_EQ(file.condensed[i].model_id, file.model.model_id);
+    EXPECT_GT(file.condensed[i].prepare_s, 0.0);
+    EXPECT_GT(prepared->boundaries[i].full_solve_ms, 0.0);
+    EXPECT_GT(prepared->boundaries[i].timings.factor_nonzeros, 0u);
+  }
+  ASSERT_EQ(file.inputs.size(), 2u);
+  EXPECT_EQ(file.inputs[0].key, "case");
+  EXPECT_EQ(file.inputs[1].key, "mesh.file");
+  EXPECT_FALSE(prepared->checkpoint.has_value());
+  EXPECT_EQ(stages.front(), "read images");
+  EXPECT_THAT(stages, Contains("contact: contact columns"));
+  EXPECT_THAT(stages, Contains("fixed: prior modes"));
+  // What comes out can be written: the model file checks that the parts belong together.
+  EXPECT_TRUE(io::write_model(folder_ / "m.h5", file));
+}
+
+TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
+  PrepareOptions options;
+  options.checkpoint = folder_ / "m.h5.partial";
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  options.progress = [&](std::string_view stage, double) {
+    if (stage == "contact: prior modes") stop.request_stop();  // the contact columns are done
+  };
+  const auto interrupted = prepare_model(config(), options);
+  ASSERT_FALSE(interrupted.has_value());
+  EXPECT_EQ(interrupted.error().code, ErrorCode::kUnavailable);
+  ASSERT_TRUE(std::filesystem::exists(options.checkpoint));
+
+  int resumed = 0;
+  options.stop = {};
+  options.progress = {};
+  options.on_resume = [&] { ++resumed; };
+  auto finished = prepare_model(config(), options);
+  ASSERT_TRUE(finished.has_value()) << finished.error().message;
+  EXPECT_EQ(resumed, 1);
+  PrepareOptions afresh;
+  const auto whole = prepare_model(config(), afresh);
+  ASSERT_TRUE(whole.has_value());
+  EXPECT_TRUE(finished->file.condensed[0].contact_columns ==
+              whole->file.condensed[0].contact_columns);
+  EXPECT_TRUE(finished->file.condensed[0].modes == whole->file.condensed[0].modes);
+  ASSERT_TRUE(finished->checkpoint.has_value());
+  EXPECT_TRUE(finished->checkpoint->remove());
+  EXPECT_FALSE(std::filesystem::exists(options.checkpoint));
+}
+
+TEST_F(BoxCase, StopsBeforeTheLongWorkWhenAsked) {
+  std::stop_source stop;
+  stop.request_stop();
+  PrepareOptions options;
+  options.stop = stop.get_token();
+  std::vector<std::string> stages;
+  options.progress = [&](std::string_view stage, double) { stages.emplace_back(stage); };
+  const auto stopped = prepare_model(config(), options);
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(stages, ::testing::Each(StartsWith("read")));
+}
+
+TEST_F(BoxCase, AFailedPreparationLeavesNoEmptyCheckpoint) {
+  CaseConfig small = config();
+  small.condensed.memory_limit_gib = 1e-6;
+  PrepareOptions options;
+  options.checkpoint = folder_ / "m.h5.partial";
+  const auto refused = prepare_model(small, options);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().message, HasSubstr("condensed.memory_limit_gib"));
+  EXPECT_FALSE(std::filesystem::exists(options.checkpoint));
+}
+
+}  // namespace
+}  // namespace brainshift::patient

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/session/model_store.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <future>
+#include <utility>
+
+#include "common/inversion/prepared/condense.hpp"
+#include "tests/support/toy_patient.hpp"
+#include "tests/unit/server/sample_values.hpp"
+
+namespace brainshift::server {
+namespace {
+
+CaseConfig config() {
+  CaseConfig config = test_support::toy_config();
+  config.condensed.max_rank = 40;
+  config.condensed.uncertainty_nodes = 40;
+  return config;
+}
+
+std::shared_ptr<const BrainModel> patient() {
+  static const auto model = std::make_shared<const BrainModel>(test_support::toy_patient());
+  return model;
+}
+
+const CondensedOperators& operators() {
+  static const CondensedOperators made = [] {
+    const auto prepared = inversion::PreparedModel::prepare(patient(), config(), Boundary::kContact);
+    return std::move(*inversion::condense(*prepared));
+  }();
+  return made;
+}
+
+Observation tumour_moved(std::uint64_t sequence) {
+  LandmarkPairs pairs;
+  pairs.undeformed = patient()->tumour.vertices;
+  pairs.deformed = pairs.undeformed.colwise() + Vec3(3, 0, 3);
+  Observation observation = landmarks(sequence);
+  observation.case_id = "toy";
+  observation.body = pairs;
+  return observation;
+}
+
+TEST(ModelStore, MakesASessionOfEveryMethodAndTellsItsSize) {
+  ModelStore store(patient(), config(), {operators()});
+  for (const Method method : kAllMethods) {
+    wire::SessionRequest request;
+    request.method = method;
+    const auto made = store.make(request);
+    ASSERT_TRUE(made.has_value()) << to_string(method) << ": " << made.error().message;
+    const wire::SessionInfo& info = (*made)->info;
+    EXPECT_EQ(info.model_id, patient()->model_id);
+    EXPECT_EQ(info.nodes, patient()->mesh.num_nodes());
+    EXPECT_EQ(info.slaves, static_cast<int>(patient()->slaves.size()));
+    EXPECT_GT(info.model_bytes, 0u) << to_string(method);
+    EXPECT_GT(info.prepare_s, 0.0) << to_string(method);
+    EXPECT_EQ(info.factor_s > 0.0, method != Method::kCondensed) << to_string(method);
+    EXPECT_EQ(info.full_solve_ms, 0.0) << "nobody asked for it";
+  }
+}
+
+TEST(ModelStore, MeasuresAFullSolveOnRequest) {
+  ModelStore store(patient(), config(), {operators()});
+  wire::SessionRequest request;
+  request.measure_full_solve = true;
+  const auto made = store.make(request);
+  ASSERT_TRUE(made.has_value());
+  EXPECT_GT((*made)->info.full_solve_ms, 0.0);
+  EXPECT_GT((*made)->info.factor_s, 0.0);
+}
+
+TEST(ModelStore, CondensesWhenTheModelFileHoldsNoOperators) {
+  ModelStore store(patient(), config(), {});
+  const auto made = store.make({});
+  ASSERT_TRUE(made.has_value());
+  const auto update = (*made)->pipeline.run(tumour_moved(1));
+  ASSERT_TRUE(update.has_value());
+  EXPECT_EQ(update->estimate.status, EstimateStatus::kConverged);
+}
+
+// Waits for the stop that only a new session requests, then lets the real inverter run with it.
+class StoppedOnTheWay final : public inversion::Inverter {
+ public:
+  explicit StoppedOnTheWay(std::unique_ptr<inversion::Inverter> real) : real_(std::move(real)) {}
+  Status update(const SparseData& data, const inversion::InversionOptions& options,
+                Estimate& estimate) override {
+    if (++calls == 1) {
+      std::promise<void> stopped;
+      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+      entered.set_value();
+      stopped.get_future().wait();
+    }
+    auto status = real_->update(data, options, estimate);
+    outcomes.push_back(status ? estimate.reason : status.error().message);
+    return status;
+  }
+  void reset() override { real_->reset(); }
+  std::optional<inversion::OmissionErrors> omission_errors() const override {
+    return real_->omission_errors();
+  }
+  std::uint64_t bytes() const override { return real_->bytes(); }
+
+  int calls = 0;
+  std::promise<void> entered;
+  std::vector<std::string> outcomes;  // of each update, in words
+
+ private:
+  std::unique_ptr<inversion::Inverter> real_;
+};
+
+// The default method, from Session::start() down to its loop over contact sets.
+TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
+  const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+  auto real = inversion::condensed_inverter(
+      std::make_shared<const CondensedOperators>(operators()), locator, config());
+  ASSERT_TRUE(real.has_value());
+  auto inverter = std::make_unique<StoppedOnTheWay>(std::move(*real));
+  StoppedOnTheWay& watched = *inverter;
+  SessionHooks hooks;
+  hooks.make_model = [&](const wire::SessionRequest& request) {
+    auto pipeline = Pipeline::build(patient(), config(), request.method, request.boundary,
+                                    std::move(inverter));
+    EXPECT_TRUE(pipeline.has_value());
+    return std::make_unique<SessionModel>(SessionModel{{}, std::move(*pipeline)});
+  };
+  std::promise<wire::UpdateMessage> published;
+  hooks.publish = [&](wire::UpdateMessage message) { published.set_value(std::move(message)); };
+  Session session("toy", std::move(hooks));
+  wire::SessionRequest request;
+  request.case_id = "toy";
+  const auto start = [&] {
+    std::promise<bool> ready;
+    session.start(request, [&](const auto& info) { ready.set_value(info.has_value()); });
+    return ready.get_future().get();
+  };
+  ASSERT_TRUE(start());
+  ASSERT_TRUE(session.submit(tumour_moved(1)).has_value());
+  watched.entered.get_future().wait();
+  ASSERT_TRUE(start());
+  ASSERT_TRUE(session.submit(tumour_moved(2)).has_value());
+  const wire::UpdateMessage message = published.get_future().get();
+  session.stop();
+  EXPECT_EQ(message.update.observation_sequence, 2u);  // the first one is not published
+  EXPECT_FALSE(message.error.has_value());
+  ASSERT_EQ(watched.outcomes.size(), 2u);
+  EXPECT_EQ(watched.outcomes[0], "inversion was stopped at iteration 1");
+  EXPECT_THAT(watched.outcomes[1], testing::HasSubstr("contact holds"));
+}
+
+}  // namespace
+}  // namespace brainshift::server
