@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // CaseConfig: what a case file says, as plain values in the units of its keys.
 //
-// Read from YAML by io::read_case_config, which resolves relative paths against the case file and
-// rejects unknown keys. validate() checks ranges and names the key, the value and the constraint.
-// Defaults: Table 1 and sections 2.2-2.6 of Ji, Roberts, Hartov, Paulsen (2009), unless said otherwise.
+// case_keys.hpp is the table of the keys: names, ranges, meanings, sources. Read from YAML by
+// io::read_case_config, which resolves relative paths against the case file and rejects unknown
+// keys. Defaults: Table 1 and sections 2.2-2.6 of Ji, Roberts, Hartov, Paulsen (2009), unless
+// case_keys.hpp names another source.
 #pragma once
 
 #include <array>
@@ -42,12 +43,12 @@ struct TumourLabel {
   std::filesystem::path path;  // NIfTI label volume
   int label = 1;
 };
-struct TumourSurface {
+struct TumourSurfaceFile {
   std::filesystem::path path;  // .stl, .ply, .obj or .vtp, mm RAS, closed
 };
 
-// An opening on the brain surface: boundary nodes within an ellipse around `centre_mm`, in the plane
-// tangential to the surface, with the given full axes (the paper's "45 x 24 mm").
+// An opening on the brain surface: boundary nodes within an ellipse around `centre_mm`, in the
+// plane tangential to the surface, with the given full axes (the paper's "45 x 24 mm").
 struct Craniotomy {
   Vec3 centre_mm = Vec3::Zero();  // projected to the nearest boundary point
   double long_axis_mm = 45.0;
@@ -90,23 +91,27 @@ struct ContactConfig {
 };
 
 // Prior on forces: zero mean, force density with standard deviation and correlation length, plus
-// modes for what pose, drainage and the water in the tissue leave open (inversion/load_modes.hpp).
+// modes for what pose, drainage and the water in the tissue leave open (prior/load_modes.hpp).
 struct PriorConfig {
   double correlation_length_mm = 5.0;
   double force_density_sd_n_m3 = 1000.0;
-  double gravity_mode_sd = 1.0;  // in units of the full buoyancy load; 0 switches the modes off
-  // How well the direction of gravity is known: modes across it have gravity_mode_sd times its tangent.
+  // In units of the full buoyancy load; 0 switches the modes off.
+  double gravity_mode_sd = 1.0;
+  // Standard deviation of the direction of gravity. A mode across it has gravity_mode_sd times the
+  // tangent of this angle.
   double gravity_direction_sd_deg = 10.0;
-  std::vector<double> gravity_levels_mm = {0.0, 20.0,
-                                           40.0};  // fluid planes below the reference plane
-  // Volume strain of swelling or shrinking tissue around the tumour, standard deviation at its centre; 0: the modes are
-  // off. 0.05 is what is usual where oedema is to be expected; a single surgery may have four times as much
-  // (kLargestScales): vasogenic oedema that raises the water content of white matter from 0.70 to 0.75 adds 0.2.
+  // Fluid planes below the reference plane.
+  std::vector<double> gravity_levels_mm = {0.0, 20.0, 40.0};
+  // Volume strain of swelling or shrinking tissue around the tumour: standard deviation at its
+  // centre. 0 switches the modes off. 0.05 is usual where oedema is to be expected; a single
+  // surgery may have four times as much (kLargestScales). Vasogenic oedema that raises the water
+  // content of white matter from 0.70 to 0.75 adds 0.2.
   double swelling_strain_sd = 0.0;
-  std::vector<double> swelling_radii_mm = {15.0, 30.0,
-                                           50.0};  // standard deviations of the Gaussians
-  // Method condensed: the strength of the prior's parts is estimated from the data, starting from the standard
-  // deviations above, known to a factor of 9 (two standard deviations of ln).
+  // Standard deviations of the Gaussians.
+  std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};
+  // Method condensed: the strength of the prior's parts is estimated from the data. It starts from
+  // the standard deviations above, which count as known to a factor of 9 (two standard deviations
+  // of ln).
   bool estimate_scales = true;
 };
 
@@ -119,16 +124,20 @@ struct InversionConfig {
 
 // How a measured cortical surface guides the model.
 enum class SurfaceGuidance {
-  kDistances,  // distances along the normal to the deformed model's surface, which may slide; method condensed only
-  kRigid,      // displacements of a rigid alignment, as for the tumour's boundary
+  // Distances along the normal to the deformed model's surface, which may slide along it. Method
+  // condensed only.
+  kDistances,
+  // Displacements of a rigid alignment, as for the tumour's boundary.
+  kRigid,
 };
 std::string_view to_string(SurfaceGuidance guidance);  // "distances", "rigid"
 
 // What is made of the room's measurements.
 struct SensingConfig {
-  // Observations of other sources are used beside the newest one while they are not older than this.
+  // Observations of other sources are used beside the newest one until they are older than this.
   double max_age_s = 120.0;
-  // Method condensed: data far from what the others and the prior say count less (robust_weights.hpp).
+  // Method condensed: data far from what the others and the prior say count less
+  // (inversion/condensed/robust_weights.hpp).
   bool robust_weights = true;
   SurfaceGuidance surface = SurfaceGuidance::kDistances;
   int surface_points = 300;  // that guide the model
@@ -139,15 +148,18 @@ struct SensingConfig {
 
 // What becomes of data outside the region that was prepared (method condensed).
 enum class OutsideRegion {
-  kExtend,  // all modes are read there; what they leave out of the prior is added to the datum's variance
-  kRefuse,  // kInvalidArgument names the datum
+  // All modes are read there. What they leave out of the prior is added to the datum's variance.
+  kExtend,
+  // kInvalidArgument names the datum.
+  kRefuse,
 };
 std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
-  // Largest number of prior modes kept, gravity modes among them. 128 move the estimate by less
-  // than 2 micrometres in the default scenario (docs/decisions/0008).
+  // Largest number of prior modes kept, gravity and swelling modes among them. Against all modes,
+  // 128 move the estimate by less than 2 micrometres in the default scenario
+  // (docs/decisions/0008).
   int max_rank = 128;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
@@ -159,9 +171,11 @@ struct CondensedConfig {
   OutsideRegion outside_region = OutsideRegion::kExtend;
 };
 
-// Which parts of the work a scene carries. kAuto: decided from case and data; every omission is listed in the
-// Update with its reason and an estimate of the error.
+// Which parts of the work a scene carries. kAuto: decided from case and data. Every Update lists
+// each omission with its reason and an estimate of the error.
 enum class Carry { kAuto, kOn, kOff };
+std::string_view to_string(Carry carry);  // "auto", "on", "off"
+
 struct SceneConfig {
   Carry pressure = Carry::kAuto;
   Carry contact = Carry::kAuto;
@@ -169,7 +183,7 @@ struct SceneConfig {
   Carry surface = Carry::kAuto;   // cortical surface data
   Carry uncertainty = Carry::kAuto;
   Carry gravity_modes = Carry::kAuto;
-  Carry far_field = Carry::kAuto;       // off: only the region of interest is rebuilt
+  Carry far_field = Carry::kAuto;       // kOff: only the region of interest is rebuilt
   double region_of_interest_mm = 40.0;  // around the tumour, used with far_field off
   double pressure_step_s = 60.0;        // since the load changed, used with pressure on
 };
@@ -182,7 +196,7 @@ struct CaseConfig {
   std::filesystem::path brain;  // mask or skull-stripped MRI: voxels > 0 are brain
 
   std::variant<MeshGeneration, MeshFile> mesh = MeshGeneration{};
-  std::variant<TumourEllipsoid, TumourLabel, TumourSurface> tumour = TumourEllipsoid{};
+  std::variant<TumourEllipsoid, TumourLabel, TumourSurfaceFile> tumour = TumourEllipsoid{};
   Craniotomy craniotomy;
   Brainstem brainstem;
   Vec3 gravity_direction = Vec3(0, -1, 0);  // normalised on reading
@@ -195,9 +209,8 @@ struct CaseConfig {
   SceneConfig scene;
 };
 
-std::string_view to_string(Carry carry);  // "auto", "on", "off"
-
-// Ok, or kInvalidArgument naming key, value and constraint ("material.poisson_ratio = 0.6: must be ...").
+// Ok, or kInvalidArgument. The message names key, value and constraint
+// ("material.poisson_ratio = 0.6: must be ...").
 Status validate(const CaseConfig& config);
 
 }  // namespace brainshift

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <vector>
 
+#include "common/core/rigid_motion.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/yaml_section.hpp"
 
@@ -56,7 +57,7 @@ std::string list(const std::vector<double>& values) {
   return text + "]";
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -121,7 +122,7 @@ std::string calibration_text(const StereoCalibration& calibration) {
   if (!calibration.pairs.empty()) text += "pairs:\n";
   for (const CalibrationPair& pair : calibration.pairs)
     text.append("  ")
-        .append(quoted(pair.name))
+        .append(in_quotes(pair.name))
         .append(": ")
         .append(digits(pair.rms_px))
         .append("\n");

@@ -1,50 +1,67 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// load_case_inputs of config_file.hpp.
-#include "common/io/config/config_file.hpp"
+#include "common/io/config/case_inputs_file.hpp"
+
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
+#include "common/values/case_keys.hpp"
 
 namespace brainshift::io {
 namespace {
 
-// Moves a result into its place, or says which key named the file.
-template <typename T>
-Status store(const std::string& key, Result<T> result, std::optional<T>& place) {
-  if (!result) return fail(result.error().code, key + ": " + result.error().message);
-  place = std::move(*result);
-  return {};
-}
+namespace fs = std::filesystem;
+
+class Loader {
+ public:
+  explicit Loader(const CaseConfig& config) : config_(config) {}
+
+  // Puts what `read` makes of the file into its place. An error names the key. Nothing happens
+  // after the first error.
+  template <typename T>
+  void load(const fs::path& member, Result<T> (*read)(const fs::path&), std::optional<T>& place) {
+    if (!status_) return;
+    Result<T> result = read(member);
+    if (result) {
+      place = std::move(*result);
+    } else {
+      blame(member, result.error());
+    }
+  }
+  void look_up(const fs::path& member) {
+    if (member.empty() || !status_) return;
+    if (Status found = check_regular_file(member); !found) blame(member, found.error());
+  }
+  const Status& status() const { return status_; }
+
+ private:
+  void blame(const fs::path& member, const Error& error) {
+    status_ = fail(error.code, key_of(config_, member) + ": " + error.message);
+  }
+  const CaseConfig& config_;
+  Status status_;
+};
 
 }  // namespace
 
 Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
   CaseInputs inputs;
   inputs.config = config;
-  Status status;
-  if (!config.mri.empty()) {
-    if (Status mri = check_regular_file(config.mri); !mri) {
-      return fail(mri.error().code, "images.mri: " + mri.error().message);
-    }
-  }
+  Loader loader(config);
+  loader.look_up(config.mri);
   if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
-    status = store("mesh.file", read_tet_mesh(file->path), inputs.mesh);
+    loader.load(file->path, read_tet_mesh, inputs.mesh);
   } else {
-    status = store("images.brain", read_nifti(config.brain), inputs.brain);
+    loader.load(config.brain, read_nifti, inputs.brain);
   }
-  if (!status) return tl::unexpected(status.error());
-
   if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
-    status = store("tumour.label_volume.file", read_nifti(label->path), inputs.tumour_labels);
-  } else if (const auto* surface = std::get_if<TumourSurface>(&config.tumour)) {
-    status = store("tumour.surface.file", read_surface(surface->path), inputs.tumour_surface);
+    loader.load(label->path, read_nifti, inputs.tumour_labels);
+  } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {
+    loader.load(surface->path, read_surface, inputs.tumour_surface);
   }
-  if (!status) return tl::unexpected(status.error());
-
   if (config.contact.skull_file) {
-    status = store("contact.skull_file", read_surface(*config.contact.skull_file), inputs.skull);
+    loader.load(*config.contact.skull_file, read_surface, inputs.skull);
   }
-  if (!status) return tl::unexpected(status.error());
+  if (!loader.status()) return tl::unexpected(loader.status().error());
   return inputs;
 }
 

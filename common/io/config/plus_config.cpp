@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/config/plus_config.hpp"
+#include "common/core/rigid_motion.hpp"
 
 #include <fmt/format.h>
 
@@ -38,14 +39,14 @@ Result<PlusTransform> read_transform(const pugi::xml_node& node) {
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
   const bool scales = tracking::is_image_frame(frames.from) || tracking::is_image_frame(frames.to);
-  const Status usable = scales ? tracking::check_affine(matrix) : tracking::check_rigid(matrix);
+  const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
   if (!usable) {
     return fail(ErrorCode::kUnreadable, name + ": Matrix " + usable.error().message);
   }
   if (scales) {
     transform.link.T_to_from.matrix() = matrix;
   } else {
-    transform.link.T_to_from = tracking::nearest_rigid(matrix);
+    transform.link.T_to_from = nearest_rigid(matrix);
   }
   if (const auto error = parse_numbers<1>(node.attribute("Error").value())) {
     transform.error = error->front();

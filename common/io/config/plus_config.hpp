@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Device set files of the PLUS Toolkit (XML): the constant transforms and how volumes are to be reconstructed.
+// Device set files of the PLUS Toolkit (XML): the constant transforms and how volumes are to be
+// reconstructed.
 //
-//   PlusConfiguration / CoordinateDefinitions / Transform  From, To, Matrix (16 numbers, row by row), Error, Date
-//   PlusConfiguration / VolumeReconstruction               ClipRectangleOrigin, ClipRectangleSize (pixels), OutputSpacing
+//   PlusConfiguration / CoordinateDefinitions / Transform
+//       From, To, Matrix (16 numbers, row by row), Error, Date
+//   PlusConfiguration / VolumeReconstruction
+//       ClipRectangleOrigin, ClipRectangleSize (pixels), OutputSpacing
 //
-// ImageToProbe turns pixels into mm: it scales, and its third column is a direction without meaning for flat images. Links
-// between frames of bodies must be rigid. The rest of the file is not looked at.
+// ImageToProbe turns pixels into mm: it scales, and its third column is a direction without
+// meaning for flat images. Links between frames of bodies must be rigid. The rest of the file is
+// not looked at.
 #pragma once
 
 #include <array>

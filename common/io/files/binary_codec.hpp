@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The encodings that mesh files use: numbers of either byte order, base64, zlib. Errors are a sentence
-// without the file name, which the caller puts in front.
+// The encodings that mesh files use: numbers of either byte order, base64, zlib. Errors are a
+// sentence without the file name, which the caller puts in front.
 #pragma once
 
 #include <algorithm>
@@ -51,8 +51,8 @@ class RawSource : public ByteSource {
   std::string_view bytes_;
 };
 
-// Skips white space. Padding may also occur inside, where one encoded stream follows another: VTK encodes
-// an array's header and its data apart, other writers together.
+// Skips white space. Padding may also occur inside, where one encoded stream follows another: VTK
+// encodes an array's header and its data apart, other writers together.
 class Base64Source : public ByteSource {
  public:
   explicit Base64Source(std::string_view text) : text_(text) {}

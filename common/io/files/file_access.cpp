@@ -100,7 +100,8 @@ PendingFile::~PendingFile() {
 }
 
 Result<PendingFile> PendingFile::create(const fs::path& path) {
-  // Process and counter keep two writers of the same target apart; hidden, so that no glob picks it up.
+  // Process and counter keep two writers of the same target apart; hidden, so that no glob picks
+  // it up.
   static std::atomic<unsigned> counter{0};
   std::string name = ".";
   name += path.filename().string() + ".tmp-" + std::to_string(::getpid()) + "-";

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whole files in and out; every write is checked, and a reader never sees half a file.
 //
-// A file is written under a temporary name in its own folder, synced, renamed over the final name, and
-// the folder is synced: after a crash there is the old file or the new one. Messages begin with the path.
+// A file is written under a temporary name in its own folder, synced, renamed over the final
+// name, and the folder is synced: after a crash there is the old file or the new one. Messages
+// begin with the path.
 #pragma once
 
 #include <filesystem>
@@ -22,8 +23,8 @@ Result<std::string> read_file(const std::filesystem::path& path);
 // Replaces `path` by `content`, or leaves it as it was. kWriteFailed.
 Status write_file(const std::filesystem::path& path, std::string_view content);
 
-// For libraries that write the file themselves: they write to temporary_path(), and commit() puts the
-// complete file in place. Without commit() the temporary file is removed.
+// For libraries that write the file themselves: they write to temporary_path(), and commit() puts
+// the complete file in place. Without commit() the temporary file is removed.
 class PendingFile {
  public:
   // The temporary file exists and is empty. kWriteFailed.

@@ -9,8 +9,9 @@
 
 namespace brainshift::io {
 
-// One row per line that is neither empty nor begins with '#' or "//"; numbers between blanks, tabs, commas or
-// semicolons. kUnreadable names line and word. "nan" and "inf" are numbers here; the caller judges.
+// One row per line that is neither empty nor begins with '#' or "//"; numbers between blanks,
+// tabs, commas or semicolons. kUnreadable names line and word. "nan" and "inf" are numbers here;
+// the caller judges.
 Result<std::vector<std::vector<double>>> parse_number_rows(const std::string& text);
 
 }  // namespace brainshift::io

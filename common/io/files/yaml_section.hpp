@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A YAML document read strictly: every key must be known, every value of its type, nothing twice.
 //
-// Usage: open a document, take values by key, then finish(). The first problem wins; all later calls are
-// no-ops, so a reader is a plain list of keys:
+// Usage: open a document, take values by key, ask for status(). The first problem wins and
+// all later calls do nothing, so a reader is a plain list of keys:
 //   YamlDocument document = YamlDocument::parse(text, file);
 //   YamlSection material = document.root().section("material");
 //   material.number("poisson_ratio", config.material.poisson_ratio);   // optional: default stays
 //   material.done();                                                    // unknown keys are errors
 //   Status status = document.status();
-// Messages: "FILE:LINE: KEY = VALUE: must be ...", KEY with its sections ("material.poisson_ratio").
+// Messages: "FILE:LINE: KEY = VALUE: must be ...", KEY with its sections
+// ("material.poisson_ratio").
 #pragma once
 
 #include <filesystem>
@@ -59,7 +60,8 @@ class YamlSection {
   void text(const std::string& key, std::string& value, Presence presence = Presence::kOptional);
   // One of `words`.
   void choice(const std::string& key, std::string& value, const std::vector<std::string>& words);
-  // Relative paths are taken from the document's folder; the result is absolute. Empty text: empty path.
+  // Relative paths are taken from the document's folder; the result is absolute. Empty text:
+  // empty path.
   void path(const std::string& key, std::filesystem::path& value,
             Presence presence = Presence::kOptional);
   // [x, y, z]
@@ -81,7 +83,8 @@ class YamlSection {
   // The value of a key, or null (and an error, if required).
   std::shared_ptr<Node> take(const std::string& key, Presence presence);
   std::string full_key(const std::string& key) const;
-  // Lines for messages, 0 if unknown: of a key, and of the section's heading (where a missing key belongs).
+  // Lines for messages, 0 if unknown: of a key, and of the section's heading (where a missing key
+  // belongs).
   int line_of_key(const std::string& key) const;
   int own_line() const;
 

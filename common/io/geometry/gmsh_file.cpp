@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gmsh .msh, versions 2.2 and 4.1, ASCII and binary. Both encodings hold the same numbers in the same
-// order, so one reader walks both and only the cursor differs.
+// Both encodings hold the same numbers in the same order, so one reader walks both and only the
+// cursor differs.
+#include "common/io/geometry/gmsh_file.hpp"
+
 #include <charconv>
 #include <limits>
 #include <map>
 #include <unordered_map>
 
 #include "common/io/files/binary_codec.hpp"
-#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -15,7 +16,8 @@ namespace {
 constexpr int kTetrahedron = 4;
 constexpr int kTriangle = 2;
 
-// Thrown inside this file only, so that the readers stay a plain list of numbers; parse_gmsh catches it.
+// Thrown inside this file only, so that the readers stay a plain list of numbers; parse_gmsh
+// catches it.
 struct FormatProblem {
   std::string message;
 };
@@ -74,7 +76,8 @@ class Cursor {
   int integer() { return number<std::int32_t>(); }
   std::int64_t size() { return number<std::int64_t>(); }  // size_t in the file
   double real() { return number<double>(); }
-  // A count of things that take at least one byte each: a larger one is a lie and would exhaust memory.
+  // A count of things that take at least one byte each: a larger one is a lie and would exhaust
+  // memory.
   std::int64_t checked(std::int64_t count) {
     if (count < 0 || static_cast<std::uint64_t>(count) > rest_.size()) {
       refuse("section '" + section_ + "' promises " + std::to_string(count) + " entries");

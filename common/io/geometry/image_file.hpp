@@ -9,10 +9,11 @@
 
 namespace brainshift::io {
 
-// Reads a 3-D NIfTI-1/2 image (.nii, .nii.gz, .hdr/.img). Honours the sform, else the qform (oblique and
-// left-handed ones too), scl_slope / scl_inter, every integer and float type. A 4-D image with one time
-// point is accepted. Fails with kNotFound, or kUnreadable naming the file and what is wrong (no 3-D image,
-// no usable affine, unsupported type, truncated, non-finite affine or spatial unit that is not mm).
+// Reads a 3-D NIfTI-1/2 image (.nii, .nii.gz, .hdr/.img). Honours the sform, else the qform
+// (oblique and left-handed ones too), scl_slope / scl_inter, every integer and float type. A 4-D
+// image with one time point is accepted. Fails with kNotFound, or kUnreadable naming the file and
+// what is wrong (no 3-D image, no usable affine, unsupported type, truncated, non-finite affine
+// or spatial unit that is not mm).
 Result<VoxelImage> read_nifti(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

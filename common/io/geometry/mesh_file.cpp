@@ -5,7 +5,12 @@
 #include <cctype>
 
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/mesh_formats.hpp"
+#include "common/io/geometry/gmsh_file.hpp"
+#include "common/io/geometry/obj_file.hpp"
+#include "common/io/geometry/ply_file.hpp"
+#include "common/io/geometry/stl_file.hpp"
+#include "common/io/geometry/vtk_xml_file.hpp"
+#include "common/io/geometry/xyz_file.hpp"
 
 namespace brainshift::io {
 namespace {

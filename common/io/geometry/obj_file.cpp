@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Wavefront .obj: `v x y z` and triangular `f a b c` lines, where a vertex may carry texture and normal
-// indices (a/b/c) and count from the end (-1 is the latest vertex). Everything else is skipped.
+#include "common/io/geometry/obj_file.hpp"
+
 #include <limits>
 #include <sstream>
 #include <vector>
-
-#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {

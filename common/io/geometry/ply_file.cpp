@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .ply, ascii and binary: elements "vertex" (x, y, z) and "face" (a list of vertex indices); all other
-// elements and properties are skipped. Source: Greg Turk, "The PLY Polygon File Format".
+#include "common/io/geometry/ply_file.hpp"
+
 #include <charconv>
 #include <cstdint>
 #include <limits>
@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "common/io/files/binary_codec.hpp"
-#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {

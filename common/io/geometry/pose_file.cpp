@@ -1,55 +1,87 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/geometry/pose_file.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
 #include <vector>
 
-#include "common/values/stereo_calibration.hpp"
+#include "common/core/rigid_motion.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/files/number_text.hpp"
-#include "common/io/files/yaml_section.hpp"
 
 namespace brainshift::io {
 namespace {
 
-constexpr std::size_t kNumbers = 16;
+// What may stand between numbers in text, JSON and YAML; "-" begins an entry of a YAML list.
+constexpr std::string_view kSeparators = " \t\r\n,;[]{}\"':-";
 
-Result<std::vector<double>> yaml_numbers(const std::string& text, const std::filesystem::path& path,
-                                         const std::string& name) {
-  YamlDocument document = YamlDocument::parse(text, path);
-  YamlSection root = document.root();
+// A '-' or '+' that belongs to a number; "-nan" and "-inf" are refused later, by their own names.
+bool is_sign_of_number(std::string_view text) {
+  return text.size() > 1 && text[0] == '-' &&
+         ((text[1] >= '0' && text[1] <= '9') || text[1] == '.' || text[1] == 'i' || text[1] == 'n');
+}
+
+void skip_separators(std::string_view& rest) {
+  while (!rest.empty()) {
+    const bool separator =
+        !is_sign_of_number(rest) && kSeparators.find(rest.front()) != std::string_view::npos;
+    if (!separator) return;
+    rest.remove_prefix(1);
+  }
+}
+
+// The numbers of a text without comments; kUnreadable for anything else in it.
+Result<std::vector<double>> parse_numbers(std::string_view rest, const std::string& name) {
+  skip_separators(rest);
+  if (rest.rfind(name, 0) == 0) rest.remove_prefix(name.size());
   std::vector<double> numbers;
-  root.numbers(name, numbers, Presence::kRequired);
-  root.done();
-  if (Status ok = document.status(); !ok) return tl::unexpected(ok.error());
+  for (skip_separators(rest); !rest.empty(); skip_separators(rest)) {
+    const std::size_t end = std::min(rest.find_first_of(" \t\r\n,;[]{}"), rest.size());
+    std::string_view word = rest.substr(0, end);
+    if (word.size() > 1 && word.front() == '+' && word[1] != '-') word.remove_prefix(1);
+    double number = 0.0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    if (error != std::errc() || stop != word.data() + word.size()) {
+      return fail(ErrorCode::kUnreadable,
+                  fmt::format("\"{}\" is no number of a 4 x 4 matrix {}", word.substr(0, 30), name));
+    }
+    numbers.push_back(number);
+    rest.remove_prefix(end);
+  }
   return numbers;
+}
+
+std::string without_comments(std::string_view text) {
+  std::string kept;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
+    const std::string_view line = text.substr(0, end);
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first == std::string_view::npos || line[first] != '#') kept += line;
+    text.remove_prefix(end);
+  }
+  return kept;
 }
 
 }  // namespace
 
 Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name) {
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
-  const std::string extension = path.extension().string();
-  std::vector<double> numbers;
-  if (extension == ".yaml" || extension == ".yml") {
-    auto read = yaml_numbers(*text, path, name);
-    if (!read) return tl::unexpected(read.error());
-    numbers = std::move(*read);
-  } else {
-    auto rows = parse_number_rows(*text);
-    if (!rows) return file_error(rows.error().code, path, rows.error().message);
-    for (const std::vector<double>& row : *rows)
-      numbers.insert(numbers.end(), row.begin(), row.end());
-  }
-  if (numbers.size() != kNumbers) {
+  const auto content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const auto numbers = parse_numbers(without_comments(*content), name);
+  if (!numbers) return file_error(numbers.error().code, path, numbers.error().message);
+  if (numbers->size() != 16) {
     return file_error(ErrorCode::kUnreadable, path,
-                      name + " has " + std::to_string(numbers.size()) +
-                          " numbers: must have sixteen, a 4 x 4 matrix row by row");
+                      fmt::format("{} has {} numbers: must have 16, a 4 x 4 matrix row by row",
+                                  name, numbers->size()));
   }
-  Eigen::Matrix4d matrix;
-  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = numbers[static_cast<std::size_t>(i)];
-  if (Status ok = check_rigid(name, matrix); !ok)
-    return file_error(ok.error().code, path, ok.error().message);
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
+  if (Status rigid = check_rigid(matrix); !rigid) {
+    return file_error(ErrorCode::kUnreadable, path, name + " " + rigid.error().message);
+  }
   return nearest_rigid(matrix);
 }
 

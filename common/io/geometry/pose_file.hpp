@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A rigid transform from a file, for poses of cameras and probes.
+// A rigid transform from a file: poses of cameras and probes, the patient registration.
 //
-// .yaml or .yml: a mapping with one key, the transform's name, whose value is the 4 x 4 matrix, sixteen numbers row by
-// row, flat. Any other name: a text of sixteen numbers between white space or commas, row by row, nothing else; lines
-// that begin with # are skipped. Lengths in mm.
+// The file holds the 16 numbers of the 4 x 4 matrix row by row, lengths in mm, as plain text,
+// JSON or YAML. The transform's name may stand in front as a key; lines that begin with # are
+// skipped:
+//   1 0 0 10
+//   0 1 0 0 ...
+//   {"T_ras_reference": [[1, 0, 0, 10], ...]}
+//   T_ras_reference: [1, 0, 0, 10, ...]
 #pragma once
 
 #include <filesystem>
@@ -14,8 +18,9 @@
 
 namespace brainshift::io {
 
-// `name`: "T_ras_camera". kNotFound, kUnreadable (another number of numbers), kNotFinite, kInvalidArgument: the file
-// does not hold a rigid motion (core/stereo_calibration.hpp, check_rigid). Messages begin with the file.
+// `name`: "T_ras_camera". Rotations with three decimals are accepted (core/rigid_motion.hpp) and
+// made orthonormal. kNotFound; kUnreadable, which names the file and what is wrong: a word that
+// is no number, another number of numbers, not a rigid motion.
 Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name);
 
 }  // namespace brainshift::io

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .stl, ASCII and binary. STL stores three corners per triangle; equal corners become one vertex.
+#include "common/io/geometry/stl_file.hpp"
+
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -8,7 +9,6 @@
 #include <vector>
 
 #include "common/io/files/binary_codec.hpp"
-#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -16,8 +16,8 @@ namespace {
 constexpr std::size_t kHeader = 84;    // 80 bytes of text, 4 of count
 constexpr std::size_t kTriangle = 50;  // normal, three corners (floats), 2 bytes of attributes
 
-// Merges corners whose coordinates are equal bit for bit (after making -0 into 0): programs write a shared
-// vertex with the same digits each time.
+// Merges corners whose coordinates are equal bit for bit (after making -0 into 0): programs write
+// a shared vertex with the same digits each time.
 class SurfaceBuilder {
  public:
   void add_corner(double x, double y, double z) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// write_surface of mesh_file.hpp: .ply and .vtp.
+#include "common/io/geometry/surface_writer.hpp"
+
 #include <bit>
 #include <cstdint>
 
 #include "common/io/files/binary_codec.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/mesh_formats.hpp"
 #include "common/io/geometry/vtk_xml_writing.hpp"
 
 namespace brainshift::io {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // VTK's XML container: arrays by name out of .vtu and .vtp files, whatever their encoding.
 //
-// ascii, binary (base64) and appended (raw or base64) arrays; zlib-compressed or not; header_type UInt32
-// or UInt64; either byte order. Source: VTK user's guide, "VTK XML file formats". Messages name the array
-// and not the file.
+// ascii, binary (base64) and appended (raw or base64) arrays; zlib-compressed or not; header_type
+// UInt32 or UInt64; either byte order. Source: VTK user's guide, "VTK XML file formats". Messages
+// name the array and not the file.
 #pragma once
 
 #include <cstdint>
@@ -32,15 +32,16 @@ class VtkXmlFile {
   VtkXmlFile(VtkXmlFile&&) noexcept;
   ~VtkXmlFile();
 
-  // An integer attribute of the piece, e.g. "NumberOfPoints"; 0 when absent, kUnreadable if no count.
+  // An integer attribute of the piece, e.g. "NumberOfPoints"; 0 when absent, kUnreadable if no
+  // count.
   Result<std::int64_t> count(const std::string& attribute) const;
 
   // Arrays of a section of the piece ("Points", "Cells", "PointData"), without decoding.
   std::vector<std::string> array_names(const std::string& section) const;
   bool is_real_array(const std::string& section, std::size_t index) const;
 
-  // The index-th array of a section; `tuples` is the expected number, or -1 to take what the file has
-  // (connectivity, whose length no attribute tells).
+  // The index-th array of a section; `tuples` is the expected number, or -1 to take what the file
+  // has (connectivity, whose length no attribute tells).
   Result<VtkArray> array(const std::string& section, std::size_t index, std::int64_t tuples) const;
   // By name.
   Result<VtkArray> array(const std::string& section, const std::string& name,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .vtu and .vtp: what the arrays of a VTK XML file mean.
+#include "common/io/geometry/vtk_xml_file.hpp"
+
 #include <limits>
 
-#include "common/io/geometry/mesh_formats.hpp"
 #include "common/io/geometry/vtk_xml.hpp"
 
 namespace brainshift::io {

@@ -25,8 +25,8 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-// Header [blocks][block size][size of a partial last block, or 0][compressed sizes], then the blocks;
-// header and blocks are base64 streams of their own, as VTK writes them.
+// Header [blocks][block size][size of a partial last block, or 0][compressed sizes], then the
+// blocks; header and blocks are base64 streams of their own, as VTK writes them.
 }  // namespace
 
 std::string vtk_encoded(std::string_view bytes) {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// VTK's XML container as it is written: base64 of zlib blocks, in this machine's byte order. Private to io.
+// VTK's XML container as it is written: base64 of zlib blocks, in this machine's byte order.
+// Private to io.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/node_field.hpp"
 
 namespace brainshift::io {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// write_vtu of mesh_file.hpp.
+#include "common/io/geometry/vtu_writer.hpp"
+
 #include <cassert>
 #include <cstdint>
 
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/mesh_file.hpp"
 #include "common/io/geometry/vtk_xml_writing.hpp"
 
 namespace brainshift::io {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Point clouds in plain text: x, y, z at the start of each line.
+#include "common/io/geometry/xyz_file.hpp"
+
 #include <algorithm>
 
-#include "common/io/geometry/mesh_formats.hpp"
 #include "common/io/files/number_text.hpp"
 
 namespace brainshift::io {

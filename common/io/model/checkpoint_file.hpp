@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CheckpointFile: blocks of a long computation, kept as they are finished, so that it can go on after an
-// interruption.
+// CheckpointFile: blocks of a long computation, kept as they are finished, so that it can go on
+// after an interruption.
 //
-// The file is only appended to. It begins with {magic, version, key, CRC-32}; the key says what the blocks belong
-// to, and a file of another key is started afresh. Each block follows as {index, scalar size, rows, columns,
-// CRC-32s} and its numbers, column by column. What an interruption left incomplete, and everything behind a
-// damaged block, is dropped on opening. Native byte order: it is no file to keep or to give away.
+// The file is only appended to. It begins with {magic, version, key, CRC-32}; the key says what
+// the blocks belong to, and a file of another key is started afresh. Each block follows as
+// {index, scalar size, rows, columns, CRC-32s} and its numbers, column by column. What an
+// interruption left incomplete, and everything behind a damaged block, is dropped on opening.
+// Native byte order: it is no file to keep or to give away.
 //
-// Not synced block by block: a block that a power failure lost fails its checksum and is computed again.
-// append() and read() may be called from several threads at once.
+// Not synced block by block: a block that a power failure lost fails its checksum and is computed
+// again. append() and read() may be called from several threads at once.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,8 +24,8 @@ namespace brainshift::io {
 
 class CheckpointFile {
  public:
-  // kUnreadable for a file that is there but is no checkpoint (it is left as it is); kUnavailable when another
-  // process has it open; kWriteFailed when it cannot be made.
+  // kUnreadable for a file that is there but is no checkpoint (it is left as it is); kUnavailable
+  // when another process has it open; kWriteFailed when it cannot be made.
   static Result<CheckpointFile> open_or_create(const std::filesystem::path& path,
                                                std::uint64_t key);
   CheckpointFile(CheckpointFile&&) noexcept;
@@ -39,8 +40,9 @@ class CheckpointFile {
   Status append(int index, const Eigen::Ref<const Eigen::MatrixXf>& block);
   Status append(int index, const Eigen::Ref<const Eigen::MatrixXd>& block);
 
-  // Into `out`, which has the block's shape, e.g. columns of a larger matrix. kNotFound; kInvalidArgument for
-  // another shape or scalar; kUnreadable (then `out` holds no meaningful numbers).
+  // Into `out`, which has the block's shape, e.g. columns of a larger matrix. kNotFound;
+  // kInvalidArgument for another shape or scalar; kUnreadable (then `out` holds no meaningful
+  // numbers).
   Status read(int index, Eigen::Ref<Eigen::MatrixXf> out) const;
   Status read(int index, Eigen::Ref<Eigen::MatrixXd> out) const;
 

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// misfit_of of model_layout.hpp.
+#include "common/io/model/condensed_check.hpp"
+
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <cstring>
 
 #include "common/core/thread_team.hpp"
-#include "common/io/model/model_layout.hpp"
 
 namespace brainshift::io {
 namespace {
 
-// A number is finite unless all bits of its exponent are set. Whole-number arithmetic without branches, so that
-// the compiler vectorises it: the loop runs as fast as memory.
+// A number is finite unless all bits of its exponent are set. Whole-number arithmetic without
+// branches, so that the compiler vectorises it: the loop runs as fast as memory.
 bool finite(const float* values, std::size_t count) {
   constexpr std::uint32_t kExponent = 0x7f800000u;
   std::uint32_t bad = 0;
@@ -110,7 +110,8 @@ bool are_slaves(std::vector<NodeIndex> list, std::vector<NodeIndex> slaves) {
 
 }  // namespace
 
-std::optional<std::string> misfit_of(const CondensedOperators& operators, const BrainModel& model) {
+std::optional<std::string> incompatibility_of(const CondensedOperators& operators,
+                                              const BrainModel& model) {
   const Eigen::Index n = model.mesh.num_nodes();
   const Eigen::Index r = operators.modes.cols();
   const auto s = static_cast<Eigen::Index>(operators.slaves.size());

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The /condensed group of a model file.
+#include "common/io/model/condensed_layout.hpp"
+
 #include <algorithm>
 
-#include "common/io/model/model_layout.hpp"
+#include "common/io/model/condensed_check.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -25,9 +26,9 @@ VecX packed_lower(const Eigen::MatrixXd& matrix) {
   return packed;
 }
 
-// The packed numbers are read into the end of the matrix's own memory and spread from its beginning: column j
-// goes to [jn + j, (j+1)n) and comes from n(n-1)/2 + jn - j(j-1)/2, which is never before its target and lies
-// behind all columns already spread.
+// The packed numbers are read into the end of the matrix's own memory and spread from its
+// beginning: column j goes to [jn + j, (j+1)n) and comes from n(n-1)/2 + jn - j(j-1)/2, which is
+// never before its target and lies behind all columns already spread.
 void read_symmetric(const Hdf5Reader& in, const std::string& name, Eigen::Index n,
                     Eigen::MatrixXd& out) {
   out.resize(n, n);
@@ -107,7 +108,7 @@ std::vector<CondensedOperators> read_condensed(const Hdf5Reader& in, const Brain
   for (const Boundary boundary : kBoundaries) {
     if (!in.has(group_of(boundary))) continue;
     all.push_back(read_one(in, boundary));
-    if (const auto misfit = misfit_of(all.back(), model)) throw Hdf5Problem{*misfit};
+    if (const auto problem = incompatibility_of(all.back(), model)) throw Hdf5Problem{*problem};
   }
   return all;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file around the groups of model_layout.hpp: its first block, its checksum, its atomic writing.
+// The file around the groups of model_layout.hpp: its first block, its checksum, its atomic
+// writing.
 #include "common/io/model/model_file.hpp"
 
 #include <fcntl.h>
@@ -11,11 +12,13 @@
 #include <string>
 #include <string_view>
 
-#include "common/values/model_id.hpp"
 #include "common/io/files/checksum.hpp"
 #include "common/io/files/descriptor.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/model/condensed_check.hpp"
+#include "common/io/model/condensed_layout.hpp"
 #include "common/io/model/model_layout.hpp"
+#include "common/values/model_id.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -44,7 +47,8 @@ std::string quoted_line(const std::string& header, std::size_t at) {
   return "'" + line + "'";
 }
 
-// Ok if the file is whole and unchanged since it was written. The checksum comes last, for it takes time.
+// Ok if the file is whole and unchanged since it was written. The checksum comes last, for it
+// takes time.
 Status check_header(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   std::string header(kHeaderSize, '\0');
@@ -101,7 +105,8 @@ Status check_content(const fs::path& path, const ModelFile& file) {
   if (Status valid = validate(file.model.tumour_distance); !valid)
     return refuse("tumour_distance: " + valid.error().message);
   for (std::size_t i = 0; i < file.condensed.size(); ++i) {
-    if (const auto misfit = misfit_of(file.condensed[i], file.model)) return refuse(*misfit);
+    if (const auto problem = incompatibility_of(file.condensed[i], file.model))
+      return refuse(*problem);
     for (std::size_t j = 0; j < i; ++j) {
       if (file.condensed[i].boundary == file.condensed[j].boundary) {
         return refuse("has two sets of operators for the boundary condition " +
@@ -157,8 +162,9 @@ Result<ModelFile> read_once(const fs::path& path) {
   }
 }
 
-// Reading opens the file by its name more than once, and a newer model may take its place in between. While a
-// file is held open its number is not given to another one, so the name still leads to it if numbers agree.
+// Reading opens the file by its name more than once, and a newer model may take its place in
+// between. While a file is held open its number is not given to another one, so the name still
+// leads to it if numbers agree.
 bool is_still(const fs::path& path, const Descriptor& held) {
   struct stat now {};
   struct stat then {};

@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Model file: a BrainModel with the case it came from and its condensed operators, HDF5. Written to a temporary
-// name, synced, renamed: a reader finds the old file or the new one.
+// Model file: a BrainModel with the case it came from and its condensed operators, HDF5. Written
+// to a temporary name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
 //   brainshift model file\nformat 3\nbytes N\ncrc32 XXXXXXXX\n
-// N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is checked first,
-// because the HDF5 library itself is not safe against damaged files.
+// N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is
+// checked first, because the HDF5 library itself is not safe against damaged files.
 //
-// HDF5 layout. Shapes are rows x columns of the data set; n nodes, r modes, s slaves, c control nodes. Points are
-// n x 3 float64, indices int32, text uint8, all little-endian; data sets are contiguous, not compressed.
-//   root attributes  case_id, model_id, gravity_direction, fluid_plane_depth_mm, slave_plane_depth_mm
-//   /case/{yaml, file}  the case as case_config_text gives it and the path of its file (re-parsed on reading;
-//                       the file itself is not needed any more)
-//   /inputs/KEY         one group per input, attributes path, bytes (uint64), crc32 (uint32); model_inputs.hpp
-//   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles}, /tumour/{vertices,triangles},
-//   /sets/{craniotomy,brainstem,slaves,fixed}
-//   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); absent when the model has none
-//     values_mm               dims 1*2*3  float32  signed distance to /tumour, common/core/distance_grid.hpp
-//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes (int32),
-//                                         prepare_s (float64, s)
+// HDF5 layout. Shapes are rows x columns of the data set; n nodes, r modes, s slaves, c control
+// nodes. Points are n x 3 float64, indices int32, text uint8, all little-endian; data sets are
+// contiguous, not compressed.
+//   root attributes  case_id, model_id, gravity_direction, fluid_plane_depth_mm,
+//                    slave_plane_depth_mm
+//   /case/{yaml, file}  the case as case_config_text gives it and the path of its file. The text is
+//                       parsed again on reading; the file itself is not needed any more.
+//   /inputs/KEY         one group per input, attributes path, bytes (uint64), crc32 (uint32);
+//                       model_inputs.hpp
+//   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles},
+//   /tumour/{vertices,triangles}, /sets/{craniotomy,brainstem,slaves,fixed}
+//   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); the model may have none
+//     values_mm               dims 1*2*3  float32  signed distance, core/distance_grid.hpp
+//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes
+//                                         (int32), prepare_s (float64, s)
 //     modes                   r x 3n      float32  mm     U, one mode per row
 //     contact_columns         s x 3n      float32  mm/N   G, one slave per row
-//     compliance_lower        s(s+1)/2    float64  mm/N   Phi: columns of the lower triangle, diagonal first
+//     compliance_lower        s(s+1)/2    float64  mm/N   Phi: lower triangle, by columns
 //     slave_modes             r x s       float64  mm     N^T U, one mode per row
 //     slave_normals           s x 3       float64
 //     initial_penetration_mm  s           float64
@@ -31,7 +34,7 @@
 //     truncated_variance_mm2  c           float64
 //     control_neighbours      n x 4       int32    into control; 0 x 4 without control nodes
 //     control_weights         n x 4       float32
-// model_id is the hash of the model (common/core/model_id.hpp).
+// model_id is the hash of the model (common/values/model_id.hpp).
 //
 // The HDF5 library is not thread-safe: one call at a time in a process.
 #pragma once
@@ -39,11 +42,11 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/core/error.hpp"
+#include "common/io/model/model_inputs.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
 #include "common/values/condensed_operators.hpp"
-#include "common/core/error.hpp"
-#include "common/io/model/model_inputs.hpp"
 
 namespace brainshift::io {
 
@@ -54,11 +57,13 @@ struct ModelFile {
   std::vector<InputFile> inputs = {};              // record_inputs, sorted by key
 };
 
-// kWriteFailed; kInvalidArgument when model.model_id is not content_hash(model), the case or the distance grid is not
-// valid, or operators do not fit the model or are not finite (the sentence names the array).
+// kWriteFailed; kInvalidArgument when model.model_id is not content_hash(model), the case or the
+// distance grid is not valid, or operators do not fit the model or are not finite (the sentence
+// names the array).
 Status write_model(const std::filesystem::path& path, const ModelFile& file);
-// kNotFound; kUnreadable, with the reason, for a file that is no model file, of another format, truncated, altered,
-// whose content does not hash to its model_id or whose operators do not fit the model.
+// kNotFound; kUnreadable, with the reason, for a file that is no model file, of another format,
+// truncated, altered, whose content does not hash to its model_id or whose operators do not fit
+// the model.
 Result<ModelFile> read_model(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

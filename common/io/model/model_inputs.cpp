@@ -2,39 +2,16 @@
 #include "common/io/model/model_inputs.hpp"
 
 #include <algorithm>
-#include <utility>
 
-#include "common/io/files/checksum.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/io/files/checksum.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/values/case_keys.hpp"
 
 namespace brainshift::io {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr const char* kCase = "case";
-
-// The files that a case names, by key.
-std::vector<std::pair<std::string, fs::path>> named_files(const CaseConfig& config) {
-  std::vector<std::pair<std::string, fs::path>> files;
-  const auto add = [&files](const char* key, const fs::path& path) {
-    if (!path.empty()) files.emplace_back(key, path);
-  };
-  add("images.mri", config.mri);
-  if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
-    add("mesh.file", file->path);
-  } else {
-    add("images.brain", config.brain);
-  }
-  if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
-    add("tumour.label_volume.file", label->path);
-  } else if (const auto* surface = std::get_if<TumourSurface>(&config.tumour)) {
-    add("tumour.surface.file", surface->path);
-  }
-  if (config.contact.skull_file) add("contact.skull_file", *config.contact.skull_file);
-  return files;
-}
 
 FileChecksum case_checksum(const CaseConfig& config) {
   const std::string text = case_config_text(config);

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fiducials for the patient registration, from a .csv; lengths mm, '#' begins a comment, a heading is allowed.
+// Fiducials for the patient registration, from a .csv; lengths mm, '#' begins a comment, a
+// heading is allowed.
 //
-//   reference_x,reference_y,reference_z,ras_x,ras_y,ras_z     a pair per row: touched by the pointer, and in the image
-//   reference,x,y,z  and  ras,x,y,z                           a point per row where the order is not known; the
-//                                                             correspondence is found (registration/fiducials.hpp)
+//   reference_x,reference_y,reference_z,ras_x,ras_y,ras_z
+//       a pair per row: touched by the pointer, and in the image
+//   reference,x,y,z  and  ras,x,y,z
+//       a point per row where the order is not known. The correspondence is found
+//       (registration/fiducials.hpp).
 #pragma once
 
 #include <filesystem>
@@ -18,7 +21,8 @@ struct FiducialFile {
   bool matched = false;                    // the correspondence was found, not given
 };
 
-// kNotFound; kUnreadable naming file and line; the errors of register_fiducials and match_fiducials, naming the file.
+// kNotFound; kUnreadable naming file and line; the errors of register_fiducials and
+// match_fiducials, naming the file.
 Result<FiducialFile> read_fiducials(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

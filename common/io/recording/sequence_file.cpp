@@ -9,6 +9,7 @@
 #include "common/io/files/file_access.hpp"
 #include "common/io/recording/sequence_frames.hpp"
 #include "common/io/recording/sequence_header.hpp"
+#include "common/io/recording/sequence_values.hpp"
 
 namespace brainshift::io {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/recording/sequence_frames.hpp"
+#include "common/core/rigid_motion.hpp"
 
 #include <fmt/format.h>
 
@@ -88,7 +89,7 @@ Status read_link(const FrameFields& fields, int frame, int count, const std::str
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
   const bool scales =
       tracking::is_image_frame(frames->from) || tracking::is_image_frame(frames->to);
-  const Status usable = scales ? tracking::check_affine(matrix) : tracking::check_rigid(matrix);
+  const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
   if (!usable) {
     recording.defects.push_back({frame, frame_field(frame, name), usable.error().message});
     return {};
@@ -97,7 +98,7 @@ Status read_link(const FrameFields& fields, int frame, int count, const std::str
   if (scales) {
     link.T_to_from.matrix() = matrix;
   } else {
-    link.T_to_from = tracking::nearest_rigid(matrix);
+    link.T_to_from = nearest_rigid(matrix);
   }
   return {};
 }

@@ -8,7 +8,8 @@
 
 namespace brainshift::io {
 
-// Fills time_s, image_ok, links and defects for `count` frames. kUnreadable naming frame and field.
+// Fills time_s, image_ok, links and defects for `count` frames. kUnreadable naming frame and
+// field.
 Status read_frame_fields(const SequenceHeader& header, int count, tracking::Recording& recording);
 
 }  // namespace brainshift::io

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The text headers of MetaImage (.mha) and NRRD image sequences, and where their pixels begin.
 //
-// MetaImage: lines "Key = value" up to and with "ElementDataFile = LOCAL". NRRD: a magic line, lines "field: value" and
-// "key:=value" and comments "#" up to an empty line. Fields of frame i are called "Seq_Frame000i_Name" in both. Of either
-// only what a sequence of single-channel images needs is understood; the rest of the fields is kept as text.
-// Sources: MetaIO documentation (itk.org), teem.sourceforge.net/nrrd/format.html, PLUS user manual "Sequence file".
+// MetaImage: lines "Key = value" up to and with "ElementDataFile = LOCAL". NRRD: a magic line,
+// lines "field: value" and "key:=value" and comments "#" up to an empty line. Fields of frame i
+// are called "Seq_Frame000i_Name" in both. Of either only what a sequence of single-channel
+// images needs is understood; the rest of the fields is kept as text. Sources: MetaIO
+// documentation (itk.org), teem.sourceforge.net/nrrd/format.html, PLUS user manual "Sequence
+// file".
 #pragma once
 
 #include <cstdint>
@@ -23,7 +25,8 @@ struct SequenceHeader {
   bool big_endian = false;
   bool compressed = false;
   std::map<std::string, std::string> fields;  // of the whole file, MetaImage names
-  // Fields of each frame, "ProbeToTrackerTransform" for Seq_Frame0012_ProbeToTrackerTransform; by frame number.
+  // Fields of each frame, "ProbeToTrackerTransform" for Seq_Frame0012_ProbeToTrackerTransform; by
+  // frame number.
   std::map<int, std::map<std::string, std::string>> frames;
   std::string_view data;  // the bytes behind the header; refers to the content that was parsed
 };
@@ -34,9 +37,5 @@ std::string frame_field(int frame, const std::string& name);
 // kUnreadable with a sentence that names the field and its value, without the file.
 Result<SequenceHeader> parse_meta_header(std::string_view content);
 Result<SequenceHeader> parse_nrrd_header(std::string_view content);
-
-// The pixels as the file orders them, expanded, in native byte order: product(sizes) x bytes_per_value. kUnreadable for
-// data that are truncated, damaged, longer than the sizes say, or above 8 GiB.
-Result<std::string> sequence_values(const SequenceHeader& header, int bytes_per_value);
 
 }  // namespace brainshift::io

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/recording/sequence_values.hpp"
+
 #include <fmt/format.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <bit>
 #include <limits>
-
-#include "common/io/recording/sequence_header.hpp"
 
 namespace brainshift::io {
 namespace {

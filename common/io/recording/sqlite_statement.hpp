@@ -10,7 +10,8 @@
 
 namespace brainshift::io {
 
-// A prepared statement. Binding and stepping remember the first failure; done() and row() report it.
+// A prepared statement. Binding and stepping remember the first failure; done() and row() report
+// it.
 class Statement {
  public:
   Statement(sqlite3* db, const char* sql) {

@@ -7,6 +7,7 @@
 
 #include <bit>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -57,7 +58,7 @@ CREATE TABLE truth_scalar(
 constexpr const char* kInsertRecord =
     "INSERT INTO record(kind, sequence, recorded_ns, payload) VALUES(?1, ?2, ?3, ?4)";
 constexpr const char* kSelectRecords =
-    "SELECT kind, sequence, recorded_ns, payload FROM record WHERE kind = ?1 ORDER BY id";
+    "SELECT sequence, recorded_ns, payload FROM record WHERE kind = ?1 ORDER BY id";
 constexpr const char* kSelectField =
     "SELECT nodes, displacement FROM truth_field WHERE observation_sequence = ?1";
 constexpr const char* kSelectPoints =
@@ -66,7 +67,35 @@ constexpr const char* kSelectPoints =
 constexpr const char* kSelectScalars =
     "SELECT name, value FROM truth_scalar WHERE observation_sequence = ?1";
 
-bool is_record_kind(std::string_view kind) { return kind == "observation" || kind == "update"; }
+// Every key of the meta table is named once; MetaWriter and MetaReader walk the same list.
+template <typename A, typename Meta>
+void visit(A& a, Meta& meta) {
+  a("case_id", meta.case_id), a("model_id", meta.model_id), a("case_file", meta.case_file);
+  a("scenario", meta.scenario), a("seed", meta.seed), a("method", meta.method);
+  a("boundary", meta.boundary), a("created_utc", meta.created_utc), a("software", meta.software);
+}
+
+struct MetaWriter {
+  std::map<std::string, std::string> rows;
+  void operator()(const char* key, const std::string& value) {
+    if (!value.empty()) rows[key] = value;
+  }
+  void operator()(const char* key, const std::optional<std::uint64_t>& value) {
+    if (value) rows[key] = std::to_string(*value);
+  }
+};
+
+struct MetaReader {
+  std::map<std::string, std::string> rows;
+  void operator()(const char* key, std::string& value) { value = rows[key]; }
+  // A seed that is not a whole number counts as not given.
+  void operator()(const char* key, std::optional<std::uint64_t>& value) {
+    const std::string& text = rows[key];
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error == std::errc() && end == text.data() + text.size()) value = number;
+  }
+};
 
 // SQLite integers are signed; a sequence beyond them would come back negative.
 bool fits(std::uint64_t sequence) {
@@ -102,11 +131,22 @@ Status check_truth(const fs::path& path, const SurgeryTruth& truth) {
 
 }  // namespace
 
+std::string_view to_string(RecordKind kind) {
+  return kind == RecordKind::kObservation ? "observation" : "update";
+}
+
+void discard_surgery(const fs::path& path) {
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    std::error_code ignored;
+    fs::remove(fs::path(path) += suffix, ignored);
+  }
+}
+
 struct SurgeryFile::Impl {
   fs::path path;
   sqlite3* db = nullptr;
   bool writable = false;
-  std::map<std::string, std::string> meta;
+  SurgeryMeta meta;
   std::unique_ptr<Statement> insert_record;
 
   Impl() = default;
@@ -170,7 +210,9 @@ Status SurgeryFile::Impl::initialise() {
     return write_failure("schema");
   }
   Statement insert(db, "INSERT INTO meta(key, value) VALUES(?1, ?2)");
-  for (const auto& [key, value] : meta) {
+  MetaWriter writer;
+  visit(writer, meta);
+  for (const auto& [key, value] : writer.rows) {
     if (!insert.bind_text(1, key).bind_text(2, value).run()) return write_failure("meta");
   }
   if (!execute("COMMIT")) return write_failure("meta");
@@ -193,8 +235,8 @@ Status SurgeryFile::Impl::verify() {
   for (const char* sql : {kSelectRecords, kSelectField, kSelectPoints, kSelectScalars}) {
     if (!Statement(db, sql).ok()) return read_failure("surgery file");
   }
-  // SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file itself
-  // may rightly be torn, and the log mends it.
+  // SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file
+  // itself may rightly be torn, and the log mends it.
   std::error_code ignored;
   const auto page_size = query("PRAGMA page_size");
   const auto log_bytes = fs::file_size(fs::path(path) += "-wal", ignored);
@@ -204,8 +246,10 @@ Status SurgeryFile::Impl::verify() {
     return file_error(ErrorCode::kUnreadable, path, "is truncated");
   }
   Statement select(db, "SELECT key, value FROM meta");
-  while (select.row()) meta[select.bytes(0)] = select.bytes(1);
+  MetaReader reader;
+  while (select.row()) reader.rows[select.bytes(0)] = select.bytes(1);
   if (!select.ok()) return read_failure("meta");
+  visit(reader, meta);
   return {};
 }
 
@@ -264,8 +308,7 @@ SurgeryFile& SurgeryFile::operator=(SurgeryFile&&) noexcept = default;
 // Without close() SQLite folds the log as well as it can; nobody is left to be told of a failure.
 SurgeryFile::~SurgeryFile() = default;
 
-Result<SurgeryFile> SurgeryFile::create(const fs::path& path,
-                                        const std::map<std::string, std::string>& meta) {
+Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta& meta) {
   // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty.
   const int reserved = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
   if (reserved < 0) {
@@ -281,10 +324,7 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path,
   if (status) status = impl->initialise();
   if (!status) {
     impl.reset();
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
-      std::error_code ignored;
-      fs::remove(fs::path(path) += suffix, ignored);
-    }
+    discard_surgery(path);
     return fail(ErrorCode::kWriteFailed, status.error().message);
   }
   return SurgeryFile(std::move(impl));
@@ -330,16 +370,15 @@ Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
 
 Status SurgeryFile::append(const SurgeryRecord& record) {
   if (Status status = impl_->check_writable("record"); !status) return status;
-  if (!is_record_kind(record.kind) || !fits(record.sequence)) {
-    return file_error(ErrorCode::kInvalidArgument, impl_->path,
-                      "record of kind \"" + record.kind + "\" and sequence " +
-                          std::to_string(record.sequence) +
-                          ": kind must be observation or update, sequence below 2^63");
+  if (!fits(record.sequence)) {
+    return file_error(
+        ErrorCode::kInvalidArgument, impl_->path,
+        "record of sequence " + std::to_string(record.sequence) + ": must be below 2^63");
   }
   if (!impl_->insert_record) {
     impl_->insert_record = std::make_unique<Statement>(impl_->db, kInsertRecord);
   }
-  const bool written = impl_->insert_record->bind_text(1, record.kind)
+  const bool written = impl_->insert_record->bind_text(1, to_string(record.kind))
                            .bind(2, static_cast<std::int64_t>(record.sequence))
                            .bind(3, record.recorded_ns)
                            .bind_blob(4, record.payload.data(), record.payload.size())
@@ -378,20 +417,16 @@ Status SurgeryFile::close() {
   return status;
 }
 
-const std::map<std::string, std::string>& SurgeryFile::meta() const { return impl_->meta; }
+const SurgeryMeta& SurgeryFile::meta() const { return impl_->meta; }
 
-Result<std::vector<SurgeryRecord>> SurgeryFile::records(const std::string& kind) const {
+Result<std::vector<SurgeryRecord>> SurgeryFile::records(RecordKind kind) const {
   if (impl_->db == nullptr) return impl_->read_failure("records");
-  if (!is_record_kind(kind)) {
-    return file_error(ErrorCode::kInvalidArgument, impl_->path,
-                      "records of kind \"" + kind + "\": must be observation or update");
-  }
   std::vector<SurgeryRecord> records;
   Statement select(impl_->db, kSelectRecords);
-  select.bind_text(1, kind);
+  select.bind_text(1, to_string(kind));
   while (select.row()) {
-    records.push_back({select.bytes(0), static_cast<std::uint64_t>(select.integer(1)),
-                       select.integer(2), select.bytes(3)});
+    records.push_back(
+        {kind, static_cast<std::uint64_t>(select.integer(0)), select.integer(1), select.bytes(2)});
   }
   if (!select.ok()) return impl_->read_failure("records");
   return records;

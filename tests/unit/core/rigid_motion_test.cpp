@@ -24,15 +24,26 @@ void expect_not_rigid(const Eigen::Matrix4d& matrix, const std::string& says) {
   EXPECT_THAT(status.error().message, HasSubstr(says));
 }
 
-TEST(CheckRigid, AcceptsRotationsRoundedToFourDigits) {
-  for (double angle = 0.0; angle < 3.0; angle += 0.1) {
-    Eigen::Matrix4d matrix = rotation(angle);
-    matrix = (matrix * 1e4).array().round() / 1e4;
-    EXPECT_TRUE(check_rigid(matrix)) << angle;
-    const RigidTransform T = nearest_rigid(matrix);
-    EXPECT_LT((T.linear().transpose() * T.linear() - Mat3::Identity()).norm(), 1e-14);
-    EXPECT_LT((T.matrix() - rotation(angle)).cwiseAbs().maxCoeff(), 2e-4);
+// Rounding moves an entry by up to half of the last digit; the nearest rotation is within twice
+// that.
+TEST(CheckRigid, AcceptsRotationsRoundedToThreeDecimals) {
+  for (const double decimals : {1e3, 1e4, 1e6}) {
+    for (double angle = 0.0; angle < 3.0; angle += 0.1) {
+      Eigen::Matrix4d matrix = rotation(angle);
+      matrix = (matrix * decimals).array().round() / decimals;
+      EXPECT_TRUE(check_rigid(matrix)) << angle;
+      const RigidTransform T = nearest_rigid(matrix);
+      EXPECT_LT((T.linear().transpose() * T.linear() - Mat3::Identity()).norm(), 1e-14);
+      EXPECT_LT((T.matrix() - rotation(angle)).cwiseAbs().maxCoeff(), 1.0 / decimals);
+    }
   }
+}
+
+TEST(CheckRigid, TakesAnotherToleranceFromItsCaller) {
+  Eigen::Matrix4d matrix = rotation(0.7);
+  matrix.topLeftCorner<3, 3>() *= 1.0005;
+  EXPECT_TRUE(check_rigid(matrix));
+  EXPECT_FALSE(check_rigid(matrix, 1e-4));
 }
 
 TEST(CheckRigid, RefusesScaleReflectionShearAndInfinity) {

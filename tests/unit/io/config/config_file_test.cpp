@@ -3,18 +3,16 @@
 
 #include <gmock/gmock.h>
 
-#include <sstream>
-
+#include "common/values/case_keys.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/io/config/documented_keys.hpp"
 
 namespace brainshift::io {
 namespace {
 
 using test_support::content_of;
-using test_support::TemporaryFolder;
 
 namespace fs = std::filesystem;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -138,7 +136,7 @@ TEST(CaseFile, ReadyMeshAndTumourSurfaceNeedNoBrainMask) {
   const auto read = parse_case_config(text, "/cases/c.yaml");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(std::get<MeshFile>(read->mesh).path, "/cases/head.msh");
-  EXPECT_EQ(std::get<TumourSurface>(read->tumour).path, "/cases/tumour.stl");
+  EXPECT_EQ(std::get<TumourSurfaceFile>(read->tumour).path, "/cases/tumour.stl");
 }
 
 TEST(CaseFile, EdgeLengthHoldsForRegionsWithoutTheirOwn) {
@@ -391,82 +389,9 @@ TEST(ShippedCases, DefaultCaseHasThePapersTumourVolume) {
   EXPECT_NEAR(4.0 / 3.0 * 3.14159265358979 * axes.prod(), 10990.0, 0.01);
 }
 
-// The default case shows every key: whoever adds one must document it there.
-TEST(ShippedCases, DefaultCaseDocumentsEveryKey) {
-  const auto full = parse_case_config(kFull, "c.yaml");
-  ASSERT_TRUE(full);
-  const std::string shipped =
-      content_of(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml");
-  std::istringstream lines(case_config_text(*full));
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t begin = line.find_first_not_of(' ');
-    const std::string key = line.substr(begin, line.find(':') - begin);
-    EXPECT_THAT(shipped, HasSubstr(key + ":"));
-  }
-}
-
-TEST(DaemonFile, ShippedFileHasTheDefaults) {
-  const auto read = read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/daemon.yaml");
-  ASSERT_TRUE(read) << read.error().message;
-  const DaemonConfig defaults;
-  EXPECT_EQ(read->endpoint, defaults.endpoint);
-  EXPECT_EQ(read->model, defaults.model);
-  EXPECT_EQ(read->journal_dir, defaults.journal_dir);
-  EXPECT_EQ(read->log_level, defaults.log_level);
-  EXPECT_EQ(read->max_clients, defaults.max_clients);
-  EXPECT_EQ(read->max_message_mib, defaults.max_message_mib);
-}
-
-class DaemonFileKeys : public testing::Test {
- protected:
-  Result<DaemonConfig> read(const std::string& text) {
-    return read_daemon_config(folder_.write("d.yaml", text));
-  }
-  TemporaryFolder folder_;
-};
-
-TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
-  const auto config = read(
-      "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
-      "max_message_mib: 5\n");
-  ASSERT_TRUE(config) << config.error().message;
-  EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
-  EXPECT_EQ(config->model, folder_ / "m.h5");
-  EXPECT_EQ(config->journal_dir, "/j");
-  EXPECT_EQ(config->log_level, "debug");
-  EXPECT_EQ(config->max_clients, 3);
-  EXPECT_EQ(config->max_message_mib, 5);
-}
-
-TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
-  const std::pair<const char*, const char*> kBad[] = {
-      {"# a\nport: 5", "d.yaml:2: port: unknown key"},
-      {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
-      {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
-      {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
-      {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 1024"},
-      {"max_message_mib: 1025", "d.yaml:1: max_message_mib = 1025: must be"},
-      {"log_level: loud", "d.yaml:1: log_level = loud: must be trace, debug, info, warn or error"},
-      {"endpoint: 5555", "d.yaml:1: endpoint = 5555: must be tcp://HOST:PORT"},
-      {"endpoint: 'tcp://'", "endpoint = tcp://: must be"},
-      {"endpoint: 'tcp://host'", "endpoint = tcp://host: must be"},
-      {"endpoint: 'tcp://host:'", "endpoint = tcp://host:: must be"},
-      {"endpoint: 'ipc://'", "endpoint = ipc://: must be"},
-      {"model: [a]", "d.yaml:1: model = [a]: must be text"},
-  };
-  for (const auto& [text, message] : kBad) {
-    const auto config = read(text);
-    ASSERT_FALSE(config) << text;
-    EXPECT_EQ(config.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(config.error().message,
-                AllOf(HasSubstr(message), HasSubstr(folder_.path().string())));
-  }
-}
-
-TEST_F(DaemonFileKeys, MissingFileIsNotFound) {
-  const auto config = read_daemon_config(folder_ / "absent.yaml");
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().code, ErrorCode::kNotFound);
+TEST(ShippedCases, DefaultCaseDocumentsEveryKeyAsTheTableDoes) {
+  expect_documented(content_of(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml"),
+                    case_key_documents());
 }
 
 }  // namespace

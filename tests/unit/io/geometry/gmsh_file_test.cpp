@@ -97,7 +97,8 @@ std::string version_2(bool binary, bool swap = false) {
 std::string version_4(bool binary, bool swap = false) {
   Numbers out(binary, swap);
   format(out, "4.1");
-  // A point with a physical tag, a surface with two bounding curves, two volumes in groups 7 and 8.
+  // A point with a physical tag, a surface with two bounding curves, two volumes in groups 7 and
+  // 8.
   out.text("$Entities\n").size(1).size(0).size(1).size(2).new_line();
   out.integer(1).real(0).real(0).real(0).size(1).integer(99).new_line();
   out.integer(1);

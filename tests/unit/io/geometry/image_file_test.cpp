@@ -370,11 +370,22 @@ TEST_F(ImageFile, MetresAndMicrometresAreRefused) {
   }
 }
 
-TEST_F(ImageFile, NonFiniteScalingIsRefusedOrIgnoredButNeverSpread) {
-  const float inf = std::numeric_limits<float>::infinity();
-  const auto image = read(Header().scaling(inf, 0.0f), voxels<float>(24));
-  if (!image) return;
-  for (const float value : image->values) EXPECT_TRUE(std::isfinite(value));
+// libnifti reads a slope or intercept that is not finite as 0: no scaling, or no shift.
+TEST_F(ImageFile, NonFiniteScalingIsIgnored) {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const auto plain = read(Header(), voxels<float>(24));
+  ASSERT_TRUE(plain) << plain.error().message;
+  for (const float slope : {kInf, -kInf, kNan}) {
+    const auto image = read(Header().scaling(slope, 5.0f), voxels<float>(24));
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->values, plain->values) << slope;
+  }
+  const auto twice = read(Header().scaling(2.0f, kNan), voxels<float>(24));
+  ASSERT_TRUE(twice) << twice.error().message;
+  for (std::size_t i = 0; i < plain->values.size(); ++i) {
+    EXPECT_EQ(twice->values[i], 2.0f * plain->values[i]);
+  }
 }
 
 TEST_F(ImageFile, MissingFileIsNotFoundEvenBesideAGzippedOne) {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/surface_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .vtu and .vtp in every encoding, put together here by hand; base64 has its own encoder (zlib's is the
-// library's), so that an error in the reader's codec cannot cancel out.
+// .vtu and .vtp in every encoding, put together here by hand; base64 has its own encoder (zlib's
+// is the library's), so that an error in the reader's codec cannot cancel out.
 #include <gmock/gmock.h>
 #include <zlib.h>
 
@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -132,7 +133,8 @@ class Writer {
   std::string appended_;
 };
 
-// A tetrahedron, a triangle that is to be ignored, another tetrahedron; point 4 belongs to the triangle.
+// A tetrahedron, a triangle that is to be ignored, another tetrahedron; point 4 belongs to the
+// triangle.
 const std::vector<double> kPoints = {0, 0, 0,     1.5, 0, 0, 0, 2.25, 0,
                                      0, 0, -3e-3, 9,   9, 9, 1, 1,    1e2};
 const std::vector<std::int64_t> kConnectivity = {0, 1, 2, 3, 0, 1, 4, 5, 1, 2, 0};

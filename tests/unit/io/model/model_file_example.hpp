@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A small model file with every part, and its first block made independently of the code under test.
+// A small model file with every part, and its first block made independently of the code under
+// test.
 #pragma once
 
 #include <zlib.h>
@@ -8,9 +9,9 @@
 #include <sstream>
 #include <string>
 
-#include "common/values/model_id.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/model/model_file.hpp"
+#include "common/values/model_id.hpp"
 
 namespace brainshift::io::test_example {
 
@@ -67,7 +68,8 @@ void count_up(Matrix& values, Eigen::Index rows, Eigen::Index columns, double fr
   }
 }
 
-// Fits model_file(): 5 nodes, 3 modes, 2 slaves (the other way round than in the model), 2 control nodes.
+// Fits model_file(): 5 nodes, 3 modes, 2 slaves (the other way round than in the model), 2
+// control nodes.
 inline CondensedOperators operators(Boundary boundary) {
   CondensedOperators result;
   result.boundary = boundary;

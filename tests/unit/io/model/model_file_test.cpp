@@ -285,7 +285,8 @@ TEST_F(ModelFileTest, FullDiskLeavesTheOldFileAlone) {
   EXPECT_TRUE(write_model(folder_ / "m.h5", condensed_file())) << "HDF5 is still usable";
 }
 
-// The other process replaces the file all the time; HDF5 itself allows one call at a time in a process.
+// The other process replaces the file all the time; HDF5 itself allows one call at a time in a
+// process.
 TEST_F(ModelFileTest, ReaderNeverSeesAHalfWrittenModel) {
   const auto path = written();
   const pid_t writer = fork();

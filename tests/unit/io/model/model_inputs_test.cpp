@@ -54,7 +54,7 @@ TEST_F(ModelInputsTest, EveryFileOfACaseIsRecorded) {
 
 TEST_F(ModelInputsTest, MeshAndSurfaceFilesAreRecorded) {
   config_.mesh = MeshFile{folder_.write("brain.msh", "mesh")};
-  config_.tumour = TumourSurface{folder_.write("tumour.ply", "surface")};
+  config_.tumour = TumourSurfaceFile{folder_.write("tumour.ply", "surface")};
   const auto inputs = record_inputs(config_);
   ASSERT_TRUE(inputs) << inputs.error().message;
   EXPECT_THAT(keys(*inputs), ElementsAre("case", "contact.skull_file", "images.mri", "mesh.file",

@@ -2,8 +2,9 @@
 // load_case_inputs: which files are read, and which key a bad one is blamed on.
 #include <gmock/gmock.h>
 
+#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -30,7 +31,7 @@ class CaseInputsFile : public testing::Test {
     folder_.write("s.stl", kSurface);
     folder_.write("t1.nii", "only looked up");
     config_.mesh = MeshFile{folder_ / "mesh.vtu"};
-    config_.tumour = TumourSurface{folder_ / "s.stl"};
+    config_.tumour = TumourSurfaceFile{folder_ / "s.stl"};
     config_.contact.skull_file = folder_ / "s.stl";
     config_.mri = folder_ / "t1.nii";
   }
@@ -61,7 +62,7 @@ TEST_F(CaseInputsFile, MissingFilesAreBlamedOnTheirKeys) {
   config_.mri.clear();
   config_.contact.skull_file = folder_ / "no_skull.stl";
   expect_blame(ErrorCode::kNotFound, "contact.skull_file", "no_skull.stl: no such file");
-  config_.tumour = TumourSurface{folder_ / "no_tumour.stl"};
+  config_.tumour = TumourSurfaceFile{folder_ / "no_tumour.stl"};
   expect_blame(ErrorCode::kNotFound, "tumour.surface.file", "no_tumour.stl: no such file");
   config_.tumour = TumourLabel{folder_ / "no_labels.nii", 1};
   expect_blame(ErrorCode::kNotFound, "tumour.label_volume.file", "no_labels.nii: no such file");

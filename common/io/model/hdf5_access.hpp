@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The few HDF5 calls that a model file needs. For the .cpp files of this folder only.
 //
-// Every number has a fixed size and byte order in the file, so that it means the same on every machine. Data
-// sets are contiguous and not compressed: they are read straight into their final place.
-// A matrix is column-major in memory; its columns are the rows of the data set (3 x n points: n x 3).
+// Every number has a fixed size and byte order in the file, so that it means the same on every
+// machine. Data sets are contiguous and not compressed: they are read straight into their final
+// place. A matrix is column-major in memory; its columns are the rows of the data set (3 x n
+// points: n x 3).
 #pragma once
 
 #include <hdf5.h>
@@ -16,15 +17,16 @@
 
 namespace brainshift::io {
 
-// Thrown inside the model file's sources only, by the first HDF5 call that fails; write_model and read_model
-// catch it.
+// Thrown inside the model file's sources only, by the first HDF5 call that fails; write_model and
+// read_model catch it.
 struct Hdf5Problem {
   std::string message;
 };
 
-// To be made before any other HDF5 call. HDF5 prints every failed call to stderr unless told otherwise. At the
-// exit of the process it would close a file again that could not be closed, because the disk was full, and crash;
-// everything is closed here explicitly, so it is told to do nothing then.
+// To be made before any other HDF5 call. HDF5 prints every failed call to stderr unless told
+// otherwise. At the exit of the process it would close a file again that could not be closed,
+// because the disk was full, and crash; everything is closed here explicitly, so it is told to do
+// nothing then.
 class QuietHdf5 {
  public:
   QuietHdf5() {
@@ -103,7 +105,8 @@ struct Hdf5Type<std::uint32_t> {
   static hid_t file() { return H5T_STD_U32LE; }
 };
 
-// Names are paths from the root ("mesh/nodes"); an attribute's `object` is a group, "/" for the root.
+// Names are paths from the root ("mesh/nodes"); an attribute's `object` is a group, "/" for the
+// root.
 class Hdf5Writer {
  public:
   explicit Hdf5Writer(hid_t file) : file_(file) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/io/files/hdf5_access.hpp"
+#include "common/io/model/hdf5_access.hpp"
 
 #include <algorithm>
 

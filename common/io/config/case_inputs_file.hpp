@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files that a case names, read.
+#pragma once
+
+#include "common/core/error.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/case_inputs.hpp"
+
+namespace brainshift::io {
+
+// Reads the files that a case names. The MRI, which only pictures need, is just looked up.
+// kNotFound, kUnreadable: the message names key and file.
+Result<CaseInputs> load_case_inputs(const CaseConfig& config);
+
+}  // namespace brainshift::io

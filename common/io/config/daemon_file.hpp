@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The daemon's configuration file (YAML) to plain values. Unknown keys are errors. Every message
+// is one line: file, line, key, value, constraint.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/values/key_table.hpp"
+
+namespace brainshift::io {
+
+// What a daemon file says (config/daemon.yaml documents every key; the table is in the .cpp).
+struct DaemonConfig {
+  std::string endpoint = "tcp://127.0.0.1:5555";  // tcp://HOST:PORT or ipc://PATH
+  // Model file. Empty: clients get model_not_ready until one is loaded.
+  std::filesystem::path model;
+  std::filesystem::path journal_dir;  // empty: no journal
+  std::string log_level = "info";
+  int max_clients = 32;
+  int max_message_mib = 64;
+};
+
+// Reads and validates; relative paths are taken from the file's folder.
+Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path);
+
+// The documentation of every key.
+std::vector<KeyDocument> daemon_key_documents();
+
+}  // namespace brainshift::io
