@@ -59,4 +59,18 @@ std::vector<KeyDocument> case_key_documents() {
   return documenter.documents();
 }
 
+// What follows the table, of case_config.hpp.
+
+Status validate(const CaseConfig& config) {
+  KeyChecker checker;
+  visit(checker, config);
+  checker.require(!config.brain.empty() || !std::holds_alternative<MeshGeneration>(config.mesh),
+                  "images.brain", "must name a brain mask to mesh");
+  return checker.status();
+}
+
+std::string_view to_string(SurfaceGuidance guidance) { return word_of(guidance, kGuidanceWords); }
+std::string_view to_string(OutsideRegion outside) { return word_of(outside, kOutsideWords); }
+std::string_view to_string(Carry carry) { return word_of(carry, kCarryWords); }
+
 }  // namespace brainshift

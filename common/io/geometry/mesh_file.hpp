@@ -34,10 +34,6 @@ Result<TriangleSurface> read_surface_or_points(const std::filesystem::path& path
 
 // A VTU's mesh with all of its point arrays that are float or double, in file order. Keeps
 // unreferenced nodes, so that node i is the file's point i.
-struct MeshWithFields {
-  TetMesh mesh;
-  std::vector<NodeField> node_fields;
-};
 Result<MeshWithFields> read_vtu(const std::filesystem::path& path);
 
 // Lower-case, with its dot.

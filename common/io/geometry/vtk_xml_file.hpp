@@ -8,7 +8,7 @@
 #include "common/core/error.hpp"
 #include "common/core/grouped_mesh.hpp"
 #include "common/core/mesh.hpp"
-#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/node_field.hpp"
 
 namespace brainshift::io {
 
