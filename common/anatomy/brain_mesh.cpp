@@ -24,7 +24,8 @@ namespace {
 // A head is 150-200 mm; 20 admits small phantoms, 400 giants.
 constexpr double kSmallestExtent_mm = 20.0;
 constexpr double kLargestExtent_mm = 400.0;
-// Growth of the edge per mm away from a refined zone; Delaunay refinement grades like this by itself.
+// Growth of the edge per mm away from a refined zone. Delaunay refinement by itself grades like
+// this.
 constexpr double kGrading = 1.0 / 3.0;
 constexpr int kRimSamples = 96;
 // As far from the tangent plane as a craniotomy node may lie (node_sets.cpp).
@@ -85,16 +86,17 @@ Vec3 nearest_surface_voxel(const VoxelImage& mask, const Vec3& target) {
   return nearest;
 }
 
-// Where the line from `x` against `normal` first meets the domain, starting kRimSearch_mm above x; x itself
-// when it does not.
+// First point of the domain on the line through `x` against `normal`, from kRimSearch_mm above x
+// down to kRimSearch_mm below it. x itself when the line misses the domain.
 Vec3 drop_to_surface(const geometry::Interpolator& value, const Vec3& x, const Vec3& normal) {
   for (double height = kRimSearch_mm; height > -kRimSearch_mm; height -= 0.5)
     if (value(x + height * normal) >= 0.5f) return x + height * normal;
   return x;
 }
 
-// Points on the rim of the craniotomy: its ellipse in the plane tangential to the mask's surface, dropped
-// to that surface. Good enough to say where the mesh is finer; the node set is chosen later, on the mesh.
+// Points on the rim of the craniotomy: its ellipse in the plane tangential to the mask's surface,
+// dropped to that surface. This is accurate enough to refine the mesh; the node set is chosen
+// later, on the mesh.
 Points craniotomy_rim(const VoxelImage& smooth_mask, const Craniotomy& craniotomy) {
   const Vec3 centre = nearest_surface_voxel(smooth_mask, craniotomy.centre_mm);
   const geometry::Interpolator value(smooth_mask);
@@ -123,8 +125,9 @@ double graded(double fine, double coarse, double distance, double margin) {
   return std::min(coarse, fine + kGrading * std::max(0.0, distance - margin));
 }
 
-// Distance to the tumour (mm), 0 inside. Beyond `reach` only a lower bound, from the sphere round the
-// tumour, because most questions come from far away and the answer no longer matters there.
+// Distance to the tumour (mm), 0 inside. Beyond `reach` it is only a lower bound, the distance to
+// the sphere round the tumour: most queries come from far away, where the exact value does not
+// matter.
 class TumourDistance {
  public:
   static Result<TumourDistance> build(const TriangleSurface& tumour, double reach) {

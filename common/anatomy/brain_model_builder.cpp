@@ -6,19 +6,19 @@
 #include <string>
 #include <utility>
 
-#include "common/values/model_id.hpp"
-#include "common/geometry/closest_point.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
-#include "common/geometry/surface.hpp"
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/node_sets.hpp"
 #include "common/anatomy/tumour_surface.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/values/model_id.hpp"
 
 namespace brainshift::anatomy {
 namespace {
 
-// A given skull turned so that its normals agree with the brain's. It may be open (a skull with its
-// craniotomy), so an enclosed volume cannot tell; the brain beneath it can.
+// Turns a given skull so that its normals agree with the brain's. The skull may be open (with its
+// craniotomy), so the sign of its volume cannot decide; the brain beneath it can.
 Result<TriangleSurface> oriented_skull(TriangleSurface skull, const BrainSurface& brain,
                                        const std::string& file) {
   const auto index = geometry::ClosestPointIndex::build(skull);
@@ -44,8 +44,9 @@ Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface&
   return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
 }
 
-// Distances that aligning boundary points reads instead of searching triangles. None for a segmentation whose
-// parts touch along an edge: such a surface is not closed in the strict sense, and its triangles are searched.
+// Distance grid of the tumour, for fast alignment. It is empty for a segmentation whose parts
+// touch along an edge: such a surface is not closed in the strict sense, and alignment then
+// searches its triangles.
 Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
   if (!geometry::is_closed(tumour)) return DistanceGrid{};
   const auto index = geometry::ClosestPointIndex::build(tumour);

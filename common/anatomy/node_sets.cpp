@@ -14,15 +14,16 @@
 namespace brainshift::anatomy {
 namespace {
 
-// Deep enough for the curvature of a head under a large opening (45 mm across: 4 mm), shallow enough not
-// to reach another gyrus' inner wall or the far side.
+// Deep enough for the curvature of a head under a large opening (45 mm across: 4 mm), shallow
+// enough not to reach another gyrus' inner wall or the far side.
 constexpr double kLargestHeight_mm = 15.0;
-// cos 60 degrees: turned further, a node belongs to a sulcus' wall or the other side.
+// cos 60 degrees. A node whose normal turns further belongs to the wall of a sulcus or the far
+// side.
 constexpr double kLeastCosine = 0.5;
 
 enum class Role { kNone, kCraniotomy, kBrainstem };
 
-// The opening's own frame: origin on the boundary, along and across in the tangent plane.
+// The frame of the opening: origin on the surface, along and across in the tangent plane.
 struct Opening {
   Vec3 origin = Vec3::Zero();
   Vec3 along = Vec3::Zero();
@@ -73,7 +74,7 @@ bool in_opening(const Opening& opening, const Craniotomy& craniotomy, const Vec3
          normal.dot(opening.normal) >= kLeastCosine;
 }
 
-// The boundary vertices' roles where the case decides by place.
+// Roles of the surface vertices as far as their place decides them.
 Result<std::vector<Role>> place_roles(const BrainSurface& brain, const CaseConfig& config) {
   const auto opening = place_opening(brain, config.craniotomy);
   if (!opening) return tl::unexpected(opening.error());

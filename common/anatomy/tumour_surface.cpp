@@ -17,10 +17,10 @@ namespace {
 
 // Gives 2,562 vertices on the ellipsoid of the default case; the paper's tumour had 2,541.
 constexpr double kSurfaceEdge_mm = 1.05;
-// Tetrahedra inside a tumour are thrown away: coarse ones are good enough.
+// Tetrahedra inside a tumour are not kept, so coarse ones are good enough.
 constexpr double kInnerEdge_mm = 4.0;
-// Width of the Gaussian that turns label voxels into a smooth surface, in mm and at least in voxels.
-// A sphere of radius r shrinks by about sigma^2 / r: 0.07 mm at 14 mm.
+// Width of the Gaussian that turns label voxels into a smooth surface, in mm and at least in
+// voxels. A sphere of radius r shrinks by about sigma^2 / r: 0.07 mm at 14 mm.
 constexpr double kLabelSmoothing_mm = 1.0;
 constexpr double kLabelSmoothing_voxels = 0.7;
 

@@ -25,8 +25,9 @@ constexpr double kCancelled = 1e-6;
 // A projection this little beyond a border, relative to the triangle, still falls within it.
 constexpr double kWithin = 1e-12;
 
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
-                                                   PointColumns, 3, std::size_t>;
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                        PointColumns, 3, std::size_t>;
 
 struct Projection {
   Vec3 point = Vec3::Zero();
@@ -104,7 +105,8 @@ std::vector<int> MasterSurface::used_vertices() const {
   return used;
 }
 
-// Orthogonal projection onto the plane; infinitely far when it falls beyond the triangle's border.
+// Orthogonal projection onto the plane; infinitely far when it falls beyond the triangle's
+// border.
 Projection MasterSurface::on_face(int triangle, const Vec3& slave) const {
   const Vec3 n = face_normals_.col(triangle);
   const auto corners = skull_->triangles.col(triangle);

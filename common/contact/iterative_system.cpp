@@ -6,19 +6,19 @@
 namespace brainshift::contact {
 namespace {
 
-// How far the true residual may lie above the one that the recurrence says.
+// Largest ratio of the true residual to the tolerance. The residual of the recurrence drifts from
+// it.
 constexpr double kDrift = 10.0;
 
 }  // namespace
 
-IterativeSystem::IterativeSystem(const ForwardModel& forward,
-                                 const IterativeOptions& options)
+IterativeSystem::IterativeSystem(const ForwardModel& forward, const IterativeOptions& options)
     : PenalisedSystem(forward), options_(options) {
   solver_.setMaxIterations(options.max_iterations);
 }
 
-Result<std::unique_ptr<IterativeSystem>> IterativeSystem::build(
-    const ForwardModel& forward, const IterativeOptions& options) {
+Result<std::unique_ptr<IterativeSystem>> IterativeSystem::build(const ForwardModel& forward,
+                                                                const IterativeOptions& options) {
   std::unique_ptr<IterativeSystem> system(new IterativeSystem(forward, options));
   if (auto status = system->refresh(); !status) return tl::unexpected(status.error());
   return system;
@@ -36,8 +36,9 @@ Status IterativeSystem::refresh() {
   return {};
 }
 
-// Moves q by sum_A N (N . r) / beta, what the springs of the active slaves take up, where that lowers the residual
-// r = rhs - K_p q (soft springs take up nothing by themselves). Slaves carry the identity frame and no constraint.
+// Moves q by sum_A N (N . r) / beta, which is what the springs of the active slaves take up, if
+// that lowers the residual r = rhs - K_p q (with soft springs it does not). Slaves carry the
+// identity frame and no constraint.
 void IterativeSystem::lift(const VecX& rhs, VecX& residual, VecX& q) const {
   const PenaltyContact& contact = forward().contact();
   VecX lifted = q;

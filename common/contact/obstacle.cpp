@@ -33,7 +33,8 @@ Pairs with_sphere(const Points& points, const RigidSphere& sphere) {
 }
 
 Pairs with_surface(const Points& points, const RigidSurface& obstacle) {
-  // search_contact expects a surface that looks away from the body, as a skull does from the brain.
+  // search_contact expects a surface that looks away from the body, as a skull does from the
+  // brain.
   TriangleSurface flipped = obstacle.surface;
   flipped.triangles.row(1).swap(flipped.triangles.row(2));
   std::vector<NodeIndex> all(static_cast<std::size_t>(points.cols()));

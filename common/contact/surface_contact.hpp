@@ -42,7 +42,6 @@ class SurfaceContact {
 
   const std::vector<SurfaceContactPoint>& points() const { return points_; }
   int num_points() const { return static_cast<int>(points_.size()); }
-  int num_obstacles() const { return num_obstacles_; }
 
   VecX penetration(const Points& u) const;
   // N . u at every point. The penetration is 0p minus this.

@@ -17,7 +17,8 @@ ActiveSet where_positive(const VecX& values) {
   return active;
 }
 
-// True when the sets differ in points alone that hover at the obstacle, where the sign is rounding.
+// True when the sets differ only in points so close to the obstacle that rounding decides their
+// sign.
 bool same_set(const ActiveSet& a, const ActiveSet& b, const VecX& penetration, double hover_mm) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i] != b[i] && std::abs(penetration[static_cast<Eigen::Index>(i)]) > hover_mm)
@@ -67,7 +68,8 @@ class Problem {
     return {};
   }
 
-  // t in (0, 1] that minimises the energy on the way from q to q + d. The slope grows with t: bisection.
+  // t in (0, 1] that minimises the energy on the way from q to q + d. The slope grows with t:
+  // bisection.
   double line_search(const VecX& q, const VecX& d) const {
     const VecX kd = linalg::multiply(stiffness_, d);
     const double slope_0 = kd.dot(q) - b_.dot(d);

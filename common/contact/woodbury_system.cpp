@@ -8,8 +8,8 @@
 namespace brainshift::contact {
 namespace {
 
-// Right-hand sides per block. A solve then costs about a fifth of a single one, and a block of the
-// default head takes 28 MB.
+// Right-hand sides per block. A solve then costs about a fifth of a single one, and a block of
+// the default head takes 28 MB.
 constexpr std::size_t kBlock = 64;
 
 }  // namespace
@@ -126,7 +126,7 @@ Status WoodburySystem::solve(const Points& f, Points& u) const {
     VecX dc;
     if (auto status = apply(residual, du, dc); !status) return status;
     u += du;
-    c += dc;
+    c += dc - left;  // K du = N_A (left - dc), so that K u + N_A c = f still holds
   }
 }
 

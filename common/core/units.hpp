@@ -17,7 +17,5 @@ constexpr double weight_density_from_kg_m3(double kg_m3) {
 constexpr double permeability_from_m3_s_kg(double m3_s_kg) { return m3_s_kg * 1e12; }
 // 1/Pa = m^2/N -> mm^2/N
 constexpr double storage_from_per_pa(double per_pa) { return per_pa * 1e6; }
-// mm^3 -> cc
-constexpr double cc_from_mm3(double mm3) { return mm3 * 1e-3; }
 
 }  // namespace brainshift::units

@@ -8,8 +8,8 @@
 namespace brainshift::fem {
 namespace {
 
-// For every node the sorted nodes that share an element with it and are not smaller, itself included:
-// the block pattern of the lower triangle, column by column.
+// For every node the sorted nodes that share an element with it and are not smaller, itself
+// included: the block pattern of the lower triangle, column by column.
 std::vector<std::vector<int>> lower_adjacency(const Eigen::Ref<const Eigen::MatrixXi>& elements,
                                               int num_nodes) {
   std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(num_nodes));
@@ -30,7 +30,8 @@ std::vector<std::vector<int>> lower_adjacency(const Eigen::Ref<const Eigen::Matr
 }
 
 // The block is in local axes.
-// Unknowns of one node are consecutive, so one binary search per column finds all of the block's rows.
+// Unknowns of one node are consecutive, so one binary search per column finds all of the block's
+// rows.
 void scatter(linalg::SymmetricMatrix& lower, const DofMap& dofs, int row_node, int column_node,
              const Mat3& block) {
   const long* rows = lower.innerIndexPtr();
@@ -52,7 +53,7 @@ void scatter(linalg::SymmetricMatrix& lower, const DofMap& dofs, int row_node, i
 }  // namespace
 
 linalg::SymmetricMatrix lower_pattern(const Eigen::Ref<const Eigen::MatrixXi>& elements,
-                              const DofMap& dofs) {
+                                      const DofMap& dofs) {
   const std::vector<std::vector<int>> neighbours = lower_adjacency(elements, dofs.num_nodes());
   const long n = dofs.num_unknowns();
   linalg::SymmetricMatrix matrix(n, n);

@@ -158,7 +158,7 @@ Status BiotStepper::check(const BiotState& state, const BiotLoad& load, double d
   return {};
 }
 
-// The state before, with what the load prescribes at the end of the step.
+// The state before the step, with the values that the load prescribes at its end.
 BiotState BiotStepper::with_prescribed(const BiotState& state, const BiotLoad& load) const {
   BiotState guess = state;
   for (int node = 0; node < mesh_.num_nodes(); ++node) {
@@ -177,7 +177,8 @@ BiotState BiotStepper::with_prescribed(const BiotState& state, const BiotLoad& l
   return guess;
 }
 
-// Right-hand side for the correction of `guess`: what the two equations leave there, at the unknowns.
+// Right-hand side for the correction of `guess`: the residuals of the two equations, at the
+// unknowns.
 VecX BiotStepper::residual(const BiotState& before, const BiotState& guess, const BiotLoad& load,
                            double dt_s) const {
   Points force = -internal_force(guess);

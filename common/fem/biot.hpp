@@ -47,7 +47,7 @@ struct BiotOptions {
   int kept_factors = 4;   // step sizes whose factor is kept; the least recently used goes first
 };
 
-// What the last step did.
+// Diagnostics of the last step.
 struct BiotDiagnostics {
   double dt_s = 0.0;
   bool factorised = false;                               // the step size was new

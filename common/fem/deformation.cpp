@@ -9,9 +9,9 @@
 namespace brainshift::fem {
 namespace {
 
-// Below it single precision is not believed.
+// Below this J the element is computed again in double precision.
 constexpr float kSurelyUpright = 0.1F;
-// Error of J that single precision may make, otherwise the element is looked at in double.
+// So is an element for which single precision may err by more than this.
 constexpr double kRatioError = 0.01;
 
 using Corners = Eigen::Matrix<double, 3, 4>;
@@ -21,7 +21,8 @@ double six_volumes(const Corners& x) {
   return Vec3(x.col(1) - x.col(0)).cross(Vec3(x.col(2) - x.col(0))).dot(Vec3(x.col(3) - x.col(0)));
 }
 
-// Sum of 1 / height over the four corners, 1/mm: J moves by at most this times the error of a position.
+// Sum of 1 / height over the four corners, 1/mm: J changes by at most this times a position
+// error.
 double sum_inverse_heights(const Corners& x) {
   const Vec3 a = x.col(1) - x.col(0), b = x.col(2) - x.col(0), c = x.col(3) - x.col(0);
   const double areas = a.cross(b).norm() + b.cross(c).norm() + c.cross(a).norm() +
@@ -90,7 +91,8 @@ void DeformationCheck::measure_part(long begin, long end, const Points& u,
                                     Deformation& part) const {
   float least = std::numeric_limits<float>::infinity();
   long least_tet = -1;
-  // Some elements at a time, component by component, so that the arithmetic runs in vector registers.
+  // Several elements at a time, component by component, so that the compiler can vectorise the
+  // loop.
   constexpr int kLanes = 16;
   using Lane = Eigen::Array<float, kLanes, 1>;
   Eigen::Array<float, kLanes, 12> x =

@@ -9,10 +9,12 @@
 namespace brainshift::fem {
 namespace {
 
-// Two directions whose sine is below this are one; a normal this close to a coordinate axis is that axis.
+// Two directions whose sine is below this count as one, and a normal this close to a coordinate
+// axis counts as that axis.
 constexpr double kParallel = 1e-6;
 constexpr double kAxisAligned = 1e-12;
-// Values that agree up to this are no contradiction, relative to 1 mm or the value.
+// Values that differ by less than this do not contradict each other; relative to 1 mm or the
+// value.
 constexpr double kSameValue = 1e-9;
 
 Vec3 snapped(const Vec3& direction) {

@@ -13,7 +13,7 @@ constexpr std::array<std::array<int, 2>, 3> kFaceEdges = {{{0, 1}, {1, 2}, {2, 0
 
 std::array<int, 2> edge_between(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
 
-// Node in the middle of an edge, -1 where there is none.
+// Node in the middle of an edge, -1 when the edge does not exist.
 int edge_node(const DisplacementSpace& space, int a, int b) {
   const std::array<int, 2> edge = edge_between(a, b);
   const auto found = std::lower_bound(space.edges.begin(), space.edges.end(), edge);

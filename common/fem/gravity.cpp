@@ -23,8 +23,9 @@ double negative_volume_fraction(const Eigen::Vector4d& values) {
   if (v[2] <= 0.0) {
     return 1.0 - v[3] / (v[3] - v[0]) * (v[3] / (v[3] - v[1])) * (v[3] / (v[3] - v[2]));
   }
-  // Two and two: corners A, B negative, C, D positive. The wedge cut off at fractions s, t (edges AC, AD) and
-  // p, q (BC, BD) splits into three tetrahedra; every term is positive, so nothing cancels.
+  // Two and two: corners A, B negative, C, D positive. The wedge cut off at fractions s, t (edges
+  // AC, AD) and p, q (BC, BD) splits into three tetrahedra; every term is positive, so nothing
+  // cancels.
   const double a = -v[0], b = -v[1], c = v[2], d = v[3];
   const double s = a / (a + c), t = a / (a + d), p = b / (b + c), q = b / (b + d);
   return s * t + s * (1.0 - t) * q + (1.0 - s) * p * q;

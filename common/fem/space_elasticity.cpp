@@ -76,8 +76,8 @@ Mat3 gradient_of(const DisplacementSpace& space, const Points& u, int element,
 
 }  // namespace
 
-linalg::SymmetricMatrix assemble_stiffness(const DisplacementSpace& space, const MaterialMap& materials,
-                                   const DofMap& dofs) {
+linalg::SymmetricMatrix assemble_stiffness(const DisplacementSpace& space,
+                                           const MaterialMap& materials, const DofMap& dofs) {
   assert(static_cast<int>(materials.of_tet.size()) == space.num_elements());
   return assemble_lower(space.elements, dofs, [&](int element) {
     return ElementStiffness(space, materials.at(element).elastic, element);
@@ -157,7 +157,8 @@ Points pressure_load(const DisplacementSpace& space,
     const Eigen::Vector3i face = faces.col(f);
     const auto nodes = face_nodes(space, face);
     const Vec3 third = -pressure / 3.0 * face_area_vector(space.mesh, face);
-    // A third per vertex (P1); the vertices' shape functions of P2 integrate to zero, the edges' to a third.
+    // A third per vertex (P1); the vertices' shape functions of P2 integrate to zero, the edges'
+    // to a third.
     const std::size_t first = space.element == Element::kP1 ? 0 : 3;
     for (std::size_t k = first; k < first + 3; ++k) load.col(nodes[k]) += third;
   }

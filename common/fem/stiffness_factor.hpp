@@ -19,7 +19,7 @@ namespace brainshift::fem {
 
 class StiffnessFactor {
  public:
-  // What one thread needs to solve with a factor that several threads share.
+  // Scratch memory for one thread that solves with a factor shared by several threads.
   using Workspace = linalg::SparseCholesky::Workspace;
 
   explicit StiffnessFactor(linalg::SparseCholesky factor) : factor_(std::move(factor)) {}

@@ -127,7 +127,7 @@ Status Builder::set_materials() {
   const auto label = [this](std::size_t t) {
     return file_.mesh.labels.empty() ? 0 : file_.mesh.labels[t];
   };
-  // "all" fills what no other region claims, wherever it stands.
+  // "all" fills the tetrahedra that no other region claims, wherever it stands in the list.
   for (const bool all : {false, true}) {
     for (const auto& [region, material] : spec_.regions) {
       if ((region == "all") != all) continue;

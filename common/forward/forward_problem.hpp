@@ -121,9 +121,9 @@ Status validate(const ForwardProblem& problem);
 // penetration that remains is below a hundredth of the compression of one edge.
 double default_penalty(const ForwardProblem& problem, const FaceGroup& group);
 
-// What any solver of the problem starts from: nodes, prescribed displacements, and the consistent
-// nodal forces (3 x n, N) of body forces, tractions and pressures, without contact. Errors as
-// validate; kInvalidArgument for prescribed displacements that contradict each other.
+// The discrete problem that every solver starts from: nodes, prescribed displacements, and the
+// consistent nodal forces (3 x n, N) of body forces, tractions and pressures, without contact.
+// Errors as validate; kInvalidArgument for prescribed displacements that contradict each other.
 struct Discretised {
   fem::DisplacementSpace space;
   fem::DisplacementConstraints constraints;

@@ -134,7 +134,8 @@ Result<contact::SurfaceContact> build_contact(const ForwardProblem& problem,
   return contact;
 }
 
-// Prescribed directions, and the contact points that touch in the undeformed state, must hold the body.
+// Prescribed directions, and the contact points that touch in the undeformed state, must hold the
+// body.
 Status check_held(const fem::DisplacementSpace& space,
                   const fem::DisplacementConstraints& constraints,
                   const contact::SurfaceContact& contact, const Points& lift, double touching_mm) {
@@ -272,7 +273,7 @@ Result<ForwardSolution> solve(const ForwardProblem& problem, const Progress& pro
   solution.nodal_stress = fem::nodal_stress(space, problem.materials, solution.displacement);
   solution.min_jacobian = fem::min_jacobian(space, solution.displacement);
   add_contact_results(problem, *contact, found->active, solution);
-  // Equilibrium of the whole: what loads and obstacles do not balance, the supports do.
+  // Equilibrium of the whole body: the supports balance the sum of loads and obstacle forces.
   solution.reaction = -load.rowwise().sum();
   for (const ContactResult& c : solution.contacts) solution.reaction -= c.force;
   add_warnings(problem, solution);

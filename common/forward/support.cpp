@@ -8,7 +8,8 @@
 namespace brainshift::forward {
 namespace {
 
-// Squared sine-like measure of how well a rigid motion is held; a support that resists less is none.
+// Squared sine-like measure of how well a rigid motion is held. Below it the motion counts as
+// free.
 constexpr double kHeld = 1e-10;
 
 }  // namespace

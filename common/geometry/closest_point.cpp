@@ -16,20 +16,21 @@
 namespace brainshift::geometry {
 namespace {
 
-// Distances need no exact predicates; `contains` votes over directions instead.
+// Distances need no exact predicates; `contains` takes a vote of three rays instead.
 using Kernel = CGAL::Simple_cartesian<double>;
 using Triangle = Kernel::Triangle_3;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle>::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
-// Twice the area over the longest edge squared; flatter triangles have no usable normal. Their points lie
-// on the edges of their neighbours, so nothing is lost by leaving them out.
+// Twice the area over the longest edge squared; flatter triangles have no usable normal. Their
+// points lie on the edges of their neighbours, so nothing is lost by leaving them out.
 constexpr double kFlat = 1e-12;
 // Barycentric weight below which the closest point counts as lying on the opposite edge.
 constexpr double kOnEdge = 1e-9;
 
-// A ray that grazes an edge may count it twice or not at all, so three vote. They are fixed, so that the
-// answer is reproducible, and skew, so that surfaces made on a grid are not met edge-on.
+// A ray that grazes an edge may count it twice or not at all, so three rays vote. Their directions
+// are fixed, so that the answer is reproducible, and skew, so that no ray meets the surfaces of a
+// grid edge-on.
 constexpr double kRayDirections[3][3] = {
     {0.3713, 0.5477, 0.7497}, {-0.8271, 0.2179, 0.5182}, {0.4583, -0.7941, -0.3992}};
 

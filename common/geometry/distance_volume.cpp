@@ -55,7 +55,7 @@ DistanceSample DistanceVolume::outside(const Vec3& x, const Vec3& cells) const {
   const Vec3 away = x - (c - rim.distance_mm * rim.gradient / slope);
   DistanceSample sample;
   const double size = away.norm();
-  // A grid that ends within the surface goes on with the sign of its rim.
+  // Beyond a grid that ends inside the surface the sign is that of the grid's rim.
   const double sign = rim.distance_mm < 0.0 ? -1.0 : 1.0;
   sample.distance_mm = sign * size;
   sample.gradient = size > kTouching ? Vec3(sign * away / size) : Vec3(rim.gradient / slope);

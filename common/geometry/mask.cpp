@@ -20,7 +20,8 @@ struct Run {
   int end = 0;
 };
 
-// 6-connected components of the voxels that equal `value`, as runs in row order with one root each.
+// 6-connected components of the voxels that equal `value`, as runs in row order with one root
+// each.
 class RunComponents {
  public:
   RunComponents(const Binary& voxels, const std::array<int, 3>& dims, std::uint8_t value)
@@ -105,7 +106,7 @@ void paint(Binary& voxels, const std::array<int, 3>& dims, std::size_t row, cons
   std::fill(first + run.begin, first + run.end, value);
 }
 
-// Leaves only the largest component of ones; false when there is none.
+// Keeps only the largest component of ones; false when there is no component.
 bool keep_largest(Binary& voxels, const std::array<int, 3>& dims) {
   RunComponents components(voxels, dims, 1);
   if (components.num_runs() == 0) return false;
@@ -162,7 +163,8 @@ void add_scaled(float* out, const float* in, float weight, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) out[i] += weight * in[i];
 }
 
-// Convolves along one axis, seeing the image as [outer][length][inner] with `inner` contiguous voxels.
+// Convolves along one axis, seeing the image as [outer][length][inner] with `inner` contiguous
+// voxels.
 std::vector<float> convolve(const std::vector<float>& in, std::size_t inner, std::size_t length,
                             const std::vector<float>& kernel) {
   std::vector<float> out(in.size(), 0.0f);

@@ -36,11 +36,13 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
-// CGAL bounds circumradii from above, users think in edges. With these ratios of bound to target the
-// mean edge of the mesh is the target within a few per cent (measured on balls and on the head).
+// CGAL bounds circumradii from above; users give edge lengths. With these ratios of bound to
+// target the mean edge of the mesh is the target within a few per cent (measured on balls and on
+// the head).
 constexpr double kCellRadiusOverEdge = 0.74;
 constexpr double kFacetRadiusOverEdge = 0.74;
-// Bisection on the implicit function stops at this fraction of the bounding box: about 2 um on a head.
+// Bisection on the implicit function stops at this fraction of the bounding box: about 2 um on a
+// head.
 constexpr double kSurfaceTolerance = 1e-5;
 constexpr unsigned kSeed = 20090529;
 
@@ -71,8 +73,8 @@ struct Enclosure {
   }
 };
 
-// CGAL shoots its first rays from the centre of the enclosure and waits for hits, so the centre must
-// lie inside: the voxel with the largest value, of equals the one nearest to the centroid.
+// CGAL shoots its first rays from the centre of the enclosure and waits for hits, so the centre
+// must lie inside: the voxel with the largest value, of equals the one nearest to the centroid.
 std::optional<Enclosure> enclose(const VoxelImage& mask, float level) {
   Vec3 centroid = Vec3::Zero();
   Vec3 low = Vec3::Zero();

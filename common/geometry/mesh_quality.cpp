@@ -36,8 +36,8 @@ double longest_edge(const TetMesh& mesh, int tet) {
   return longest;
 }
 
-// Angle between the two faces that meet in edge (a, b): seen along the edge, the angle between the
-// directions to the two other nodes.
+// Angle between the two faces that meet in edge (a, b): seen along the edge, the angle between
+// the directions to the two other nodes.
 double dihedral_deg(const TetMesh& mesh, int tet, int edge) {
   const auto [a, b] = kEdges[static_cast<std::size_t>(edge)];
   const auto [c, d] = kEdges[static_cast<std::size_t>(5 - edge)];  // the opposite edge

@@ -19,7 +19,8 @@ namespace {
 // Nodes nearer than this many spacings are measured against every triangle that near.
 constexpr double kBandSpacings = 3.0;
 
-// Triangles that share a corner with each triangle, ascending: row t is ids[first[t] .. first[t + 1]).
+// Triangles that share a corner with each triangle, ascending. Row t is
+// ids[first[t] .. first[t + 1]).
 struct Neighbours {
   std::vector<int> first, ids;
 };
@@ -105,8 +106,9 @@ void GridBuilder::for_nodes(int first_layer, int end_layer, Body&& body) {
         body(nodes_[grid_.index(i, j, k)], grid_.node(i, j, k));
 }
 
-// Nodes of the layers within the band of one triangle. Triangles come in ascending order and only a smaller
-// distance replaces another, so the result does not depend on how layers are shared out.
+// Nodes of the layers within the band of one triangle. Triangles come in ascending order and only
+// a smaller distance replaces another, so the result does not depend on how layers are shared
+// out.
 void GridBuilder::measure_box(int triangle, int first_layer, int end_layer) {
   const TriangleFrame& frame = frames_[static_cast<std::size_t>(triangle)];
   const Vec3 b = frame.a + frame.ab, c = frame.a + frame.ac;
@@ -146,8 +148,8 @@ void GridBuilder::measure_band(int first_layer, int end_layer) {
   });
 }
 
-// A node without a triangle is farther than the band, so the surface does not pass between it and a neighbour:
-// they are on the same side.
+// A node without a triangle is farther than the band, so the surface does not pass between it and
+// a neighbour: they are on the same side.
 void GridBuilder::take_over(Node& node, const Node& from, const Vec3& x) const {
   if (from.triangle < 0 || from.triangle == node.triangle) return;
   const double squared = squared_distance(from.triangle, x);
@@ -212,7 +214,7 @@ DistanceGrid GridBuilder::build() {
   return std::move(grid_);
 }
 
-// Nodes over the surface's box and margin, none measured yet.
+// Nodes over the surface's box and margin. No node has a distance yet.
 DistanceGrid empty_grid(const TriangleSurface& surface, const DistanceGridOptions& options) {
   const Vec3 low = surface.vertices.rowwise().minCoeff().array() - options.margin_mm;
   const Vec3 high = surface.vertices.rowwise().maxCoeff().array() + options.margin_mm;

@@ -39,8 +39,9 @@ Vec3 area_vector(const TriangleSurface& surface, int triangle) {
   return (surface.vertices.col(t[1]) - a).cross(surface.vertices.col(t[2]) - a);
 }
 
-// --- Geodesic sphere -------------------------------------------------------------------------------------
-// Each face of an icosahedron is divided into n^2 triangles: 10 n^2 + 2 vertices, 20 n^2 triangles.
+// Geodesic sphere.
+// Each face of an icosahedron is divided into n^2 triangles: 10 n^2 + 2 vertices, 20 n^2
+// triangles.
 
 // Vertices (0, +-1, +-g) and cyclic permutations, g the golden ratio.
 Points icosahedron_vertices() {
@@ -78,8 +79,8 @@ std::vector<std::array<int, 3>> icosahedron_faces(const Points& v) {
 TriangleSurface geodesic_sphere(int n) {
   const Points corners = icosahedron_vertices();
   std::vector<Vec3> vertices;
-  // A grid point is the sum of its corners with integer weights that add up to n; written without the
-  // zero weights and sorted, this names a point that neighbouring faces share.
+  // A grid point is the sum of its corners with integer weights that add up to n; written without
+  // the zero weights and sorted, this names a point that neighbouring faces share.
   using Name = std::array<std::pair<int, int>, 3>;
   std::map<Name, int> index_of;
   std::vector<std::array<int, 3>> triangles;
@@ -248,7 +249,8 @@ Points sample_surface(const TriangleSurface& surface, int count, std::uint64_t s
     const double target = random.uniform() * total;
     const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
     const auto t = surface.triangles.col(found - cumulative.begin());
-    // Uniform in a triangle: sqrt turns a uniform number into one whose density grows from the apex.
+    // Uniform in a triangle: sqrt turns a uniform number into one whose density grows from the
+    // apex.
     const double s = std::sqrt(random.uniform());
     const double r = random.uniform();
     points.col(i) = (1.0 - s) * surface.vertices.col(t[0]) +
@@ -258,7 +260,8 @@ Points sample_surface(const TriangleSurface& surface, int count, std::uint64_t s
 }
 
 Points plane_section(const TriangleSurface& surface, const Vec3& normal, double offset) {
-  // A vertex on the plane counts as above it: then each triangle is crossed through two edges or none.
+  // A vertex on the plane counts as above it: then each triangle is crossed through two edges or
+  // none.
   const VecX height = (surface.vertices.transpose() * normal).array() - offset;
   const auto crossing = [&](int a, int b) -> Vec3 {
     if (a > b) std::swap(a, b);  // both triangles of an edge compute the same point, bit for bit

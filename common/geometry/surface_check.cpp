@@ -48,7 +48,7 @@ Status check_extent(double extent_mm, const CorticalSite& site,
                           extent_mm, least, most, site.size_mm, unit));
 }
 
-// Turns the triangles outwards; says so in `checked`.
+// Turns the triangles outwards, and notes it in `checked`.
 Status orient(CheckedSurface& checked, const CorticalSite& site,
               const SurfaceCheckOptions& options) {
   TriangleSurface& surface = checked.surface;

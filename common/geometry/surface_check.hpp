@@ -60,7 +60,7 @@ struct CheckedSurface {
   bool turned = false;  // its triangles looked inwards
   double extent_mm = 0.0;
   double distance_mm = 0.0;  // of the closest point from the craniotomy's centre
-  int parts = 0;             // that hang together by edges
+  int parts = 0;             // components of triangles connected by edges
   int holes = 0;             // rims beyond the longest one of each part
   double longest_hole_rim_mm = 0.0;
   std::vector<std::string> notes;  // sentences on what was mended or is worth knowing

@@ -10,7 +10,7 @@
 namespace brainshift::geometry {
 namespace {
 
-// A directed edge is known by its triangle t and its place k: from corner k to corner k + 1. Number 3 t + k.
+// A directed edge has the number 3 t + k: it goes from corner k to corner k + 1 of triangle t.
 using EdgeOf = std::unordered_map<std::uint64_t, int>;
 
 std::uint64_t key(int from, int to) {
@@ -86,7 +86,8 @@ std::vector<int> part_of_triangles(const TriangleSurface& surface, const EdgeOf&
   return part;
 }
 
-// From a rim edge to the next one: turn about its end, triangle by triangle, until there is no further one.
+// From a rim edge to the next one: turn about its end, triangle by triangle, until there is no
+// further one.
 int next_on_rim(const TriangleSurface& surface, const EdgeOf& edges, int edge) {
   int candidate = next_in_triangle(edge);
   for (int other = opposite(surface, edges, candidate); other >= 0;

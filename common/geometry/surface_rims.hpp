@@ -10,7 +10,7 @@
 namespace brainshift::geometry {
 
 struct SurfaceRims {
-  int parts = 0;                 // of triangles that hang together by edges
+  int parts = 0;                 // components of triangles connected by edges
   std::vector<int> part_of_rim;  // per closed rim
   std::vector<double> rim_mm;    // its length
 };

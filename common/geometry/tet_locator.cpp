@@ -16,8 +16,8 @@
 namespace brainshift::geometry {
 namespace {
 
-// A weight that rounding has made this negative still counts as inside: neighbouring tetrahedra compute
-// their common face differently, and no point may fall between them.
+// A weight that rounding has made this negative still counts as inside: neighbouring tetrahedra
+// compute their common face differently, and no point may fall between them.
 constexpr double kTolerance = 1e-10;
 
 using Cell = Eigen::Array3i;
@@ -75,8 +75,9 @@ void TetLocator::Impl::fill_grid() {
   const int num_tets = static_cast<int>(tets.cols());
   for (int k = 0; k < 4; ++k)
     for (int t = 0; t < num_tets; ++t) box.extend(nodes.col(tets(k, t)));
-  // About the mean edge: the edge of regular tetrahedra that share the box among them, a little more than
-  // the true one as the mesh does not fill its box. So there are fewer cells than tetrahedra.
+  // About the mean edge: the edge of regular tetrahedra that share the box among them, a little
+  // more than the true one as the mesh does not fill its box. So there are fewer cells than
+  // tetrahedra.
   const double share = box.volume() / num_tets;
   cell_mm = std::cbrt(6.0 * std::sqrt(2.0) * share);
   dims = (box.sizes() / cell_mm).array().ceil().cwiseMax(1.0).cast<int>();

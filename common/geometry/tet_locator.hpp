@@ -27,7 +27,7 @@ struct TetLocation {
 
 class TetLocator {
  public:
-  // Copies what it needs. Precondition: check_mesh(mesh), or no tetrahedron at all.
+  // Copies the mesh. Precondition: check_mesh(mesh), or no tetrahedron at all.
   explicit TetLocator(const TetMesh& mesh);
   TetLocator(TetLocator&&) noexcept;
   TetLocator& operator=(TetLocator&&) noexcept;

@@ -6,7 +6,8 @@
 namespace brainshift::geometry {
 namespace {
 
-// Fraction along an edge of the point closest to where the projection on it is `along` of length^2.
+// Fraction along an edge of the point closest to one whose projection on the edge is `along` of
+// length^2.
 double clamped(double along, double length_squared) {
   return std::clamp(along / length_squared, 0.0, 1.0);
 }

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kSeed = 19670401;  // any fixed number
 
-// NaN where the vector holds one: Eigen's maximum does not say.
+// Maximum norm; NaN when the vector holds a NaN or an infinity, which Eigen's maximum can hide.
 double max_abs(const VecX& v) {
   return v.allFinite() ? v.lpNorm<Eigen::Infinity>() : std::numeric_limits<double>::quiet_NaN();
 }
@@ -52,7 +52,8 @@ Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
     x.swap(better);
     quality.backward_error = error;
   }
-  if (!(quality.backward_error <= kRefuseAbove)) return tl::unexpected(solve_refusal(b, x, quality));
+  if (!(quality.backward_error <= kRefuseAbove))
+    return tl::unexpected(solve_refusal(b, x, quality));
   return quality;
 }
 

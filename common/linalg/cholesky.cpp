@@ -44,10 +44,10 @@ cholmod_dense view_of(const double* data, std::size_t rows, std::size_t columns)
   return view;
 }
 
-// The smallest pivot L_jj^2 over the diagonal K_jj it is left of: what elimination has cancelled. Rounding leaves a pivot
-// wrong by some 1e-14 K_jj (`make stability`, weak support: 85 unit roundoffs), so a share below this makes an error of
-// more than a thousandth. Unlike the reciprocal condition it does not depend on units: stiff contact springs do not
-// lower it.
+// Smallest ratio of a pivot L_jj^2 to the diagonal K_jj: what elimination has cancelled. Rounding
+// leaves a pivot wrong by some 1e-14 K_jj (`make stability`, weak support: 85 unit roundoffs), so
+// with a ratio below this its error is more than a thousandth. Unlike the reciprocal condition
+// this ratio does not depend on units: stiff contact springs do not lower it.
 constexpr double kLeastPivotShare = 1e-11;
 
 double least_pivot_share(const cholmod_factor& factor, const SymmetricMatrix& lower) {
@@ -68,7 +68,7 @@ double least_pivot_share(const cholmod_factor& factor, const SymmetricMatrix& lo
   return least;
 }
 
-// CHOLMOD reads the lower triangle and drops what lies above it without a word.
+// CHOLMOD reads the lower triangle and silently drops entries above it.
 Status check_symmetric(const SymmetricMatrix& lower) {
   for (long j = 0; j < lower.outerSize(); ++j) {
     const long first = lower.outerIndexPtr()[j];
@@ -131,7 +131,7 @@ SparseCholesky::Workspace::~Workspace() = default;
 struct SparseCholesky::Impl {
   mutable cholmod_common common{};
   cholmod_factor* factor = nullptr;
-  mutable Workspace::Impl workspace;  // of solves that bring none
+  mutable Workspace::Impl workspace;  // for solves without a workspace of their own
   std::uint64_t nonzeros = 0;
   double rcond = 0.0;
   double analyse_s = 0.0;

@@ -40,7 +40,7 @@ class SparseCholesky {
   // Several right-hand sides at once, one per column; cheaper per column than single solves.
   Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const;
 
-  // What one thread needs to solve with a factor that several threads share.
+  // Scratch memory for one thread that solves with a factor shared by several threads.
   class Workspace {
    public:
     Workspace();

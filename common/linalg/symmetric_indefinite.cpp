@@ -23,8 +23,8 @@ namespace {
 
 constexpr int kBlock = 64;       // right-hand sides that MUMPS works on at once
 constexpr int kMostRefined = 2;  // steps of iterative refinement
-// Quasi-definite matrices have an L D L^T in any order; what MUMPS swaps with its usual threshold costs no time that
-// can be measured, and keeps extreme steps accurate.
+// Quasi-definite matrices have an L D L^T in any order. The swaps that MUMPS makes with its usual
+// threshold cost no measurable time and keep extreme steps accurate.
 constexpr double kPivotThreshold = 0.01;
 constexpr std::uint64_t kSeed = 17;
 
@@ -44,8 +44,8 @@ Status check_finite(const SymmetricMatrix& lower) {
   return {};
 }
 
-// Position in the elimination order of each unknown, 1-based: nested dissection by the METIS in CHOLMOD. MUMPS brings
-// SCOTCH, PORD and AMD; docs/decisions/0011.
+// Position in the elimination order of each unknown, 1-based: nested dissection by the METIS in
+// CHOLMOD. MUMPS itself has SCOTCH, PORD and AMD; docs/decisions/0011.
 std::vector<int> nested_dissection(const SymmetricMatrix& lower) {
   cholmod_common common{};
   cholmod_l_start(&common);
@@ -207,8 +207,9 @@ double SymmetricIndefinite::Impl::backward_error(const VecX& b, const VecX& x,
   return error;
 }
 
-// 1 / (|A| |A^-1|), the second norm by Hager's ascent: a lower bound that is rarely off by more than three. The last
-// vector is Higham's (1988, ACM TOMS 14:381), for matrices whose symmetry the ascent cannot leave.
+// 1 / (|A| |A^-1|), the second norm by Hager's ascent: a lower bound that is rarely off by more
+// than three. Its last vector is Higham's (1988, ACM TOMS 14:381), for matrices whose symmetry
+// keeps the ascent where it started.
 double SymmetricIndefinite::Impl::estimate_rcond() const {
   const Eigen::Index n = scale.size();
   VecX x = VecX::Constant(n, 1.0 / static_cast<double>(n));
@@ -237,7 +238,7 @@ double SymmetricIndefinite::Impl::estimate_rcond() const {
   return inverse_norm > 0.0 ? 1.0 / (norm * inverse_norm) : 0.0;
 }
 
-// x solves A x = b up to rounding: leaves it better, or says how far off it stays.
+// Refines x, a solution of A x = b up to rounding, or returns an error with its backward error.
 Status SymmetricIndefinite::Impl::refine(const VecX& b, VecX& x, SolveCheck& check) const {
   VecX residual;
   check = {backward_error(b, x, residual), 0};

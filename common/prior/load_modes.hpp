@@ -3,8 +3,8 @@
 // loads, each times the standard deviation that the case gives it.
 //
 //   gravity   for each fluid level of the case the buoyancy of a fluid plane at that level: along
-//             gravity (what drainage leaves open) and along the two directions across it (what
-//             pose leaves open); three columns (along, across, across) per level
+//             gravity (drainage is unknown) and along the two directions across it (pose is
+//             unknown); three columns (along, across, across) per level
 //   swelling  tissue that changes its volume by the strain theta around the tumour's centre c
 //             (fem/swelling.hpp); four columns for each radius s of the case, r = |x - c|:
 //               theta = exp(-r^2 / 2 s^2)

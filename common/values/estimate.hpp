@@ -134,10 +134,10 @@ struct Omission {
 
 struct StageTimings {  // milliseconds, monotonic clock
   double register_ms = 0.0;
-  double invert_ms = 0.0;
+  double invert_ms = 0.0;  // without the rebuild
   double rebuild_ms = 0.0;
-  double encode_ms = 0.0;
-  double journal_ms = 0.0;
+  double encode_ms = 0.0;   // of this update, but for these timings
+  double journal_ms = 0.0;  // queueing the newest observation for the journal; 0 without a journal
 };
 
 struct Update {

@@ -9,7 +9,8 @@
 namespace brainshift::test_support {
 namespace {
 
-// Rows of points on the unit octant; equal angles along its borders. Vertex (i, j) lies in row i from the pole z.
+// Rows of points on the unit octant; equal angles along its borders. Vertex (i, j) lies in row i
+// from the pole z.
 struct Patch {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> triangles;
@@ -61,8 +62,8 @@ TetMesh octant_mesh(const std::vector<double>& radii, int cells) {
   std::vector<Eigen::Vector4i> tets;
   for (int s = 0; s + 1 < shells; ++s) {
     for (std::array<int, 3> t : patch.triangles) {
-      // A prism in three tetrahedra along its walk from the lowest inner to the highest outer node, so that
-      // neighbours cut their common quadrilaterals alike.
+      // A prism in three tetrahedra along its walk from the lowest inner to the highest outer
+      // node, so that neighbours cut their common quadrilaterals alike.
       std::sort(t.begin(), t.end());
       const auto in = [&](std::size_t k) { return index(s, t[k]); };
       const auto out = [&](std::size_t k) { return index(s + 1, t[k]); };

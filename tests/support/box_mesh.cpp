@@ -20,7 +20,8 @@ TetMesh box_mesh(int nx, int ny, int nz, const Vec3& size) {
       }
     }
   }
-  // Kuhn: one tetrahedron per order in which the three axes are walked from corner 000 to corner 111.
+  // Kuhn: one tetrahedron per order in which the three axes are walked from corner 000 to corner
+  // 111.
   std::array<int, 3> axes = {0, 1, 2};
   std::vector<Eigen::Vector4i> tets;
   do {

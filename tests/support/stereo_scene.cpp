@@ -56,7 +56,8 @@ double value_noise(double x, double y, int octave) {
          b * ((1 - a) * lattice(ii, jj + 1, octave) + a * lattice(ii + 1, jj + 1, octave));
 }
 
-// Grey level of the patch at a place, about 128 with sd `contrast`: lattices of 9, 4.5, 2.2 and 1.1 mm.
+// Grey level of the patch at a place, about 128 with sd `contrast`: lattices of 9, 4.5, 2.2 and
+// 1.1 mm.
 double texture(double x, double y, double contrast) {
   double sum = 0.0;
   for (int octave = 0; octave < 4; ++octave) {
@@ -128,7 +129,8 @@ stereo::GrayImage render(const StereoCalibration& rig, Eye eye, const Patch& pat
   for (int v = 0; v < image.height; ++v) {
     for (int u = 0; u < image.width; ++u) {
       const Vec3 direction = T_left_camera.linear() * ray(camera_of(rig, eye), u, v);
-      // The patch is nearly across the rays: walking to its depth at the last place settles quickly.
+      // The patch is nearly across the rays: walking to its depth at the last place settles
+      // quickly.
       double t = patch.depth_mm / direction.z();
       Vec3 x = origin;
       for (int i = 0; i < 12; ++i) {

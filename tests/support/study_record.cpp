@@ -23,7 +23,8 @@ std::string number(double value) {
   return text;
 }
 
-// One write per row in append mode, so that tests that run at the same time do not mix their rows.
+// One write per row in append mode, so that tests that run at the same time do not mix their
+// rows.
 void append(const char* name, const std::string& row) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
   if (folder == nullptr) return;
@@ -47,6 +48,12 @@ bool record_check(const std::string& study, const std::string& name, double valu
   append("checks.csv", cell(study) + "," + cell(name) + "," + number(value) + "," + cell(bound) +
                            "," + (pass ? "1" : "0") + "," + cell(source));
   return pass;
+}
+
+void record_figure(const std::string& study, const std::string& name, double value,
+                   const std::string& note, const std::string& source) {
+  append("checks.csv", cell(study) + "," + cell(name) + "," + number(value) + "," + cell(note) +
+                           ",," + cell(source));
 }
 
 void record_left_out(const std::string& study, const std::string& reason) {

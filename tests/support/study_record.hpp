@@ -5,7 +5,7 @@
 // in it. Otherwise nothing is written; the tests assert all the same. Texts hold no commas,
 // quotes or line breaks. The files have no headings:
 //   points.csv    study,series,x_name,y_name,x,y
-//   checks.csv    study,name,value,bound,pass,source
+//   checks.csv    study,name,value,bound,pass,source      pass: 1, 0, or empty without a bound
 //   left_out.csv  study,reason
 #pragma once
 
@@ -26,6 +26,11 @@ void record(const StudyPoint& point);
 //   the reference.
 bool record_check(const std::string& study, const std::string& name, double value,
                   const std::string& bound, bool pass, const std::string& source);
+
+// A figure that a study shows without a bound, so that it neither passes nor fails. `note` stands
+// in the bound's column: "shown", with further figures if need be.
+void record_figure(const std::string& study, const std::string& name, double value,
+                   const std::string& note, const std::string& source);
 
 // A part of a study that could not run here, e.g. for want of data; the summary lists it.
 void record_left_out(const std::string& study, const std::string& reason);

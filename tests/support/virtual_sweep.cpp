@@ -147,8 +147,8 @@ SequenceContent VirtualSweep::content() const {
 }
 
 ultrasound::Contour VirtualSweep::section(int frame, int corners) const {
-  // In the ellipsoid's own scale the plane cuts a unit sphere: q(u, v) = |a + u b + v c|^2 = 1, a conic whose centre and
-  // axes follow from the 2 x 2 matrix of b and c.
+  // In units of the ellipsoid's axes the plane cuts a unit sphere: q(u, v) = |a + u b + v c|^2 =
+  // 1, a conic whose centre and axes follow from the 2 x 2 matrix of b and c.
   const AffineTransform T = T_ras_image(frame);
   const Vec3 a = (T.translation() - centre_mm).cwiseQuotient(semi_axes_mm);
   Eigen::Matrix<double, 3, 2> B;

@@ -11,7 +11,7 @@
 
 namespace brainshift::test_support {
 
-// What a sequence file holds, before it becomes text.
+// The contents of a sequence file before they become text.
 struct SequenceContent {
   int width = 0, height = 0;
   std::string element = "uint8";  // or "int16", "uint16"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Identities that the inversion rests on, with contact active and with pore pressure carried:
-//   <K_p^-1 f, g> = <f, K_p^-1 g>                                   the adjoint of the forward model is itself
+//   <K_p^-1 f, g> = <f, K_p^-1 g>             the forward model is self-adjoint
 //   d/dh Omega(Sigma (w + h dw)) = gradient . Sigma dw               paper eq. 5-8
 // For a given active set Omega is quadratic, so central differences are exact but for rounding.
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <cmath>
 
 #include "common/contact/refactorised_system.hpp"
-#include "tests/unit/inversion/objective.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "tests/support/study_record.hpp"
+#include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A column under its own weight, bottom fixed, top free. With nu = 0 there is no lateral strain, so the free
-// column and a confined one coincide and the closed form is one-dimensional (E = 2 G, height H, weight density f):
+// A column under its own weight, bottom fixed, top free. With nu = 0 there is no lateral strain,
+// so the free column and a confined one coincide and the closed form is one-dimensional (E = 2 G,
+// height H, weight density f):
 //   u_z(z) = -f / E (H z - z^2 / 2),   sag of the top f H^2 / (2 E)
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "common/values/case_config.hpp"
 #include "common/core/units.hpp"
-#include "common/linalg/cholesky.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/fem/gravity.hpp"
+#include "common/linalg/cholesky.hpp"
+#include "common/values/case_config.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"
 
@@ -55,8 +56,8 @@ TEST(GravityColumn, SagConvergesToTheClosedForm) {
   const double coarse = column_error(6);
   const double fine = column_error(12);
   ASSERT_GT(fine, 1e-8);  // not exact by accident, so that the order means something
-  // Largest nodal error on edges of H / 12; order 1.7 on the way to 2, because the one-sided diagonals of the mesh
-  // bend the column a little.
+  // Largest nodal error on edges of H / 12; order 1.7 on the way to 2, because the one-sided
+  // diagonals of the mesh bend the column a little.
   constexpr char kSource[] = "u = -f (H z - z^2/2) / E";
   const double order = std::log2(coarse / fine);
   EXPECT_TRUE(test_support::record_check("gravity-column", "P1 error %", 100.0 * fine, "<= 3",

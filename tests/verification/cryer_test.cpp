@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cryer's sphere (Cryer 1963, Q. J. Mech. Appl. Math. 16:401; Verruijt 2016, section 4.3): radius R, surface drained and
-// loaded with pressure q from t = 0. With incompressible constituents, e = (1 - nu) / (1 - 2 nu), T = c_v t / R^2,
-// (1 - e x_j^2 / 2) tan x_j = x_j:
+// Cryer's sphere (Cryer 1963, Q. J. Mech. Appl. Math. 16:401; Verruijt 2016, section 4.3): radius
+// R, surface drained and loaded with pressure q from t = 0. With incompressible constituents,
+//   e = (1 - nu) / (1 - 2 nu),   T = c_v t / R^2,   (1 - e x_j^2 / 2) tan x_j = x_j
 //   p(centre) = q e sum_j (sin x_j - x_j) / ((e - 1) sin x_j + e x_j cos x_j / 2) exp(-x_j^2 T)
 // One eighth of the ball, its planes of symmetry fixed along their normals and sealed.
 #include <cmath>
@@ -38,7 +38,8 @@ double series(double poisson_ratio, double time) {
   return e * sum;
 }
 
-// The unit cube's layers |x|_max = const become spherical shells; its three faces at 0 stay planes.
+// The unit cube's layers |x|_max = const become spherical shells; its three faces at 0 stay
+// planes.
 TetMesh eighth_of_a_ball(int cells) {
   TetMesh mesh = test_support::box_mesh(cells, cells, cells, Vec3::Ones());
   for (int n = 0; n < mesh.num_nodes(); ++n) {

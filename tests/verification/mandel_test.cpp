@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mandel's problem (Mandel 1953; Cheng and Detournay 1988, Int. J. Numer. Anal. Methods Geomech. 12:551): a slab of
-// half-width a between rigid frictionless plates, loaded with force F per unit thickness on its half from t = 0, drained at
-// x = a. With incompressible constituents, T = c_v t / a^2, tan(w_i) = (1 - nu) / (1/2 - nu) w_i:
+// Mandel's problem (Mandel 1953; Cheng and Detournay 1988, Int. J. Numer. Anal. Methods Geomech.
+// 12:551): a slab of half-width a between rigid frictionless plates, loaded with force F per unit
+// thickness on its half from t = 0, drained at x = a. With incompressible constituents,
+//   T = c_v t / a^2,   tan(w_i) = (1 - nu) / (1/2 - nu) w_i
 //   p = F / a sum_i sin w_i / (w_i - sin w_i cos w_i) (cos(w_i x / a) - cos w_i) exp(-w_i^2 T)
-// The pressure at the centre first rises above F / (2a): the drained rim shrinks, and the stiff plate hands its load
-// inwards (the Mandel-Cryer effect).
+// The pressure at the centre first rises above F / (2a): the drained rim shrinks, and the stiff
+// plate hands its load inwards (the Mandel-Cryer effect).
 //
-// The plate is tied by superposition: each step is solved for two displacements of the plate, and the combination whose
-// reaction is F is the answer; no series enters.
+// The plate is tied by superposition: each step is solved for two displacements of the plate, and
+// the combination whose reaction is F is the answer; no series enters.
 #include <cmath>
 #include <numbers>
 
@@ -30,7 +31,8 @@ std::vector<double> roots(double poisson_ratio) {
     double low = i * kPi + 1e-9, high = i * kPi + kPi / 2.0;
     for (int k = 0; k < 100; ++k) {
       const double w = 0.5 * (low + high);
-      // sin w - slope w cos w is negative left of the root, positive right of it; its sign alternates with i.
+      // sin w - slope w cos w is negative left of the root, positive right of it; its sign
+      // alternates with i.
       const double f = (std::sin(w) - slope * w * std::cos(w)) * (i % 2 == 0 ? 1.0 : -1.0);
       (f < 0.0 ? low : high) = w;
     }

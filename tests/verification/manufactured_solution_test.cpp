@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Manufactured solution: u = (a, b, c) s(x) s(y) s(z) with s(t) = sin(pi t / L) on a cube, zero on its boundary.
-// The body force that makes it exact, f = -(lambda + G) grad div u - G lap u, and the errors are integrated by a rule
-// of degree five. With polynomials of degree p the L2 error must fall with order p + 1, that of the gradient with p.
+// Manufactured solution: u = (a, b, c) s(x) s(y) s(z) with s(t) = sin(pi t / L) on a cube, zero
+// on its boundary. The body force that makes it exact, f = -(lambda + G) grad div u - G lap u,
+// and the errors are integrated by a rule of degree five. With polynomials of degree p the L2
+// error must fall with order p + 1, that of the gradient with p.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "common/linalg/cholesky.hpp"
 #include "common/fem/space_elasticity.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"
 

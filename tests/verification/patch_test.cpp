@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Patch test and rigid motion (Irons & Razzaque 1972): a linear displacement on the boundary of a distorted mesh is
-// found inside, with its constant stress, by P1 and P2; a quadratic one by P2. A rigid motion costs no force.
+// Patch test and rigid motion (Irons & Razzaque 1972): a linear displacement on the boundary of a
+// distorted mesh is found inside, with its constant stress, by P1 and P2; a quadratic one by P2.
+// A rigid motion costs no force.
 #include <cmath>
 
 #include "tests/support/box_mesh.hpp"
@@ -25,8 +26,8 @@ Vec3 linear(const Vec3& x) {
   return Vec3(0.1, -0.2, 0.3) + gradient * x;
 }
 
-// Divergence-free stress: u = (x^2 - ..., chosen so that (lambda + G) grad div u + G lap u = 0 for every material:
-// div u = 0 and lap u = 0.
+// Quadratic displacement with div u = 0 and lap u = 0, so that (lambda + G) grad div u + G lap u
+// = 0 for every material: the stress is free of divergence.
 Vec3 quadratic(const Vec3& x) {
   return 1e-3 * Vec3(x[0] * x[0] - x[1] * x[1], -2.0 * x[0] * x[1], x[0] * x[1]);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Terzaghi's column (Terzaghi 1923; Verruijt 2016, Theory and Problems of Poroelasticity, section 2.2): height H, load q
-// from t = 0, drained at the top. With incompressible constituents, y the depth below the top, T = c_v t / H^2:
+// Terzaghi's column (Terzaghi 1923; Verruijt 2016, Theory and Problems of Poroelasticity, section
+// 2.2): height H, load q from t = 0, drained at the top. With incompressible constituents, y the
+// depth below the top, T = c_v t / H^2:
 //   p = q sum_m 4 / ((2m+1) pi) sin((2m+1) pi y / 2H) exp(-(2m+1)^2 pi^2 T / 4)
 //   settlement = q H / (lambda + 2 G) (1 - sum_m 8 / ((2m+1)^2 pi^2) exp(-(2m+1)^2 pi^2 T / 4))
 #include <cmath>
@@ -50,7 +51,8 @@ TEST(Terzaghi, PressureAndSettlementFollowTheSeries) {
   BiotStepper stepper = column.stepper(material);
   const double scale_s = time_scale_s(material);
   BiotState state = BiotState::at_rest(column.mesh.num_nodes());
-  // Steps of a hundredth of the time that they reach, so that the error in time stays below that in space.
+  // Steps of a hundredth of the time that they reach, so that the error in time stays below that
+  // in space.
   double time = 0.0, pressure_error = 0.0, settlement_error = 0.0;
   for (const double until : {0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0}) {
     const double dt = (until - time) / 100.0;
@@ -111,7 +113,7 @@ TEST(Terzaghi, BackwardEulerHasOrderOneInTheStep) {
   }
 }
 
-// What the pressure along the column rises and falls beyond a monotone profile, over q.
+// Rise and fall of the pressure along the column beyond a monotone profile, over q.
 double roughness(double step_over_bound, bool stabilise) {
   const PoroMaterial material = tissue(0.46);
   const Column column(20, kLoad);
@@ -162,7 +164,8 @@ TEST(Terzaghi, LongAfterTheLoadItIsDrainedElasticity) {
   const auto late = stepper->step(BiotState::at_rest(mesh.num_nodes()), load, 1e10 * relaxation_s);
   ASSERT_TRUE(late.has_value()) << late.error().message;
   EXPECT_EQ(stepper->diagnostics().stabilised_tets, 0);
-  const auto factor = linalg::SparseCholesky::factorise(assemble_stiffness(mesh, material.elastic, dofs));
+  const auto factor =
+      linalg::SparseCholesky::factorise(assemble_stiffness(mesh, material.elastic, dofs));
   const Points drained = dofs.expand(factor->solve(dofs.restrict_to(load.force)));
   const double difference =
       (late->displacement - drained).cwiseAbs().maxCoeff() / drained.cwiseAbs().maxCoeff();

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Thick sphere under internal pressure, radii a < b (Lame; Timoshenko & Goodier, Theory of Elasticity, art. 142):
+// Thick sphere under internal pressure, radii a < b (Lame; Timoshenko & Goodier, Theory of
+// Elasticity, art. 142):
 //   u_r(r) = p a^3 / (b^3 - a^3) [ (1 - 2 nu) r / E + (1 + nu) b^3 / (2 E r^2) ]
-// Near nu = 1/2 the volume hardly changes: P1 locks, P2 does not. What remains of P2's error is the flat faces of the
-// cavity, alike for every nu.
+// Near nu = 1/2 the volume hardly changes: P1 locks, P2 does not. What remains of P2's error is
+// the flat faces of the cavity, alike for every nu.
 #include <cmath>
 #include <map>
 
@@ -79,8 +80,9 @@ Outcome thick_sphere(fem::Element element, double nu, int cells) {
           solution.assemble_s + solution.solve_s};
 }
 
-// The third candidate, for the comparison only: P1 with the dilatation averaged around each node (Bonet & Burton
-// 1998): K = K_dev + kappa sum_n d_n d_n^T / V_n, with d_n^T u the change of the nodal volume V_n.
+// The third candidate, for the comparison only: P1 with the dilatation averaged around each node
+// (Bonet & Burton 1998): K = K_dev + kappa sum_n d_n d_n^T / V_n, with d_n^T u the change of the
+// nodal volume V_n.
 Outcome nodal_average(double nu, int cells) {
   const Stopwatch watch;
   const auto space = fem::make_space(shell(cells), fem::Element::kP1);
@@ -172,7 +174,8 @@ TEST(ThickSphere, LinearElementsLockAndQuadraticOnesDoNot) {
   ASSERT_EQ(p1.unknowns, p2.unknowns);
   EXPECT_TRUE(test_support::record_check(kStudy, "P2 nu 0.4999 displacement error %", p2.error_pct,
                                          "<= 3", p2.error_pct <= 3.0, kSource));
-  // Locking: with the same unknowns P1 is several times worse, and worse than itself where it does not lock.
+  // Locking: with the same unknowns P1 is several times worse, and worse than itself where it
+  // does not lock.
   const double ratio = p1.error_pct / p2.error_pct;
   EXPECT_TRUE(test_support::record_check(kStudy, "P1 error over P2 error at nu 0.4999", ratio,
                                          ">= 4", ratio >= 4.0, kSource));

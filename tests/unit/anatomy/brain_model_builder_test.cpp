@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "common/values/model_id.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
+#include "common/values/model_id.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
 namespace brainshift::anatomy {
@@ -121,8 +121,8 @@ TEST(BrainModelBuilder, FluidPlanePassesThroughTheLowestCraniotomyNode) {
   for (const NodeIndex node : model.craniotomy) lowest = std::max(lowest, depth(node));
   EXPECT_EQ(model.fluid_plane_depth_mm, lowest);
   EXPECT_DOUBLE_EQ(model.slave_plane_depth_mm, lowest + 20.0);
-  // Gravity is -x: the rim's end on the long axis lies at sqrt(50^2 - 25^2) = 43.3 mm, on the short
-  // axis at 47.7; nodes are up to an edge away from the rim.
+  // Gravity is -x: the rim's end on the long axis lies at sqrt(50^2 - 25^2) = 43.3 mm, on the
+  // short axis at 47.7; nodes are up to an edge away from the rim.
   EXPECT_GT(-model.fluid_plane_depth_mm - kBallCentre[0], 42.5);
   EXPECT_LT(-model.fluid_plane_depth_mm - kBallCentre[0], 47.7);
   for (const NodeIndex node : model.slaves) EXPECT_LT(depth(node), model.slave_plane_depth_mm);
@@ -249,7 +249,7 @@ TEST(BrainModelBuilder, ThePatientsOwnSkullIsTurnedLikeTheBrain) {
   }
 }
 
-TEST(BrainModelBuilder, ABrainstemOfRadiusZeroIsNone) {
+TEST(BrainModelBuilder, ABrainstemOfRadiusZeroSelectsNoNode) {
   CaseInputs inputs = ball_case();
   inputs.config.brainstem.radius_mm = 0.0;
   EXPECT_TRUE(built(inputs).brainstem.empty());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every bad case is refused with one line that names the key and the value.
+// Every invalid case is rejected with one line that names the key and the value.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/geometry/surface.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
@@ -32,8 +32,8 @@ void expect_refused(const CaseInputs& inputs, ErrorCode code,
 CaseInputs box_case() {
   CaseInputs inputs = ball_case();
   inputs.config.mesh = MeshFile{"box.msh"};
-  inputs.mesh = test_support::box_mesh(kBallCentre - Vec3::Constant(40),
-                                            kBallCentre + Vec3::Constant(40), 8);
+  inputs.mesh =
+      test_support::box_mesh(kBallCentre - Vec3::Constant(40), kBallCentre + Vec3::Constant(40), 8);
   inputs.config.tumour = TumourEllipsoid{kBallCentre + Vec3(20, 0, 0), Vec3(10, 8, 6)};
   inputs.config.craniotomy.centre_mm = kBallCentre + Vec3(41, 3, 2);
   inputs.config.brainstem = {kBallCentre - Vec3(0, 0, 40), 16.0};

@@ -35,8 +35,9 @@ TriangleSurface plate(double height) {
                       {{0, 1, 2}, {0, 2, 3}});
 }
 
-// Two plates that meet in the edge x = 0, z = 0 (from y = -3 to y = 3) and fall away to both sides with slope
-// `fall`. Outward is up. Seen from below a fall > 0 is a roof (convex skull), a fall < 0 a valley.
+// Two plates that meet in the edge x = 0, z = 0 (from y = -3 to y = 3) and fall away to both
+// sides with slope `fall`. Outward is up. Seen from below a fall > 0 is a roof (convex skull), a
+// fall < 0 a valley.
 TriangleSurface roof(double fall) {
   return make_surface({{0, -3, 0}, {0, 3, 0}, {-4, 0, -4 * fall}, {4, 0, -4 * fall}},
                       {{0, 1, 2}, {1, 0, 3}});
@@ -54,8 +55,8 @@ ContactPair search_one(const Vec3& slave, const TriangleSurface& skull) {
   return pairs ? pairs->front() : ContactPair{};
 }
 
-// Independent oracle: closest point of a triangle by minimising over a barycentric grid that is refined
-// round its best point; needs no case distinction between face, edge and vertex.
+// Independent oracle: closest point of a triangle by minimising over a barycentric grid that is
+// refined round its best point; needs no case distinction between face, edge and vertex.
 Vec3 closest_on_triangle(const std::array<Vec3, 3>& corners, const Vec3& x) {
   double u = 1.0 / 3.0, v = 1.0 / 3.0, step = 0.5;
   const auto at = [&](double a, double b) -> Vec3 {
@@ -222,7 +223,8 @@ TEST(ContactSearch, NoSlavesGiveNoPairs) {
 }
 
 TEST(ContactSearch, IgnoresVerticesWithoutTriangles) {
-  // First in the list, so that indices of master nodes and of vertices differ; right at the slave.
+  // First in the list, so that indices of master nodes and of vertices differ; right at the
+  // slave.
   TriangleSurface skull = plate(1.0);
   const Points corners = skull.vertices;
   skull.vertices.resize(3, 5);
@@ -233,7 +235,7 @@ TEST(ContactSearch, IgnoresVerticesWithoutTriangles) {
   EXPECT_LT((search_one(Vec3(-1.0, -1.0, 0.0), skull).contact_point - Vec3(0, 0, 1)).norm(), 1e-14);
 }
 
-TEST(ContactSearch, RefusesWhatItCannotSearch) {
+TEST(ContactSearch, RejectsWhatItCannotSearch) {
   const Points nodes = Vec3(1, 1, 0);
   const auto code = [&](const std::vector<NodeIndex>& slaves, const TriangleSurface& skull) {
     const auto pairs = search_contact(nodes, slaves, skull);

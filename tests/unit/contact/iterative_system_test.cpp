@@ -18,9 +18,9 @@ Points load() {
   return Points::Random(3, patient()->mesh.num_nodes());
 }
 
-// The stop rule asks for a residual of 1e-8 of the cold start's. A guess that is wrong by 1e-4 has half
-// of the digits already, so about half of the iterations remain. One that is wrong by its own size
-// saves nothing and must not spoil the answer.
+// The stop rule asks for a residual of 1e-8 of the cold start's. A guess that is wrong by 1e-4
+// has half of the digits already, so about half of the iterations remain. One that is wrong by
+// its own size saves nothing and must not spoil the answer.
 TEST(IterativeSystem, AGoodFirstGuessSavesIterations) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
   const auto system = IterativeSystem::build(model.forward());
@@ -46,7 +46,7 @@ TEST(IterativeSystem, AGoodFirstGuessSavesIterations) {
   for (const Points& u : {near, far}) EXPECT_LT((u - exact).norm(), 1e-6 * exact.norm());
 }
 
-TEST(IterativeSystem, SaysSoWhenTheLimitStopsIt) {
+TEST(IterativeSystem, ReportsTheLimitThatStopsIt) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
   const auto system =
       IterativeSystem::build(model.forward(), {.tolerance = 1e-8, .max_iterations = 3});
@@ -59,7 +59,7 @@ TEST(IterativeSystem, SaysSoWhenTheLimitStopsIt) {
       << status.error().message;
 }
 
-TEST(IterativeSystem, RefusesALoadThatIsNotFinite) {
+TEST(IterativeSystem, RejectsALoadThatIsNotFinite) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
   const auto system =
       IterativeSystem::build(model.forward(), {.tolerance = 1e-8, .max_iterations = 50});

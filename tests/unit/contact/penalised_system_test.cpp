@@ -43,8 +43,8 @@ INSTANTIATE_TEST_SUITE_P(Kinds, PenalisedSystems,
                            return each.param == Kind::kWoodbury ? "woodbury" : "iterative";
                          });
 
-// Independent reference: K_p formed and factorised with dense matrices. Sets follow one another, so that columns and
-// factors of the set before must not leak into the next.
+// Independent reference: K_p formed and factorised with dense matrices. Sets follow one another,
+// so that columns and factors of the set before must not leak into the next.
 TEST_P(PenalisedSystems, EqualsADenseSolveForEverySet) {
   const inversion::PreparedModel model = prepare(Boundary::kContact);
   const ForwardModel& forward = model.forward();

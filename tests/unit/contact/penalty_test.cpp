@@ -31,9 +31,9 @@ TEST(PenaltyContact, PenetrationFollowsEquation11) {
   EXPECT_DOUBLE_EQ(contact.penetration(u)[0], -1.0);
 }
 
-// A column on a floor is pulled upwards against a ceiling by a uniform traction. By hand: without ceiling its
-// top rises by u0 = t H / E' with E' the column's modulus; the ceiling at gap g < u0 holds it at g, so the
-// total contact force is (u0 - g) / u0 of the total pull.
+// A column on a floor is pulled upwards against a ceiling by a uniform traction. By hand: without
+// ceiling its top rises by u0 = t H / E' with E' the column's modulus; the ceiling at gap g < u0
+// holds it at g, so the total contact force is (u0 - g) / u0 of the total pull.
 class Column : public ::testing::Test {
  protected:
   static constexpr double kHeight = 30.0, kWidth = 20.0;
@@ -149,7 +149,7 @@ TEST(ForwardModel, FixedBoundaryHoldsSlavesInTheNormalAndLetsThemSlide) {
   EXPECT_GT(slide, 0.1);
 }
 
-TEST(ForwardModel, SaysThatABodyWithoutFixedNodesFloats) {
+TEST(ForwardModel, ReportsABodyWithoutFixedNodes) {
   BrainModel model = test_support::toy_patient();
   model.slaves.insert(model.slaves.end(), model.fixed.begin(), model.fixed.end());
   model.fixed.clear();

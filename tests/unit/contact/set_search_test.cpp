@@ -26,7 +26,7 @@ TEST(SetSearch, PenetratingSlavesJoinAndPullingOnesLeave) {
   EXPECT_EQ(search.current(), (ActiveSet{1, 0, 0}));
 }
 
-TEST(SetSearch, ViolationsWithinTheToleranceAreNone) {
+TEST(SetSearch, ViolationsWithinTheToleranceDoNotCount) {
   SetSearch search(3, 10, 1e-3);
   search.begin();
   EXPECT_EQ(search.next(VecX::Zero(3), VecX::Constant(3, 0.9e-3), kUnit), SetSearch::Step::kSolved);
@@ -35,8 +35,8 @@ TEST(SetSearch, ViolationsWithinTheToleranceAreNone) {
             SetSearch::Step::kContinue);
 }
 
-// Violated in every set but {0}, where only slave 1 is, and least: slaves 0 and 1 chase each other for ever when both
-// change at once.
+// Two slaves that chase each other for ever when both change at once. Every set has a violation;
+// that of {0}, by slave 1, is the least.
 struct Chase {
   VecX forces = VecX::Zero(2), penetration = VecX::Zero(2);
   explicit Chase(const ActiveSet& set, double least) {
@@ -59,7 +59,7 @@ SetSearch::Step run_chase(SetSearch& search, double least) {
   return step;
 }
 
-TEST(SetSearch, ACycleIsSaidAndTheBestSetKept) {
+TEST(SetSearch, ACycleIsReportedAndTheBestSetKept) {
   SetSearch search(2, 12);
   EXPECT_EQ(run_chase(search, 0.1), SetSearch::Step::kExhausted);
   EXPECT_EQ(search.iteration(), 12);
@@ -75,7 +75,7 @@ TEST(SetSearch, ACycleWhoseBestSetHoldsEndsEarly) {
   EXPECT_EQ(search.best(), (ActiveSet{1, 0}));
 }
 
-TEST(SetSearch, FollowSaysWhetherTheSetIsAnother) {
+TEST(SetSearch, FollowReportsWhetherTheSetChanged) {
   SetSearch search(2, 30);
   search.begin();
   const Chase now(search.current(), 0.1);
@@ -84,7 +84,8 @@ TEST(SetSearch, FollowSaysWhetherTheSetIsAnother) {
   EXPECT_FALSE(search.follow(VecX::Zero(2), VecX::Zero(2)));
 }
 
-// A linear complementarity problem with a symmetric positive definite matrix has one solution, and it is found.
+// A linear complementarity problem with a symmetric positive definite matrix has one solution.
+// The search must find it.
 TEST(SetSearch, SolvesContactWithFixedLoads) {
   std::srand(5);
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(40, 40);

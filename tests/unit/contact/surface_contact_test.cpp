@@ -34,7 +34,7 @@ TEST(Obstacle, PlaneSphereAndSurfaceAgreeOnPenetration) {
   }
 }
 
-TEST(Obstacle, APointInTheCentreOfTheBallIsRefused) {
+TEST(Obstacle, APointInTheCentreOfTheBallIsRejected) {
   EXPECT_FALSE(contact_pairs(Points::Zero(3, 1), RigidSphere{Vec3::Zero(), 1.0}));
 }
 

@@ -69,7 +69,8 @@ TEST(Tissues, ALabelThatTheMeshDoesNotHaveIsNamed) {
   EXPECT_EQ(map.error().message, "material.regions.7: the mesh has no such label (there: 0, 5)");
 }
 
-// A stiffer tumour deforms less under the same load, and the same stiffness written down changes nothing.
+// A stiffer tumour deforms less under the same load, and the same stiffness written down changes
+// nothing.
 TEST(Tissues, AStiffTumourDeformsLess) {
   const BrainModel model = test_support::toy_patient();
   CaseConfig config = test_support::toy_config();

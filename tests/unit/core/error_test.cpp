@@ -7,8 +7,6 @@
 #include <set>
 #include <string>
 
-#include "common/values/estimate.hpp"
-
 namespace brainshift {
 namespace {
 
@@ -42,20 +40,6 @@ TEST(Fail, CarriesCodeAndMessage) {
   EXPECT_EQ(status.error().message, "craniotomy selects no node");
   const Result<int> result = fail(ErrorCode::kNotFound, "x");
   EXPECT_FALSE(result);
-}
-
-TEST(EstimateNames, AreStable) {
-  EXPECT_EQ(to_string(Boundary::kContact), "contact");
-  EXPECT_EQ(to_string(Boundary::kFixed), "fixed");
-  EXPECT_EQ(to_string(Method::kPaper), "paper");
-  EXPECT_EQ(to_string(EstimateStatus::kNotRun), "not_run");
-  EXPECT_EQ(to_string(EstimateStatus::kIterating), "iterating");
-  EXPECT_EQ(to_string(EstimateStatus::kConverged), "converged");
-  EXPECT_EQ(to_string(EstimateStatus::kIterationLimit), "iteration_limit");
-}
-
-TEST(EstimateNames, AnEstimateStartsAsNotRun) {
-  EXPECT_EQ(Estimate{}.status, EstimateStatus::kNotRun);
 }
 
 }  // namespace

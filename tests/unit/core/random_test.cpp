@@ -28,8 +28,8 @@ TEST(Random, SameSeedGivesTheSameNumbersAndAnotherOthers) {
   EXPECT_EQ(equal, 0);
 }
 
-// The C++ standard fixes the generator (10000th output of the default seed), so recorded surgeries can be
-// made again on any machine.
+// The C++ standard fixes the generator (10000th output of the default seed), so recorded
+// surgeries can be made again on any machine.
 TEST(Random, UniformIsTheGeneratorsTop53Bits) {
   Random random(5489);
   double last = 0.0;
@@ -37,7 +37,8 @@ TEST(Random, UniformIsTheGeneratorsTop53Bits) {
   EXPECT_EQ(last, static_cast<double>(9981545732273789042ull >> 11) / 9007199254740992.0);
 }
 
-// Tolerances: five standard errors of the mean, 5 / sqrt(20000) = 0.035, and of the spread, 0.025.
+// Tolerances: five standard errors of the mean, 5 / sqrt(20000) = 0.035, and of the spread,
+// 0.025.
 TEST(Random, NormalHasMeanZeroAndSpreadOne) {
   Random random(1);
   std::vector<double> values(kSamples);

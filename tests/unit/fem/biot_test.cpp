@@ -73,8 +73,9 @@ TEST(BiotStepper, MatrixIsThatOfTheElementsAndTheStepLeavesNoResidual) {
   }
   for (const NodeIndex n : cube.drained) EXPECT_DOUBLE_EQ(second->pressure[n], 3e-4);
 
-  // Mass balance of the whole: what flowed in is stored or leaves through drained nodes. Summed over all test
-  // functions the diffusion vanishes, so only the rows of drained nodes hold a flow.
+  // Mass balance of the whole: what flowed in is stored or leaves through drained nodes. Summed
+  // over all test functions the diffusion vanishes, so only the rows of drained nodes hold a
+  // flow.
   BiotLoad sealed = load;
   sealed.displacement = Points();
   sealed.pressure = VecX();
@@ -126,7 +127,7 @@ TEST(BiotStepper, KeepsTheFactorsOfTheStepSizesUsedLast) {
   EXPECT_TRUE(factorised(2.0));
 }
 
-TEST(BiotStepper, SaysWhereItStabilises) {
+TEST(BiotStepper, ReportsWhereItStabilises) {
   Cube cube;
   // Half of the tetrahedra a thousandth as permeable.
   PoroMaterial tight = tissue();

@@ -5,8 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "common/linalg/cholesky.hpp"
 #include "common/geometry/surface.hpp"
+#include "common/linalg/cholesky.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::fem {
@@ -65,8 +65,8 @@ TEST(Elasticity, StiffnessHasExactlySixZeroEnergyModes) {
   EXPECT_GT(eigenvalues[6], 1e-6 * largest);
 }
 
-// Constant-strain patch test: a linear displacement prescribed on the boundary of an irregular patch is
-// reproduced inside to rounding.
+// Constant-strain patch test: a linear displacement prescribed on the boundary of an irregular
+// patch is reproduced inside to rounding.
 TEST(Elasticity, PatchTestReproducesLinearDisplacement) {
   TetMesh mesh = box_mesh(3, 4, 3, Vec3(30, 40, 30));
   perturb_interior(mesh, 2.0, 11);
@@ -108,9 +108,9 @@ void add_traction(const TetMesh& box, int axis, double plane, const Vec3& tracti
   }
 }
 
-// A box on a sliding floor under tractions that keep its strain uniaxial stretches by u_z = t z / M with
-// M = lambda + 2 G, which P1 holds exactly. Turning the whole problem turns the solution with it, which
-// exercises normal-fixed frames that are not aligned with the axes.
+// A box on a sliding floor under tractions that keep its strain uniaxial stretches by u_z = t z /
+// M with M = lambda + 2 G, which P1 holds exactly. Turning the whole problem turns the solution
+// with it, which exercises normal-fixed frames that are not aligned with the axes.
 TEST(Elasticity, SlidingFloorInRotatedFrameIsExact) {
   const Vec3 size(20, 20, 30);
   const TetMesh straight = box_mesh(2, 2, 3, size);
@@ -134,7 +134,8 @@ TEST(Elasticity, SlidingFloorInRotatedFrameIsExact) {
     for (NodeIndex n : nodes_where(straight, [](const Vec3& x) { return x[2] == 0.0; })) {
       dofs.fix_normal(n, turn * Vec3::UnitZ());
     }
-    // Two held nodes stop the rigid motions that the floor allows; the exact solution does not move them.
+    // Two held nodes stop the rigid motions that the floor allows; the exact solution does not
+    // move them.
     dofs.fix_all(0);
     dofs.fix_all(1);
     dofs.finalise();

@@ -13,7 +13,8 @@ namespace {
 
 using testing::HasSubstr;
 
-// Two layers, labels 1 (named "low") and 2; triangles: one of the bottom turned inwards, one inside the body.
+// Two layers, labels 1 (named "low") and 2; triangles: one of the bottom turned inwards, one
+// inside the body.
 GroupedMesh layers() {
   GroupedMesh file;
   file.mesh = test_support::box_mesh(1, 1, 2, Vec3(1.0, 1.0, 2.0));
@@ -84,7 +85,7 @@ TEST(BuildProblem, FacesLookOutwardsAndInnerOnesAreKnown) {
   EXPECT_EQ(problem->groups.at("9").inner.cols(), 1);
 }
 
-TEST(BuildProblem, RefusesWhatTheMeshDoesNotHave) {
+TEST(BuildProblem, RejectsWhatTheMeshDoesNotHave) {
   const auto message = [](const ProblemSpec& file) {
     const auto problem = build_problem(file, layers(), {});
     return problem ? std::string("accepted") : problem.error().message;
@@ -103,7 +104,8 @@ TEST(BuildProblem, RefusesWhatTheMeshDoesNotHave) {
   EXPECT_EQ(message(file), "accepted");
 }
 
-// A block on a ball, held at its top: the stress, the pressed points and nothing else balance at every free node.
+// A block on a ball, held at its top: the stress, the pressed points and nothing else balance at
+// every free node.
 TEST(Solve, ContactSolutionIsInEquilibriumWithWhatPresses) {
   for (const fem::Element element : {fem::Element::kP1, fem::Element::kP2}) {
     ForwardProblem problem;
@@ -148,7 +150,7 @@ TEST(Solve, ContactSolutionIsInEquilibriumWithWhatPresses) {
   }
 }
 
-TEST(Solve, RefusesLoadsOnInnerFaces) {
+TEST(Solve, RejectsLoadsOnInnerFaces) {
   auto problem = build_problem(spec(), layers(), {});
   ASSERT_TRUE(problem);
   problem->groups["9"].faces = problem->groups["bottom"].faces;

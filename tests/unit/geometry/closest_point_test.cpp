@@ -117,7 +117,8 @@ TEST(ClosestPointIndex, PseudoNormalsOfACube) {
 }
 
 TEST(ClosestPointIndex, PseudoNormalTellsInsideFromOutside) {
-  // A sharp wedge: single triangles' normals give the wrong sign near its edge, pseudo-normals never.
+  // A sharp wedge: single triangles' normals give the wrong sign near its edge, pseudo-normals
+  // never.
   TriangleSurface wedge;
   wedge.vertices.resize(3, 6);
   wedge.vertices << 0, 0, 5, 5, 5, 5,  //
@@ -219,7 +220,7 @@ TEST(ClosestPointIndex, SurvivesBeingMoved) {
   EXPECT_EQ(second.surface().num_triangles(), cube().num_triangles());
 }
 
-TEST(ClosestPointIndex, RefusesWhatIsNoSurface) {
+TEST(ClosestPointIndex, RejectsAnInvalidSurface) {
   EXPECT_EQ(ClosestPointIndex::build({}).error().code, ErrorCode::kEmptySet);
   TriangleSurface points_only = cube();
   points_only.triangles.resize(3, 0);

@@ -113,7 +113,7 @@ TEST(SignedDistanceGrid, SpacingGrowsUntilTheNodesFit) {
   EXPECT_LT(DistanceVolume::create(*grid)->at(kCentre).distance_mm, 0.0);
 }
 
-TEST(SignedDistanceGrid, RefusesOpenSurfacesAndOptionsOutOfRange) {
+TEST(SignedDistanceGrid, RejectsOpenSurfacesAndOptionsOutOfRange) {
   TriangleSurface open = peanut(3.0);
   open.triangles.conservativeResize(3, open.num_triangles() - 1);
   const auto refused = [](const ClosestPointIndex& index, const DistanceGridOptions& options,
@@ -136,7 +136,8 @@ TEST(SignedDistanceGrid, RefusesOpenSurfacesAndOptionsOutOfRange) {
   refused(index, options, "max_nodes = 1");
 }
 
-// h^2 / (4 R) for the sphere itself; its triangles' chords lie inside it by a^2 / (8 R), a their edge.
+// h^2 / (4 R) for the sphere itself; its triangles' chords lie inside it by a^2 / (8 R), a their
+// edge.
 TEST(DistanceVolume, InterpolationErrorFallsWithTheSquareOfTheSpacing) {
   const double radius = 12.0, edge = 0.5;
   const ClosestPointIndex index =
@@ -245,7 +246,7 @@ TEST(DistanceVolume, ManyPointsAreTheSameAsOneByOne) {
   }
 }
 
-TEST(DistanceVolume, RefusesGridsThatDoNotFit) {
+TEST(DistanceVolume, RejectsGridsThatDoNotFit) {
   DistanceGrid good;
   good.spacing_mm = 1.0;
   good.dims = {2, 2, 3};

@@ -181,7 +181,8 @@ TEST(GaussianSmooth, TurnsAStepIntoTheNormalDistribution) {
     // The step lies half a voxel before voxel 30.
     const double x = 0.5 * (i - 29.5);
     const double expected = 0.5 * std::erfc(-x / (2.0 * std::sqrt(2.0)));
-    // The voxel sum is the midpoint rule: h^2/24 max|p'| = 6e-4; the cut at 3.5 sigma leaves out 5e-4.
+    // The voxel sum is the midpoint rule: h^2/24 max|p'| = 6e-4; the cut at 3.5 sigma leaves out
+    // 5e-4.
     EXPECT_NEAR(smooth.at(i, 20, 20), expected, 1.1e-3) << i;
   }
 }

@@ -100,7 +100,7 @@ TEST(MeshMask, WithoutSliverBoundLeavesOptimisationOut) {
   EXPECT_LT(mesh_quality(*mesh).min_dihedral_deg, 10.0);  // what the optimisation is for
 }
 
-TEST(MeshMask, RefinesWhereTheSizingFieldSaysSo) {
+TEST(MeshMask, RefinesWhereTheSizingFieldIsSmall) {
   const auto graded = [](const Vec3& x) { return x[0] < kBall.centre[0] ? 2.5 : 6.0; };
   const TetMesh mesh = meshed(ball_mask(), graded);
   double sum[2] = {0, 0};
@@ -160,8 +160,8 @@ TEST(MeshMask, ADomainThatFillsTheImageIsClosedAtItsBorder) {
   std::fill(mask.values.begin(), mask.values.end(), 1.0f);
   const TetMesh mesh = meshed(mask, uniform(4.0));
   EXPECT_TRUE(is_closed(boundary_surface(mesh)));
-  // A cube of 12 voxels: the half level lies half a voxel outside the outermost centres; facets cut
-  // its edges and corners by up to 0.15 x 4 mm.
+  // A cube of 12 voxels: the half level lies half a voxel outside the outermost centres; facets
+  // cut its edges and corners by up to 0.15 x 4 mm.
   EXPECT_NEAR(mesh_quality(mesh).volume_mm3, 24.0 * 24.0 * 24.0, 0.06 * 24 * 24 * 24);
 }
 

@@ -70,7 +70,8 @@ TEST(MeshQuality, OfARegularTetrahedronIsClosedForm) {
 
 TEST(MeshQuality, OfKuhnCubesCountsEachEdgeOnce) {
   const int n = 3;
-  const MeshQuality quality = mesh_quality(test_support::box_mesh(Vec3::Zero(), Vec3::Constant(n), n));
+  const MeshQuality quality =
+      mesh_quality(test_support::box_mesh(Vec3::Zero(), Vec3::Constant(n), n));
   EXPECT_NEAR(quality.volume_mm3, n * n * n, 1e-12);
   EXPECT_NEAR(quality.min_dihedral_deg, 45.0, 1e-10);
   EXPECT_NEAR(quality.max_dihedral_deg, 90.0, 1e-10);
@@ -93,7 +94,7 @@ TEST(CheckMesh, AcceptsAGoodMesh) {
   EXPECT_TRUE(status) << status.error().message;
 }
 
-TEST(CheckMesh, RefusesNoTetrahedron) {
+TEST(CheckMesh, RejectsNoTetrahedron) {
   TetMesh mesh = good_mesh();
   mesh.tets.resize(4, 0);
   expect_refused(mesh, ErrorCode::kEmptySet, "no tetrahedron");
@@ -119,7 +120,7 @@ TEST(CheckMesh, NamesTheIndexOutOfRange) {
   }
 }
 
-TEST(CheckMesh, RefusesLabelsOfAnotherLength) {
+TEST(CheckMesh, RejectsLabelsOfAnotherLength) {
   TetMesh mesh = good_mesh();
   mesh.labels.assign(7, 0);
   expect_refused(mesh, ErrorCode::kInvalidArgument, "7 labels");

@@ -86,7 +86,8 @@ TEST(OrientedCloud, NormalsOfEitherSignMakeTheSamePlane) {
   }
 }
 
-// Points with 0.1 mm of noise: from one to the next, the distance to its plane jumps; the blended one does less.
+// Points with 0.1 mm of noise: the distance to the plane of the closest point jumps from point to
+// point; the blended distance jumps less.
 TEST(OrientedCloud, DistanceHardlyJumpsWhereTheClosestPointChanges) {
   Points points = sphere(2000, 20);
   Random noise(8);
@@ -145,7 +146,7 @@ TEST(OrientedCloud, PointsOfASingleLineHaveNoPlane) {
   EXPECT_NEAR(std::abs(cloud->at(Vec3(100.1, 0.1, 0.3)).distance_mm), 0.3, 1e-9);
 }
 
-TEST(OrientedCloud, RefusesWhatIsNoCloud) {
+TEST(OrientedCloud, RejectsAnInvalidCloud) {
   const auto refused = [](const Points& points, const Points& normals, const CloudOptions& options,
                           ErrorCode code, const std::string& naming) {
     const auto cloud = OrientedCloud::build(points, normals, options);

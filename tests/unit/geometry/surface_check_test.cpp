@@ -18,8 +18,8 @@ using testing::HasSubstr;
 
 const CorticalSite kSite{Vec3(10, 20, 30), Vec3(0, 0, 1), 45.0};
 
-// A shallow cap of n x n points, 40 mm wide, `above_mm` over the site's centre; looks along +z. Cells for which
-// `leave_out` is true have no triangles.
+// A shallow cap of n x n points, 40 mm wide, `above_mm` over the site's centre; looks along +z.
+// Cells for which `leave_out` is true have no triangles.
 TriangleSurface cap(int n = 21, double above_mm = -4.0,
                     const std::function<bool(int, int)>& leave_out = {}) {
   TriangleSurface surface;
@@ -63,7 +63,7 @@ TEST(SurfaceCheck, AGoodSurfacePassesAsItIs) {
   EXPECT_TRUE(checked->notes.empty());
 }
 
-TEST(SurfaceCheck, ASurfaceThatLooksInwardsIsTurnedRoundAndSaysSo) {
+TEST(SurfaceCheck, ASurfaceThatLooksInwardsIsTurnedRoundAndReported) {
   TriangleSurface inwards = cap();
   inwards.triangles.row(0).swap(inwards.triangles.row(1));
   const auto checked = check_cortical_surface(inwards, kSite);
@@ -73,19 +73,19 @@ TEST(SurfaceCheck, ASurfaceThatLooksInwardsIsTurnedRoundAndSaysSo) {
   EXPECT_THAT(checked->notes, testing::ElementsAre(HasSubstr("were turned round")));
 }
 
-TEST(SurfaceCheck, ASurfaceAcrossTheOpeningIsRefused) {
+TEST(SurfaceCheck, ASurfaceAcrossTheOpeningIsRejected) {
   const CorticalSite sideways{kSite.centre, Vec3(1, 0, 0), 45.0};
   EXPECT_THAT(refusal(cap(), sideways),
               HasSubstr("look neither out of the craniotomy nor into it: mean cosine"));
 }
 
-TEST(SurfaceCheck, OneTriangleTurnedAgainstTheRestIsRefused) {
+TEST(SurfaceCheck, OneTriangleTurnedAgainstTheRestIsRejected) {
   TriangleSurface surface = cap();
   surface.triangles.col(100).reverseInPlace();
   EXPECT_THAT(refusal(surface), HasSubstr("are turned against each other"));
 }
 
-TEST(SurfaceCheck, AThirdTriangleOnAnEdgeIsRefused) {
+TEST(SurfaceCheck, AThirdTriangleOnAnEdgeIsRejected) {
   TriangleSurface surface = cap();
   surface.triangles.conservativeResize(3, surface.num_triangles() + 1);
   surface.triangles.rightCols<1>() << 1, 0, 200;
@@ -94,7 +94,7 @@ TEST(SurfaceCheck, AThirdTriangleOnAnEdgeIsRefused) {
   EXPECT_EQ(refusal(surface), "the edge between vertices 0 and 1 has more than two triangles");
 }
 
-TEST(SurfaceCheck, ATriangleOfUnknownOrRepeatedVerticesIsRefused) {
+TEST(SurfaceCheck, ATriangleOfUnknownOrRepeatedVerticesIsRejected) {
   TriangleSurface surface = cap();
   surface.triangles.col(7) << 1, 2, 441;
   EXPECT_EQ(refusal(surface), "triangle 7 has the vertices 1 2 441: must be three of 441");
@@ -140,14 +140,14 @@ TEST(SurfaceCheck, OtherUnitsAreNamed) {
   EXPECT_THAT(refusal(scaled(1e-9)), testing::EndsWith("for a craniotomy of 45 mm"));
 }
 
-TEST(SurfaceCheck, ASurfaceFarFromTheCraniotomyIsRefused) {
+TEST(SurfaceCheck, ASurfaceFarFromTheCraniotomyIsRejected) {
   EXPECT_THAT(refusal(cap(21, -26.0)),
               HasSubstr("closest point is 26.0 mm from the craniotomy's "
                         "centre: must be within 25 mm; is its pose right?"));
   EXPECT_EQ(refusal(cap(21, -24.0)), "no refusal");
 }
 
-TEST(SurfaceCheck, FewOrInfinitePointsAreRefused) {
+TEST(SurfaceCheck, FewOrInfinitePointsAreRejected) {
   EXPECT_EQ(refusal(cap(7)), "the surface has 49 points: must be at least 50");
   TriangleSurface surface = cap();
   surface.vertices(1, 17) = NAN;

@@ -148,7 +148,7 @@ TEST(TetLocator, AnswersFarQueries) {
   EXPECT_NEAR(described(mesh, found).x(), 2.0, 1e-9);
 }
 
-TEST(TetLocator, SaysSoWhenThereIsNoAnswer) {
+TEST(TetLocator, ReportsThatThereIsNoAnswer) {
   const TetLocator locator(box_mesh(kLow, kHigh, 2));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Vec3& x : {Vec3(nan, 0, 0), Vec3(0, std::numeric_limits<double>::infinity(), 0)}) {

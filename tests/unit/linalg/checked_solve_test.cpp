@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/fem/block_solver.hpp"
+#include "common/fem/elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::linalg {
@@ -34,7 +35,7 @@ struct Block {
   SparseCholesky factor_of_another(double relative) const {
     SymmetricMatrix other = stiffness;
     fem::add_to_node_block(other, dofs, mesh.num_nodes() - 1,
-                      relative * max_norm(stiffness) * Mat3::Identity());
+                           relative * max_norm(stiffness) * Mat3::Identity());
     return std::move(*SparseCholesky::factorise(other));
   }
 };
@@ -72,7 +73,7 @@ TEST(CheckedSolve, RefinesWhatASlightlyWrongFactorDid) {
   EXPECT_LT((x - expected).norm(), 1e-12 * expected.norm());
 }
 
-TEST(CheckedSolve, RefusesTheFactorOfAnotherMatrix) {
+TEST(CheckedSolve, RejectsTheFactorOfAnotherMatrix) {
   const Block block;
   const SparseCholesky factor = block.factor_of_another(10.0);
   VecX x;
@@ -83,7 +84,7 @@ TEST(CheckedSolve, RefusesTheFactorOfAnotherMatrix) {
   EXPECT_NE(quality.error().message.find("backward error"), std::string::npos);
 }
 
-TEST(CheckedSolve, RefusesARightHandSideThatIsNotFinite) {
+TEST(CheckedSolve, RejectsARightHandSideThatIsNotFinite) {
   const Block block;
   const auto factor = SparseCholesky::factorise(block.stiffness);
   for (const double bad :
@@ -120,7 +121,7 @@ TEST(CheckedSolve, OneWrongColumnAmongManyIsFoundAndRefined) {
   EXPECT_EQ(check_many(block.stiffness, norm, *factor, b, x, workspace)->refinements, 0);
 }
 
-TEST(CheckedSolve, BlocksOfAnotherMatrixAreRefused) {
+TEST(CheckedSolve, BlocksOfAnotherMatrixAreRejected) {
   const Block block;
   const fem::StiffnessFactor factor(block.factor_of_another(10.0));
   fem::BlockSolver solver(block.stiffness, factor, block.dofs);

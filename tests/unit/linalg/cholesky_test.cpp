@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "common/fem/elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::linalg {
@@ -75,7 +76,7 @@ TEST(SparseCholesky, RefactorisedCloneEqualsAFreshFactorAndLeavesTheOriginalAlon
   EXPECT_GT((original->solve(b) - expected).norm(), 1e-3 * expected.norm());
 }
 
-TEST(SparseCholesky, RefusesABodyThatFloats) {
+TEST(SparseCholesky, RejectsABodyThatFloats) {
   const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
   fem::DofMap dofs(mesh.num_nodes());
   dofs.finalise();
@@ -84,7 +85,7 @@ TEST(SparseCholesky, RefusesABodyThatFloats) {
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
 }
 
-TEST(SparseCholesky, RefusesABodyThatCanOnlySlide) {
+TEST(SparseCholesky, RejectsABodyThatCanOnlySlide) {
   const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
   fem::DofMap dofs(mesh.num_nodes());
   for (NodeIndex n : nodes_where(mesh, [](const Vec3& x) { return x[2] == 0.0; })) {
@@ -96,7 +97,7 @@ TEST(SparseCholesky, RefusesABodyThatCanOnlySlide) {
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
 }
 
-TEST(SparseCholesky, RefusesNumbersThatAreNotFinite) {
+TEST(SparseCholesky, RejectsNumbersThatAreNotFinite) {
   const Block block;
   for (double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -113,7 +114,7 @@ TEST(SparseCholesky, RefusesNumbersThatAreNotFinite) {
   }
 }
 
-TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
+TEST(SparseCholesky, RejectsAnIndefiniteMatrix) {
   const Block block;
   SymmetricMatrix k = block.stiffness();
   k.coeffRef(5, 5) = -1.0;
@@ -122,8 +123,9 @@ TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
 }
 
-// Springs at three corners: answers are off by 1e-14 over their stiffness, relative to the body's.
-TEST(SparseCholesky, RefusesABodyThatSpringsHardlyHold) {
+// Springs at three corners: answers are off by 1e-14 over their stiffness, relative to the
+// body's.
+TEST(SparseCholesky, RejectsABodyThatSpringsHardlyHold) {
   const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
   fem::DofMap dofs(mesh.num_nodes());
   dofs.finalise();
@@ -143,14 +145,14 @@ TEST(SparseCholesky, RefusesABodyThatSpringsHardlyHold) {
   }
 }
 
-TEST(SparseCholesky, StiffContactSpringsAreNoReasonToRefuse) {
+TEST(SparseCholesky, StiffContactSpringsAreAccepted) {
   const Block block;
   SymmetricMatrix k = block.stiffness();
   fem::add_to_node_block(k, block.dofs, block.mesh.num_nodes() - 1, 1e9 * Mat3::Identity());
   EXPECT_TRUE(SparseCholesky::factorise(k).has_value());
 }
 
-TEST(SparseCholesky, RefusesEntriesAboveTheDiagonal) {
+TEST(SparseCholesky, RejectsEntriesAboveTheDiagonal) {
   const Block block;
   SymmetricMatrix k = block.stiffness();
   const SymmetricMatrix upper = k.transpose();
@@ -161,7 +163,7 @@ TEST(SparseCholesky, RefusesEntriesAboveTheDiagonal) {
   }
 }
 
-TEST(SparseCholesky, RefusesASystemWithoutUnknowns) {
+TEST(SparseCholesky, RejectsASystemWithoutUnknowns) {
   EXPECT_EQ(SparseCholesky::factorise(SymmetricMatrix(0, 0)).error().code, ErrorCode::kEmptySet);
 }
 

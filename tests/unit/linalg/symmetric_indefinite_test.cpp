@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/fem/biot_matrix.hpp"
+#include "common/fem/elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::linalg {
@@ -31,7 +32,8 @@ struct Block {
     fem::PoroMaterial tissue;
     tissue.elastic = {0.024, shear};
     tissue.permeability = 1e5;
-    return fem::assemble_biot(mesh, fem::MaterialMap::uniform(tissue, mesh.num_tets()), dofs, pressure, dt_s);
+    return fem::assemble_biot(mesh, fem::MaterialMap::uniform(tissue, mesh.num_tets()), dofs,
+                              pressure, dt_s);
   }
 };
 
@@ -109,14 +111,14 @@ TEST(SymmetricIndefinite, RefactorisedCloneEqualsAFreshFactorAndLeavesTheOrigina
   EXPECT_GT((cloned - before).norm(), 1e-3 * before.norm());
 }
 
-TEST(SymmetricIndefinite, RefusesABodyThatFloats) {
+TEST(SymmetricIndefinite, RejectsABodyThatFloats) {
   const auto factor = factor_of(Block(false).matrix(0.1));
   ASSERT_FALSE(factor.has_value());
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
   EXPECT_THAT(factor.error().message, HasSubstr("not held"));
 }
 
-TEST(SymmetricIndefinite, RefusesAMatrixOfTheRightInertiaThatIsAsGoodAsSingular) {
+TEST(SymmetricIndefinite, RejectsAMatrixOfTheRightInertiaThatIsAsGoodAsSingular) {
   SymmetricMatrix lower(3, 3);
   for (int i = 0; i < 3; ++i) lower.insert(i, i) = i < 2 ? 1.0 : -1.0;
   lower.insert(1, 0) = 1.0 - 1e-15;
@@ -128,7 +130,7 @@ TEST(SymmetricIndefinite, RefusesAMatrixOfTheRightInertiaThatIsAsGoodAsSingular)
 }
 
 // Nothing moves at the boundary and nothing drains: a constant pressure is left open.
-TEST(SymmetricIndefinite, RefusesFluidEnclosedInABodyThatCannotChangeItsVolume) {
+TEST(SymmetricIndefinite, RejectsFluidEnclosedInABodyThatCannotChangeItsVolume) {
   Block block;
   block.dofs = fem::DofMap(block.mesh.num_nodes());
   const Vec3 size(30, 20, 20);
@@ -145,7 +147,7 @@ TEST(SymmetricIndefinite, RefusesFluidEnclosedInABodyThatCannotChangeItsVolume) 
   EXPECT_THAT(factor.error().message, HasSubstr("fluid is enclosed"));
 }
 
-TEST(SymmetricIndefinite, RefusesTheWrongInertia) {
+TEST(SymmetricIndefinite, RejectsTheWrongInertia) {
   fem::BiotMatrix matrix = Block().matrix(0.1);
   // A tissue that pushes back with negative stiffness at one unknown.
   matrix.lower.coeffRef(5, 5) *= -1.0;
@@ -155,7 +157,7 @@ TEST(SymmetricIndefinite, RefusesTheWrongInertia) {
   EXPECT_THAT(factor.error().message, HasSubstr("negative pivots instead of"));
 }
 
-TEST(SymmetricIndefinite, RefusesNumbersThatAreNotFinite) {
+TEST(SymmetricIndefinite, RejectsNumbersThatAreNotFinite) {
   const fem::BiotMatrix good = Block().matrix(0.1);
   auto factor = factor_of(good);
   ASSERT_TRUE(factor.has_value());
@@ -175,7 +177,7 @@ TEST(SymmetricIndefinite, RefusesNumbersThatAreNotFinite) {
   }
 }
 
-TEST(SymmetricIndefinite, RefusesASolutionThatOverflows) {
+TEST(SymmetricIndefinite, RejectsASolutionThatOverflows) {
   const fem::BiotMatrix matrix = Block().matrix(0.1);
   const auto factor = factor_of(matrix);
   ASSERT_TRUE(factor.has_value());
@@ -184,7 +186,7 @@ TEST(SymmetricIndefinite, RefusesASolutionThatOverflows) {
   EXPECT_FALSE(factor->solve(b, x).has_value());
 }
 
-TEST(SymmetricIndefinite, RefusesASystemWithoutUnknowns) {
+TEST(SymmetricIndefinite, RejectsASystemWithoutUnknowns) {
   EXPECT_EQ(SymmetricIndefinite::factorise(SymmetricMatrix(0, 0), 0).error().code,
             ErrorCode::kEmptySet);
 }

@@ -21,8 +21,8 @@ TEST(WendlandC2, IsOneAtZeroAndVanishesAtItsSupport) {
   EXPECT_DOUBLE_EQ(wendland_c2(10.5, 21.0), 3.0 / 16.0);  // (1/2)^4 * 3
 }
 
-// Largest difference of the two formulas: 0.1976 at r = 2.376 L, and never negative. Other supports
-// fail: with S = 4 L it is 0.223, with S = 4.4 L 0.174.
+// Largest difference of the two formulas: 0.1976 at r = 2.376 L, and never negative. Other
+// supports fail: with S = 4 L it is 0.223, with S = 4.4 L 0.174.
 TEST(WendlandC2, FallsALittleFasterThanThePapersCorrelation) {
   constexpr double kLength = 5.0;
   double largest = 0.0, at = 0.0;

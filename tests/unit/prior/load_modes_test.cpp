@@ -52,7 +52,8 @@ TEST(LoadModes, SwellingBalancesItself) {
   }
 }
 
-// Work in a uniform dilation u = x e: sum f . x = kappa sum V theta tr(grad x) = 3 kappa int theta.
+// Work in a uniform dilation u = x e: sum f . x = kappa sum V theta tr(grad x) = 3 kappa int
+// theta.
 TEST(LoadModes, SwellingDoesTheWorkOfItsVolumeStrain) {
   const BrainModel patient = test_support::toy_patient(8);
   CaseConfig config = test_support::toy_config();

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/linalg/blas.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+namespace brainshift::linalg {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+
+// Sums of up to 9 products of numbers below 1: a few roundings.
+constexpr double kRounding = 1e-14;
+constexpr float kFloatRounding = 1e-5f;
+
+// Eigen's own products are the reference. A and B are blocks of larger matrices, so that the
+// leading dimension is not the number of rows.
+struct Blocks {
+  MatrixXd storage_a, storage_b;
+  Blocks() {
+    std::srand(11);
+    storage_a = MatrixXd::Random(12, 10);
+    storage_b = MatrixXd::Random(12, 10);
+  }
+  auto a() const { return storage_a.block(1, 2, 7, 5); }
+  auto b() const { return storage_b.block(3, 1, 5, 4); }
+};
+
+TEST(Blas, MultipliesBlocks) {
+  const Blocks blocks;
+  const MatrixXd before = MatrixXd::Random(7, 4);
+  MatrixXd c = before;
+  blas::multiply(2.0, blocks.a(), blocks.b(), 0.5, c);
+  EXPECT_LT((c - (2.0 * blocks.a() * blocks.b() + 0.5 * before)).norm(), kRounding);
+  MatrixXf single = before.cast<float>();
+  const MatrixXf a = blocks.a().cast<float>(), b = blocks.b().cast<float>();
+  blas::multiply(2.0f, a, b, 0.5f, single);
+  EXPECT_LT((single - c.cast<float>()).norm(), kFloatRounding);
+}
+
+TEST(Blas, MultipliesTransposedBlocks) {
+  const Blocks blocks;
+  const MatrixXd before = MatrixXd::Random(5, 3);
+  MatrixXd c = before;
+  const MatrixXd b = MatrixXd::Random(7, 3);
+  blas::multiply_transposed(-1.5, blocks.a(), b, 2.0, c);
+  EXPECT_LT((c - (-1.5 * blocks.a().transpose() * b + 2.0 * before)).norm(), kRounding);
+}
+
+TEST(Blas, GramAddsToTheLowerTriangleOnly) {
+  const Blocks blocks;
+  const MatrixXd before = MatrixXd::Random(5, 5);
+  MatrixXd c = before;
+  blas::gram(blocks.a(), 0.5, c);
+  const MatrixXd expected = blocks.a().transpose() * blocks.a() + 0.5 * before;
+  for (int j = 0; j < 5; ++j) {
+    for (int i = 0; i < 5; ++i) {
+      EXPECT_NEAR(c(i, j), i >= j ? expected(i, j) : before(i, j), kRounding);
+    }
+  }
+}
+
+TEST(Blas, CholeskyAndItsTriangularSolves) {
+  const Blocks blocks;
+  const MatrixXd spd = blocks.a().transpose() * blocks.a() + MatrixXd::Identity(5, 5);
+  MatrixXd l = spd;
+  ASSERT_TRUE(blas::cholesky(l));
+  const MatrixXd lower = l.triangularView<Eigen::Lower>();
+  EXPECT_LT((lower * lower.transpose() - spd).norm(), 10 * kRounding);
+  const MatrixXd b = MatrixXd::Random(5, 3);
+  MatrixXd x = b;
+  blas::solve_lower(l, x);
+  EXPECT_LT((lower * x - b).norm(), kRounding);
+  blas::solve_lower_transposed(l, x);
+  EXPECT_LT((spd * x - b).norm(), 10 * kRounding);
+  const MatrixXf row = MatrixXf::Random(3, 5), single = lower.cast<float>();
+  MatrixXf y = row;
+  blas::solve_lower_transposed_right(single, y);
+  EXPECT_LT((y * single.transpose() - row).norm(), kFloatRounding);
+}
+
+TEST(Blas, CholeskyRejectsAnIndefiniteMatrix) {
+  MatrixXd indefinite = MatrixXd::Identity(4, 4);
+  indefinite(2, 2) = -1.0;
+  EXPECT_FALSE(blas::cholesky(indefinite));
+}
+
+TEST(Blas, AddsScaledVectors) {
+  const Eigen::VectorXd x = Eigen::VectorXd::Random(9), before = Eigen::VectorXd::Random(9);
+  Eigen::VectorXd y = before;
+  blas::add_scaled(8, -0.5, x.data(), y.data());
+  EXPECT_LT((y - before + 0.5 * x).head(8).norm(), kRounding);
+  EXPECT_EQ(y[8], before[8]);
+  Eigen::VectorXf single = before.cast<float>();
+  const Eigen::VectorXf xf = x.cast<float>();
+  blas::add_scaled(8, -0.5f, xf.data(), single.data());
+  EXPECT_LT((single - y.cast<float>()).norm(), kFloatRounding);
+}
+
+}  // namespace
+}  // namespace brainshift::linalg
