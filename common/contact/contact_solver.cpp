@@ -27,8 +27,8 @@ Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffn
       Points b_p = load;
       contact.add_load(b_p, solution.active);
       if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
-      quality =
-          fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p), unknowns);
+      quality = fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p),
+                                   unknowns);
     }
     if (!quality) return tl::unexpected(quality.error());
     solution.backward_error = std::max(solution.backward_error, quality->backward_error);

@@ -63,7 +63,8 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   fem::DofMap dofs = constrain(model, boundary);
   const auto materials = tissue_map(model, config.material);
   if (!materials) return tl::unexpected(materials.error());
-  linalg::SymmetricMatrix stiffness = fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
+  linalg::SymmetricMatrix stiffness =
+      fem::assemble_stiffness(model.mesh, materials->elastic(), dofs);
   const double assemble_s = watch.seconds();
 
   std::vector<ContactPair> pairs;

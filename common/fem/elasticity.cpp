@@ -26,13 +26,14 @@ TetGeometry tet_geometry(const TetMesh& mesh, int tet) {
 }
 
 linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const Elasticity& material,
-                                   const DofMap& dofs) {
+                                           const DofMap& dofs) {
   return assemble_stiffness(
       mesh, std::vector<Elasticity>(static_cast<std::size_t>(mesh.num_tets()), material), dofs);
 }
 
-linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
-                                   const DofMap& dofs) {
+linalg::SymmetricMatrix assemble_stiffness(const TetMesh& mesh,
+                                           const std::vector<Elasticity>& of_tet,
+                                           const DofMap& dofs) {
   assert(of_tet.size() == static_cast<std::size_t>(mesh.num_tets()));
   return assemble_lower(mesh.tets, dofs, [&](int tet) {
     const Elasticity& material = of_tet[static_cast<std::size_t>(tet)];

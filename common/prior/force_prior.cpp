@@ -12,8 +12,9 @@
 namespace brainshift::prior {
 namespace {
 
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
-                                                   PointColumns, 3, std::size_t>;
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                        PointColumns, 3, std::size_t>;
 
 }  // namespace
 

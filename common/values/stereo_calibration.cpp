@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/values/stereo_calibration.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <sstream>
+
+#include "common/core/rigid_motion.hpp"
 
 namespace brainshift {
 namespace {
 
-// Distortion coefficients of real lenses are below a few units; far beyond, a model has been fitted to noise.
+// Distortion coefficients of real lenses are below a few units; far beyond, a model has been
+// fitted to noise.
 constexpr double kMaxDistortion = 100.0;
 constexpr int kMaxPicture = 16384;
 constexpr double kRigidTolerance = 1e-4;
@@ -26,7 +28,8 @@ Status check_camera(const std::string& name, const CameraIntrinsics& camera, int
     return refuse(name + ".focal_x_px", camera.focal_x_px, "finite and > 0");
   if (!positive(camera.focal_y_px))
     return refuse(name + ".focal_y_px", camera.focal_y_px, "finite and > 0");
-  // A principal point outside the picture is legal optics only for a cropped picture; a swapped pair of numbers is not.
+  // A principal point outside the picture is legal optics only for a cropped picture; a swapped
+  // pair of numbers is not.
   if (!(camera.centre_x_px >= 0.0 && camera.centre_x_px <= width))
     return refuse(name + ".centre_x_px", camera.centre_x_px, "inside the picture");
   if (!(camera.centre_y_px >= 0.0 && camera.centre_y_px <= height))
@@ -77,34 +80,9 @@ Status validate(const StereoCalibration& calibration) {
 }
 
 Status check_rigid(const std::string& name, const Eigen::Matrix4d& matrix) {
-  if (!matrix.allFinite())
-    return fail(ErrorCode::kNotFinite, name + " has an entry that is not finite");
-  const Mat3 R = matrix.topLeftCorner<3, 3>();
-  const double skew = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (skew > kRigidTolerance) {
-    std::ostringstream text;
-    text << name << " is no rigid motion: R^T R differs from 1 by " << skew << ", must be below "
-         << kRigidTolerance;
-    return fail(ErrorCode::kInvalidArgument, text.str());
-  }
-  if (R.determinant() < 0.0) {
-    return fail(ErrorCode::kInvalidArgument,
-                name + " is no rigid motion: its determinant is -1, a mirror image");
-  }
-  if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9) {
-    return fail(ErrorCode::kInvalidArgument,
-                name + " is no rigid motion: its last row must be 0 0 0 1");
-  }
+  const Status rigid = brainshift::check_rigid(matrix, kRigidTolerance);
+  if (!rigid) return fail(rigid.error().code, name + " " + rigid.error().message);
   return {};
-}
-
-RigidTransform nearest_rigid(const Eigen::Matrix4d& matrix) {
-  const Eigen::JacobiSVD<Mat3> svd(matrix.topLeftCorner<3, 3>(),
-                                   Eigen::ComputeFullU | Eigen::ComputeFullV);
-  RigidTransform T = RigidTransform::Identity();
-  T.linear() = svd.matrixU() * svd.matrixV().transpose();
-  T.translation() = matrix.topRightCorner<3, 1>();
-  return T;
 }
 
 }  // namespace brainshift

@@ -49,9 +49,9 @@ Vec3 right_camera_in_left(const StereoCalibration& calibration);
 // stands to the left of the left one (swapped), and cameras one above the other.
 Status validate(const StereoCalibration& calibration);
 
-// Ok, or kInvalidArgument when the matrix is not a rigid motion within 1e-4 (core/rigid_motion.hpp):
-// a calibration has more digits than a pose that somebody wrote down. The message begins with `name`.
-// kNotFinite.
+// Ok, or kInvalidArgument when the matrix is not a rigid motion within 1e-4
+// (core/rigid_motion.hpp): a calibration has more digits than a pose that somebody wrote down.
+// The message begins with `name`. kNotFinite.
 Status check_rigid(const std::string& name, const Eigen::Matrix4d& matrix);
 
 }  // namespace brainshift

@@ -3,8 +3,8 @@
 
 #include <set>
 
-#include "common/values/model_id.hpp"
 #include "common/geometry/surface.hpp"
+#include "common/values/model_id.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::test_support {

@@ -4,18 +4,18 @@
 
 #include <filesystem>
 
+#include "common/anatomy/brain_model_builder.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
 
 namespace brainshift::anatomy {
 namespace {
 
 TEST(RealHead, CoarseDefaultCaseGivesAWholeModel) {
-  const auto config =
-      io::read_case_config(std::filesystem::path(BRAINSHIFT_SOURCE_DIR "/config/cases") / "colin27-coarse.yaml");
+  const auto config = io::read_case_config(
+      std::filesystem::path(BRAINSHIFT_SOURCE_DIR "/config/cases") / "colin27-coarse.yaml");
   ASSERT_TRUE(config) << config.error().message;
   const auto inputs = io::load_case_inputs(*config);
   ASSERT_TRUE(inputs) << inputs.error().message;

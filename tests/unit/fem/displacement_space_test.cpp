@@ -96,7 +96,8 @@ TEST(SpaceStiffness, AgreesWithTheInternalForce) {
     DofMap dofs(space.num_nodes());
     dofs.finalise();
     const Points u = Points::Random(3, space.num_nodes());
-    const VecX product = linalg::multiply(assemble_stiffness(space, materials, dofs), dofs.restrict_to(u));
+    const VecX product =
+        linalg::multiply(assemble_stiffness(space, materials, dofs), dofs.restrict_to(u));
     const VecX force = dofs.restrict_to(internal_force(space, materials, u));
     ASSERT_GT(force.norm(), 0.0);
     EXPECT_LT((product - force).norm(), 1e-12 * force.norm());
