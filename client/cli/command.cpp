@@ -9,26 +9,6 @@
 
 namespace brainshift::client {
 
-int exit_status(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kInvalidArgument:
-    case ErrorCode::kNotFound:
-    case ErrorCode::kUnreadable:
-    case ErrorCode::kDegenerateMesh:
-    case ErrorCode::kEmptySet:
-    case ErrorCode::kFloatingBody:
-    case ErrorCode::kNotFinite: return 2;
-    case ErrorCode::kWriteFailed:
-    case ErrorCode::kSingularMatrix:
-    case ErrorCode::kNotConverged:
-    case ErrorCode::kModelNotReady:
-    case ErrorCode::kProtocol:
-    case ErrorCode::kUnavailable:
-    case ErrorCode::kInternal: return 1;
-  }
-  return 1;
-}
-
 void print_error(std::string_view sentence) {
   std::string line(sentence);
   for (char& c : line) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the commands of `brainshift` share: registration, exit status, progress.
+// What the commands of `brainshift` share: registration, the line of an error, progress.
 //
-// Exit status: 0 success, 2 bad usage or bad input, 1 any other failure. Every failure is one line on
-// stderr, "brainshift: <sentence>".
+// Every failure is one line on stderr, "brainshift: <sentence>", and an exit status
+// (common/core/exit_status.hpp).
 #pragma once
 
 #include <string_view>
@@ -16,8 +16,8 @@ class App;
 
 namespace brainshift::client {
 
-// Each adds a subcommand to `app`; once the arguments are parsed, the chosen one stores its outcome in
-// `status`. `status` must outlive the parsing.
+// Each adds a subcommand to `app`. When app.parse() has read the arguments, it runs the chosen
+// one, which stores its outcome in `status`. `status` must outlive the parsing.
 void add_simulate(CLI::App& app, Status& status);
 void add_replay(CLI::App& app, Status& status);
 void add_report(CLI::App& app, Status& status);
@@ -25,14 +25,11 @@ void add_solve(CLI::App& app, Status& status);
 void add_import(CLI::App& app, Status& status);
 void add_stereo(CLI::App& app, Status& status);
 
-// 2 for what the user can mend in arguments or files, else 1.
-int exit_status(ErrorCode code);
-
-// "brainshift: sentence" on stderr, line breaks replaced.
+// Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);
 
-// Draws stage and percentage on one line of stderr when that is a terminal; empty otherwise. The line is
-// ended when a stage is complete.
+// Draws stage and percentage on one line of stderr, and ends the line when a stage is complete. An
+// empty function when stderr is no terminal.
 Progress terminal_progress();
 
 }  // namespace brainshift::client

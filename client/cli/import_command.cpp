@@ -9,17 +9,17 @@
 namespace brainshift::client {
 namespace {
 
-Status run(const client::ImportOptions& options) {
-  const auto report = client::import_recording(options, terminal_progress());
+Status run(const ImportOptions& options) {
+  const auto report = import_recording(options, terminal_progress());
   if (!report) return tl::unexpected(report.error());
-  for (const std::string& line : client::report_lines(*report)) std::printf("%s\n", line.c_str());
+  for (const std::string& line : report_lines(*report)) std::printf("%s\n", line.c_str());
   return {};
 }
 
 }  // namespace
 
 void add_import(CLI::App& app, Status& status) {
-  auto options = std::make_shared<client::ImportOptions>();
+  auto options = std::make_shared<ImportOptions>();
   CLI::App* command = app.add_subcommand(
       "import", "Make a surgery file from a recording of tracked ultrasound (docs/import.md).");
   command->add_option("--recording", options->recording,

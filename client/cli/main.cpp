@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/cli/command.hpp"
+#include "common/core/exit_status.hpp"
 
 int main(int argc, char** argv) {
   using namespace brainshift;
@@ -42,19 +43,19 @@ int main(int argc, char** argv) {
     client::print_error(
         "unknown command \"" + std::string(argv[1]) +
         "\": must be simulate, replay, report, solve, import or stereo (see brainshift --help)");
-    return 2;
+    return kExitBadInput;
   }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     client::print_error(std::string(error.what()) + " (see brainshift --help)");
-    return 2;
+    return kExitBadInput;
   } catch (const std::exception& error) {
     client::print_error(std::string("internal error: ") + error.what());
-    return 1;
+    return kExitFailure;
   }
-  if (status) return 0;
+  if (status) return kExitSuccess;
   client::print_error(status.error().message);
-  return client::exit_status(status.error().code);
+  return exit_status(status.error().code);
 }

@@ -10,12 +10,12 @@ namespace brainshift::client {
 namespace {
 
 struct Arguments {
-  client::SimulateOptions options;
+  SimulateOptions options;
   bool list = false;
 };
 
 void print_scenarios() {
-  for (const client::ScenarioInfo& scenario : client::scenarios()) {
+  for (const ScenarioInfo& scenario : scenarios()) {
     std::printf("%-12s %s\n", scenario.name.c_str(), scenario.description.c_str());
   }
 }
@@ -32,7 +32,7 @@ Status run(const Arguments& arguments) {
   if (Status ok = required(!arguments.options.case_file.empty(), "--case"); !ok) return ok;
   if (Status ok = required(!arguments.options.scenario.empty(), "--scenario"); !ok) return ok;
   if (Status ok = required(!arguments.options.out.empty(), "--out"); !ok) return ok;
-  return client::simulate(arguments.options, terminal_progress());
+  return simulate(arguments.options, terminal_progress());
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ void add_simulate(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       app.add_subcommand("simulate", "Record a simulated surgery with its known truth.");
-  client::SimulateOptions& options = arguments->options;
+  SimulateOptions& options = arguments->options;
   command->add_option("--case", options.case_file, "case file (YAML)");
   command->add_option("--scenario", options.scenario, "what happens; --list shows the names");
   command->add_option("--seed", options.seed, "seed of noise and point selection")

@@ -10,9 +10,10 @@
 
 #include "client/cli/command.hpp"
 #include "common/forward/build_problem.hpp"
+#include "common/io/config/problem_file.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/config/problem_file.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -23,7 +24,8 @@ struct Arguments {
 };
 
 constexpr double kPaPerMegapascal = 1e6;
-// A probe this far outside the mesh, relative to its size, is rounding of what should lie on the surface.
+// A probe this far outside the mesh, relative to its size, is rounding
+// of what should lie on the surface.
 constexpr double kProbeTolerance = 1e-6;
 
 double mesh_size(const TetMesh& mesh) {

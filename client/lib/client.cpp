@@ -157,7 +157,7 @@ Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
   while (true) {
     const auto message = impl_->dealer->receive(deadline);
     if (!message) return tl::unexpected(message.error());
-    // No request is open: whatever has an id is late; what answers the next one was never asked for.
+    // No request is open: a reply with an old id is late, one with the next id is unasked for.
     auto unexpected = impl_->answer(*message, impl_->last_request_id + 1, MessageType::kUpdate);
     if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
     if (auto update = impl_->updates.pop()) return *std::move(update);

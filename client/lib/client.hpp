@@ -1,20 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-// Client: how a navigation system talks to brainshiftd. Links no solver.
+// Client: how a navigation system talks to brainshiftd. Links no solver and nothing under the GPL.
 //
 //   auto client = Client::connect("tcp://127.0.0.1:5555");
-//   client->subscribe();
-//   client->start_session({.case_id = "colin27"});
-//   client->submit(observation);
-//   auto message = client->next_update(std::chrono::seconds(30));
+//   if (!client) return show(client.error().message);
+//   if (auto ready = client->start_session({.case_id = "colin27"}); !ready)
+//     return show(ready.error().message);
+//   auto model = client->model();                         // the mesh that displacements belong to
+//   if (auto ok = client->subscribe(); !ok) return show(ok.error().message);
 //
-// Not thread-safe: one Client per thread. Every call returns within its timeout with a value or an Error
-// (kUnavailable: no daemon; kModelNotReady, kInvalidArgument, ...: the daemon's own answer; kProtocol).
-// Updates that arrive while another call waits are queued (bounded; the oldest iterate is dropped first,
-// final updates never).
+//   Observation seen;
+//   seen.case_id = "colin27";
+//   seen.source = "ius";
+//   seen.sequence = 1;                                    // counts up from 1
+//   seen.body = TumourBoundary{boundary_points, 0.5};     // 3 x m, mm; sd per component, mm
+//   if (auto taken = client->submit(seen); !taken) return show(taken.error().message);
 //
-// connect() does not wait for the daemon; the first request does. When the daemon goes away while a call
-// waits, the call returns kUnavailable at once instead of at its timeout. The connection comes back by
-// itself, but the daemon has then forgotten this client: subscribe again.
+//   auto message = client->next_update(std::chrono::seconds(60));
+//   if (message && !message->error) {
+//     const Points& u = message->update.estimate.displacement;   // 3 x nodes, mm
+//     draw(model->mesh.nodes + u);
+//   }
+//
+// Conventions. Coordinates are patient RAS in millimetres. Points are 3 x n matrices, a column per
+// point. A displacement moves an undeformed point to its deformed place; its columns are in the
+// order of BrainModel::mesh.nodes. Estimate::sd_mm has one entry per node, mm, or none at all.
+//
+// Errors. Every call returns a value or an Error: a code to branch on and one sentence to show.
+//   kUnavailable    no daemon, no answer in time, a lost connection, or a daemon that is stopping
+//   kProtocol       the answer could not be understood
+//   any other code  the daemon's own answer, e.g. kModelNotReady, kInvalidArgument
+// An observation from which no estimate could be made is not an error of next_update(): its
+// message arrives with UpdateMessage::error set. The estimate before it stays the valid one.
+//
+// Threads. A Client is not thread-safe: use each from one thread at a time. Several Clients may
+// talk to one daemon, which has one session at a time for all of them.
+//
+// Waiting. Every call returns within its timeout. Updates that arrive while a call waits for its
+// reply are queued for next_update(). The queue holds 256 of them; when it is full, the oldest
+// iterate gives way. Final updates and errors are never dropped.
+//
+// Lost connections. connect() does not wait for the daemon; the first request does. When the
+// daemon goes away while a call waits, the call returns kUnavailable at once instead of at its
+// timeout. The connection comes back by itself, but the daemon may have forgotten this client:
+// subscribe again, and start the session again if the daemon was restarted.
 #pragma once
 
 #include <chrono>
@@ -22,32 +50,55 @@
 #include <memory>
 #include <string>
 
-#include "common/values/brain_model.hpp"
 #include "common/core/error.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 
+// Each must be at least 1 ms and at most 6 days.
 struct ClientOptions {
+  // For every request but start_session.
   std::chrono::milliseconds request_timeout{5000};
-  std::chrono::milliseconds session_timeout{600000};  // starting a session may prepare the model
+  // Starting a session may prepare the model, which takes up to minutes.
+  std::chrono::milliseconds session_timeout{600000};
+  // A daemon that misses three heartbeats counts as gone.
   std::chrono::milliseconds heartbeat_interval{1000};
 };
 
 class Client {
  public:
+  // `endpoint`: as ZeroMQ writes it, "tcp://127.0.0.1:5555" or "ipc:///run/brainshift".
+  // kInvalidArgument names the endpoint or option that is invalid.
   static Result<Client> connect(const std::string& endpoint, const ClientOptions& options = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();
 
+  // Version, loaded case and model, and whether an inversion runs. The daemon always answers it.
   Result<wire::DaemonStatus> status();
+
+  // Starts a session for all clients and ends the running one. Returns when the model is prepared,
+  // with the sizes of the mesh and the times of the preparation. kInvalidArgument: the daemon
+  // serves another case; kModelNotReady: it has no model; kUnavailable: also when another client's
+  // start came later.
   Result<wire::SessionInfo> start_session(const wire::SessionRequest& request);
+
+  // The undeformed mesh with its node sets, skull and tumour: some MiB.
   Result<BrainModel> model();
+
+  // From now on the daemon pushes updates to this client. If the session has a final update
+  // already, the newest one comes at once.
   Status subscribe();
+
+  // Hands an observation over. Returns when the daemon has accepted it, not when it has been
+  // inverted. The receipt tells whether it replaced an older one of the same source that still
+  // waited. kInvalidArgument and others: the daemon rejects the observation and names the field.
   Result<wire::ObservationReceipt> submit(const Observation& observation);
-  // Next pushed update (iterate or final) in order of arrival.
+
+  // The next pushed update in order of arrival: an iterate, a final update (Update::final), or the
+  // error that an observation ended in. kUnavailable when none arrives within the timeout.
   Result<wire::UpdateMessage> next_update(std::chrono::milliseconds timeout);
 
  private:

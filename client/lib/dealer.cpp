@@ -131,7 +131,7 @@ Status Dealer::send(std::string_view message, Deadline deadline) {
   do {
     zmq_pollitem_t item{socket_, 0, ZMQ_POLLOUT, 0};
     zmq_poll(&item, 1, remaining_ms(deadline));
-    // A connection that accepts messages was made after every loss that the monitor has told of so far.
+    // A connection that accepts messages was made after every loss that the monitor has reported.
     drain_monitor();
     if (zmq_send(socket_, message.data(), message.size(), ZMQ_DONTWAIT) >= 0) return {};
     if (errno != EAGAIN && errno != EINTR) {

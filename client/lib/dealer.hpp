@@ -2,9 +2,10 @@
 // A ZeroMQ DEALER socket that sends and receives single-part messages before a deadline.
 // Private to client/lib; knows nothing of what the bytes mean.
 //
-// Messages are handed only to completed connections, so that a request to nobody fails instead of waiting
-// in a queue. Heartbeats notice a peer that vanished without closing; a lost connection is reported
-// while waiting, because the peer's answer is then lost with it. The socket reconnects by itself.
+// The socket hands messages to completed connections only, so that a request to nobody fails
+// instead of waiting in a queue. Heartbeats notice a peer that vanished without closing. receive()
+// reports a lost connection at once, because the peer's answer is lost with it. The socket
+// reconnects by itself. Not thread-safe.
 #pragma once
 
 #include <chrono>
@@ -29,7 +30,8 @@ class Dealer {
 
   // kUnavailable when no connection accepts the message before the deadline.
   Status send(std::string_view message, Deadline deadline);
-  // kUnavailable at the deadline or when the connection is lost; kProtocol for a multipart message.
+  // kUnavailable at the deadline or when the connection is lost; kProtocol for a multipart
+  // message.
   Result<std::string> receive(Deadline deadline);
 
   const std::string& endpoint() const { return endpoint_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Updates that arrived while a call waited for something else, in order of arrival.
-// Private to client/lib.
+// Private to client/lib. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,15 @@
 
 namespace brainshift::client {
 
-// Holds `capacity` entries. When full, the oldest iterate gives way: a newer one says more. Final updates
-// and errors are never dropped, so that the queue grows past its capacity if it holds nothing else.
+// Holds `capacity` entries. When it is full, the oldest iterate gives way, because a newer one
+// says more. Final updates and errors are never dropped: a queue of nothing else grows past its
+// capacity.
 class UpdateQueue {
  public:
   explicit UpdateQueue(std::size_t capacity) : capacity_(capacity) {}
 
   void push(Result<wire::UpdateMessage> update);
+  // The oldest entry; nullopt when there is none.
   std::optional<Result<wire::UpdateMessage>> pop();
   std::size_t size() const { return updates_.size(); }
 

@@ -2,10 +2,10 @@
 #include "client/plot/canvas.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/imgproc.hpp>
+
+#include "client/plot/ticks.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -26,7 +26,8 @@ cv::Point sub_pixel(cv::Point2d p) {
           static_cast<int>(std::lround(p.y * (1 << kSubPixelBits)))};
 }
 
-// cv::line's fixed-point coordinates overflow far outside the image; nothing is visible there anyway.
+// cv::line's fixed-point coordinates overflow far outside the image; nothing is visible there
+// anyway.
 bool drawable(cv::Point2d p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::abs(p.x) < 3e4 && std::abs(p.y) < 3e4;
 }
@@ -156,11 +157,6 @@ cv::Scalar magnitude_colour(double t) {
   return {static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
 }
 
-void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std::string& label,
-                     const cv::Scalar& ink) {
-  draw_colour_bar(image, bar, ColourScale{0.0, max}, label, ink);
-}
-
 void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& scale,
                      const std::string& label, const cv::Scalar& ink) {
   for (int y = 0; y < bar.height; ++y) {
@@ -184,36 +180,6 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& sca
   }
   draw_vertical_text(image, {bar.x + bar.width + 16 + widest + 36, bar.y + bar.height / 2}, label,
                      style);
-}
-
-std::vector<double> nice_ticks(double min, double max, int target) {
-  assert(min < max && target >= 1);
-  const double rough = (max - min) / target;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  double step = 10.0 * power;
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= rough * (1.0 - 1e-9)) {
-      step = factor * power;
-      break;
-    }
-  }
-  std::vector<double> ticks;
-  const auto first = static_cast<long>(std::ceil(min / step - 1e-9));
-  const auto last = static_cast<long>(std::floor(max / step + 1e-9));
-  for (long k = first; k <= last; ++k) ticks.push_back(static_cast<double>(k) * step);
-  return ticks;
-}
-
-std::string fixed_decimals(double value, int decimals) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
-  return buffer;
-}
-
-std::string tick_label(double value, double step) {
-  const int decimals =
-      step > 0.0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 0;
-  return fixed_decimals(std::abs(value) < 1e-9 * std::abs(step) ? 0.0 : value, decimals);
 }
 
 }  // namespace brainshift::client

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drawing primitives of the report's pictures. Private to client/report: pulls in OpenCV.
+// Drawing primitives of charts and pictures: text, lines, arrows, markers, a colour scale.
 //
-// Pictures are drawn at kPixelRatio times the size at which the page shows them, so that the stroke font
-// stays legible. All lengths here are device pixels; colours are BGR.
-// Hershey fonts know ASCII only: write "deg" and "+/-".
+// Pictures are drawn at kPixelRatio times the size at which a page shows them, so that the stroke
+// font stays legible. All lengths here are device pixels; colours are BGR; images are 8-bit BGR.
+// The font knows ASCII only: write "deg" and "+/-".
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -13,6 +13,7 @@
 namespace brainshift::client {
 
 inline constexpr int kPixelRatio = 2;
+inline constexpr int kMarkerRadius = 10;  // of a chart's points
 
 // Okabe and Ito's palette: distinguishable under the common colour-vision deficiencies.
 namespace palette {
@@ -40,8 +41,9 @@ struct TextStyle {
   bool halo = false;  // black rim, for text on images
 };
 
-// Width in pixels; `at` is the baseline's left end, middle or right end.
+// Width in pixels.
 int text_width(const std::string& text, const TextStyle& style);
+// `at` is the baseline's left end, middle or right end, as style.align says.
 void draw_text(cv::Mat& image, cv::Point at, const std::string& text, const TextStyle& style = {});
 // Reads from bottom to top, centred on `centre`.
 void draw_vertical_text(cv::Mat& image, cv::Point centre, const std::string& text,
@@ -55,33 +57,22 @@ struct Stroke {
 
 // Sub-pixel, anti-aliased. Parts outside the image are clipped.
 void draw_polyline(cv::Mat& image, const std::vector<cv::Point2d>& points, const Stroke& stroke);
-// `head_px`: length of the barbs, shortened for short arrows. `rim` > 0 draws a black rim of that width.
+// `head_px`: length of the barbs, shortened for short arrows. `rim`: width of a black rim, px.
 void draw_arrow(cv::Mat& image, cv::Point2d from, cv::Point2d to, const Stroke& stroke,
                 double head_px = 16.0, int rim = 0);
 
 enum class Marker { kNone, kCircle, kSquare, kTriangle };
 void draw_marker(cv::Mat& image, cv::Point2d at, Marker marker, const cv::Scalar& colour,
-                 int radius = 8);
+                 int radius);
 
 // Viridis without its darkest quarter, which would vanish on an MRI; t is clamped to [0, 1].
 cv::Scalar magnitude_colour(double t);
 
-// Vertical bar from min (bottom) to max (top) with ticks on its right and a vertical label beyond them.
+// Vertical bar from min (bottom) to max (top), ticks on its right, a vertical label beyond them.
 struct ColourScale {
   double min = 0.0, max = 1.0;  // min < max
 };
 void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& scale,
                      const std::string& label, const cv::Scalar& ink);
-// From 0 to max.
-void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, double max, const std::string& label,
-                     const cv::Scalar& ink);
-
-// Round tick positions (1, 2 or 5 times a power of ten apart) within [min, max]; about `target` of them.
-// Precondition: min < max.
-std::vector<double> nice_ticks(double min, double max, int target = 6);
-
-// As many decimals as the step between ticks needs.
-std::string tick_label(double value, double step);
-std::string fixed_decimals(double value, int decimals);
 
 }  // namespace brainshift::client

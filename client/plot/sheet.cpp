@@ -50,7 +50,7 @@ cv::Mat compose(const Sheet& sheet) {
   }
   if (sheet.colour_max > 0.0) {
     const cv::Rect bar(x, kHeader + kPanelTitle + height / 8, 36, 3 * height / 4);
-    draw_colour_bar(image, bar, sheet.colour_max, sheet.colour_label, palette::kInk);
+    draw_colour_bar(image, bar, {0.0, sheet.colour_max}, sheet.colour_label, palette::kInk);
   }
   if (!sheet.legend.empty())
     draw_legend(image, kHeader + kPanelTitle + height + kMargin / 2, sheet.legend);

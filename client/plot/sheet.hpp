@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Panels side by side with title, legend and colour bar. Private to client/report: pulls in OpenCV.
+// Panels side by side under one title, with a legend and a colour bar.
 #pragma once
 
 #include <opencv2/core.hpp>

@@ -92,7 +92,8 @@ class Player {
 
   void answered(std::size_t i) { std::erase(waiting_, i); }
 
-  // Every answer, iterates included, renews the deadline: a long inversion that shows progress is alive.
+  // Every answer, an iterate too, renews the deadline: a long
+  // inversion that shows progress is alive.
   void wait_for_all() {
     while (!waiting_.empty() && !lost_) {
       const auto before = received_;

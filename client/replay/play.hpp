@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plays recorded observations to a daemon session and collects what comes back.
+// Plays recorded observations to a daemon session and collects the answers.
 //
-// Latency is taken on the client's monotonic clock, from just before the observation is sent until its
-// final update has been received and decoded. Fields and iterates are kept for the latest answered observation
-// only: an observation that was played leaves some hundred bytes behind, however large the mesh.
+// Latency is taken on the client's monotonic clock, from just before an observation is sent until
+// its final update has been received and decoded. Fields and iterates are kept for the latest
+// answered observation only: the others leave some hundred bytes each, however large the mesh.
 #pragma once
 
 #include <chrono>
@@ -13,17 +13,17 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/progress.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
-#include "common/core/progress.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 
-// What playing needs of a daemon: Client's calls of the same names, or a test's own.
+// What play() needs of a daemon: Client's calls of the same names, or a test's own.
 struct DaemonLink {
   std::function<Result<wire::ObservationReceipt>(const Observation&)> submit;
-  // Blocks up to the timeout; kUnavailable when it passed.
+  // Blocks up to the timeout; kUnavailable when it has passed.
   std::function<Result<wire::UpdateMessage>(std::chrono::milliseconds)> next_update;
 };
 
@@ -38,12 +38,12 @@ enum class Speed {
 };
 
 struct PlayOptions {
-  std::uint64_t session_id =
-      0;  // updates of other sessions (a snapshot for late joiners) are ignored
+  // Updates of other sessions are ignored, e.g. the one that a late joiner gets.
+  std::uint64_t session_id = 0;
   Speed speed = Speed::kMax;
   std::chrono::milliseconds timeout{120000};  // longest wait for one answer
-  // The recording is played so many times over, at least 1; above 1 at Speed::kMax only. Sequence numbers go
-  // on counting up from cycle to cycle (see sequence_in_cycle), else the daemon would refuse them.
+  // The recording is played this many times, at least 1; more than 1 at Speed::kMax only. Sequence
+  // numbers count up from cycle to cycle (sequence_in_cycle), else the daemon would reject them.
   int repeat = 1;
 };
 
@@ -52,7 +52,8 @@ struct Iterate {
   Points displacement;
 };
 
-// Exactly one of latency_ms, error, superseded describes the outcome; the rest goes with latency_ms.
+// One observation as it was sent. Exactly one of latency_ms, error and superseded tells how it
+// ended; the other values belong to latency_ms.
 struct PlayedObservation {
   std::uint64_t sequence = 0;  // as sent
   std::optional<double> latency_ms;
@@ -66,19 +67,20 @@ struct PlayedObservation {
 };
 
 struct PlayedSession {
-  std::vector<PlayedObservation>
-      observations;                          // repeat times one per recorded observation, in order
+  // In the order sent: `repeat` times the recording.
+  std::vector<PlayedObservation> observations;
   std::optional<Update> last;                // the last final update that carries an estimate
   std::uint64_t last_recorded_sequence = 0;  // of the recorded observation that `last` answers
   std::vector<Iterate> iterates;             // of the observation that `last` answers
 };
 
-// Sequence number that a recorded observation is sent with in a cycle (from 0): moved up by the span of the
-// recorded numbers, last - first + 1, per cycle; as recorded in the first. Increasing numbers stay increasing.
+// Sequence number with which a recorded observation is sent in a cycle, counted from 0:
+//   recorded number + cycle (last - first + 1)
+// Numbers that increase within the recording increase over all cycles.
 std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
                                 std::size_t index, int cycle);
 
-// Never fails as a whole: what went wrong stands with its observation. After kUnavailable the remaining
+// Never fails as a whole: each observation carries its own error. After kUnavailable the remaining
 // observations are not sent and carry the same error.
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress = {});

@@ -2,14 +2,13 @@
 #include "client/replay/replay.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <set>
 
 #include "client/lib/client.hpp"
 #include "client/replay/score.hpp"
-#include "client/replay/write_file.hpp"
-#include "common/io/geometry/mesh_file.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
 #include "common/io/recording/surgery_file.hpp"
 
 namespace brainshift::client {
@@ -27,29 +26,14 @@ struct Surgery {
   std::vector<RecordedObservation> observations;
 };
 
-Result<std::string> meta_value(const io::SurgeryFile& file, const fs::path& path, const char* key) {
-  const auto found = file.meta().find(key);
-  if (found == file.meta().end() || found->second.empty()) {
-    return fail(ErrorCode::kUnreadable, path.string() + ": meta." + key + " is missing");
-  }
-  return found->second;
-}
-
-std::string optional_meta(const io::SurgeryFile& file, const char* key) {
-  const auto found = file.meta().find(key);
-  return found == file.meta().end() ? std::string() : found->second;
-}
-
-std::optional<std::uint64_t> parse_seed(const std::string& text) {
-  std::uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return seed;
+Status check_given(const fs::path& path, const char* key, const std::string& value) {
+  if (!value.empty()) return {};
+  return fail(ErrorCode::kUnreadable, path.string() + ": meta." + key + " is missing");
 }
 
 Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
                                                            const fs::path& path) {
-  const auto records = file.records("observation");
+  const auto records = file.records(io::RecordKind::kObservation);
   if (!records) return tl::unexpected<Error>(records.error());
   std::vector<RecordedObservation> observations;
   for (const io::SurgeryRecord& record : *records) {
@@ -89,21 +73,22 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   const fs::path& path = options.surgery;
   auto file = io::SurgeryFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
-  auto case_id = meta_value(*file, path, "case_id");
-  if (!case_id) return tl::unexpected<Error>(case_id.error());
-  auto model_id = meta_value(*file, path, "model_id");
-  if (!model_id) return tl::unexpected<Error>(model_id.error());
+  const io::SurgeryMeta meta = file->meta();
+  if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  if (Status ok = check_given(path, "model_id", meta.model_id); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
   auto observations = read_observations(*file, path);
   if (!observations) return tl::unexpected<Error>(observations.error());
   if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
     return tl::unexpected<Error>(ok.error());
   }
 
-  Surgery surgery{std::move(*file), *case_id, *model_id, {}, {}, {}, {}};
-  surgery.case_file = optional_meta(surgery.file, "case_file");
-  surgery.scenario = optional_meta(surgery.file, "scenario");
-  if (surgery.scenario.empty()) surgery.scenario = path.stem().string();
-  surgery.seed = parse_seed(optional_meta(surgery.file, "seed"));
+  const std::string scenario = meta.scenario.empty() ? path.stem().string() : meta.scenario;
+  Surgery surgery{
+      std::move(*file), meta.case_id, meta.model_id, meta.case_file, scenario, meta.seed, {}};
   surgery.observations = std::move(*observations);
   return surgery;
 }
@@ -237,7 +222,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
   RunReport run = describe_run(surgery, *session, options, boundary);
   summarise(played, run);
   if (!options.latency_csv.empty()) {
-    if (Status ok = write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
+    if (Status ok = io::write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
       return tl::unexpected<Error>(ok.error());
     }
   }

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <type_traits>
 
-#include "client/replay/write_file.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -246,7 +246,7 @@ Result<std::vector<RunReport>> from_json(const std::string& text, const std::str
 }
 
 Status write_reports(const std::filesystem::path& path, const std::vector<RunReport>& runs) {
-  return write_file(path, to_json(runs));
+  return io::write_file(path, to_json(runs));
 }
 
 Result<std::vector<RunReport>> read_reports(const std::filesystem::path& path) {

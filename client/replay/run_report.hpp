@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// RunReport: what one run (scenario x method x boundary) of a replay showed; one object of report.json.
+// RunReport: what one run (scenario x method x boundary) of a replay
+// showed; one object of report.json.
 //
-// The keys are the contract of docs/DESIGN section 6. A value that does not apply (no truth recorded, no
-// uncertainty computed, no update) is nullopt here and null there; so is a number that is not finite.
-// Unknown keys are ignored on reading, because newer writers may add some.
-// Lengths mm, times ms or s as the name says, angles degrees, shares percent.
+// The keys are those of visit() in run_report.cpp, most of them the names below.
+// A value that does not apply (no truth recorded, no uncertainty computed, no
+// update) is nullopt here and null in the file; a number that is not finite is
+// null too. Readers ignore unknown keys, because newer writers may add some.
+// Lengths are mm, times ms or s as the name says, angles degrees, shares percent.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +27,8 @@ struct MeshSize {
   int slaves = 0;
 };
 
-// Over the final updates of a run but the first (that one too when it is the only one), linear interpolation
-// between order statistics.
+// Over the final updates of a run but the first; over the first when it is the only one. Linear
+// interpolation between order statistics.
 struct LatencyPercentiles {
   double p50 = 0.0;
   double p95 = 0.0;
@@ -55,14 +57,15 @@ struct RunErrors {
   std::optional<MeanStd> craniotomy_displacement;
 };
 
-// |u_est - u_true| over all nodes, percent of the largest |u_true|.
+// Percentiles of |u_est - u_true| over all nodes, in percent of the largest |u_true|.
 struct FieldError {
   double p50 = 0.0;
   double p99 = 0.0;
   double max = 0.0;
 };
 
-// One iteration: the paper's Fig. 3. `cross` is null when that iterate was not received or truth is absent.
+// One iteration, as in the paper's Fig. 3. `cross` is null when that
+// iterate did not arrive or no truth is recorded.
 struct TracePoint {
   int iteration = 0;
   MeanStd sparse;
@@ -126,9 +129,9 @@ struct RunReport {
 // JSON text, an array with one object per run; two-space indentation.
 std::string to_json(const std::vector<RunReport>& runs);
 
-// `origin` (a file name) opens every message. kUnreadable: not JSON, not an array of objects, a required key
-// (case, scenario, method, boundary) missing, or a value of the wrong type; the sentence names the key as
-// "R.json: [0].error_mm.cross.mean ...".
+// kUnreadable: not JSON, not an array of objects, a required key (case, scenario, method,
+// boundary) is missing, or a value has the wrong type. The sentence begins with `origin`, a file
+// name, and names the key: "R.json: [0].error_mm.cross.mean ...".
 Result<std::vector<RunReport>> from_json(const std::string& text, const std::string& origin);
 
 // kWriteFailed; an existing file is replaced.

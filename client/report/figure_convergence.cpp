@@ -17,35 +17,26 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run) {
   spec.title = "Convergence: " + run.scenario + ", " + run.boundary + " boundary";
   spec.subtitle = "case " + run.case_id + ", method " + run.method +
                   "; iteration 0 is the misfit of no displacement";
-  spec.x_label = "iteration";
-  spec.left_label = "mean misfit (mm)";
-  spec.right_label = "nodes penetrating the skull";
+  spec.x = {.label = "iteration", .counts = true, .from_zero = false};
+  spec.y.label = "mean misfit (mm)";
+  spec.right = {.label = "nodes penetrating the skull", .counts = true};
 
-  Series sparse{.legend = "sparse data",
-                .x = {},
-                .y = {},
-                .right_axis = false,
-                .colour = palette::kBlue,
-                .marker = Marker::kCircle,
-                .dash_px = 0};
-  Series cross{.legend = "cross-validation",
-               .x = {},
-               .y = {},
-               .right_axis = false,
-               .colour = palette::kVermillion,
-               .marker = Marker::kSquare,
-               .dash_px = 0};
-  Series penetrating{.legend = "penetrating nodes (right)",
-                     .x = {},
-                     .y = {},
-                     .right_axis = true,
-                     .colour = palette::kGreen,
-                     .marker = Marker::kTriangle,
-                     .dash_px = 14};
-  const auto add = [](Series& series, int iteration, double value) {
-    series.x.push_back(iteration);
-    series.y.push_back(value);
+  const auto series = [](const char* legend, const cv::Scalar& colour, Marker marker) {
+    Series made;
+    made.legend = legend;
+    made.colour = colour;
+    made.marker = marker;
+    made.line = true;
+    return made;
   };
+  const auto add = [](Series& to, int iteration, double value) {
+    to.points.push_back({static_cast<double>(iteration), value, ""});
+  };
+  Series sparse = series("sparse data", palette::kBlue, Marker::kCircle);
+  Series cross = series("cross-validation", palette::kVermillion, Marker::kSquare);
+  Series penetrating = series("penetrating nodes (right)", palette::kGreen, Marker::kTriangle);
+  penetrating.dash_px = 14.0;
+  penetrating.right_axis = true;
   if (run.error_mm.sparse_initial) add(sparse, 0, run.error_mm.sparse_initial->mean);
   if (run.error_mm.initial) add(cross, 0, run.error_mm.initial->mean);
   for (const TracePoint& point : run.trace) {

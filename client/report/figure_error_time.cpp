@@ -2,14 +2,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/plot/chart.hpp"
 #include "client/report/figures.hpp"
 #include "client/report/paper_values.hpp"
-#include "client/plot/xy_chart.hpp"
 
 namespace brainshift::client {
 
 std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
-  XyChartSpec spec;
+  ChartSpec spec;
   spec.title = "Error against run time";
   spec.subtitle =
       "mean error at the tumour's cross-validation points; time from observation to update";
@@ -24,7 +24,7 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
     if (!r.latency_ms || !r.error_mm.cross) continue;
     const std::string name = r.method + ", " + r.boundary;
     auto found = std::find_if(spec.series.begin(), spec.series.end(),
-                              [&](const XySeries& s) { return s.legend == name; });
+                              [&](const Series& s) { return s.legend == name; });
     if (found == spec.series.end()) {
       const bool fixed = r.boundary == to_string(Boundary::kFixed);
       const auto& colour = colours[spec.series.size() % std::size(colours)];
@@ -35,7 +35,7 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
     found->points.push_back({r.latency_ms->p50, r.error_mm.cross->mean, r.scenario});
   }
   if (!several_methods || spec.series.size() < 2) return std::nullopt;
-  XySeries paper{"Ji et al. 2009 (their machine)", palette::kInk, Marker::kSquare, false, 0.0, {}};
+  Series paper{"Ji et al. 2009 (their machine)", palette::kInk, Marker::kSquare, false, 0.0, {}};
   paper.points.push_back({1e3 * paper::kTime_s, paper::kContactCross_mm.mean, "paper"});
   spec.series.push_back(std::move(paper));
 
@@ -46,7 +46,7 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
       "paper's time "
       "was measured on a machine of 2009. make bench draws the same for more methods, ranks and "
       "meshes.";
-  figure.image = draw_xy_chart(spec);
+  figure.image = draw_chart(spec);
   return figure;
 }
 

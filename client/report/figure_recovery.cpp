@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
-#include "client/plot/chart.hpp"
+#include "client/plot/bars.hpp"
 #include "client/report/figures.hpp"
 #include "client/report/paper_values.hpp"
 

@@ -3,8 +3,9 @@
 #include <cmath>
 #include <tuple>
 
-#include "client/report/figures.hpp"
 #include "client/plot/sheet.hpp"
+#include "client/plot/ticks.hpp"
+#include "client/report/figures.hpp"
 #include "client/report/slice_panel.hpp"
 #include "common/geometry/surface.hpp"
 

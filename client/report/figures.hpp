@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report's pictures. Private to client/report: pulls in OpenCV.
+// The report's pictures. Private to client/report.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -23,12 +23,13 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run);
 // Recovery at tumour and craniotomy over all groups, contact and fixed, with the paper's values.
 Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs);
 
-// Error at the tumour against the time of an update, over all runs; nullopt when they are all by one method.
+// Error at the tumour against the time of an update, over all runs;
+// nullopt when one method made them all.
 std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs);
 
-// Slices of one group (the paper's Fig. 4): displacement arrows with tumour outlines and a close-up of the
-// tumour, axial and coronal; true field and differences, error map (axial; need truth). Empty when no run of
-// the group has a field.
+// Slices of one group (the paper's Fig. 4). Axial and coronal: displacement arrows with tumour
+// outlines, and a close-up of the tumour. Axial, where truth is recorded: true field and
+// differences, error map. Empty when no run of the group has a field.
 std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<ReportedRun>& runs,
                                   const Head& head);
 

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <cctype>
 
-#include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/patient/read_patient.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -24,28 +23,25 @@ Vec3 mean_of(const Points& points) {
 }  // namespace
 
 Result<Head> load_head(const std::filesystem::path& case_file, const Progress& progress) {
-  const auto config = io::read_case_config(case_file);
-  if (!config) return tl::unexpected<Error>(config.error());
-  const auto inputs = io::load_case_inputs(*config);
-  if (!inputs) return tl::unexpected<Error>(inputs.error());
-  auto model = anatomy::build_brain_model(*inputs, progress);
-  if (!model) return tl::unexpected<Error>(model.error());
+  auto patient = patient::read_patient(case_file, progress);
+  if (!patient) return tl::unexpected<Error>(patient.error());
+  BrainModel& model = patient->model;
 
   Head head;
-  if (!config->mri.empty()) {
-    auto mri = io::read_nifti(config->mri);
+  if (!patient->config.mri.empty()) {
+    auto mri = io::read_nifti(patient->config.mri);
     if (!mri) return tl::unexpected<Error>(mri.error());
     head.mri = std::move(*mri);
   }
-  Points craniotomy(3, static_cast<Eigen::Index>(model->craniotomy.size()));
-  for (std::size_t i = 0; i < model->craniotomy.size(); ++i) {
-    craniotomy.col(static_cast<Eigen::Index>(i)) = model->mesh.nodes.col(model->craniotomy[i]);
+  Points craniotomy(3, static_cast<Eigen::Index>(model.craniotomy.size()));
+  for (std::size_t i = 0; i < model.craniotomy.size(); ++i) {
+    craniotomy.col(static_cast<Eigen::Index>(i)) = model.mesh.nodes.col(model.craniotomy[i]);
   }
   head.craniotomy_centre = mean_of(craniotomy);
-  head.model_id = model->model_id;
-  head.tumour = std::move(model->tumour);
+  head.model_id = model.model_id;
+  head.tumour = std::move(model.tumour);
   head.tumour_centre = mean_of(head.tumour.vertices);
-  head.gravity_direction = model->gravity_direction;
+  head.gravity_direction = model.gravity_direction;
   return head;
 }
 

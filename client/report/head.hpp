@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the pictures need of a case and of a run's field file.
+// What the report's pictures need of a case and of a run's field file.
 #pragma once
 
 #include <filesystem>
@@ -25,7 +25,7 @@ struct Head {
   Vec3 tumour_centre = Vec3::Zero();      // mean of the tumour's vertices
   Vec3 gravity_direction = Vec3::Zero();
 };
-// Errors of reading the case, its files, and of building its model.
+// Errors: of reading the case and its files, and of building its model.
 Result<Head> load_head(const std::filesystem::path& case_file, const Progress& progress);
 
 // The .vtu that replay wrote beside report.json.
@@ -43,7 +43,7 @@ struct ReportedRun {
   std::optional<RunField> field;
 };
 
-// Runs that differ in nothing but the boundary condition, shown side by side. Indices into the runs.
+// Runs that differ in the boundary condition only, shown side by side. Indices into the runs.
 struct RunGroup {
   std::string name;  // unique among the groups, fit for file names
   std::optional<std::size_t> contact;
@@ -52,7 +52,7 @@ struct RunGroup {
 // In order of appearance; a second run of the same kind opens another group.
 std::vector<RunGroup> group_runs(const std::vector<ReportedRun>& runs);
 
-// Letters, digits, '-' and '_' kept; everything else becomes '-'.
+// Keeps letters, digits, '-' and '_'; everything else becomes '-'.
 std::string file_name_from(const std::string& text);
 
 }  // namespace brainshift::client

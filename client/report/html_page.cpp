@@ -2,8 +2,9 @@
 #include "client/report/html_page.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
+
+#include "common/io/files/binary_codec.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -72,7 +73,7 @@ std::string section(const std::string& title, const std::string& body) {
 std::string picture(const PagePicture& picture) {
   return "<figure><img alt=\"" + escape_html(picture.caption) + "\" width=\"" +
          std::to_string(picture.width) + "\" height=\"" + std::to_string(picture.height) +
-         "\" src=\"data:image/png;base64," + base64(picture.png) + "\"><figcaption>" +
+         "\" src=\"data:image/png;base64," + io::base64_encode(picture.png) + "\"><figcaption>" +
          escape_html(picture.caption) + "</figcaption></figure>\n";
 }
 
@@ -131,24 +132,6 @@ std::string escape_html(std::string_view text) {
     }
   }
   return escaped;
-}
-
-std::string base64(std::string_view bytes) {
-  static constexpr char kAlphabet[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      group = (group << 8) | (k < count ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= count ? kAlphabet[(group >> (18 - 6 * k)) & 63u] : '=';
-    }
-  }
-  return text;
 }
 
 }  // namespace brainshift::client

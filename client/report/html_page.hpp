@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report as one self-contained page: no script, no external link, images embedded.
+// The report as one self-contained HTML page: no script, no external link, images embedded.
 #pragma once
 
 #include <string>
@@ -20,16 +20,16 @@ struct PagePicture {
 std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
                       const std::vector<PagePicture>& pictures);
 
-// The page's tables: errors beside the paper's, timings, what was left out, failures (empty string if none).
-std::string error_table(const std::vector<ReportedRun>& runs);
+// The page's parts, as HTML.
+std::string error_table(const std::vector<ReportedRun>& runs);  // beside the paper's values
 std::string timing_table(const std::vector<ReportedRun>& runs);
 std::string left_out_list(const std::vector<ReportedRun>& runs);
 // One row per instrument of each run's last update; empty when no update had named sources.
 std::string source_table(const std::vector<ReportedRun>& runs);
+// Empty when nothing failed.
 std::string failure_list(const std::vector<ReportedRun>& runs);
 
-// &, <, >, " and ' replaced by their entities.
+// `text` with &, <, >, " and ' replaced by their entities.
 std::string escape_html(std::string_view text);
-std::string base64(std::string_view bytes);
 
 }  // namespace brainshift::client

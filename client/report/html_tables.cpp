@@ -30,7 +30,7 @@ std::string plain(const std::string& text) { return text.empty() ? kNothing : es
 
 using Cell = std::function<std::string(const RunReport&)>;
 
-// A row: what it is, a cell per run, then the paper's three columns (contact, fixed, ICP) when wanted.
+// A row: its name, a cell for each run, then the paper's columns (contact, fixed, ICP) if wanted.
 class Table {
  public:
   Table(const std::vector<ReportedRun>& runs, bool with_paper)

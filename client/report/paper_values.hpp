@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The published figures that the tables set beside ours: simulated case (patient 2) of Ji, Roberts, Hartov,
-// Paulsen, "Brain-skull contact boundary conditions in an inverse computational deformation model",
-// Medical Image Analysis 13 (2009), section 3.1, Fig. 3-4, and section 4 for ICP.
+// Published values for comparison: the simulated case (patient 2) of Ji, Roberts, Hartov, Paulsen,
+// "Brain-skull contact boundary conditions in an inverse computational deformation model", Medical
+// Image Analysis 13 (2009), section 3.1, Fig. 3-4, and section 4 for ICP.
 #pragma once
 
 #include "common/core/statistics.hpp"
@@ -26,7 +26,7 @@ inline constexpr int kIterations = 14;
 inline constexpr int kPenetrating = 8;
 inline constexpr double kTime_s = 186.0;
 
-// Not stated in the paper, but follows from its own definition: 100 (1 - 0.53 / 2.9).
+// The paper does not state it; it follows from the paper's own definition.
 inline constexpr double kFixedRecovery_pct = 100.0 * (1.0 - 0.53 / 2.9);
 
 }  // namespace brainshift::client::paper

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "client/plot/ticks.hpp"
 #include "common/core/statistics.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"

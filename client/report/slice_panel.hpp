@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One slice: MRI, field arrows, magnitude map, outlines. Private to client/report: pulls in OpenCV.
+// One slice: MRI, field arrows, magnitude map, outlines. Private to client/report.
 //
-// Radiological view: the patient's right is on the left of the picture; anterior (axial slice) or superior
-// (coronal slice) is up. Arrows and maps are
-// sampled on the undeformed slice; an arrow is the projection of the displacement on the slice plane, drawn
-// from the undeformed point, its colour the full length of the displacement.
+// Radiological view: the patient's right is on the left of the picture; anterior (axial slice) or
+// superior (coronal slice) is up. Arrows and maps are sampled on the undeformed slice. An arrow
+// begins at the undeformed point and is the projection of the displacement on the slice plane; its
+// colour shows the full length of the displacement.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -46,14 +46,14 @@ struct SliceSamples {
 SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow& window,
                           double spacing_mm);
 
-// sum of weights times nodal values.
+// The field at the location: the sum of weights times nodal values.
 Vec3 interpolate(const geometry::TetLocation& location, const Points& nodal);
 
-// Vertices moved by the field at their undeformed places.
+// The surface with every vertex moved by the field at its undeformed place.
 TriangleSurface deformed_surface(const TriangleSurface& surface,
                                  const geometry::TetLocator& locator, const Points& displacement);
 
-// Segments of plane_section joined end to end into polylines (closed ones repeat their first point).
+// The segments of plane_section, joined end to end. A closed line repeats its first point.
 std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface, const Vec3& normal,
                                                  double offset);
 
@@ -61,9 +61,10 @@ class SlicePanel {
  public:
   explicit SlicePanel(const SliceWindow& window);  // black
 
-  // Grey values between the 1st and 99.5th percentile of the slice's non-zero ones, at `brightness` of white.
+  // Grey values from black at the 1st percentile of the slice's
+  // non-zero values to `brightness` (0 to 1) of white at the 99.5th.
   void draw_mri(const VoxelImage& mri, double brightness);
-  // Colour over the samples' cells; max_mm is the colour scale's end.
+  // Colours the samples' cells by the length of the field; max_mm: the end of the colour scale.
   void draw_magnitude_map(const SliceSamples& samples, const Points& field, double max_mm,
                           double opacity);
   // Arrow = magnification x displacement. `thin` draws hairlines in white instead of colours.

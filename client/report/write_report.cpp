@@ -4,19 +4,19 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
-#include "client/replay/write_file.hpp"
 #include "client/plot/canvas.hpp"
 #include "client/report/figures.hpp"
 #include "client/report/head.hpp"
 #include "client/report/html_page.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Reads every report with the fields it names. Field files are found beside their report; in `runs` their
-// names become relative to `out`, where the merged report will lie.
+// Reads every report with the fields it names, which lie beside it. In the result the names of
+// field files are relative to `out`, where the merged report will lie.
 Result<std::vector<ReportedRun>> load_runs(const ReportOptions& options) {
   std::vector<ReportedRun> runs;
   for (const fs::path& path : options.reports) {
@@ -116,11 +116,12 @@ Status write_report(const ReportOptions& options, const Progress& progress) {
   for (const Figure& figure : draw_figures(*runs, groups, *heads, progress)) {
     auto png = encode_png(figure);
     if (!png) return tl::unexpected<Error>(png.error());
-    if (Status ok = write_file(options.out / figure.file_name, *png); !ok) return ok;
+    if (Status ok = io::write_file(options.out / figure.file_name, *png); !ok) return ok;
     pictures.push_back({std::move(*png), figure.caption, figure.image.cols / kPixelRatio,
                         figure.image.rows / kPixelRatio});
   }
-  if (Status ok = write_file(options.out / "report.html", html_page(*runs, groups, pictures)); !ok)
+  if (Status ok = io::write_file(options.out / "report.html", html_page(*runs, groups, pictures));
+      !ok)
     return ok;
   std::vector<RunReport> merged;
   for (const ReportedRun& run : *runs) merged.push_back(run.report);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reports of replays to one folder: report.json (all runs), report.html (self-contained) and pictures.
+// Writes the reports of replays to one folder: report.json (all runs), report.html and pictures.
 #pragma once
 
 #include <filesystem>
@@ -15,9 +15,10 @@ struct ReportOptions {
   std::filesystem::path out;                   // folder, made if missing
 };
 
-// Slices are drawn for runs that name a field file and a case file; a file that is named must be there.
-// kNotFound / kUnreadable name the file and key; kInvalidArgument: a case file that has changed since the run; kEmptySet when the reports hold no run at all; kWriteFailed.
-// Each file is complete or absent.
+// Runs that name a field file and a case file get slices; a file that is named must exist.
+// kNotFound, kUnreadable: a file or key, named; kInvalidArgument: a
+// case file that has changed since the run; kEmptySet: the reports
+// hold no run at all; kWriteFailed. Each file is complete or absent.
 Status write_report(const ReportOptions& options, const Progress& progress = {});
 
 }  // namespace brainshift::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A picture of what was matched: the rectified left picture beside its disparities in colour, with a colour bar in px
-// and the depths that they mean. Grey: not valid.
+// A picture of what was matched: the rectified left picture beside its disparities in colour, with
+// a colour bar in px and the depths that they mean. Pale: no match.
 #pragma once
 
 #include <filesystem>

@@ -19,17 +19,19 @@ namespace brainshift::client {
 
 // Pictures of a chessboard -> calibration file.
 struct CalibrateJob {
-  std::vector<std::string> left,
-      right;                  // files or patterns; as many left as right, paired in order
+  // Files or patterns; as many left as right, paired in order.
+  std::vector<std::string> left, right;
   std::string board = "9x6";  // inner corners
   double square_mm = 0.0;
   std::filesystem::path out;
 };
-// kInvalidArgument for another number of left than right pictures; else as its parts. Nothing is written on failure.
+// kInvalidArgument for another number of left than right pictures. Other errors: of reading
+// pictures, of stereo::calibrate, and of writing. Writes nothing on failure.
 Result<stereo::CalibrationResult> calibrate_files(const CalibrateJob& job,
                                                   const Progress& progress = {});
 
-// A pair of pictures -> surface file (with fields sd_mm and confidence) and, if named, a picture of the disparities.
+// A pair of pictures -> surface file with the fields sd_mm and confidence, and a picture of the
+// disparities if its path is given.
 struct ReconstructJob {
   std::filesystem::path left, right, calibration, pose, out, disparity_picture;
   stereo::DepthRange range;
@@ -42,13 +44,13 @@ struct ReconstructSummary {
 Result<ReconstructSummary> reconstruct_files(const ReconstructJob& job,
                                              const Progress& progress = {});
 
-// A surface file -> one more observation of a surgery file, which is made if it does not exist. The surface is checked
-// against the model's craniotomy first (geometry/surface_check.hpp).
+// A surface file -> one more observation of a surgery file, which is made if it does not exist.
+// The surface must pass geometry/surface_check.hpp against the model's craniotomy.
 struct ObserveJob {
   std::filesystem::path surface, model, out;
   double sd_mm = 0.0;
-  std::optional<double>
-      time_s;  // since the surgery's first observation; default: one second after the last one
+  // Since the surgery's first observation; default: one second after the last one.
+  std::optional<double> time_s;
   std::string source = "stereopsis";
 };
 struct ObserveSummary {
@@ -56,7 +58,8 @@ struct ObserveSummary {
   std::uint64_t sequence = 0;
   double time_s = 0.0;
 };
-// kInvalidArgument: sd or time out of range, a surgery of another case or model, a surface that fails its check.
+// kInvalidArgument: sd or time out of range, a surgery of another case or model, a surface that
+// fails its check. Other errors: of reading and writing the files.
 Result<ObserveSummary> observe_surface(const ObserveJob& job);
 
 }  // namespace brainshift::client

@@ -3,15 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <tuple>
 
 #include "client/stereo/jobs.hpp"
-#include "common/values/observation.hpp"
+#include "common/core/utc_time.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/io/recording/surgery_creation.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
@@ -46,7 +46,7 @@ struct Place {
 };
 
 Result<Place> last_place(const io::SurgeryFile& surgery, const fs::path& path) {
-  const auto records = surgery.records("observation");
+  const auto records = surgery.records(io::RecordKind::kObservation);
   if (!records) return tl::unexpected(records.error());
   Place place;
   for (const io::SurgeryRecord& record : *records) {
@@ -64,11 +64,9 @@ Result<Place> last_place(const io::SurgeryFile& surgery, const fs::path& path) {
 }
 
 Status check_same(const io::SurgeryFile& surgery, const fs::path& path, const BrainModel& model) {
-  for (const auto& [key, ours] :
-       {std::pair<std::string, std::string>("case_id", model.case_id),
-        std::pair<std::string, std::string>("model_id", model.model_id)}) {
-    const auto found = surgery.meta().find(key);
-    const std::string theirs = found == surgery.meta().end() ? "" : found->second;
+  const io::SurgeryMeta& meta = surgery.meta();
+  for (const auto& [key, theirs, ours] : {std::tuple("case_id", meta.case_id, model.case_id),
+                                          std::tuple("model_id", meta.model_id, model.model_id)}) {
     if (theirs == ours) continue;
     return io::file_error(ErrorCode::kInvalidArgument, path,
                           fmt::format("{} is \"{}\": the model's is \"{}\"", key, theirs, ours));
@@ -91,12 +89,13 @@ Result<Target> open_target(const fs::path& path, const io::ModelFile& model) {
     if (!place) return tl::unexpected(place.error());
     return Target{std::move(*file), *place};
   }
-  const std::map<std::string, std::string> meta = {{"case_id", model.model.case_id},
-                                                   {"model_id", model.model.model_id},
-                                                   {"case_file", model.config.file.string()},
-                                                   {"scenario", "recorded"},
-                                                   {"created_utc", io::utc_now()},
-                                                   {"software", "brainshift stereo"}};
+  io::SurgeryMeta meta;
+  meta.case_id = model.model.case_id;
+  meta.model_id = model.model.model_id;
+  meta.case_file = model.config.file.string();
+  meta.scenario = "recorded";
+  meta.created_utc = utc_now();
+  meta.software = "brainshift stereo";
   auto file = io::SurgeryFile::create(path, meta);
   if (!file) return tl::unexpected(file.error());
   return Target{std::move(*file), {}};
@@ -146,8 +145,8 @@ Result<ObserveSummary> observe_surface(const ObserveJob& job) {
   observation.sequence = target->place.last_sequence + 1;
   observation.acquired_ns = *time_ns;
   observation.body = CorticalSurface{checked->surface, job.sd_mm};
-  Status status = target->file.append(
-      {"observation", observation.sequence, observation.acquired_ns, wire::encode(observation)});
+  Status status = target->file.append({io::RecordKind::kObservation, observation.sequence,
+                                       observation.acquired_ns, wire::encode(observation)});
   if (status) status = target->file.close();
   if (!status) return tl::unexpected(status.error());
   return ObserveSummary{std::move(*checked), observation.sequence,

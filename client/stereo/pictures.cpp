@@ -14,7 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A picture of more bytes is no photograph, and a small gzip file may stand for any number of them.
+// A picture of more bytes is no photograph, and a small gzip file may
+// stand for any number of them.
 constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 
 bool is_gzip(const std::string& bytes) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures from files.
+// Reads pictures, and finds their files.
 #pragma once
 
 #include <filesystem>
@@ -11,12 +11,13 @@
 
 namespace brainshift::client {
 
-// Grey levels of a PNG, JPEG, TIFF, BMP or PGM file; colours become their luminance. 16 bits are divided by 256. The
-// file may be compressed with gzip. kNotFound, or kUnreadable naming the file.
+// Grey levels of a PNG, JPEG, TIFF, BMP or PGM file; colours become their
+// luminance, 16 bits are divided by 256. The file may be compressed with
+// gzip. kNotFound or kUnreadable; the sentence names the file.
 Result<stereo::GrayImage> read_picture(const std::filesystem::path& path);
 
-// Files that names and shell patterns ("left*.jpg") stand for, each pattern's in alphabetical order. kNotFound names
-// the pattern that no file matches.
+// The files that names and shell patterns ("left*.jpg") match, in the order of the patterns, the
+// files of each in alphabetical order. kNotFound names a pattern that no file matches.
 Result<std::vector<std::filesystem::path>> expand_patterns(const std::vector<std::string>& names);
 
 }  // namespace brainshift::client

@@ -39,9 +39,10 @@ Scenario sag_progress() {
   return scenario;
 }
 
-// Oedema deep to the tumour presses the hemisphere against the skull and the tumour towards the craniotomy,
-// while hardly any fluid has drained: contact on a wide front. Strong enough that an estimate, which sees the
-// tumour alone and finds less contact than there is, still has more than 500 active slaves in colin27.
+// Oedema deep to the tumour presses the hemisphere against the skull and the tumour towards the
+// craniotomy, while hardly any fluid has drained: contact on a wide
+// front. An estimate sees the tumour alone and finds less contact than
+// there is; even it has more than 500 active slaves in colin27.
 Scenario distension() {
   Scenario scenario;
   scenario.name = "distension";
@@ -53,9 +54,9 @@ Scenario distension() {
   return scenario;
 }
 
-// The fluid has only begun to drain: the upper brain sinks a little, away from the skull, and pushes the rest of
-// it less far outwards than the gap is wide. (Gravity alone, because the force prior can represent it: an
-// estimate of this surgery stays off the skull as its truth does.)
+// The fluid has only begun to drain: the upper brain sinks a little, away from the skull, and
+// pushes the rest of it outwards by less than the gap. (Gravity alone, because the force prior can
+// represent it: an estimate of this surgery stays off the skull as its truth does.)
 Scenario no_contact() {
   Scenario scenario;
   scenario.name = "no-contact";

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What happens in each simulated surgery.
 //
-// A surgery is a series of moments, one observation of every instrument each. At every moment the brain is in equilibrium (drained,
-// see common/fem/elasticity.hpp) under gravity with the fluid at that moment's level, plus one swelling that does
-// not change; each moment has its own truth, its own choice of points and its own noise.
+// A surgery is a series of moments. Every instrument makes one observation at
+// each of them. The brain is in equilibrium (drained, common/fem/elasticity.hpp)
+// under gravity, with the fluid at the moment's level, and under one swelling
+// that does not change. Each moment has its own truth, points and noise.
 #pragma once
 
 #include <optional>
@@ -15,43 +16,47 @@
 namespace brainshift::client {
 
 enum class Measurement {
-  kDisplacements,  // 200 tumour surface points with noisy displacements (the paper's simulated data)
-  kProbeSections,  // iUS-like boundary points on planar probe sections, to be registered by ICP
+  kDisplacements,  // points of the tumour's surface with noisy displacements, as in the paper
+  kProbeSections,  // boundary points on planar ultrasound sections, to be registered by ICP
 };
 
-// What a stereo camera and a tracker of vessels see of the exposed cortex, some seconds after the ultrasound.
+// What a stereo camera and a tracker of vessels see of the exposed
+// cortex, seconds after the ultrasound.
 struct CortexView {
   double points_per_mm2 = 1.0;  // of the surface
   double noise_sd_mm = 0.5;     // of a surface point, per component
-  double pose_sd_mm = 0.2;      // of the camera's pose, drawn anew for every view: shift per axis,
-  double pose_sd_deg = 0.2;     // turn per axis about the craniotomy's centre
-  int tracks = 0;               // points of the surface that are found again, e.g. forks of vessels
-  double track_noise_sd_mm = 0.5;  // magnitude
+  // Error of the camera's pose, drawn anew for every view: shift per
+  // axis, and turn per axis about the craniotomy's centre.
+  double pose_sd_mm = 0.2;
+  double pose_sd_deg = 0.2;
+  // Points of the surface that are found again, e.g. forks of vessels.
+  int tracks = 0;
+  double track_noise_sd_mm = 0.5;  // of the noise's magnitude
 };
 
 struct Scenario {
   std::string name;
   std::string description;
-  // Per moment: depth below the lowest craniotomy node to which the surrounding fluid has drained, along
-  // gravity, mm. Not empty.
+  // For each moment: how far the fluid has drained, as a depth along gravity below the lowest
+  // craniotomy node, mm. Not empty.
   std::vector<double> fluid_levels_mm;
   double interval_s = 30.0;  // between moments
   Swelling swelling;         // around the tumour's centroid
-  // Unknown stiffness: ln of the shear modulus varies smoothly with this standard deviation over this length
-  // (stiffness.hpp). Grey and white matter, and one patient and another, differ by some 30 %.
+  // Unknown stiffness: ln of the shear modulus varies smoothly, with this standard deviation over
+  // this length (stiffness.hpp). Grey and white matter differ by some 30 %, and so do patients.
   double stiffness_sd = 0.0;
   double stiffness_length_mm = 20.0;
-  // The head is turned about the axis of the craniotomy after its pose was told: gravity pulls that much beside the
-  // direction the case knows.
+  // Error of the known pose: gravity pulls at this angle to the direction that the case states.
+  // The head is turned about the axis from the tumour to the craniotomy.
   double gravity_tilt_deg = 0.0;
-  // The scenario promises that no slave touches the skull; a case in which one does is refused.
+  // The scenario promises that no slave touches the skull. Where one does, playing it is an error.
   bool contact_free = false;
   Measurement measurement = Measurement::kDisplacements;
   int sparse_points = 200;           // kDisplacements
-  double noise_sd_mm = 0.51;         // magnitude of the noise vector: half a pixel (paper 2.6)
+  double noise_sd_mm = 0.51;         // of the noise's magnitude: half a pixel (paper 2.6)
   double section_spacing_mm = 3.0;   // kProbeSections: between parallel probe planes
   double point_spacing_mm = 0.2;     // kProbeSections: along a section (paper 2.5)
-  std::optional<CortexView> cortex;  // cameras look at the exposed cortex, too
+  std::optional<CortexView> cortex;  // absent: nothing looks at the exposed cortex
 };
 
 const std::vector<Scenario>& all_scenarios();

@@ -3,49 +3,34 @@
 
 #include "client/twin/scenario.hpp"
 #include "client/twin/surgery.hpp"
-#include "common/linalg/blas_threads.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/io/recording/surgery_creation.hpp"
+#include "common/core/utc_time.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {
 
-struct Patient {
-  CaseConfig config;
-  BrainModel model;
-};
-
-Result<Patient> load_patient(const std::filesystem::path& case_file, const Progress& progress) {
-  auto config = io::read_case_config(case_file);
-  if (!config) return tl::unexpected(config.error());
-  auto inputs = io::load_case_inputs(*config);
-  if (!inputs) return tl::unexpected(inputs.error());
-  auto model = anatomy::build_brain_model(*inputs, progress);
-  if (!model) return tl::unexpected(model.error());
-  return Patient{std::move(*config), std::move(*model)};
-}
+using patient::Patient;
 
 Status write_surgery(const SimulateOptions& options, const Patient& patient,
                      const SimulatedSurgery& surgery) {
-  const std::map<std::string, std::string> meta = {
-      {"case_id", patient.model.case_id},
-      {"model_id", patient.model.model_id},
-      {"case_file", std::filesystem::absolute(options.case_file).lexically_normal().string()},
-      {"scenario", options.scenario},
-      {"seed", std::to_string(options.seed)},
-      {"created_utc", io::utc_now()},
-      {"software", "brainshift twin"},
-  };
+  io::SurgeryMeta meta;
+  meta.case_id = patient.model.case_id;
+  meta.model_id = patient.model.model_id;
+  meta.case_file = std::filesystem::absolute(options.case_file).lexically_normal().string();
+  meta.scenario = options.scenario;
+  meta.seed = options.seed;
+  meta.created_utc = utc_now();
+  meta.software = "brainshift twin";
   auto file = io::SurgeryFile::create(options.out, meta);
   if (!file) return tl::unexpected(file.error());
   Status status;
   for (std::size_t i = 0; status && i < surgery.observations.size(); ++i) {
     const Observation& observation = surgery.observations[i];
-    status = file->append(
-        {"observation", observation.sequence, observation.acquired_ns, wire::encode(observation)});
+    status = file->append({io::RecordKind::kObservation, observation.sequence,
+                           observation.acquired_ns, wire::encode(observation)});
     if (status) status = file->write_truth(observation.sequence, surgery.truths[i]);
   }
   if (status) status = file->close();
@@ -74,7 +59,7 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
     return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
   }
   linalg::use_single_threaded_blas();  // before the first factorisation
-  auto patient = load_patient(options.case_file, progress);
+  const auto patient = patient::read_patient(options.case_file, progress);
   if (!patient) return tl::unexpected(patient.error());
   const auto surgery =
       play_scenario(patient->model, patient->config, *scenario, options.seed, progress);

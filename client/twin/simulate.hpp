@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Twin: simulated surgeries with known truth (paper section 2.6), recorded as surgery files.
 //
-// The truth is a forward solution of the case's own model with contact: gravity, drainage down to the
-// scenario's fluid level, and swelling. Every observation has a truth of its own. It is written to the truth
-// tables of the surgery file, which only scoring reads; the observations carry what an operating room would
-// measure.
-// Inverse crime, as in the paper: truth and estimate use the same mesh and material. What the estimate does
-// not know is the load (fluid level, swelling), the contact state, and the noise.
+// The truth is a forward solution of the case's own model with contact, under gravity, drainage
+// down to the scenario's fluid level, and swelling. Every observation has a truth of its own. It
+// goes to the truth tables of the surgery file, which only scoring reads. The observations carry
+// what an operating room would measure.
+//
+// Inverse crime, as in the paper: truth and estimate share mesh and, unless
+// the scenario varies the stiffness, material. The estimate does not know
+// the load (fluid level, swelling), the contact state and the noise.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +34,9 @@ struct SimulateOptions {
   std::filesystem::path out;  // must not exist; nothing is left behind on failure
 };
 
-// kNotFound for an unknown scenario (the sentence lists the known ones); else as io, scene and fem.
+// kNotFound for an unknown scenario; the sentence lists the known
+// ones. kWriteFailed when `out` exists or cannot be written. Other
+// errors: of reading the case, building its model, and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 
 }  // namespace brainshift::client

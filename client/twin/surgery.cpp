@@ -25,8 +25,8 @@ Vec3 value_at(const io::ScorePoint& point, const Points& u) {
   return value;
 }
 
-// The tumour's surface vertices as points of the mesh: which of them are given (sparse) and which are kept to
-// check (cross) is drawn for every observation.
+// The tumour's surface vertices as points of the mesh: which of them are given (sparse) and which
+// are kept to check (cross) is drawn for every observation.
 std::vector<io::ScorePoint> tumour_pool(const BrainModel& model) {
   const geometry::TetLocator locator(model.mesh);
   std::vector<io::ScorePoint> pool;
@@ -140,8 +140,8 @@ std::vector<Observation> observe(const BrainModel& model, const Scenario& scenar
   return observations;
 }
 
-// What pulls: the case's gravity, turned about the craniotomy's outward axis (through the tumour), and the fluid plane
-// through the lowest craniotomy node, perpendicular to it.
+// The case's gravity, turned about the axis from the tumour to the craniotomy, and the fluid plane
+// perpendicular to it through the lowest craniotomy node.
 struct Gravity {
   Vec3 direction;
   double fluid_plane_depth_mm = 0.0;

@@ -7,32 +7,36 @@
 
 #include "client/twin/scenario.hpp"
 #include "common/contact/forward_model.hpp"
-#include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/observation.hpp"
 #include "common/core/progress.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::client {
 
-// One entry per observation in both: of the moments in turn, every instrument of a moment with the same truth.
+// One entry per observation in both lists: moment after moment, every
+// instrument of a moment with the same truth.
 struct SimulatedSurgery {
   std::vector<Observation> observations;  // sequences from 1, acquired_ns from 0
   std::vector<io::SurgeryTruth> truths;
 };
 
-// Truth scalars: fluid_level_mm, noise_sd_mm, max_displacement_mm, tumour_displacement_mm (mean over the tumour
-// surface), active_slaves, max_penetration_mm (negative: minus the least distance between slave and skull), and
-// swelling_volume_strain, swelling_radius_mm where the scenario has a swelling.
+// Plays the scenario. Everything random comes from the seed.
+// Truth scalars: fluid_level_mm, noise_sd_mm, max_displacement_mm,
+// tumour_displacement_mm (mean over the tumour's surface), active_slaves,
+// max_penetration_mm (negative: minus the least distance between slave and
+// skull); with a swelling also swelling_volume_strain and swelling_radius_mm.
 //
-// Everything random comes from the seed. kInvalidArgument when the scenario promises that nothing touches the
-// skull and something does; kNotConverged when a contact search does not settle; else as contact::ForwardModel.
+// kInvalidArgument when a scenario that promises no contact has some; kNotConverged when a contact
+// search does not settle. Other errors: of contact::ForwardModel.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
-// The same with a forward model that is at hand: contact boundary, of this model and case. Where the scenario varies
-// the stiffness, another one is factorised for the truth.
+// The same with a forward model that exists already. Precondition: it
+// was built for this model and case with the contact boundary. Where
+// the scenario varies the stiffness, the truth needs another one.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const contact::ForwardModel& forward,
                                        const Scenario& scenario, std::uint64_t seed,

@@ -7,17 +7,16 @@
 #include <cmath>
 #include <map>
 
+#include "client/ultrasound/surgery_writer.hpp"
+#include "common/core/utc_time.hpp"
+#include "common/io/config/plus_config.hpp"
+#include "common/io/geometry/pose_file.hpp"
+#include "common/io/model/model_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/io/recording/fiducial_file.hpp"
-#include "common/io/recording/registration_file.hpp"
-#include "client/ultrasound/surgery_writer.hpp"
-#include "common/values/observation.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/io/model/model_file.hpp"
-#include "common/io/config/plus_config.hpp"
 #include "common/io/recording/sequence_file.hpp"
-#include "common/io/recording/surgery_creation.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/patient/read_patient.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -26,7 +25,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRas = "Ras";
 constexpr double kFarthest_mm = 100.0;
-// Trackers stand metres away from what they track: a link that never moves this far from the origin is suspect.
+// Trackers stand metres away from what they track: a link that stays
+// nearer than this is suspicious.
 constexpr double kNearTracker_mm = 10.0;
 constexpr double kMostSd_mm = 20.0;
 
@@ -87,19 +87,15 @@ Result<Patient> load_patient(const ImportOptions& options, const Progress& progr
     if (!file) return tl::unexpected(file.error());
     return patient_of(file->model, file->config.file);
   }
-  auto config = io::read_case_config(options.case_file);
-  if (!config) return tl::unexpected(config.error());
-  auto inputs = io::load_case_inputs(*config);
-  if (!inputs) return tl::unexpected(inputs.error());
-  const auto model = anatomy::build_brain_model(*inputs, progress);
-  if (!model) return tl::unexpected(model.error());
-  return patient_of(*model, options.case_file);
+  const auto patient = patient::read_patient(options.case_file, progress);
+  if (!patient) return tl::unexpected(patient.error());
+  return patient_of(patient->model, options.case_file);
 }
 
 // T_ras_reference, from the file or from fiducials.
 Result<RigidTransform> patient_registration(const ImportOptions& options,
                                             std::optional<io::FiducialFile>& fiducials) {
-  if (options.fiducials.empty()) return io::read_registration(options.registration);
+  if (options.fiducials.empty()) return io::read_pose(options.registration, "T_ras_reference");
   auto file = io::read_fiducials(options.fiducials);
   if (!file) return tl::unexpected(file.error());
   fiducials = std::move(*file);
@@ -118,8 +114,8 @@ FiducialReport describe(const io::FiducialFile& file, const Patient& patient) {
 }
 
 // Device transforms and the patient registration.
-Result<std::vector<tracking::ConstantLink>> constant_links(const ImportOptions& options,
-                                                           std::optional<io::FiducialFile>& fiducials) {
+Result<std::vector<tracking::ConstantLink>> constant_links(
+    const ImportOptions& options, std::optional<io::FiducialFile>& fiducials) {
   std::vector<tracking::ConstantLink> links;
   if (!options.device.empty()) {
     const auto config = io::read_plus_config(options.device);
@@ -258,10 +254,13 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
     return fail(observations.error().code,
                 options.recording.string() + ": " + observations.error().message);
   }
-  const std::map<std::string, std::string> meta = {
-      {"case_id", patient->case_id},     {"model_id", patient->model_id},
-      {"case_file", patient->case_file}, {"scenario", options.recording.stem().string()},
-      {"created_utc", io::utc_now()},        {"software", "brainshift import"}};
+  io::SurgeryMeta meta;
+  meta.case_id = patient->case_id;
+  meta.model_id = patient->model_id;
+  meta.case_file = patient->case_file;
+  meta.scenario = options.recording.stem().string();
+  meta.created_utc = utc_now();
+  meta.software = "brainshift import";
   if (Status ok = write_surgery(options.out, meta, *observations); !ok) {
     return tl::unexpected(ok.error());
   }

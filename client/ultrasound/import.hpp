@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `brainshift import`: a recording of tracked ultrasound to a surgery file that the daemon replays (docs/import.md).
+// `brainshift import`: makes a surgery file from a recording of
+// tracked ultrasound (docs/import.md).
 //
-//   recording, device file, registration --> chain Image -> Probe -> Tracker -> Reference -> Ras, per frame
-//   contours, or seeds and the tracer    --> boundary points, one observation (TumourBoundary, "ius") per sweep
-//   case or model file                   --> case_id and model_id of the surgery, and where the tumour lies
+//   recording, device file, registration --> chain Image -> Probe -> Tracker -> Reference -> Ras
+//                                            for every frame
+//   contours, or seeds and the tracer    --> boundary points: for every sweep one observation
+//                                            (TumourBoundary, "ius")
+//   case or model file                   --> case_id, model_id and the place of the tumour
 //
-// Every point's error is sd_mm; it is taken to be independent from point to point, which errors of calibration and
-// registration are not: those move all points of a sweep together, and the daemon's ICP sees them as motion.
+// Statistics: every point's error has standard deviation sd_mm and is taken as independent of the
+// other points' errors. Errors of calibration and registration are not: they move all points of a
+// sweep together, and the daemon's ICP takes them for motion.
 #pragma once
 
 #include <cstdint>
@@ -23,14 +27,15 @@ namespace brainshift::client {
 
 struct ImportOptions {
   std::filesystem::path recording;
-  std::filesystem::path device;        // PLUS device set; empty: the recording has every transform
-  std::filesystem::path contours;      // either this
-  std::filesystem::path seeds;         // or this
-  std::filesystem::path registration;  // either T_ras_reference
-  std::filesystem::path fiducials;     // or the points it is computed from
-  std::filesystem::path case_file;     // either this, the model being built again,
-  std::filesystem::path model;         // or this
-  std::filesystem::path out;
+  std::filesystem::path device;  // PLUS device set; empty: the recording has every transform
+  // Exactly one of each pair must be given.
+  std::filesystem::path contours;
+  std::filesystem::path seeds;
+  std::filesystem::path registration;  // T_ras_reference
+  std::filesystem::path fiducials;     // points from which T_ras_reference is computed
+  std::filesystem::path case_file;     // its model is built again
+  std::filesystem::path model;
+  std::filesystem::path out;  // must not exist
   std::string image_frame = "Image";
   std::string reference_frame = "Reference";
   std::string orientation;  // for a recording that does not say
@@ -64,15 +69,16 @@ struct ImportReport {
   std::vector<tracking::Dropped> dropped;
   std::vector<tracking::Dropped> lost_contours;
   std::vector<ImportedSweep> sweeps;
-  std::vector<std::string>
-      notes;  // what the user should know: defects, where tracing ended, suspicious units
+  // What the user should know: defects, where tracing ended, suspicious units.
+  std::vector<std::string> notes;
 };
 
-// Nothing is left behind on failure. kInvalidArgument, kNotFound, kUnreadable, kEmptySet for input that cannot be used; the
-// sentence names option, file, frame or field. A boundary more than 100 mm from the case's tumour is refused.
+// Leaves nothing behind on failure. kInvalidArgument, kNotFound, kUnreadable or kEmptySet for
+// input that cannot be used, e.g. a boundary more than 100 mm from the case's tumour; the sentence
+// names option, file, frame or field. kWriteFailed: `out` exists or cannot be written.
 Result<ImportReport> import_recording(const ImportOptions& options, const Progress& progress = {});
 
-// A line for each fact, for people.
+// The report as lines for a terminal.
 std::vector<std::string> report_lines(const ImportReport& report);
 
 }  // namespace brainshift::client

@@ -48,7 +48,7 @@ std::string summary(const std::vector<tracking::Dropped>& dropped) {
   return text;
 }
 
-// Contours belong to images of this size; half a pixel beyond the outermost centres is still the image.
+// Contours must lie on the image, which ends half a pixel beyond the outermost pixels' centres.
 Status check_contours(const tracking::Recording& recording,
                       const std::vector<ultrasound::Contour>& contours) {
   for (const ultrasound::Contour& contour : contours) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recording and contours on its images to tumour boundaries in patient RAS, one per sweep.
+// From contours on the images of a recording to tumour boundaries in
+// patient RAS, one for each sweep.
 #pragma once
 
 #include <string>
@@ -17,7 +18,7 @@ struct BoundaryOptions {
   std::string ras_frame = "Ras";
   tracking::ChainOptions chain;
   double spacing_mm = ultrasound::kBoundarySpacing_mm;
-  // A new sweep begins where no contour was traced for longer than this; 0: the recording is one sweep.
+  // A new sweep begins after this long without a traced contour; 0: the recording is one sweep.
   double sweep_gap_s = 0.0;
 };
 
@@ -34,10 +35,10 @@ struct Boundaries {
   std::vector<tracking::Dropped> lost_contours;  // contours on frames without a chain
 };
 
-// kInvalidArgument: no chain from the image frame to RAS, a contour on a frame that does not exist or outside
-// its image, options out of range;
-// a pixel that is not 0.005 to 2 mm wide (metres taken for mm), a boundary that does not span 1 to 300 mm.
-// kEmptySet: no contour lies on a frame with a valid chain; the sentence says why the frames were dropped.
+// kInvalidArgument: no chain leads from the image frame to RAS; a contour on a frame that does not
+// exist or outside its image; options out of range; a pixel that is not 0.005 to 2 mm wide (metres
+// taken for mm); a boundary that does not span 1 to 300 mm.
+// kEmptySet: no contour lies on a frame with a valid chain; the sentence gives the reasons.
 Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
                                      const std::vector<tracking::ConstantLink>& constants,
                                      std::vector<ultrasound::Contour> contours,

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# bench.sh BIN_DIR [OUT_DIR]: error against run time of all inversion methods, and the latency of updates through
-# the real daemon and client. Writes OUT_DIR (default: out/bench; emptied first): raw CSV, figures, tables.md,
-# summary.json. Exit status 0 only if every check holds.
-#   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold
+# bench.sh BIN_DIR [OUT_DIR]: error against run time of all inversion methods, and the latency of
+# updates through the real daemon and client. Empties OUT_DIR (default: out/bench) and writes to it:
+# raw CSV, figures, tables.md, scenes.txt, summary.json. Exit status 0 only if every check holds.
+#   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold;
+#               no scenes.txt
 #   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs 20 GiB
 #   BUDGET_S=.. time per method, mesh and scenario, default 200 s
 #   REFINED=... sizes that are meshed with refinement too, default 18 (QUICK: none)
@@ -78,8 +79,8 @@ for size in ${sizes//,/ }; do
   step "error against time: $size thousand nodes" error_time --sizes "$size"
 done
 for size in ${refined//,/ }; do
-  step "error against time: $size thousand nodes, refined" error_time --sizes "$size" --local-factor 0.6 \
-    --methods condensed,paper-woodbury,cg
+  step "error against time: $size thousand nodes, refined" error_time --sizes "$size" \
+    --local-factor 0.6 --methods condensed,paper-woodbury,cg
 done
 
 options=()
@@ -89,8 +90,11 @@ case ",$sizes," in
 esac
 if [ "${QUICK:-0}" = 1 ]; then
   options+=(--left-out "QUICK=1: $((20 * cycles)) updates for the tail, $growth_updates for the memory")
-elif [ -x "$bin/bench_exactness" ]; then
-  # Its exit status repeats what the checks below say of its numbers.
+else
+  # The table of docs/architecture.md.
+  scenes() { "$bin/bench_scenes" "$case_file" >"$out/scenes.txt"; }
+  step "scenes: what leaving out parts saves and costs" scenes
+  # Its exit status repeats the checks below, so only a missing result is an error here.
   exactness() {
     "$bin/bench_exactness" --case "$case_file" --scenario "$1" --out "$out/direct-$1.json" >/dev/null ||
       [ -s "$out/direct-$1.json" ]
@@ -99,7 +103,6 @@ elif [ -x "$bin/bench_exactness" ]; then
     step "exactness: condensed against the direct posterior, $scenario" exactness "$scenario"
   done
 fi
-commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 current=summary
 echo
-"$bin/bench_summary" --dir "$out" --commit "$commit" "${options[@]}"
+"$bin/bench_summary" --dir "$out" --commit "$(commit_name)" "${options[@]}"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# demo.sh BIN_DIR [OUT_DIR]: the whole job on the default case, from the MRI to the report, through the real
-# daemon and client. BIN_DIR holds brainshiftd and brainshift; OUT_DIR (default: demo) is emptied first.
+# demo.sh BIN_DIR [OUT_DIR]: the whole job on the default case, from the MRI to the report, through
+# the real daemon and client. BIN_DIR holds the programs; empties OUT_DIR (default: demo) first.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -37,7 +37,8 @@ step "replay: scenario sag-progress, 100 updates by the condensed method, contac
   "$bin/brainshift" replay "$out/sag-progress.surgery" --endpoint "$endpoint" --boundary contact \
   --repeat 5 --report "$out/runs/sag-progress.json" --latency-csv "$out/runs/sag-progress-latency.csv"
 reports=("${scenarios[@]/%/.json}" paper-method.json sag-progress.json)
-step "report: tables and pictures" "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
+step "report: tables and pictures" \
+  "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
 step "stop: daemon" stop_daemon
 step "error against time: all methods on a mesh of 5 thousand nodes (make bench has the others)" \
   "$bin/bench_error_time" --case "$case_file" --sizes 5 --scenarios paper --quick --out "$out/bench"

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# sensing.sh BUILD_DIR [OUT_DIR]: from what the room measures to sparse data, accuracy and time (docs/sensing.md).
-# Writes OUT_DIR (default: out/sensing; emptied first): points.csv, checks.csv, left_out.csv, charts, tables.md,
-# summary.json. Exit status 0 only if every check holds. BRAINSHIFT_EXTERNAL_DATA: folder of recorded data; without it
-# those checks are reported as left out.
+# sensing.sh BUILD_DIR [OUT_DIR]: from the room's measurements to sparse data, accuracy and time
+# (docs/sensing.md). Empties OUT_DIR (default: out/sensing) and writes to it: points.csv, checks.csv,
+# left_out.csv, charts, tables.md, summary.json. Exit status 0 only if every check holds.
+#   BRAINSHIFT_EXTERNAL_DATA=...  folder of recorded data; without it their checks are left out
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -22,22 +22,24 @@ for one in icp cars estimates reregistration ultrasound tracing stereo; do
   study "$one"
 done
 
-# The same job as an operating room has it: through the daemon and the client, tumour alone and with the cortex.
+# The whole job through the daemon and the client: with the tumour alone, and with the cortex.
 through_the_daemon() {
   local surgery=$out/joint-mixed.surgery
   rm -f "$surgery"
-  sed 's/swelling_strain_sd: 0.0$/swelling_strain_sd: 0.05/' config/cases/colin27.yaml >"$out/colin27-oedema.yaml"
-  "$bin/brainshiftd" prepare --case "$out/colin27-oedema.yaml" --out "$out/colin27.h5" >"$out/prepare.txt"
-  "$bin/brainshift" simulate --case "$out/colin27-oedema.yaml" --scenario joint-mixed --seed 1 --out "$surgery"
+  local case_file=$out/colin27-oedema.yaml
+  sed 's/swelling_strain_sd: 0.0$/swelling_strain_sd: 0.05/' config/cases/colin27.yaml >"$case_file"
+  "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" >"$out/prepare.txt"
+  "$bin/brainshift" simulate --case "$case_file" --scenario joint-mixed --seed 1 --out "$surgery"
   start_daemon "$out/colin27.h5"
   "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact --sources ius \
     --report "$out/tumour-alone.json"
-  "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact --report "$out/joint.json"
+  "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact \
+    --report "$out/joint.json"
   stop_daemon
   "$bin/brainshift" report "$out/joint.json" --out "$out/report"
 }
 step "through the daemon: joint-mixed" through_the_daemon || status=1
-commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$commit" --command "make sensing" --title Sensing || status=1
+"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make sensing" \
+  --title Sensing || status=1
 exit "$status"

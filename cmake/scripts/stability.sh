@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# stability.sh BIN_DIR [OUT_DIR]: sweeps the product to the edges of what may be asked of it (docs/stability.md).
-# Writes OUT_DIR (default: out/stability; emptied first): points.csv, a map per sheet, guards.csv, summary.json. Exit
-# status 0 only if no answer is wrong without saying so, the maps can turn red, and the guards cost at most 3 %.
-#   QUICK=1     ends and middle of every sweep; no cost of the guards
+# stability.sh BIN_DIR [OUT_DIR]: sweeps the product to the edges of what may be asked of it
+# (docs/stability.md). Writes OUT_DIR (default: out/stability; emptied first): points.csv, faults.csv,
+# a map per sheet, guards.csv, summary.json. Exit status 0 only if no answer is wrong without a
+# warning, every seeded fault is found, and the guards cost at most 3 %.
+#   QUICK=1     ends and middle of every sweep; no seeded faults, no cost of the guards
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -21,4 +22,4 @@ else
   step "guards: their cost on the default head" "$bin/bench_guards" "$out/guards.csv"
   step "sweeps" "$bin/stability_suite" --out "$out"
 fi
-echo "wrote $out/summary.json, points.csv and maps"
+echo "wrote $out/summary.json, points.csv, faults.csv and maps"

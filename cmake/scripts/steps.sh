@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Sourced by the scripts that run a job in steps: demo.sh, bench.sh and their like. They set `name` (first word of
-# messages), `bin` (folder of the binaries) and `out` (folder of results) before.
+# Sourced by demo.sh, bench.sh, verify.sh, stability.sh and sensing.sh: timed steps, the daemon,
+# and the end of a script. They set before: `name`, the first word of messages; `bin`, the folder
+# of the programs; `out`, the folder of results. They set `current=summary` before a last command
+# whose own output tells what failed.
 
 # A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -22,7 +24,7 @@ step() {
 # seconds_since EPOCHREALTIME DIGITS
 seconds_since() { awk -v a="$1" -v b="$EPOCHREALTIME" -v d="$2" 'BEGIN { printf "%.*f", d, b - a }'; }
 
-# empty_folder DIR: makes it, empty. Refuses what nobody means.
+# empty_folder DIR: makes it, and empties it. Refuses the working folder, its parent and the root.
 empty_folder() {
   case $1 in
     "" | / | . | ..) echo "$name: $1 is no folder to empty" >&2; exit 2 ;;
@@ -39,7 +41,10 @@ empty_study() {
   echo "study,reason" >"$1/left_out.csv"
 }
 
-# start_daemon MODEL: on a free loopback port; sets `endpoint` and `daemon`.
+# commit_name: for tables; "-dirty" when files differ from the commit.
+commit_name() { git describe --always --dirty 2>/dev/null || echo unknown; }
+
+# start_daemon MODEL: starts it on a free loopback port; sets `endpoint` and `daemon`.
 start_daemon() {
   local pipe=$out/daemon.pipe line
   mkfifo "$pipe"
@@ -58,7 +63,7 @@ start_daemon() {
     echo "$name: brainshiftd ended or said nothing within 120 s" >&2
     return 1
   fi
-  # Whatever it says later must not fill the pipe.
+  # Its later output must not fill the pipe.
   cat <&"$daemon_output" >>"$out/daemon.log" &
 }
 

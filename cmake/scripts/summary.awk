@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# summary.awk report.json: one line per run. Relies on the two-space indentation that `brainshift report`
-# writes: a key's depth is its indentation, and a run ends at the depth where it began.
+# summary.awk report.json: one line per run. Relies on the two-space indentation of `brainshift
+# report`: a key's depth is its indentation, and a run ends at the depth where it began.
 function number(key, format) {
   return key in value && value[key] != "null" ? sprintf(format, value[key]) : "-"
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# verify.sh BUILD_DIR [OUT_DIR]: the verification suite against closed forms and series. Writes OUT_DIR (default:
-# out/verify; emptied first): points.csv, checks.csv, one chart per study, tables.md, summary.json. Exit status 0 only
-# if every test passes and every check holds.
+# verify.sh BUILD_DIR [OUT_DIR]: the verification suite against closed forms and series. Empties
+# OUT_DIR (default: out/verify) and writes to it: points.csv, checks.csv, one chart per study,
+# tables.md, summary.json. Exit status 0 only if every test passes and every check holds.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -19,7 +19,6 @@ tests() {
     ctest --test-dir "$build" -L '^verification$' --no-tests=error --output-on-failure -j 2 || status=1
 }
 step "verification tests" tests
-commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$commit" --command "make verify" || status=1
+"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make verify" || status=1
 exit "$status"

@@ -1,48 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ways to solve one backward-Euler step of Biot consolidation on the default head (docs/decisions/0011): L D L^T of
-// the whole matrix, and conjugate gradients on the pressure Schur complement with the Cholesky factor of K. One BLAS
-// thread. Prints a table; about two minutes. Arguments: step sizes in seconds (default 60 1 0.01).
+// Ways to solve one backward-Euler step of Biot consolidation on the default head
+// (docs/decisions/0011): L D L^T of the whole matrix, and conjugate gradients on the pressure
+// Schur complement with the Cholesky factor of K. One BLAS thread. Prints a table; about two
+// minutes. Arguments: step sizes in seconds (default 60 1 0.01).
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
 
 #include "common/contact/forward_model.hpp"
-#include "common/core/units.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/fem/biot_matrix.hpp"
+#include "common/geometry/surface.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
-#include "common/geometry/surface.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/patient/read_patient.hpp"
+#include "tests/benchmarks/median_time.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr int kColumns = 64;
 
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
+using bench::median_ms;
 using bench::value_or_exit;
-
-template <typename Work>
-double median_ms(int repetitions, const Work& work) {
-  std::vector<double> times;
-  for (int i = 0; i < repetitions; ++i) {
-    const auto start = Clock::now();
-    work();
-    times.push_back(ms_since(start));
-  }
-  std::nth_element(times.begin(), times.begin() + repetitions / 2, times.end());
-  return times[static_cast<std::size_t>(repetitions / 2)];
-}
 
 double peak_gib() {
   rusage usage{};
@@ -55,7 +38,8 @@ double relative_residual(const linalg::SymmetricMatrix& lower, const VecX& b, co
   return (b - linalg::multiply(lower, x)).norm() / b.norm();
 }
 
-// (C + G^T K^-1 G) p = -g - G^T K^-1 f by conjugate gradients, preconditioned with C + M / (lambda + 2 G).
+// (C + G^T K^-1 G) p = -g - G^T K^-1 f by conjugate gradients,
+// preconditioned with C + M / (lambda + 2 G).
 class SchurComplement {
  public:
   SchurComplement(const fem::BiotMatrix& biot, const linalg::SymmetricMatrix& preconditioner)
@@ -114,24 +98,24 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
   geometry::boundary_surface(model.mesh, &surface);
   const fem::PressureMap pressure(model.mesh.num_nodes(), surface);
   const auto materials = fem::MaterialMap::uniform(tissue(config.material), model.mesh.num_tets());
-  auto start = Clock::now();
+  Stopwatch watch;
   const fem::BiotMatrix biot =
       fem::assemble_biot(model.mesh, materials, forward.dofs(), pressure, dt_s);
   std::printf("dt %g s: %ld unknowns, %d of %d tets stabilised, assembled in %.0f ms\n", dt_s,
               static_cast<long>(biot.lower.rows()), biot.stabilised_tets, model.mesh.num_tets(),
-              ms_since(start));
+              watch.milliseconds());
   const VecX b = VecX::LinSpaced(biot.lower.rows(), -1.0, 1.0);
   VecX x;
 
-  start = Clock::now();
+  watch = Stopwatch();
   const auto ldl =
       value_or_exit(linalg::SymmetricIndefinite::factorise(biot.lower, biot.pressure_unknowns));
-  const double ldl_s = ms_since(start) / 1e3;
-  const double ldl_ms = median_ms(7, [&] { (void)ldl.solve(b, x); });
+  const double ldl_s = watch.seconds();
+  const double ldl_ms = median_ms([&] { (void)ldl.solve(b, x); }, 7);
   const double residual = relative_residual(biot.lower, b, x);
   Eigen::MatrixXd columns(biot.lower.rows(), kColumns), y;
   for (int j = 0; j < kColumns; ++j) columns.col(j) = (1.0 + j) * b.array().sin();
-  const double block_ms = median_ms(3, [&] { (void)ldl.solve_many(columns, y); }) / kColumns;
+  const double block_ms = median_ms([&] { (void)ldl.solve_many(columns, y); }, 3) / kColumns;
   std::printf(
       "  L D L^T (MUMPS)     analyse %.2f s  factor %.2f s  total %.2f s  solve %.0f ms  column "
       "%.1f ms  "
@@ -140,7 +124,8 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
       static_cast<double>(ldl.bytes()) / (1 << 30), peak_gib(), residual,
       ldl.last_check().backward_error, ldl.rcond(), static_cast<double>(ldl.nonzeros()) / 1e6);
 
-  // Mass over the confined modulus: the pressure Schur complement of an incompressible fluid, undrained.
+  // Mass over the confined modulus: the pressure Schur complement of
+  // an incompressible fluid, undrained.
   auto mass_only = materials;
   for (auto& m : mass_only.materials) {
     m.storage = 1.0 / (m.elastic.lambda + 2.0 * m.elastic.shear);
@@ -149,10 +134,10 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
   const fem::BiotMatrix mass =
       fem::assemble_biot(model.mesh, mass_only, forward.dofs(), pressure, 1.0, false);
   const long nu = mass.displacement_unknowns, np = mass.pressure_unknowns;
-  start = Clock::now();
+  watch = Stopwatch();
   SchurComplement schur(biot, linalg::SymmetricMatrix(-mass.lower.block(nu, nu, np, np)));
-  const double schur_s = ms_since(start) / 1e3;
-  const double schur_ms = median_ms(3, [&] { x = schur.solve(b, 1e-12); });
+  const double schur_s = watch.seconds();
+  const double schur_ms = median_ms([&] { x = schur.solve(b, 1e-12); }, 3);
   std::printf(
       "  Schur complement    total %.2f s  solve %.0f ms (%d iterations)  factor %.2f GiB  "
       "residual %.1e\n",
@@ -160,7 +145,7 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
       relative_residual(biot.lower, b, x));
   std::printf("  elasticity alone    factor %.2f s  solve %.0f ms\n",
               forward.factor().factor_seconds(),
-              median_ms(7, [&] { (void)forward.factor().solve(VecX(b.head(nu))); }));
+              median_ms([&] { (void)forward.factor().solve(VecX(b.head(nu))); }, 7));
 }
 
 }  // namespace
@@ -170,10 +155,8 @@ int main(int argc, char** argv) {
   using namespace brainshift;
   linalg::use_single_threaded_blas();
   const char* name = std::getenv("BRAINSHIFT_CASE");
-  auto config =
-      value_or_exit(io::read_case_config(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE));
-  const auto inputs = value_or_exit(io::load_case_inputs(config));
-  const auto model = value_or_exit(anatomy::build_brain_model(inputs));
+  const auto [config, model] =
+      value_or_exit(patient::read_patient(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE));
   std::vector<double> steps;
   for (int i = 1; i < argc; ++i) steps.push_back(std::atof(argv[i]));
   if (steps.empty()) steps = {60.0, 1.0, 0.01};

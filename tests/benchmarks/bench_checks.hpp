@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The figures that `make bench` holds to a bound, and its summary.json and tables.md.
+// The figures that `make bench` checks against a bound, and its summary.json and tables.md.
 #pragma once
 
 #include <filesystem>
@@ -16,11 +16,14 @@ struct Check {
   double value = 0.0;
   std::string bound;  // in words, with the unit
   bool pass = false;
-  std::string command;  // that the value comes from
+  std::string command;  // measures the value
+  // False: a figure that is only shown. It has no "pass" in summary.json.
+  bool has_bound = true;
 };
 
 // A value that was not measured is NaN and does not pass. Times in units of t_solve are divided by
-// full_solve_ms of the same report. `folder` is named in the commands. `with_100k`: the checks of that mesh too.
+// full_solve_ms of the same report. `folder`: for the commands;
+// `with_100k`: also checks that mesh.
 std::vector<Check> checks(const Results& results, const std::string& folder, bool with_100k);
 
 // {"checks": [...], "left_out": [...]}; a value that is not finite is null.

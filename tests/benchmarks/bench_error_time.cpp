@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error against run time of all inversion methods, over mesh sizes; see error_time.hpp. Writes raw repetitions,
-// which bench_summary turns into figures, tables and checks.
+// Error against run time of all inversion methods, over mesh sizes (error_time.hpp). Writes raw
+// repetitions, which bench_summary turns into figures, tables and checks.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -10,20 +10,21 @@
 #include <string>
 #include <vector>
 
-#include "common/linalg/blas_threads.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
 #include "tests/benchmarks/error_time.hpp"
 
 namespace brainshift::bench {
 namespace {
 
-// Methods that take a minute per estimate at 18 thousand nodes, and the exact one, whose preparation takes minutes
-// and 11 GiB at 40 thousand, run up to the first; the other iterative ones up to the second.
+// The largest meshes. Slow: the methods that take a minute per estimate at 18 thousand nodes, and
+// the exact one, whose preparation takes minutes and 11 GiB at 40 thousand. Iterative: the others.
 constexpr double kSlowLimitThousandNodes = 20.0;
 constexpr double kIterativeLimitThousandNodes = 50.0;
 constexpr int kQuickRepetitions = 5;
-// The condensed method's repetitions cost nothing. The others take their time in the first scenario, where their
-// errors are compared: a measurement's noise moves the error more than the choice of method does.
+// The condensed method's repetitions cost nothing. The others repeat in
+// the first scenario only, where their errors are compared: a
+// measurement's noise moves the error more than the choice of method does.
 constexpr int kComparedRepetitions = 5;
 
 struct Arguments {
@@ -98,7 +99,7 @@ Status run_trial(const Arguments& arguments, const Head& head, const Trial& tria
 Status run_mesh(const Arguments& arguments, CaseConfig config, const MeshWish& wish) {
   config.condensed.memory_limit_gib = arguments.memory_limit_gib;
   config.condensed.max_rank = *std::max_element(arguments.ranks.begin(), arguments.ranks.end());
-  // Run times are wanted, not what fits into a deadline.
+  // The run times are measured, so no deadline may cut them.
   config.condensed.deadline_ms = 1e6;
   std::fprintf(stderr, "%s\n", wish.name.c_str());
   auto head = make_head(std::move(config), wish, lines(wish.name));

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far the condensed methods are from the posterior that they stand for, at every node of a real head.
+// How far the condensed methods are from the posterior that they stand
+// for, at every node of a real head.
 //
-// The reference takes another road. For the final active set of a method it factorises K_p = K + Q^T beta Q anew
-// (paper eq. 16), solves for the 3m columns V = K_p^-1 A^T, and
-// (Sigma with the strength of its parts that the method has estimated)
+// The reference takes another road. For the final active set of a method it factorises K_p = K +
+// Q^T beta Q anew (paper eq. 16), solves for the 3m columns V = K_p^-1 A^T, and (Sigma with the
+// strength of its parts that the method has estimated)
 //   u = u0 + K_p^-1 Sigma V mu,   (V^T Sigma V + R) mu = d - A u0,   K_p u0 = Q^T beta p
-// Exit status: 0 when the exact method is within kExactBound_mm and the reduced one, with all its modes, within
-// kReducedBound_mm; 1 when not, or on a failure; 2 for bad usage or bad input.
+// Exit status: 0 when the exact method is within kExactBound_mm and the reduced one, with all its
+// modes, within kReducedBound_mm; 1 when not, or on a failure; 2 for bad usage or bad input.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -18,18 +18,18 @@
 #include <nlohmann/json.hpp>
 
 #include "client/twin/surgery.hpp"
-#include "common/linalg/blas.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/fem/block_solver.hpp"
 #include "common/fem/sampling.hpp"
-#include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/data_check.hpp"
-#include "common/io/config/config_file.hpp"
+#include "common/inversion/prepared/condense.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift {
@@ -37,7 +37,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using inversion::PreparedModel;
-using Clock = std::chrono::steady_clock;
 
 constexpr double kExactBound_mm = 1e-6;
 constexpr double kReducedBound_mm = 0.01;
@@ -50,20 +49,12 @@ struct Arguments {
   std::uint64_t seed = 1;
 };
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 // Model and case: from a model file, or made from the case file.
 Result<io::ModelFile> load_head(const Arguments& arguments) {
   if (!arguments.model_file.empty()) return io::read_model(arguments.model_file);
-  auto config = io::read_case_config(arguments.case_file);
-  if (!config) return tl::unexpected(config.error());
-  const auto inputs = io::load_case_inputs(*config);
-  if (!inputs) return tl::unexpected(inputs.error());
-  auto model = anatomy::build_brain_model(*inputs);
-  if (!model) return tl::unexpected(model.error());
-  return io::ModelFile{std::move(*config), std::move(*model)};
+  auto made = patient::read_patient(arguments.case_file);
+  if (!made) return tl::unexpected(made.error());
+  return io::ModelFile{std::move(made->config), std::move(made->model)};
 }
 
 // The first observation: of a surgery file, or of a scenario played here.
@@ -79,7 +70,7 @@ Result<Observation> first_observation(const Arguments& arguments, const io::Mode
   }
   auto file = io::SurgeryFile::open(arguments.surgery);
   if (!file) return tl::unexpected(file.error());
-  const auto records = file->records("observation");
+  const auto records = file->records(io::RecordKind::kObservation);
   if (!records) return tl::unexpected(records.error());
   if (records->empty()) {
     return fail(ErrorCode::kInvalidArgument, arguments.surgery + ": holds no observation");
@@ -138,7 +129,7 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
     forces.col(j) = flat(prior.apply(Eigen::Map<const Points>(v.col(j).data(), 3, nodes)));
   }
   MatrixXd covariance(rows, rows);
-  fem::blas::multiply_transposed(1.0, v, forces, 0.0, covariance);
+  linalg::blas::multiply_transposed(1.0, v, forces, 0.0, covariance);
   for (int i = 0; i < rows; ++i) covariance(i, i) += data.sd_mm[i / 3] * data.sd_mm[i / 3];
 
   Points gap_load = Points::Zero(3, nodes);
@@ -177,7 +168,8 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
                           inversion::scaled_prior(model, estimate.prior_scales));
 }
 
-// How well contact holds: the deepest slave without a force, mm, and the strongest pull, N; 0 when it holds.
+// How well contact holds: the deepest slave without a force, mm, and
+// the strongest pull, N; 0 when it holds.
 nlohmann::json contact_left_open(const PreparedModel& model, const Estimate& estimate) {
   const auto& contact = model.forward().contact();
   const VecX penetration = contact.penetration(estimate.displacement);
@@ -199,15 +191,16 @@ struct Compared {
   bool within_bounds = true;
 };
 
-// The reduced method at every rank. exact: the exact method's estimate, direct: the posterior of its set.
+// The reduced method at every rank. exact: the exact method's
+// estimate, direct: the posterior of its set.
 Status compare_reduced(const PreparedModel& model, const io::ModelFile& head,
                        const SparseData& data, const Estimate& exact, const Points& direct,
                        Compared& compared) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   auto made = inversion::condense(model);
   if (!made) return tl::unexpected(made.error());
   const auto operators = std::make_shared<const CondensedOperators>(std::move(*made));
-  compared.json["reduced_prepare_s"] = seconds_since(start);
+  compared.json["reduced_prepare_s"] = watch.seconds();
   CaseConfig config = head.config;
   config.condensed.deadline_ms = 1e6;  // accuracy is asked for here, not speed
   const auto locator = std::make_shared<const geometry::TetLocator>(head.model.mesh);
@@ -264,16 +257,16 @@ Result<Compared> compare(const Arguments& arguments) {
   Estimate exact;
   Points direct;
   {  // its memory goes before the reduced method is prepared
-    auto start = Clock::now();
-    auto inverter = inversion::CondensedExact::prepare(*model);
+    Stopwatch watch;
+    auto inverter = inversion::CondensedExact::build(*model);
     if (!inverter) return tl::unexpected(inverter.error());
-    compared.json["exact_prepare_s"] = seconds_since(start);
+    compared.json["exact_prepare_s"] = watch.seconds();
     compared.json["exact_bytes"] = inverter->bytes();
-    start = Clock::now();
+    watch = Stopwatch();
     if (auto status = inverter->update(*data, exact); !status) {
       return tl::unexpected(status.error());
     }
-    compared.json["exact_update_s"] = seconds_since(start);
+    compared.json["exact_update_s"] = watch.seconds();
   }
   if (auto made = direct_posterior(*model, *data, exact); made) {
     direct = std::move(*made);

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "client/plot/xy_chart.hpp"
+#include "client/plot/chart.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/benchmarks/pareto.hpp"
 
@@ -16,9 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace palette = client::palette;
+using client::ChartSpec;
 using client::Marker;
-using client::XyChartSpec;
-using client::XySeries;
+using client::Series;
 
 constexpr double kMib = 1024.0 * 1024.0;
 
@@ -41,9 +41,9 @@ Result<fs::path> save(const fs::path& file, const cv::Mat& image) {
 using Error = double MethodSummary::*;
 
 // One panel: a point per method, number of modes and start.
-XyChartSpec error_panel(const std::vector<MethodSummary>& methods, Error error,
-                        const std::string& what) {
-  XyChartSpec spec;
+ChartSpec error_panel(const std::vector<MethodSummary>& methods, Error error,
+                      const std::string& what) {
+  ChartSpec spec;
   spec.title = "Error against run time: mesh " + methods.front().mesh + ", scenario " +
                methods.front().scenario;
   spec.subtitle = "median time; mean error over " + std::to_string(methods.front().compared) +
@@ -52,7 +52,7 @@ XyChartSpec error_panel(const std::vector<MethodSummary>& methods, Error error,
   spec.y = {what, true};
   std::vector<std::pair<double, double>> points;
   for (const MethodSummary& one : methods) points.emplace_back(one.p50_ms, one.*error);
-  XySeries front{"Pareto front", palette::kGrey, Marker::kNone, true, 12.0, {}};
+  Series front{"Pareto front", palette::kGrey, Marker::kNone, true, 12.0, {}};
   for (const std::size_t i : pareto_front(points)) {
     front.points.push_back({points[i].first, points[i].second, ""});
   }
@@ -61,7 +61,7 @@ XyChartSpec error_panel(const std::vector<MethodSummary>& methods, Error error,
     if (!std::isfinite(one.p50_ms) || !std::isfinite(one.*error)) continue;
     const std::string name = one.method == "condensed" ? one.method + ", " + one.start : one.method;
     auto found = std::find_if(spec.series.begin(), spec.series.end(),
-                              [&](const XySeries& s) { return s.legend == name; });
+                              [&](const Series& s) { return s.legend == name; });
     if (found == spec.series.end()) {
       const Marker marker = one.start == "warm" ? Marker::kCircle : Marker::kTriangle;
       spec.series.push_back({name, colour_of(one.method), marker, false, 0.0, {}});
@@ -81,10 +81,10 @@ Status draw_errors(const Results& results, const fs::path& folder, std::vector<f
       if (one.mesh == each.mesh && one.scenario == each.scenario) methods.push_back(one);
     }
     cv::Mat sheet;
-    cv::vconcat(client::draw_xy_chart(error_panel(methods, &MethodSummary::cross_mm,
-                                                  "mean error at the tumour (mm)")),
-                client::draw_xy_chart(error_panel(methods, &MethodSummary::field_mean_mm,
-                                                  "mean error of the whole field (mm)")),
+    cv::vconcat(client::draw_chart(error_panel(methods, &MethodSummary::cross_mm,
+                                               "mean error at the tumour (mm)")),
+                client::draw_chart(error_panel(methods, &MethodSummary::field_mean_mm,
+                                               "mean error of the whole field (mm)")),
                 sheet);
     auto file = save(folder / ("error_time-" + each.mesh + "-" + each.scenario + ".png"), sheet);
     if (!file) return tl::unexpected(file.error());
@@ -98,7 +98,7 @@ Status draw_latency(const Results& results, const fs::path& folder, std::vector<
                                                              {palette::kGreen, 18.0},
                                                              {palette::kOrange, 8.0},
                                                              {palette::kBlue, 0.0}};
-  XyChartSpec spec;
+  ChartSpec spec;
   spec.title = "Latency of updates through daemon and client, loopback";
   spec.subtitle = "condensed method, contact; the first update of each session is not included";
   spec.x = {"latency (ms)", true};
@@ -108,12 +108,12 @@ Status draw_latency(const Results& results, const fs::path& folder, std::vector<
     std::vector<double> sorted = latency;
     std::sort(sorted.begin(), sorted.end());
     const auto& style = styles[spec.series.size() % styles.size()];
-    XySeries series{scenario + " (" + std::to_string(sorted.size()) + ")",
-                    style.first,
-                    Marker::kNone,
-                    true,
-                    style.second,
-                    {}};
+    Series series{scenario + " (" + std::to_string(sorted.size()) + ")",
+                  style.first,
+                  Marker::kNone,
+                  true,
+                  style.second,
+                  {}};
     const auto count = static_cast<double>(sorted.size());
     for (std::size_t i = 0; i < sorted.size(); ++i) {
       series.points.push_back({sorted[i], 1.0 - (static_cast<double>(i) + 0.5) / count, ""});
@@ -131,15 +131,15 @@ Status draw_latency(const Results& results, const fs::path& folder, std::vector<
                          true,
                          5.0,
                          {{t_solve, 1.0, ""}, {t_solve, 1e-3, ""}}});
-  auto file = save(folder / "latency.png", client::draw_xy_chart(spec));
+  auto file = save(folder / "latency.png", client::draw_chart(spec));
   if (!file) return tl::unexpected(file.error());
   files.push_back(*file);
   return {};
 }
 
-XySeries over_nodes(const Results& results, const std::string& legend, const char* column,
-                    double unit, const cv::Scalar& colour, Marker marker) {
-  XySeries series{legend, colour, marker, true, 0.0, {}};
+Series over_nodes(const Results& results, const std::string& legend, const char* column,
+                  double unit, const cv::Scalar& colour, Marker marker) {
+  Series series{legend, colour, marker, true, 0.0, {}};
   for (std::size_t row = 0; row < results.meshes.rows(); ++row) {
     const std::string& name = results.meshes.text(row, "mesh");
     if (name.find("refined") != std::string::npos) continue;  // not of this family
@@ -151,9 +151,9 @@ XySeries over_nodes(const Results& results, const std::string& legend, const cha
   return series;
 }
 
-XySeries updates_over_nodes(const Results& results, const std::string& scenario,
-                            const std::string& start, const cv::Scalar& colour, Marker marker) {
-  XySeries series = over_nodes(results, scenario + ", " + start, "nodes", 1.0, colour, marker);
+Series updates_over_nodes(const Results& results, const std::string& scenario,
+                          const std::string& start, const cv::Scalar& colour, Marker marker) {
+  Series series = over_nodes(results, scenario + ", " + start, "nodes", 1.0, colour, marker);
   for (auto& point : series.points) {
     double time_ms = std::nan("");
     for (std::size_t row = 0; row < results.meshes.rows(); ++row) {
@@ -168,7 +168,7 @@ XySeries updates_over_nodes(const Results& results, const std::string& scenario,
 
 Status draw_growth(const Results& results, const fs::path& folder, std::vector<fs::path>& files) {
   if (results.meshes.rows() == 0) return {};
-  XyChartSpec time, memory, update;
+  ChartSpec time, memory, update;
   time.title = "Preparation against mesh size";
   time.subtitle = "contact boundary";
   time.y = {"time (s)", true};
@@ -194,10 +194,10 @@ Status draw_growth(const Results& results, const fs::path& folder, std::vector<f
       updates_over_nodes(results, "distension", "warm", palette::kVermillion, Marker::kCircle),
       updates_over_nodes(results, "distension", "cold", palette::kOrange, Marker::kTriangle)};
   std::vector<cv::Mat> panels;
-  for (XyChartSpec* spec : {&time, &memory, &update}) {
+  for (ChartSpec* spec : {&time, &memory, &update}) {
     spec->x = {"nodes", true};
     spec->size.height = 820;
-    panels.push_back(client::draw_xy_chart(*spec));
+    panels.push_back(client::draw_chart(*spec));
   }
   cv::Mat sheet;
   cv::vconcat(panels, sheet);

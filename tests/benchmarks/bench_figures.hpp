@@ -10,10 +10,10 @@
 
 namespace brainshift::bench {
 
-// error_time-MESH-SCENARIO.png  errors against run time with the Pareto front, for every mesh and scenario
-// latency.png                   share of updates that take longer, per scenario
-// growth.png                    preparation, memory and update time against mesh size
-// Those without data are left out. Returns the files written; kWriteFailed.
+//   error_time-MESH-SCENARIO.png  errors against run time with the Pareto front
+//   latency.png                   share of updates that take longer, for every scenario
+//   growth.png                    preparation, memory and update time against mesh size
+// Figures without data are left out. Returns the files written; kWriteFailed.
 Result<std::vector<std::filesystem::path>> draw_figures(const Results& results,
                                                         const std::filesystem::path& folder);
 

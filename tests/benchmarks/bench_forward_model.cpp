@@ -1,40 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Speed of the forward model on the default head: assembly, analysis and factorisation, single solve, solves
-// in blocks of 64, prior. One BLAS thread. The case file may be given in BRAINSHIFT_CASE.
+// Speed of the forward model on the default head: assembly, analysis
+// and factorisation, single solve, solves in blocks of 64, prior. One
+// BLAS thread. The case file may be given in BRAINSHIFT_CASE.
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
 #include <cstdlib>
 
 #include "common/contact/forward_model.hpp"
-#include "common/linalg/blas_threads.hpp"
-#include "common/prior/load_modes.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/patient/read_patient.hpp"
+#include "common/prior/load_modes.hpp"
 
 namespace brainshift {
 namespace {
 
-struct Head {
-  CaseConfig config;
-  BrainModel model;
-};
-
-const Head& head() {
-  static const Head loaded = [] {
+const patient::Patient& head() {
+  static const patient::Patient loaded = [] {
     const char* name = std::getenv("BRAINSHIFT_CASE");
-    auto config = io::read_case_config(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE);
-    const auto stop = [](const Error& error) {
-      std::fprintf(stderr, "%s\n", error.message.c_str());
+    auto made = patient::read_patient(name != nullptr ? name : BRAINSHIFT_DEFAULT_CASE);
+    if (!made) {
+      std::fprintf(stderr, "%s\n", made.error().message.c_str());
       std::exit(2);
-    };
-    if (!config) stop(config.error());
-    auto inputs = io::load_case_inputs(*config);
-    if (!inputs) stop(inputs.error());
-    auto model = anatomy::build_brain_model(*inputs);
-    if (!model) stop(model.error());
-    return Head{std::move(*config), std::move(*model)};
+    }
+    return std::move(*made);
   }();
   return loaded;
 }

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the guards of an update cost on the default head: the checks of estimate_check.hpp beside the whole update.
+// What the guards of an update cost on the default head: the checks of
+// estimate_check.hpp, compared with the whole update.
 //   build/release/bin/bench_guards [OUT.csv] [case.yaml]
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <numeric>
 
 #include "client/twin/surgery.hpp"
-#include "common/core/statistics.hpp"
-#include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/patient/read_patient.hpp"
+#include "tests/benchmarks/median_time.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -21,25 +20,14 @@ namespace {
 
 using bench::value_or_exit;
 
-// Median of many, ms.
 template <typename Work>
 double median_ms(const Work& work) {
-  std::vector<double> times_ms;
-  for (int i = 0; i < 60; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    if (i < 10) continue;
-    times_ms.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-            .count());
-  }
-  return percentile(times_ms, 50.0);
+  return bench::median_ms(work, 50, 10);
 }
 
 void run(const std::string& out, const std::string& case_file) {
-  const CaseConfig config = value_or_exit(io::read_case_config(case_file));
-  const auto model = std::make_shared<const BrainModel>(
-      value_or_exit(anatomy::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+  auto [config, brain] = value_or_exit(patient::read_patient(case_file));
+  const auto model = std::make_shared<const BrainModel>(std::move(brain));
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
   const auto operators =

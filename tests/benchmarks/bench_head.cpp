@@ -1,32 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/benchmarks/bench_head.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 #include <utility>
 
-#include "common/core/statistics.hpp"
-#include "common/inversion/prepared/condense.hpp"
-#include "common/io/config/config_file.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/prepared/full_solve.hpp"
+#include "common/io/config/case_inputs_file.hpp"
+#include "tests/benchmarks/median_time.hpp"
 
 namespace brainshift::bench {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-// The edge that the default case gives 18 thousand nodes with; other cases get meshes of another size, which
-// the rows say.
+// The edge of the default case gives 18 thousand nodes. Other cases
+// get meshes of other sizes; mesh_row() has the count.
 constexpr double kReferenceThousandNodes = 18.0;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-// Linux: 5 written to clear_refs sets the peak back to what is held now. Without it the peak is that of the
-// whole process.
+// Linux: writing 5 to clear_refs sets the peak back to the memory held now. Where that fails, the
+// peak is that of the whole process.
 void reset_peak_rss() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 std::uint64_t peak_rss_bytes() {
@@ -63,10 +58,10 @@ Result<Head> make_head(CaseConfig config, const MeshWish& wish, const Progress& 
   head.name = wish.name;
   const auto inputs = io::load_case_inputs(config);
   if (!inputs) return tl::unexpected(inputs.error());
-  auto start = Clock::now();
+  Stopwatch watch;
   auto model = anatomy::build_brain_model(*inputs, progress);
   if (!model) return tl::unexpected(model.error());
-  head.mesh_s = seconds_since(start);
+  head.mesh_s = watch.seconds();
   head.model = std::make_shared<const BrainModel>(std::move(*model));
   auto prepared =
       inversion::PreparedModel::prepare(head.model, config, Boundary::kContact, progress);
@@ -74,30 +69,15 @@ Result<Head> make_head(CaseConfig config, const MeshWish& wish, const Progress& 
   head.prepared = std::make_shared<const inversion::PreparedModel>(std::move(*prepared));
   inversion::CondenseOptions options;
   options.progress = progress;
-  start = Clock::now();
+  watch = Stopwatch();
   auto operators = inversion::condense(*head.prepared, options);
   if (!operators) return tl::unexpected(operators.error());
-  head.condense_s = seconds_since(start);
+  head.condense_s = watch.seconds();
   head.peak_rss_bytes = peak_rss_bytes();
   head.operators = std::make_shared<const CondensedOperators>(std::move(*operators));
   head.locator = std::make_shared<const geometry::TetLocator>(head.model->mesh);
   head.config = std::move(config);
   return head;
-}
-
-double solve_ms(const inversion::PreparedModel& prepared) {
-  constexpr int kSolves = 9;
-  const contact::ForwardModel& forward = prepared.forward();
-  const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
-  VecX x;
-  std::vector<double> times_ms;
-  forward.factor().solve(b, x);
-  for (int i = 0; i < kSolves; ++i) {
-    const auto start = Clock::now();
-    forward.factor().solve(b, x);
-    times_ms.push_back(1e3 * seconds_since(start));
-  }
-  return percentile(times_ms, 50.0);
 }
 
 std::vector<std::string> mesh_row(const Head& head) {
@@ -113,7 +93,7 @@ std::vector<std::string> mesh_row(const Head& head) {
           csv_number(head.mesh_s),
           csv_number(timings.analyse_s + timings.factor_s),
           csv_number(timings.total_s),
-          csv_number(timings.full_solve_ms),
+          csv_number(inversion::measure_full_solve_ms(*head.prepared)),
           csv_number(head.condense_s),
           std::to_string(head.operators->bytes()),
           std::to_string(timings.bytes),

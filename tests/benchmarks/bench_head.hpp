@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A head meshed at a wanted size and prepared for every inversion method, with what that cost.
+// A head meshed at a wanted size and prepared for every inversion method, and what that cost.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <string>
 
-#include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/condensed_operators.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 
 namespace brainshift::bench {
 
 struct MeshWish {
   std::string name;            // "18k", "18k-refined"
-  double thousand_nodes = 18;  // wanted; what comes out is written down
+  double thousand_nodes = 18;  // wanted; mesh_row() has the count that came out
   double local_factor = 1.0;   // edges at tumour and craniotomy, in units of the edge elsewhere
 };
 
@@ -35,15 +35,12 @@ struct Head {
   std::uint64_t peak_rss_bytes = 0;  // of this process, from the mesh to the condensed operators
 };
 
-// All three edges of the case scaled by (nodes of the case as it is / wanted nodes)^(1/3). kInvalidArgument when
-// the case brings a ready mesh.
+// Scales all three edges of the case by (nodes of the unscaled case / wanted nodes)^(1/3).
+// kInvalidArgument when the case names a ready mesh.
 Status scale_edges(CaseConfig& config, const MeshWish& wish);
 
 // `config` as read from the case file, with scale_edges() still to be applied.
 Result<Head> make_head(CaseConfig config, const MeshWish& wish, const Progress& progress = {});
-
-// Median of single solves, ms: t_solve at this moment, to be compared with what is timed right after it.
-double solve_ms(const inversion::PreparedModel& prepared);
 
 // meshes-*.csv
 inline constexpr const char* kMeshHeading =

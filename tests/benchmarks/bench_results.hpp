@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What one `make bench` left in its folder, read back: the only source of its figures, tables and checks.
+// What one `make bench` wrote to its folder. Its figures, tables and checks have no other source.
 //
 //   meshes-*.csv, error_time-*.csv   bench_error_time
 //   NAME.json, latency-NAME.csv      `brainshift replay` of scenario NAME
@@ -31,7 +31,8 @@ struct MethodSummary {
   double over_tsolve = 0.0;  // median of time / t_solve
   double active = 0.0;       // mean, as iterations
   double iterations = 0.0;
-  // Means over the repetitions that all methods of this mesh and scenario have, `compared` in number.
+  // Means over the repetitions that all methods of this mesh and
+  // scenario have; compared: their number.
   int compared = 0;
   double cross_mm = 0.0;
   double field_mean_mm = 0.0;
@@ -66,7 +67,7 @@ struct PairedErrors {
 PairedErrors paired_errors(const CsvTable& error_time, const MethodSummary& first,
                            const MethodSummary& second);
 
-// Parts that are missing stay empty; kUnreadable for a part that is there and makes no sense.
+// Missing parts stay empty; kUnreadable for a part that exists and is not what its name says.
 Result<Results> read_results(const std::filesystem::path& folder);
 
 }  // namespace brainshift::bench

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What leaving parts of a scene out saves and costs on the default head: every scenario of the twin without ICP,
-// updates with and without a part; true difference beside the estimate that the inverter gives.
+// What leaving out parts of a scene saves and costs on the default head, for
+// every scenario of the twin without ICP: the time of updates with and without
+// a part, the true difference between them, and the inverter's own estimate of
+// that difference. `make bench` writes the table to out/bench/scenes.txt.
 //   build/release/bin/bench_scenes [case.yaml]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "client/twin/surgery.hpp"
 #include "common/core/statistics.hpp"
-#include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
-#include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/patient/read_patient.hpp"
 #include "server/pipeline/scene_plan.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
@@ -35,7 +38,7 @@ struct Part {
 struct Measured {
   std::vector<double> invert_ms, rebuild_ms;
   void add(inversion::CondensedInverter& inverter, const SparseData& data, Estimate& estimate) {
-    for (int i = 0; i < 5; ++i) {  // warm: the set is known from the first on
+    for (int i = 0; i < 5; ++i) {  // the first is cold, the others start from its contact set
       if (auto status = inverter.update(data, estimate); !status) {
         std::fprintf(stderr, "%s\n", status.error().message.c_str());
         std::exit(1);
@@ -48,9 +51,8 @@ struct Measured {
 };
 
 void run(const std::string& case_file) {
-  const CaseConfig config = value_or_exit(io::read_case_config(case_file));
-  const auto model = std::make_shared<const BrainModel>(
-      value_or_exit(anatomy::build_brain_model(value_or_exit(io::load_case_inputs(config)))));
+  auto [config, brain] = value_or_exit(patient::read_patient(case_file));
+  const auto model = std::make_shared<const BrainModel>(std::move(brain));
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(model, config, Boundary::kContact));
   const auto operators =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Turns what `make bench` measured into figures, tables.md and summary.json. Exit status 0 only if every check
-// holds.
+// Turns what `make bench` measured into figures, tables.md and
+// summary.json. Exit status 0 only if every check holds.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/replay/write_file.hpp"
+#include "common/io/files/file_access.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/bench_figures.hpp"
 #include "tests/benchmarks/bench_results.hpp"
@@ -35,9 +35,9 @@ Result<bool> run(const Arguments& arguments) {
 
   const auto all = checks(*results, arguments.folder.string(), arguments.with_100k);
   Status ok =
-      client::write_file(arguments.folder / "tables.md", tables(*results, all, arguments.commit));
+      io::write_file(arguments.folder / "tables.md", tables(*results, all, arguments.commit));
   if (ok) {
-    ok = client::write_file(arguments.folder / "summary.json", to_json(all, arguments.left_out));
+    ok = io::write_file(arguments.folder / "summary.json", to_json(all, arguments.left_out));
   }
   if (!ok) return tl::unexpected(ok.error());
   bool pass = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of comma-separated values: what the benchmarks write, and what figures and checks are made from.
+// Tables of comma-separated values, which benchmarks write and figures and checks are made from.
 // Cells hold no commas, quotes or line breaks. An empty cell is a value that does not apply.
 #pragma once
 
@@ -15,7 +15,8 @@ namespace brainshift::bench {
 
 class CsvTable {
  public:
-  // kUnreadable when a row has another number of cells than the heading; `origin` opens the sentence.
+  // kUnreadable when a row has another number of cells than the
+  // heading; the sentence begins with `origin`.
   static Result<CsvTable> parse(std::string_view text, const std::string& origin);
   static Result<CsvTable> read(const std::filesystem::path& path);  // kNotFound, kUnreadable
 
@@ -25,7 +26,7 @@ class CsvTable {
   const std::string& text(std::size_t row, std::string_view column) const;
   // NaN where the cell is empty or no number.
   double number(std::size_t row, std::string_view column) const;
-  // The rows of `other` below these; kInvalidArgument when its heading differs. An empty table takes any.
+  // Adds the rows of `other`; kInvalidArgument when its heading differs. An empty table takes any.
   Status append(const CsvTable& other);
 
  private:
@@ -44,8 +45,8 @@ class CsvWriter {
   std::ofstream file_;
 };
 
-// Shortest text that reads back as the same number rounded to `digits` significant digits; empty for what is
-// not finite.
+// Shortest text that reads back as the number rounded to `digits`
+// significant digits; empty for a number that is not finite.
 std::string csv_number(double value, int digits = 6);
 
 }  // namespace brainshift::bench

@@ -16,18 +16,14 @@
 #include "client/replay/score.hpp"
 #include "client/twin/measure.hpp"
 #include "client/twin/surgery.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/prepared/full_solve.hpp"
 
 namespace brainshift::bench {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 // Every method weighs them alike, as the daemon does for the condensed one.
 SparseData sparse_data(const LandmarkPairs& pairs, const CaseConfig& config) {
@@ -110,7 +106,7 @@ Result<Trial> make_trial(const Head& head, const client::Scenario& scenario, int
   client::Scenario first = scenario;
   first.fluid_levels_mm.resize(1);
   auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(), first,
-                                     seed, progress);
+                                       seed, progress);
   if (!surgery) return tl::unexpected(surgery.error());
   const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
   if (pairs == nullptr) {
@@ -145,7 +141,7 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   if (!inverter) return tl::unexpected(inverter.error());
   Row row;
   row.rank = rank;
-  row.t_solve_ms = solve_ms(*head.prepared);
+  row.t_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
   Estimate estimate;
   // Memory is claimed and caches are filled by an update that does not count.
   if (Status ok = inverter->update(trial.data.back(), estimate); !ok) return ok;
@@ -155,9 +151,9 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
     for (const SparseData& data : trial.data) {
       ++row.repetition;
       if (row.start == std::string_view("cold")) inverter->reset();
-      const auto begin = Clock::now();
+      const Stopwatch watch;
       const Status updated = inverter->update(data, estimate);
-      row.time_ms = ms_since(begin);
+      row.time_ms = watch.milliseconds();
       if (updated) {
         if (Status ok = write_estimate(head, trial, row, estimate, out); !ok) return ok;
       } else {
@@ -172,23 +168,25 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
 using Update =
     std::function<Result<Estimate>(const SparseData&, const inversion::InversionOptions&)>;
 
-// One update by the given method. What a method prepares before surgery is prepared here, outside its times.
+// One update by the given method. What a method prepares before
+// surgery is prepared here, outside its times.
 Result<Update> one_update(const Head& head, Method method) {
   const inversion::PreparedModel& model = *head.prepared;
   if (method != Method::kCondensedExact) {
-    return Update([&model](const SparseData& data, const inversion::InversionOptions& options) {
-      return inversion::invert(model, data, options);
-    });
+    return Update(
+        [&model, method](const SparseData& data, const inversion::InversionOptions& options) {
+          return inversion::invert(model, data, method, options);
+        });
   }
   inversion::CondensedExactOptions cold;
   cold.warm_start = false;
-  auto made = inversion::CondensedExact::prepare(model, cold);
+  auto made = inversion::CondensedExact::build(model, cold);
   if (!made) return tl::unexpected(made.error());
   auto exact = std::make_shared<inversion::CondensedExact>(std::move(*made));
   return Update([exact](const SparseData& data,
                         const inversion::InversionOptions& options) -> Result<Estimate> {
     Estimate estimate;
-    if (auto status = exact->update(data, estimate, options.stop); !status) {
+    if (auto status = exact->update(data, estimate, options); !status) {
       return tl::unexpected(status.error());
     }
     return estimate;
@@ -199,21 +197,20 @@ Status run_method(const Head& head, const Trial& trial, Method method, int repet
                   double budget_s, CsvWriter& out) {
   Row row;
   row.method = method;
-  row.t_solve_ms = solve_ms(*head.prepared);
+  row.t_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
   const auto invert = one_update(head, method);
   if (!invert) return tl::unexpected(invert.error());
-  const auto started = Clock::now();
+  const Stopwatch all;
   for (int r = 0; r < repetitions && r < static_cast<int>(trial.data.size()); ++r) {
-    const double left_s = budget_s - 1e-3 * ms_since(started);
+    const double left_s = budget_s - all.seconds();
     if (left_s <= 0.0) break;
     const Alarm alarm(left_s);
     inversion::InversionOptions options;
-    options.method = method;
     options.stop = alarm.token();
     row.repetition = r + 1;
-    const auto begin = Clock::now();
+    const Stopwatch watch;
     const auto estimate = (*invert)(trial.data[static_cast<std::size_t>(r)], options);
-    row.time_ms = ms_since(begin);
+    row.time_ms = watch.milliseconds();
     if (estimate) {
       if (Status ok = write_estimate(head, trial, row, *estimate, out); !ok) return ok;
       continue;

@@ -11,8 +11,9 @@
 
 namespace brainshift::bench {
 
-// Indices into `points`, by ascending first value. A point is in the front when none has both values at most as
-// large and one of them smaller. Of equal points the first stays. Points that are not finite are never in it.
+// Indices into `points`, by ascending first value. The front holds the points that no other
+// dominates: none has both values at most as large and one smaller. Of equal points the front
+// holds the first; points that are not finite are left out.
 inline std::vector<std::size_t> pareto_front(const std::vector<std::pair<double, double>>& points) {
   std::vector<std::size_t> order(points.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For benchmarks that have nothing to say but the first error.
+// For benchmarks that end at the first error.
 #pragma once
 
 #include <cstdio>
@@ -10,7 +10,7 @@
 
 namespace brainshift::bench {
 
-// The value, or the sentence on stderr and exit status 2.
+// The value. On an error: prints its sentence to stderr and exits with status 2.
 template <typename T>
 T value_or_exit(Result<T> result) {
   if (result) return std::move(*result);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every bad input exits 2 with one line on stderr that names the file, key or set and the value, prints
-// nothing to stdout and leaves nothing behind.
+// Every bad input exits 2 with one line on stderr that names the file, key or set and the value,
+// prints nothing to stdout and leaves nothing behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,7 +58,8 @@ std::string nifti(std::uint8_t value) {
   return bytes + std::string(kSize * kSize * kSize, static_cast<char>(value));
 }
 
-// Gmsh 2.2 text: a block of cubes, each five tetrahedra, of the given edge length in the file's unit.
+// Gmsh 2.2 text: a block of cubes, each five tetrahedra, of the given
+// edge length in the file's unit.
 std::string msh(double edge, bool inverted, bool flat) {
   constexpr int kCells = 6;
   const auto node = [](int i, int j, int k) {

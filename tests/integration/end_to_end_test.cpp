@@ -205,17 +205,17 @@ TEST_F(EndToEnd, TheJournalHoldsWhatWasAskedAndAnswered) {
   ASSERT_EQ(daemon->end(SIGTERM), 0);
   const auto paths = journals();
   ASSERT_EQ(paths.size(), 2u) << "one per session, and no leftovers of the write-ahead log";
-  const auto recorded = io::SurgeryFile::open(surgery)->records("observation");
+  const auto recorded = io::SurgeryFile::open(surgery)->records(io::RecordKind::kObservation);
   ASSERT_TRUE(recorded.has_value());
   for (const std::string& path : paths) {
     const auto journal = io::SurgeryFile::open(path);
     ASSERT_TRUE(journal.has_value()) << journal.error().message;
-    EXPECT_EQ(journal->meta().at("case_id"), "colin27-coarse");
-    const auto observations = journal->records("observation");
+    EXPECT_EQ(journal->meta().case_id, "colin27-coarse");
+    const auto observations = journal->records(io::RecordKind::kObservation);
     ASSERT_TRUE(observations.has_value());
     ASSERT_EQ(observations->size(), recorded->size());
     EXPECT_EQ(observations->front().payload, recorded->front().payload);
-    const auto updates = journal->records("update");
+    const auto updates = journal->records(io::RecordKind::kUpdate);
     ASSERT_TRUE(updates.has_value());
     ASSERT_EQ(updates->size(), recorded->size());
     const auto update = wire::decode_update(updates->front().payload);

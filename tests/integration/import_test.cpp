@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `brainshift import` as a user runs it: a recorded sweep becomes a surgery that the daemon answers, and bad input exits 2
-// with one line that names what is wrong and leaves nothing behind.
+// `brainshift import` as a user runs it: a recorded sweep becomes a surgery that the daemon
+// answers, and bad input exits 2 with one line that names what is wrong and leaves nothing behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

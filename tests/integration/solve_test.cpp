@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brainshift solve as a user runs it: the worked examples of docs/solve.md against their closed forms, and every bad
-// problem file refused with one line.
+// `brainshift solve` as a user runs it: the worked examples of docs/solve.md against their closed
+// forms, and every bad problem file refused with one line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +32,8 @@ std::string content_of(const std::string& path) {
 
 std::string example(const std::string& name) { return examples_folder() + "/" + name; }
 
-// name -> x, y, z, ux, uy, uz, contact pressure; with time steps also time and pore pressure, step after step
+// name -> x, y, z, ux, uy, uz, contact pressure; with time steps also
+// time and pore pressure, step after step
 std::map<std::string, std::vector<double>> probes_of(const std::string& csv) {
   std::map<std::string, std::vector<double>> probes;
   const auto rows = lines(content_of(csv));
@@ -97,8 +98,8 @@ TEST(SolveExamples, LayeredColumnSagsAsTheOneDimensionalSolution) {
   expect_within(u(solved, "top", 2), -4.486542375, 1e-6);
 }
 
-// p = q sum 4 / ((2m+1) pi) sin(...) exp(...) and its settlement at T = 0.5 (tests/verification/terzaghi_test.cpp);
-// 8 elements over the height.
+// p = q sum 4 / ((2m+1) pi) sin(...) exp(...) and its settlement at T = 0.5
+// (tests/verification/terzaghi_test.cpp); 8 elements over the height.
 TEST(SolveExamples, ConsolidatingColumnFollowsTerzaghi) {
   const Solved solved = solve(example("consolidating_column.yaml"));
   constexpr std::size_t kRow = 9, kSteps = 40;

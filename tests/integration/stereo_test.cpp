@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// brainshift stereo as a user runs it: boards and a patch drawn by known cameras, over the toy patient's craniotomy;
-// and every bad input refused with one line.
+// `brainshift stereo` as a user runs it: boards and a patch drawn by known cameras, over the toy
+// patient's craniotomy; and every bad input refused with one line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/values/observation.hpp"
 #include "common/io/config/calibration_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
@@ -109,7 +109,7 @@ std::vector<Observation> observations_of(const std::string& path) {
   EXPECT_TRUE(file) << file.error().message;
   std::vector<Observation> observations;
   if (!file) return observations;
-  const auto records = file->records("observation");
+  const auto records = file->records(io::RecordKind::kObservation);
   EXPECT_TRUE(records);
   for (const io::SurgeryRecord& record : *records) {
     auto decoded = wire::decode_observation(record.payload);

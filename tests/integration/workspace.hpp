@@ -16,7 +16,8 @@ class Workspace {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   const std::filesystem::path& folder() const { return folder_; }
-  std::string write(const std::string& name, const std::string& content) const;  // returns its path
+  // Returns the new file's path.
+  std::string write(const std::string& name, const std::string& content) const;
 
  private:
   std::filesystem::path folder_;
@@ -29,8 +30,8 @@ std::string coarse_case_text();  // content
 std::string examples_folder();   // docs/examples/solve
 bool head_is_installed();        // Debian's mricron-data
 
-// The YAML text with the first line below the top-level `section:` whose key is `key` replaced, indentation
-// kept; throws when there is none.
+// The YAML text with one line replaced: the first below the top-level `section:` whose key is
+// `key`. Keeps the indentation; throws when there is no such line.
 std::string with_line(const std::string& text, const std::string& section, const std::string& key,
                       const std::string& line);
 

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "client/plot/canvas.hpp"
-#include "client/plot/xy_chart.hpp"
+#include "client/plot/ticks.hpp"
 
 namespace brainshift::stability {
 namespace {

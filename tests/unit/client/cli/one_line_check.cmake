@@ -1,5 +1,5 @@
-# Runs BINARY with ARGUMENTS; expects exit status STATUS and, on failure, exactly one line on stderr that
-# contains EXPECTED; on success, an empty stderr and something on stdout.
+# Runs BINARY with ARGUMENTS; expects exit status STATUS and, on failure, exactly one line on
+# stderr that contains EXPECTED; on success, an empty stderr and something on stdout.
 execute_process(COMMAND ${BINARY} ${ARGUMENTS} RESULT_VARIABLE status OUTPUT_VARIABLE out ERROR_VARIABLE err)
 if(NOT status EQUAL STATUS)
   message(FATAL_ERROR "exit status ${status}, expected ${STATUS}: ${err}")

@@ -1,5 +1,6 @@
-# Fails if BINARY, a program that links the client library and nothing else of ours, loads or contains a
-# solver, a mesher, an image or a model-file library. CGAL is headers only: its symbols and GMP give it away.
+# Fails if BINARY, a program that links the client library and nothing
+# else of ours, loads or contains a solver, a mesher, an image or a
+# model-file library. CGAL is headers only; its symbols and GMP show it.
 execute_process(COMMAND ldd ${BINARY} OUTPUT_VARIABLE libraries RESULT_VARIABLE rc)
 if(NOT rc EQUAL 0 OR NOT libraries MATCHES "libzmq")
   message(FATAL_ERROR "ldd ${BINARY} told nothing: ${libraries}")

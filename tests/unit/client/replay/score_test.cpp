@@ -24,7 +24,7 @@ Points uniform(int nodes, const Vec3& u) { return u.replicate(1, nodes); }
 // The box sinks by 1 mm as a whole; cross-validation at two nodes, craniotomy on the top face.
 class SinkingBox : public testing::Test {
  protected:
-  SinkingBox() : model(box.model()), nodes(model.mesh.num_nodes()) {
+  SinkingBox() : model(box_model()), nodes(model.mesh.num_nodes()) {
     truth.displacement = uniform(nodes, Vec3(0, 0, -1));
     truth.points["cross"] = {at_node(0), at_node(7)};
     for (const NodeIndex node : model.craniotomy)
@@ -44,7 +44,6 @@ class SinkingBox : public testing::Test {
     return run;
   }
 
-  test::Box box;
   BrainModel model;
   int nodes;
   io::SurgeryTruth truth;
@@ -145,7 +144,8 @@ TEST(PrincipalDirection, IsTheLineAlongWhichDisplacementsVary) {
   Points displacements(3, 50);
   for (int i = 0; i < 50; ++i) displacements.col(i) = 0.1 * i * along + Vec3(0.2, -0.1, 0.05);
   EXPECT_NEAR((principal_direction(displacements) - along).norm(), 0.0, 1e-9);
-  EXPECT_NEAR((principal_direction(-displacements) + along).norm(), 0.0, 1e-9);  // follows the mean
+  // follows the mean
+  EXPECT_NEAR((principal_direction(-displacements) + along).norm(), 0.0, 1e-9);
 }
 
 TEST(PrincipalDirection, SpreadDecidesNotTheMean) {
@@ -170,7 +170,7 @@ TEST(Angle, MatchesKnownAnglesAlsoNearZero) {
 class TruthInFile : public SinkingBox {
  protected:
   Result<std::optional<io::SurgeryTruth>> stored_and_read() {
-    auto file = io::SurgeryFile::create(path, {{"case_id", "box"}});
+    auto file = io::SurgeryFile::create(path, io::SurgeryMeta{"box"});
     EXPECT_TRUE(file);
     EXPECT_TRUE(file->write_truth(1, truth));
     return read_truth(*file, 1, model);
@@ -188,7 +188,7 @@ TEST_F(TruthInFile, ComesBackAsWritten) {
 }
 
 TEST_F(TruthInFile, IsAbsentForARealRecording) {
-  auto file = io::SurgeryFile::create(path, {{"case_id", "box"}});
+  auto file = io::SurgeryFile::create(path, io::SurgeryMeta{"box"});
   ASSERT_TRUE(file);
   const auto read = read_truth(*file, 1, model);
   ASSERT_TRUE(read) << read.error().message;

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "client/report/figures.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/unit/client/replay/box.hpp"
 
@@ -30,7 +29,7 @@ TEST(SliceWindow, CoronalShowsSuperiorUp) {
 }
 
 TEST(SliceSamples, CoverTheInsideOfTheMeshAndNothingElse) {
-  const TetMesh mesh = test::Box{}.mesh();
+  const TetMesh mesh = box_mesh();
   const geometry::TetLocator locator(mesh);
   const SliceSamples samples = sample_slice(locator, kWindow, 1.0);
   EXPECT_EQ(samples.positions.size(), 11u * 11u);
@@ -53,7 +52,7 @@ TEST(Section, OfAClosedSurfaceIsOneClosedLineOfTheRightLength) {
 }
 
 TEST(Section, OfTheDeformedSurfaceMovesWithALinearField) {
-  const TetMesh mesh = test::Box{}.mesh();
+  const TetMesh mesh = box_mesh();
   const geometry::TetLocator locator(mesh);
   const TriangleSurface sphere = geometry::ellipsoid_surface(Vec3(5, 5, 5), Vec3(2, 2, 2), 0.5);
   const Points field = 0.1 * mesh.nodes;
@@ -62,7 +61,7 @@ TEST(Section, OfTheDeformedSurfaceMovesWithALinearField) {
 }
 
 TEST(SlicePanel, ArrowPointsWhereTheFieldPoints) {
-  const TetMesh mesh = test::Box{}.mesh();
+  const TetMesh mesh = box_mesh();
   const geometry::TetLocator locator(mesh);
   const SliceSamples samples = sample_slice(locator, kWindow, 5.0);
   SlicePanel panel(kWindow);
@@ -98,63 +97,6 @@ TEST(SlicePanel, MriGreyFollowsTheVoxels) {
   SlicePanel panel(kWindow);
   panel.draw_mri(mri, 1.0);
   EXPECT_GT(panel.image().at<cv::Vec3b>(70, 20)[0], panel.image().at<cv::Vec3b>(70, 120)[0] + 100);
-}
-
-TEST(Figures, OfAGroupShowEveryPictureThatItsDataAllow) {
-  const test::Box box;
-  Head head;
-  head.tumour = geometry::ellipsoid_surface(Vec3(5, 5, 5), Vec3(2, 2, 2), 0.5);
-  head.tumour_centre = head.craniotomy_centre = Vec3(5, 5, 5);
-  head.gravity_direction = Vec3(-1, 0, 0);
-  std::vector<ReportedRun> runs(2);
-  for (std::size_t i = 0; i < 2; ++i) {
-    runs[i].report.scenario = "a b/c";
-    runs[i].report.boundary = i == 0 ? "contact" : "fixed";
-    RunField field{box.mesh(), 0.1 * box.mesh().nodes, Points(0.12 * box.mesh().nodes)};
-    runs[i].field = std::move(field);
-  }
-  auto groups = group_runs(runs);
-  ASSERT_EQ(groups.size(), 1u);
-  EXPECT_EQ(groups[0].name, "a-b-c");
-  auto figures = slice_figures(groups[0], runs, head);
-  EXPECT_EQ(figures.size(), 6u);
-  for (const Figure& figure : figures) EXPECT_FALSE(figure.image.empty()) << figure.file_name;
-
-  for (ReportedRun& run : runs) run.field->truth.reset();
-  EXPECT_EQ(slice_figures(groups[0], runs, head).size(), 4u);
-  for (ReportedRun& run : runs) run.field.reset();
-  EXPECT_TRUE(slice_figures(groups[0], runs, head).empty());
-}
-
-TEST(Groups, PairBoundariesOfOneKindAndKeepNamesApart) {
-  std::vector<ReportedRun> runs(5);
-  for (ReportedRun& run : runs) run.report.scenario = "paper";
-  runs[0].report.boundary = "contact";
-  runs[1].report.boundary = "fixed";
-  runs[2].report.boundary = "contact";
-  runs[2].report.seed = 2;
-  runs[3].report.boundary = "fixed";
-  runs[3].report.seed = 2;
-  runs[4].report.boundary = "contact";  // a repetition of run 0
-  const auto groups = group_runs(runs);
-  ASSERT_EQ(groups.size(), 3u);
-  EXPECT_EQ(groups[0].contact, 0u);
-  EXPECT_EQ(groups[0].fixed, 1u);
-  EXPECT_EQ(groups[1].contact, 2u);
-  EXPECT_EQ(groups[1].fixed, 3u);
-  EXPECT_EQ(groups[1].name, "paper-2");
-  EXPECT_EQ(groups[2].contact, 4u);
-  EXPECT_FALSE(groups[2].fixed);
-  EXPECT_EQ(groups[2].name, "paper-3");
-}
-
-TEST(Groups, KeepRunsOfDifferentSeedsApart) {
-  std::vector<ReportedRun> runs(2);
-  runs[0].report.boundary = "contact";
-  runs[1].report.boundary = "fixed";
-  EXPECT_EQ(group_runs(runs).size(), 1u);
-  runs[1].report.seed = 2;
-  EXPECT_EQ(group_runs(runs).size(), 2u);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ class SwellingLoad : public testing::Test {
   Material material;
 };
 
-// Uniform swelling of a free body is u = theta / 3 x without stress, so K u must be the load. K comes from
-// the element stiffness, the load from the gradients alone.
+// Uniform swelling of a free body is u = theta / 3 x without stress, so K u must be the load. K
+// comes from the element stiffness, the load from the gradients alone.
 TEST_F(SwellingLoad, IsWhatStretchesAFreeBodyByAThirdOfItsStrain) {
   const double theta = 0.06;
   fem::DofMap dofs(mesh.num_nodes());

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/core/rigid_motion.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
 
@@ -16,8 +17,8 @@ using testing::HasSubstr;
 constexpr double kBrain_mm = 45.0;
 const Vec3 kTumour(22, 0, 0), kVentricle(5, 14, 0);
 
-// A ball of white matter, x to the right, with a fissure (1.5 mm thick, at z = -12), a ventricle (a ball of 7 mm) and a
-// tumour (a ball of 8 mm).
+// A ball of white matter, x to the right, with a fissure (1.5 mm thick, at z = -12), a ventricle
+// (a ball of 7 mm) and a tumour (a ball of 8 mm).
 struct ToyHead {
   VoxelImage mri, brain;
   TriangleSurface tumour = geometry::ellipsoid_surface(kTumour, Vec3::Constant(8.0), 2.0);
@@ -133,9 +134,9 @@ TEST(SimulatedUltrasound, FramesLieWhereTheirPosesSay) {
   ASSERT_EQ(recording.links.size(), 1u);
   EXPECT_EQ(recording.links[0].frames.name(), "ImageToRas");
   for (const tracking::Link& link : recording.links[0].samples) {
-    EXPECT_TRUE(tracking::check_affine(link.T_to_from.matrix()));
-    EXPECT_TRUE(tracking::check_rigid(
-        (link.T_to_from * Eigen::Scaling(1.0 / UltrasoundProbe{}.pixel_mm)).matrix()));
+    EXPECT_TRUE(check_affine(link.T_to_from.matrix()));
+    EXPECT_TRUE(
+        check_rigid((link.T_to_from * Eigen::Scaling(1.0 / UltrasoundProbe{}.pixel_mm)).matrix()));
   }
   // The middle planes of both sweeps hold the target and are at right angles.
   const Vec3 one = recording.links[0].samples[1].T_to_from.linear().col(2).normalized();
@@ -189,7 +190,8 @@ TEST(SimulatedUltrasound, IsDarkBehindBone) {
   EXPECT_GT(side(open), side(shadowed) + 40.0);
 }
 
-// Goodman (2007): the envelope of fully developed speckle has mean / standard deviation = sqrt(pi / (4 - pi)) = 1.913.
+// Goodman (2007): the envelope of fully developed speckle has mean /
+// standard deviation = sqrt(pi / (4 - pi)) = 1.913.
 TEST(SimulatedUltrasound, SpeckleHasRayleighStatistics) {
   UltrasoundProbe probe;
   probe.attenuation_db_mm = 0.0;

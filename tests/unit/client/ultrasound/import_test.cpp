@@ -9,10 +9,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "common/values/model_id.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/model_id.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
@@ -86,7 +86,7 @@ gravity: {direction: [0, 0, -1]}
   std::vector<Observation> observations() const {
     const auto file = io::SurgeryFile::open(options.out).value();
     std::vector<Observation> result;
-    const auto records = file.records("observation").value();
+    const auto records = file.records(io::RecordKind::kObservation).value();
     for (const auto& record : records) {
       result.push_back(wire::decode_observation(record.payload).value());
     }
@@ -132,8 +132,8 @@ TEST_F(Import, PutsTracedContoursOntoTheSurface) {
   ASSERT_GT(mm.size(), 2000U);
   EXPECT_LT(mm.back(), 0.01);  // chords of 720 corners
   const auto file = io::SurgeryFile::open(options.out).value();
-  EXPECT_EQ(file.meta().at("model_id"), model_id);
-  EXPECT_EQ(file.meta().at("case_id"), "toy");
+  EXPECT_EQ(file.meta().model_id, model_id);
+  EXPECT_EQ(file.meta().case_id, "toy");
   EXPECT_EQ(report->sweeps[0].points, static_cast<Eigen::Index>(mm.size()));
   EXPECT_NEAR(report->sweeps[0].tumour_distance_mm, Vec3(2, -1, 1).norm(), 1.0);
 }
@@ -178,7 +178,8 @@ TEST_F(Import, FramesThatLostTheProbeAreLeftOutAndCounted) {
 
 // The probe's clock: images are stamped 40 ms after they were seen.
 TEST_F(Import, LatencyIsTakenBackByInterpolation) {
-  // The images' poses in between, stamped late: what frame i shows was seen at the sweep's time i - 0.4.
+  // Images stamped late: frame i shows what was seen at the sweep's
+  // time i - 0.4, between two poses.
   VirtualSweep fine = sweep;
   fine.frames = 201;  // ten poses per frame of the recording
   const SequenceContent poses = fine.content();
@@ -226,7 +227,8 @@ TEST_F(Import, TimeGapsSplitSweeps) {
   EXPECT_EQ(report->sweeps[1].first_frame, 8);
 }
 
-// Fiducials on the head, touched without error: the same surgery as from the matrix they belong to.
+// Fiducials on the head, touched without error: the same surgery as
+// from the matrix they belong to.
 TEST_F(Import, FiducialsGiveTheRegistrationAndItsErrorAtTheTumour) {
   ASSERT_TRUE(import_recording(options));
   const Points from_matrix = std::get<TumourBoundary>(observations().front().body).points;
@@ -283,8 +285,9 @@ TEST_F(Import, TrackingInMetresIsNoted) {
   }
   options.recording = write("metres.mha", test_support::meta_text(content, true));
   const auto report = import_recording(options);
-  const std::string said = report ? testing::PrintToString(report->notes) : report.error().message;
-  EXPECT_THAT(said, HasSubstr("ProbeToTracker is never farther than"));
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->notes,
+              testing::Contains(HasSubstr("ProbeToTracker is never farther than 1.54")));
 }
 
 TEST_F(Import, NamesWhatIsMissing) {
