@@ -7,6 +7,7 @@
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/recording/sequence_header.hpp"
+#include "common/io/recording/sequence_values.hpp"
 
 namespace brainshift::test_support {
 namespace {
@@ -42,11 +43,11 @@ Result<AnswerVolume> read_answer(const std::filesystem::path& path) {
 }
 
 Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& answer,
-                  const std::array<int, 3>& shift) {
+                  const std::array<int, 3>& shift, Voxels voxels) {
   const std::array<int, 3>& dims = answer.grid.dims;
   double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, difference = 0, bright = 0;
   for (std::size_t i = 0; i < answer.values.size(); ++i) {
-    if (ours.weight[i] <= 0.0F) continue;
+    if (voxels == Voxels::kWeFilled && ours.weight[i] <= 0.0F) continue;
     const int at = static_cast<int>(i);
     const std::array<int, 3> moved{at % dims[0] + shift[0], at / dims[0] % dims[1] + shift[1],
                                    at / dims[0] / dims[1] + shift[2]};
@@ -59,6 +60,7 @@ Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& 
     const double y =
         answer
             .values[static_cast<std::size_t>(moved[0] + dims[0] * (moved[1] + dims[1] * moved[2]))];
+    if (voxels == Voxels::kPlusFilled && y <= 0.0) continue;
     n += 1, sx += x, sy += y, sxx += x * x, syy += y * y, sxy += x * y;
     if (y > 0.0) difference += std::abs(x - y), bright += 1;
   }

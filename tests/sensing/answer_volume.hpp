@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A volume that PLUS compounded, as the answer to compare with.
+// A volume that PLUS compounded, for comparison with ours.
 #pragma once
 
 #include <array>
@@ -18,8 +18,13 @@ struct AnswerVolume {
 };
 Result<AnswerVolume> read_answer(const std::filesystem::path& path);
 
-// Agreement over the voxels that we filled, our volume moved by whole voxels against PLUS's, which marks empty voxels with 0
-// (as black ones) and holds no weights.
+// PLUS's volume holds no weights: empty voxels are 0, as are black ones.
+enum class Voxels {
+  kWeFilled,    // our weight is positive
+  kPlusFilled,  // PLUS's value is positive; ours is 0 where we have no pixel
+};
+
+// Agreement over some voxels, our volume moved against PLUS's by whole voxels.
 struct Agreement {
   double correlation = 0.0;
   double mean_difference = 0.0;  // absolute, grey values, where PLUS's is not 0
@@ -27,6 +32,6 @@ struct Agreement {
 };
 
 Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& answer,
-                  const std::array<int, 3>& shift = {0, 0, 0});
+                  const std::array<int, 3>& shift = {0, 0, 0}, Voxels voxels = Voxels::kWeFilled);
 
 }  // namespace brainshift::test_support

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two lidar clouds of parked cars (libpointmatcher's example data; Pomerleau et al. 2013) with published poses:
-// alignment of one measured cloud to another, without triangles.
-#include <chrono>
+// Two lidar clouds of parked cars (libpointmatcher's example data; Pomerleau et al. 2013) with
+// published poses: alignment of one measured cloud to another, without triangles.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/stopwatch.hpp"
 #include "common/geometry/oriented_cloud.hpp"
 #include "common/registration/icp.hpp"
 #include "tests/support/study_record.hpp"
@@ -24,7 +24,7 @@ using test_support::record_left_out;
 
 constexpr double kMillimetresPerMetre = 1000.0;
 
-// The numbers of each line, whether they are separated by commas or spaces; lines without any are skipped.
+// The numbers of each line, separated by commas or spaces. Lines without a number are skipped.
 std::vector<std::vector<double>> number_rows(const std::string& file) {
   std::vector<std::vector<double>> rows;
   std::ifstream in(file);
@@ -63,7 +63,7 @@ std::optional<RigidTransform> listed_pose(const std::string& file, const std::st
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 4; ++j) words >> T.matrix()(i, j);
     if (!words) return std::nullopt;
-    // Six digits are printed; the nearest rotation is meant.
+    // The file has six digits: take the nearest rotation.
     T.linear() = T.rotation();
     T.translation() *= kMillimetresPerMetre;
     return RigidTransform(T.matrix());
@@ -75,7 +75,8 @@ double angle_deg(const Mat3& rotation) {
   return Eigen::AngleAxisd(rotation).angle() * 180.0 / std::numbers::pi;
 }
 
-// Where the scene is not flat, planes through neighbours are off by something like the spacing of the points.
+// Where the scene is not flat, planes through neighbours are wrong by about the spacing of the
+// points.
 registration::IcpOptions lidar_options(const geometry::OrientedCloud& cloud) {
   registration::IcpOptions options;
   options.sd_mm = 30.0;                              // range noise of such a scanner
@@ -91,11 +92,10 @@ void study(const std::string& name, const Points& reference, const Points& readi
            const RigidTransform& truth) {
   const auto cloud = geometry::OrientedCloud::build(reference);
   if (!cloud) return record_left_out("cars", cloud.error().message);
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const auto result =
       registration::align(reading, *cloud, RigidTransform::Identity(), lidar_options(*cloud));
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double seconds = watch.seconds();
   if (!result) return record_left_out("cars", result.error().message);
   const RigidTransform off = truth.inverse() * result->T_surface_points;
   const double off_m = 1e-3 * off.translation().norm();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sensing_estimates [THOUSAND_NODES [STUDY...]]: the studies of estimate_studies.hpp; all on 18 thousand nodes.
-// Patients in whom oedema is to be expected have it in their prior; the others have the default case.
+// sensing_estimates [THOUSAND_NODES [STUDY...]]: the studies of estimate_studies.hpp, by default
+// all of them on 18 thousand nodes. Patients with expected oedema have it in their prior; the
+// others have the default case.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

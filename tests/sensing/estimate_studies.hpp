@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Studies of what estimates make of sensed data, on the default head. Each records its figures; an error is one that
-// keeps the study from measuring.
+// Studies of estimates from sensed data, on the default head. Each records its figures. It returns
+// an error only when it cannot measure.
 #pragma once
 
 #include "tests/benchmarks/bench_head.hpp"
@@ -12,9 +12,9 @@ inline constexpr double kExpectedSwelling = 0.05;
 
 // Tumour boundary and exposed cortex together, against the tumour alone.
 Status joint_study(const bench::Head& head);
-// The same where the prior holds no oedema: recorded, not held to a bound.
+// The same with a prior without oedema: figures without a bound.
 Status joint_study_without_oedema(const bench::Head& head);
-// Fifteen landmark pairs, leaving one out, against the best rigid fit.
+// Fifteen landmark pairs, one of them left out, against the best rigid fit.
 Status landmark_study(const bench::Head& head);
 // Gross outliers among boundary points and among landmark pairs.
 Status outlier_study(const bench::Head& head);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -8,10 +7,10 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/patient/read_patient.hpp"
 #include "common/linalg/blas_threads.hpp"
-#include "common/io/config/config_file.hpp"
 #include "common/registration/icp.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
 #include "tests/sensing/icp_study.hpp"
 #include "tests/sensing/tumour_points.hpp"
 #include "tests/support/study_record.hpp"
@@ -23,6 +22,7 @@ namespace brainshift::sensing {
 namespace {
 
 using test_support::record_check;
+using test_support::record_figure;
 using test_support::record_left_out;
 
 constexpr int kTrials = 31;
@@ -30,10 +30,9 @@ constexpr int kPoints = 4000;
 constexpr double kNoise_mm = 0.3;
 
 double milliseconds_of(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-      .count();
+  return watch.milliseconds();
 }
 
 // Points of the whole surface with noise, 5 mm and 8 degrees off.
@@ -65,24 +64,23 @@ void print(const char* name, const Method& method) {
               method.p50_ms(), percentile(method.times_ms, 95.0), method.mean_rms_mm());
 }
 
-template <typename Surface>
-registration::IcpResult align(const Points& points, const Surface& surface) {
+using registration::TargetSurface;
+
+registration::IcpResult align(const Points& points, const TargetSurface& surface) {
   registration::IcpOptions options;
   options.sd_mm = kNoise_mm;
   options.rotation_sd_deg = 0.0;
   return registration::align(points, surface, RigidTransform::Identity(), options).value();
 }
 
-template <typename Surface>
-void add_trial(const Points& points, const Surface& surface,
+void add_trial(const Points& points, const TargetSurface& surface,
                const geometry::ClosestPointIndex& index, Method& method) {
   registration::IcpResult result;
   method.times_ms.push_back(milliseconds_of([&] { result = align(points, surface); }));
   method.rms_mm.push_back(exact_rms_mm(points, result.T_surface_points, index));
 }
 
-template <typename Surface>
-Method measure(const std::vector<Points>& trials, const Surface& surface,
+Method measure(const std::vector<Points>& trials, const TargetSurface& surface,
                const geometry::ClosestPointIndex& index) {
   Method method;
   for (const Points& points : trials) add_trial(points, surface, index, method);
@@ -109,14 +107,11 @@ void compare_with_solve(const contact::ForwardModel& forward, int nodes,
 }
 
 void compare_with_head(const std::vector<Points>& trials, const geometry::DistanceVolume& surface) {
-  const auto config = io::read_case_config(BRAINSHIFT_DEFAULT_CASE);
-  const auto inputs = config ? io::load_case_inputs(*config) : tl::unexpected(config.error());
-  if (!inputs) return record_left_out("icp_speed", "default head: " + inputs.error().message);
-  const auto model = anatomy::build_brain_model(*inputs);
-  if (!model) return record_left_out("icp_speed", "default head: " + model.error().message);
-  const auto forward = contact::ForwardModel::build(*model, *config, Boundary::kContact);
+  const auto head = patient::read_patient(BRAINSHIFT_DEFAULT_CASE);
+  if (!head) return record_left_out("icp_speed", "default head: " + head.error().message);
+  const auto forward = contact::ForwardModel::build(head->model, head->config, Boundary::kContact);
   if (!forward) return record_left_out("icp_speed", "default head: " + forward.error().message);
-  compare_with_solve(*forward, model->mesh.num_nodes(), trials, surface);
+  compare_with_solve(*forward, head->model.mesh.num_nodes(), trials, surface);
 }
 
 #ifdef BRAINSHIFT_WITH_PCL
@@ -138,9 +133,13 @@ void compare_with_pcl(const std::vector<Points>& trials, const IndexedSurface& t
   const double ratio = pcl.p50_ms() / ours.p50_ms();
   const double residuals = ours.mean_rms_mm() / pcl.mean_rms_mm();
   const std::string source = "same data by turns; residual to the triangles by exact search";
-  // Ten times is the goal against point to point; point to plane is shown for orientation.
-  record_check("icp_speed", "time of " + name + " over ours", ratio, plane ? "shown" : ">= 10",
-               plane || ratio >= 10.0, source);
+  // The goal is ten times against point to point. Point to plane is the same problem as ours, like
+  // for like; its ratio is shown without a bound.
+  if (plane)
+    record_figure("icp_speed", "time of " + name + " over ours", ratio, "shown", source);
+  else
+    record_check("icp_speed", "time of " + name + " over ours", ratio, ">= 10", ratio >= 10.0,
+                 source);
   record_check("icp_speed", "residual rms of ours over that of " + name, residuals, "<= 1",
                residuals <= 1.0, source);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rigid registration of the Insight Toolkit, for comparison: Mattes mutual information, coarse to fine, on one
-// thread.
+// The rigid registration of the Insight Toolkit, for comparison: Mattes mutual information, coarse
+// to fine, on one thread.
 //
-// ITK 5.2 brings an Eigen of its own, older and in the same namespace. Neither headers nor symbols of the two can
-// be mixed: this interface is of plain numbers, and a shared library with hidden symbols.
+// ITK 5.2 has an Eigen of its own, older and in the same namespace. Neither headers nor symbols of
+// the two can be mixed. Therefore this interface has plain numbers only, and its library hides its
+// symbols.
 #pragma once
 
 #include <array>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fifteen homologous landmarks around the tumour, each found with an error of 1 mm, as in clinical data sets (Xiao et
-// al. 2017). One is left out in turn and predicted from the others: by the model, and by the best rigid motion.
+// Fifteen homologous landmarks around the tumour, each found with an error of 1 mm, as in clinical
+// data sets (Xiao et al. 2017). Each in turn is left out and predicted from the others: by the
+// model, and by the best rigid motion.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -55,7 +56,7 @@ struct Errors {
 };
 
 // One set of landmarks: the distances of the left-out ones from where they were measured.
-Status try_once(const bench::Head& head, const Points& truth, Random& random, Surgery& session,
+Status try_once(const bench::Head& head, const Points& truth, Random& random, server::Pipeline& session,
                 std::uint64_t& sequence, Errors& errors) {
   const std::vector<NodeIndex> nodes = choose_landmarks(*head.model, random);
   const LandmarkPairs all = client::measure_displacements(
@@ -70,7 +71,7 @@ Status try_once(const bench::Head& head, const Points& truth, Random& random, Su
     observation.sequence = ++sequence;
     observation.body = LandmarkPairs{all.undeformed(Eigen::all, others),
                                      all.deformed(Eigen::all, others), all.sd_mm};
-    const auto update = session.observe(observation);
+    const auto update = session.run(observation);
     if (!update) return tl::unexpected(update.error());
     const auto rigid = registration::register_fiducials(all.undeformed(Eigen::all, others),
                                                         all.deformed(Eigen::all, others));
@@ -86,7 +87,8 @@ Status try_once(const bench::Head& head, const Points& truth, Random& random, Su
   return {};
 }
 
-// Fifteen real pairs: their distances and the best rigid fit's, against the published figures of the data set.
+// Fifteen real pairs: their distances, and those after the best rigid fit, against the published
+// figures of the data set.
 void check_real_landmarks() {
   const char* folder = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
   if (folder == nullptr) {
@@ -127,9 +129,9 @@ void check_real_landmarks() {
 Status landmark_study(const bench::Head& head) {
   for (const char* name : {"joint-sag", "joint-mixed"}) {
     const auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(),
-                                             *client::find_scenario(name), 1);
+                                               *client::find_scenario(name), 1);
     if (!surgery) return tl::unexpected(surgery.error());
-    auto session = Surgery::begin(head, head.config);
+    auto session = begin_surgery(head, head.config);
     if (!session) return tl::unexpected(session.error());
     Random random(11);
     Errors errors;
@@ -152,11 +154,10 @@ Status landmark_study(const bench::Head& head) {
                  std::string(name) + ": leave-one-out error over that of the best rigid fit",
                  errors.model / errors.rigid, text, errors.model < errors.rigid,
                  "twin; 12 sets of 15 pairs");
-    record_check("landmarks",
-                 std::string(name) +
-                     ": leave-one-out error over the residual of the rigid fit of "
-                     "all 15",
-                 errors.model / errors.rigid_of_all, "shown", true, "twin; 12 sets of 15 pairs");
+    test_support::record_figure(
+        "landmarks",
+        std::string(name) + ": leave-one-out error over the residual of the rigid fit of all 15",
+        errors.model / errors.rigid_of_all, "shown", "twin; 12 sets of 15 pairs");
   }
   check_real_landmarks();
   return {};

@@ -6,7 +6,7 @@
 #include <pcl/registration/icp.h>
 #include <pcl/search/kdtree.h>
 
-#include <chrono>
+#include "common/core/stopwatch.hpp"
 
 namespace brainshift::sensing {
 namespace {
@@ -55,10 +55,9 @@ PclIcp::~PclIcp() = default;
 RigidTransform PclIcp::align(const Points& points, double& align_ms) {
   impl_->icp->setInputSource(cloud_of(points, Points(3, 0)));
   Cloud aligned;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   impl_->icp->align(aligned);
-  align_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  align_ms = watch.milliseconds();
   RigidTransform T;
   T.matrix() = impl_->icp->getFinalTransformation().cast<double>();
   return T;

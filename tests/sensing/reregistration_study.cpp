@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Re-registration before the dura is opened, on simulated ultrasound of the default head: from which errors it
-// recovers, what it leaves, how long it takes.
+// Re-registration before the dura is opened, on simulated ultrasound of the default head: from
+// which errors it recovers, the error that it leaves, and its time.
 #include <cstdio>
 #include <string>
 
 #include "client/twin/ultrasound.hpp"
+#include "common/anatomy/tumour_surface.hpp"
+#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
 #include "common/registration/rigid_increment.hpp"
-#include "common/anatomy/tumour_surface.hpp"
 #include "common/ultrasound/frame_samples.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
 #include "tests/support/study_record.hpp"
@@ -69,8 +70,8 @@ ultrasound::PixelWindow whole_image(const tracking::Recording& recording) {
   return {0, 0, recording.width, recording.height};
 }
 
-// Poses as a tracked and calibrated probe tells them: each frame off by 0.3 mm and 0.3 degrees per axis about its
-// place, depth too long by 1.5 % (speed of sound).
+// Poses as a tracked and calibrated probe measures them: each frame is wrong by 0.3 mm and 0.3
+// degrees per axis about its place, and its depth is too long by 1.5 % (speed of sound).
 ultrasound::ImagePoses measured_poses(const Patient& patient) {
   Random random(22);
   const auto draw = [&random](double sd) {

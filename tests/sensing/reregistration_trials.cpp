@@ -2,9 +2,9 @@
 #include "tests/sensing/reregistration_trials.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <numbers>
 
+#include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/registration/rigid_increment.hpp"
 
@@ -14,10 +14,6 @@ namespace {
 constexpr double kMostTurn_deg = 8.0;
 constexpr double kFullTurnFrom_mm = 5.0;
 constexpr double kTrusted = 0.5;
-
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace
 
@@ -79,9 +75,9 @@ std::vector<Trial> run_trials(const Method& method, double error_mm, int count, 
       const auto at = static_cast<std::size_t>(i);
       Trial& trial = trials[at];
       trial.before_mm = target_error_mm(starts[at], tumour);
-      const double began = seconds();
+      const Stopwatch watch;
       const Answer answer = method(starts[at]);
-      trial.seconds = seconds() - began;
+      trial.seconds = watch.seconds();
       trial.refused = answer.refused;
       trial.agreement = answer.agreement;
       trial.after_mm = answer.refused ? trial.before_mm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Random starts of a registration, and what is left of their errors at the tumour.
+// Random starts of a registration, and the errors at the tumour that it leaves.
 #pragma once
 
 #include <functional>
@@ -14,8 +14,8 @@ namespace brainshift::sensing {
 // Mean distance of the surface's vertices from where they belong.
 double target_error_mm(const RigidTransform& T, const TriangleSurface& tumour);
 
-// A motion with that target error: a turn about the tumour's centroid by up to 8 degrees (less below 5 mm, in
-// proportion) and a shift, both in random directions.
+// A motion with that target error: a turn about the tumour's centroid by up to 8 degrees (in
+// proportion less below 5 mm) and a shift, both in random directions.
 RigidTransform random_start(double error_mm, const TriangleSurface& tumour, Random& random);
 
 struct Trial {

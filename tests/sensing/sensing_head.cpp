@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "client/replay/score.hpp"
-#include "common/linalg/blas_threads.hpp"
-#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/inverter.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::sensing {
 
@@ -27,39 +27,11 @@ Result<bench::Head> make_default_head(double thousand_nodes, double swelling_str
   return head;
 }
 
-Surgery::Surgery(std::shared_ptr<inversion::CondensedInverter> inverter,
-                 std::shared_ptr<const server::Pipeline> pipeline, double max_age_s)
-    : inverter_(std::move(inverter)), pipeline_(std::move(pipeline)), evidence_(max_age_s) {}
-
-Result<Surgery> Surgery::begin(const bench::Head& head, const CaseConfig& config) {
-  auto made = inversion::CondensedInverter::build(head.operators, head.locator, config);
-  if (!made) return tl::unexpected(made.error());
-  auto inverter = std::make_shared<inversion::CondensedInverter>(std::move(*made));
-  auto pipeline = server::Pipeline::build(
-      head.model, config, Boundary::kContact,
-      [inverter](const SparseData& data,
-                 const inversion::InversionOptions& options) -> Result<Estimate> {
-        Estimate estimate;
-        if (auto status = inverter->update(data, estimate, options.moving); !status) {
-          return tl::unexpected(status.error());
-        }
-        return estimate;
-      });
-  if (!pipeline) return tl::unexpected(pipeline.error());
-  return Surgery(std::move(inverter),
-                 std::make_shared<const server::Pipeline>(std::move(*pipeline)),
-                 config.sensing.max_age_s);
-}
-
-Result<Update> Surgery::observe(const Observation& observation) {
-  server::RunOptions options;
-  options.method = Method::kCondensed;
-  return pipeline_->run(observation, options, evidence_);
-}
-
-void Surgery::restart() {
-  inverter_->reset();
-  evidence_.clear();
+Result<server::Pipeline> begin_surgery(const bench::Head& head, const CaseConfig& config) {
+  auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
+  if (!inverter) return tl::unexpected(inverter.error());
+  return server::Pipeline::build(head.model, config, Method::kCondensed, Boundary::kContact,
+                                 std::move(*inverter));
 }
 
 Result<client::RunReport> score_update(const bench::Head& head, const io::SurgeryTruth& truth,

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Stereopsis against three truths:
-//   - a pair of photographs with true disparities (aloe, Middlebury 2006 set, Hirschmueller & Scharstein 2007; from
-//     Debian's opencv-doc: 1282 x 1110 px, truth in px at this size, 0: unknown);
-//   - photographs of a chessboard (13 pairs, opencv-doc): reprojection and epipolar error of the calibration, and with
-//     pairs that took no part in it;
-//   - a simulated cortical patch: error of the surface against its distance, beside Z^2 / (f b) sd_d.
+//   - a pair of photographs with true disparities (aloe, Middlebury 2006 set, Hirschmueller &
+//     Scharstein 2007; from Debian's opencv-doc: 1282 x 1110 px, truth in px at this size, 0:
+//     unknown);
+//   - photographs of a chessboard (13 pairs, opencv-doc): reprojection and epipolar error of the
+//     calibration, also with pairs that took no part in it;
+//   - a simulated cortical patch: error of the surface at several distances, beside Z^2 / (f b)
+//     sd_d.
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -41,7 +43,8 @@ bool check(const std::string& name, double value, const std::string& bound, bool
 struct DisparityScore {
   int known = 0, valid = 0, within_1 = 0, within_2 = 0, within_2_sd = 0;
   double confidence = 0.0, absolute = 0.0;
-  // By the sd that a pixel is given, in classes of 0.1 px: how many, and the sum of squared errors below 3 px.
+  // By the sd that a pixel is given, in classes of 0.1 px: number of pixels, and the sum of their
+  // squared errors below 3 px.
   std::vector<double> in_class = std::vector<double>(10, 0.0), squared = in_class;
 };
 
@@ -174,7 +177,7 @@ Boards photographed_boards(const stereo::ChessBoard& board) {
 }
 
 void chessboards() {
-  // The board's squares are taken for 25 mm; only ratios are checked.
+  // The size of the board's squares is not known: 25 mm is assumed, and only ratios are checked.
   const stereo::ChessBoard board{9, 6, 25.0};
   const Boards all = photographed_boards(board);
   if (all.pairs.empty()) {
@@ -212,6 +215,12 @@ void chessboards() {
 
 // ---------- a simulated patch ----------
 
+// The rms error may be as large as the stated sd, and no smaller than a third of it. It is smaller
+// because floor_px holds errors of real light, which rendered pictures have not, and because a
+// vertex averages a block's pixels. Below a third, the weight 1 / sd^2 of the surface would be ten
+// times too small.
+constexpr double kLeastOverSd = 1.0 / 3.0;
+
 void patch_at(double depth_mm) {
   using test_support::Eye;
   const StereoCalibration rig = test_support::operating_rig(depth_mm);
@@ -244,7 +253,10 @@ void patch_at(double depth_mm) {
               100.0 * measured->map.valid_fraction);
   record({kStudy, "rms error in depth", "distance mm", "error mm", depth_mm, rms});
   record({kStudy, "Z^2 / (f b) sd", "distance mm", "error mm", depth_mm, said});
-  check(where + "rms error in depth mm", rms, "<= that of its sd", rms <= said, source);
+  char bound[40];
+  std::snprintf(bound, sizeof bound, "%.3f to %.3f: 1/3 to 1 of its sd", kLeastOverSd * said, said);
+  check(where + "rms error in depth mm", rms, bound, rms <= said && rms >= kLeastOverSd * said,
+        source);
   check(where + "points within twice their sd %", 100.0 * inside / n, ">= 95", inside >= 0.95 * n,
         source);
 }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tracer against noise: a virtual sweep over an ellipsoid of known place, from one seed, with more and more speckle.
-// Independent reference: the ellipsoid's own equation. Speed: a traced image over the smoothing of one.
+// The tracer against noise: a virtual sweep over an ellipsoid of known place, from one seed, with
+// more and more speckle. Independent reference: the ellipsoid's own equation. Speed: time of a
+// traced image over that of its smoothing.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
+#include "common/core/stopwatch.hpp"
 #include "common/ultrasound/lesion_polar.hpp"
 #include "common/ultrasound/lesion_tracer.hpp"
 #include "tests/support/study_record.hpp"
@@ -39,11 +40,10 @@ struct Traced {
 };
 
 Traced trace(const test_support::VirtualSweep& sweep, const tracking::Recording& recording) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
+  const Stopwatch watch;
   const auto found = ultrasound::trace_sweep(
       recording, {sweep.frames / 2, {0.5 * (sweep.width - 1), 0.5 * (sweep.height - 1)}});
-  const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  const double ms = watch.milliseconds();
   Traced traced;
   if (!found) return traced;
   std::vector<double> errors;
@@ -54,6 +54,7 @@ Traced trace(const test_support::VirtualSweep& sweep, const tracking::Recording&
     for (Eigen::Index i = 0; i < points->cols(); ++i)
       errors.push_back(sweep.distance_mm(points->col(i)));
   }
+  if (errors.empty()) return traced;
   std::sort(errors.begin(), errors.end());
   traced.frames = static_cast<int>(found->contours.size());
   traced.median_mm = errors[errors.size() / 2];
@@ -89,9 +90,11 @@ void study_noise() {
   }
 }
 
-// A lesion that differs less and less from its surroundings: it must be lost rather than traced wrongly.
+// A lesion that differs less and less from its surroundings. The tracer must lose it rather than
+// trace it wrongly, and trace it at the largest difference.
 void study_contrast() {
   double worst_mm = 0.0;
+  int frames_at_largest = 0;
   for (int difference = 5; difference <= 60; difference += 5) {
     test_support::VirtualSweep sweep;
     sweep.outside = 80.0, sweep.inside = 80.0 + difference;
@@ -104,6 +107,7 @@ void study_contrast() {
     const char* x = "grey values above surroundings of 80";
     record({"tracing_contrast", "frames traced of 21", x, "frames", double(difference),
             double(traced.frames)});
+    frames_at_largest = traced.frames;
     if (traced.frames == 0) continue;
     record({"tracing_contrast_error", "median", x, "distance to the ellipsoid mm",
             double(difference), traced.median_mm});
@@ -112,10 +116,11 @@ void study_contrast() {
     worst_mm = std::max(worst_mm, traced.median_mm);
   }
   record_check(kStudy, "worst median distance of what is traced at low contrast mm", worst_mm,
-               "<= 0.5 (two pixels)", worst_mm <= 2.0 * kPixel_mm, "equation of the ellipsoid");
+               "<= 0.5 (two pixels)", frames_at_largest > 0 && worst_mm <= 2.0 * kPixel_mm,
+               "equation of the ellipsoid");
 }
 
-// Images without a lesion: whatever is traced is invented.
+// Images without a lesion: every contour is invented.
 void study_empty_images() {
   int invented = 0;
   for (int level = 1; level <= 10; ++level) {
@@ -133,15 +138,13 @@ void study_empty_images() {
 }
 
 void study_speed() {
-  using Clock = std::chrono::steady_clock;
   test_support::VirtualSweep sweep;
   sweep.speckle = 0.2;
   const tracking::Recording recording = recording_of(sweep);
-  const auto start = Clock::now();
+  const Stopwatch watch;
   for (int frame = 0; frame < sweep.frames; ++frame)
     ultrasound::smoothed_frame(recording, frame, 2.0);
-  const double smoothing_ms =
-      std::chrono::duration<double, std::milli>(Clock::now() - start).count() / sweep.frames;
+  const double smoothing_ms = watch.milliseconds() / sweep.frames;
   const double traced_ms = trace(sweep, recording).ms_per_frame;
   fmt::print("a traced image takes {:.1f} times its smoothing ({:.3f} ms)\n",
              traced_ms / smoothing_ms, smoothing_ms);

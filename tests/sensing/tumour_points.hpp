@@ -45,7 +45,8 @@ inline IndexedSurface indexed(TriangleSurface surface) {
   return {std::move(surface), std::move(index), std::move(volume)};
 }
 
-// Points of eight planar sections through the surface, two fans of four, `count` in all: most of it is not seen.
+// `count` points of eight planar sections through the surface, two fans of four. Most of the
+// surface is not seen.
 inline Points section_points(const TriangleSurface& surface, int count, Random& random) {
   std::vector<Vec3> ends;
   const Vec3 sweep[] = {random.direction(), random.direction()};
@@ -67,7 +68,8 @@ inline RigidTransform random_motion(double translation_mm, double rotation_deg, 
   return registration::rigid_increment(xi, kTumourCentre);
 }
 
-// As measured: moved, each coordinate with Gaussian noise, and every tenth of them (if any) 5 to 30 mm off.
+// Points as measured: moved, with Gaussian noise in each coordinate; with `outliers`, every tenth
+// point is 5 to 30 mm off.
 inline Points measured(const Points& on_surface, const RigidTransform& T_points_surface,
                        double noise_mm, bool outliers, Random& random) {
   Points points =

@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
                        "reflection"},
         BadCalibration{"NotFinite",
                        [](StereoCalibration& c) { c.T_right_left.translation().x() = NAN; },
-                       "T_right_left has an entry that is not finite"},
+                       "T_right_left holds a value that is not a finite number"},
         BadCalibration{"NoBaseline",
                        [](StereoCalibration& c) { c.T_right_left.translation().setZero(); },
                        "baseline mm = 0"},
