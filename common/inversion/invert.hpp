@@ -10,15 +10,15 @@
 
 namespace brainshift::inversion {
 
-// Prepares for this one inversion and makes it. The price is the preparation: methods kCondensed (the
-// default) and kCondensedExact solve for every slave and many modes first, some thousand solves, which
-// is seconds on a toy and a minute on a head. The model's own preparation is not repeated.
-// options.stop ends the preparation too (kUnavailable).
+// Prepares for this one inversion and makes it. The price is the preparation: methods kCondensed
+// (the default) and kCondensedExact solve for every slave and many modes first, some thousand
+// solves, which is seconds on a toy and a minute on a head. The model's own preparation is not
+// repeated. options.stop ends the preparation too (kUnavailable).
 //
 // Errors as Inverter::update and make_inverter. The data are checked before anything is prepared
-// (check_data: kInvalidArgument for fewer than 3 data, sizes that differ, sd <= 0, collinear positions;
-// kNotFinite), their place afterwards: data outside the brain by more than 5 mm are kInvalidArgument, and
-// the sentence names the datum.
+// (check_data: kInvalidArgument for fewer than 3 data, sizes that differ, sd <= 0, collinear
+// positions; kNotFinite), their place afterwards: data outside the brain by more than 5 mm are
+// kInvalidArgument, and the sentence names the datum.
 Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
                         Method method = Method::kCondensed, const InversionOptions& options = {});
 

@@ -77,9 +77,9 @@ Result<std::unique_ptr<Inverter>> condense_and_build(const PreparedModel& model,
   options.stop = stop;
   auto operators = condense(model, options);
   if (!operators) return tl::unexpected(operators.error());
-  return condensed_inverter(
-      std::make_shared<const CondensedOperators>(std::move(*operators)),
-      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config());
+  return condensed_inverter(std::make_shared<const CondensedOperators>(std::move(*operators)),
+                            std::make_shared<const geometry::TetLocator>(model.model().mesh),
+                            model.config());
 }
 
 Result<std::unique_ptr<Inverter>> build_exact(std::shared_ptr<const PreparedModel> model,

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inverter: SparseData -> Estimate, again and again for one patient under one boundary condition, by one
-// method. It holds what an update can reuse; invert.hpp is the one-shot beside it.
+// Inverter: SparseData -> Estimate, again and again for one patient under one boundary condition,
+// by one method. It holds what an update can reuse; invert.hpp is the one-shot beside it.
 //
-// A session owns one and calls it from one thread. Not thread-safe, nor may two inverters over the same
-// PreparedModel run at once: their solves share the factor's workspace.
+// A session owns one and calls it from one thread. Not thread-safe, nor may two inverters over the
+// same PreparedModel run at once: their solves share the factor's workspace.
 #pragma once
 
 #include <cstdint>
@@ -28,30 +28,31 @@ class Inverter {
   virtual ~Inverter() = default;
 
   // Fills every member of `estimate`, into memory that it has already where the method can.
-  // Errors: as check_data; kInvalidArgument for data outside the brain, which names the datum, and, but
-  // for method condensed, for data along a direction; kNotFinite; kSingularMatrix; stopped() when
-  // options.stop was requested, however little time a deadline had left. After an error the estimate is
-  // not valid, and the next update works as if this one had not been tried.
+  // Errors: as check_data; kInvalidArgument for data outside the brain, which names the datum, and,
+  // but for method condensed, for data along a direction; kNotFinite; kSingularMatrix; stopped()
+  // when options.stop was requested, however little time a deadline had left. After an error the
+  // estimate is not valid, and the next update works as if this one had not been tried.
   virtual Status update(const SparseData& data, const InversionOptions& options,
                         Estimate& estimate) = 0;
   // Forgets earlier updates: what follows is what a new inverter would give.
   virtual void reset() = 0;
-  // What the last update may have lost by the parts that its scene leaves out; empty for the methods
-  // that do not estimate it.
+  // What the last update may have lost by the parts that its scene leaves out; empty for the
+  // methods that do not estimate it.
   virtual std::optional<OmissionErrors> omission_errors() const = 0;
   // Memory of what was prepared for it: operators, or factor, matrix and prior.
   virtual std::uint64_t bytes() const = 0;
 };
 
-// Method condensed, over operators that were prepared before surgery. Errors as CondensedInverter::build.
+// Method condensed, over operators that were prepared before surgery. Errors as
+// CondensedInverter::build.
 Result<std::unique_ptr<Inverter>> condensed_inverter(
     std::shared_ptr<const CondensedOperators> operators,
     std::shared_ptr<const geometry::TetLocator> locator, const CaseConfig& config,
     const CondensedOptions& options = {});
 
-// Any method, over a factorised model. kCondensed condenses first, kCondensedExact computes the outputs
-// of the whole prior: seconds on a toy, a minute on a head; the other methods take no time here.
-// stop: of that preparation. Errors as condense() and output_operators().
+// Any method, over a factorised model. kCondensed condenses first, kCondensedExact computes the
+// outputs of the whole prior: seconds on a toy, a minute on a head; the other methods take no time
+// here. stop: of that preparation. Errors as condense() and output_operators().
 Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedModel> model,
                                                 Method method, const std::stop_token& stop = {});
 

@@ -5,13 +5,13 @@
 #include <string>
 #include <utility>
 
+#include "common/anatomy/brain_model_builder.hpp"
 #include "common/core/fnv1a.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/prepared/full_solve.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/anatomy/brain_model_builder.hpp"
 
 namespace brainshift::patient {
 namespace {
@@ -42,8 +42,8 @@ Status open_checkpoint(const PrepareOptions& options, const CaseConfig& config,
   return {};
 }
 
-// Blocks 2 i and 2 i + 1 of the file are the columns and the compliance of block i. A block that cannot
-// be kept is solved again next time; the preparation goes on.
+// Blocks 2 i and 2 i + 1 of the file are the columns and the compliance of block i. A block that
+// cannot be kept is solved again next time; the preparation goes on.
 inversion::BlockStore block_store(io::CheckpointFile& file) {
   inversion::BlockStore store;
   store.load = [&file](int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // prepare_model(): everything that is done before surgery, CaseConfig -> ModelFile.
 //
-//   read       the files that the case names, and what they are told by later (io/model/model_inputs.hpp)
+//   read       the files that the case names, and what they are told by later
+//              (io/model/model_inputs.hpp)
 //   build      mesh, surfaces, node sets (anatomy)
 //   factorise  under each boundary condition; a model that cannot be solved ends here
 //   condense   the operators of each boundary condition; minutes on a head
@@ -50,9 +51,9 @@ struct PreparedPatient {
   std::optional<io::CheckpointFile> checkpoint;
 };
 
-// Errors: of io::record_inputs, io::load_case_inputs, anatomy::build_brain_model, PreparedModel::prepare
-// and condense(), which name a key or file; of CheckpointFile; kUnavailable when stopped. An error
-// leaves the blocks that are finished in the checkpoint.
+// Errors: of io::record_inputs, io::load_case_inputs, anatomy::build_brain_model,
+// PreparedModel::prepare and condense(), which name a key or file; of CheckpointFile; kUnavailable
+// when stopped. An error leaves the blocks that are finished in the checkpoint.
 Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOptions& options = {});
 
 }  // namespace brainshift::patient

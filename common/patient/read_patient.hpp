@@ -16,8 +16,8 @@ struct Patient {
   BrainModel model;
 };
 
-// Errors of io::read_case_config, io::load_case_inputs and anatomy::build_brain_model. progress: stages
-// of the last.
+// Errors of io::read_case_config, io::load_case_inputs and anatomy::build_brain_model. progress:
+// stages of the last.
 Result<Patient> read_patient(const std::filesystem::path& case_file, const Progress& progress = {});
 
 // The same for a case that has been read, and perhaps changed, already.

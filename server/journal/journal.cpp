@@ -135,7 +135,8 @@ void Journal::write(Item item) {
   const auto status = writing([&] { return sink_->append(item.record); });
   if (status) return;
   set_error(writing_generation_, status.error());
-  // A gap in a journal is worse than its end: the file ends with the last record before the failure.
+  // A gap in a journal is worse than its end: the file ends with the last record before the
+  // failure.
   static_cast<void>(writing([&] { return sink_->close(); }));
   sink_.reset();
 }

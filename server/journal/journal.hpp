@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Journal: every accepted observation and every final update, appended to a surgery file by a thread of its
-// own, so that no commit lies on the latency path. One file per session; it can be replayed.
+// Journal: every accepted observation and every final update, appended to a surgery file by a
+// thread of its own, so that no commit lies on the latency path. One file per session; it can be
+// replayed.
 //
-// append() only queues. The first failure (file not creatable, disk full, queue overrun) is kept: status()
-// says so until the next begin(), nothing more is written to that file, and `on_error` is told once. What
-// was committed before stays readable; the surgery file survives a crash at any instant.
+// append() only queues. The first failure (file not creatable, disk full, queue overrun) is kept:
+// status() says so until the next begin(), nothing more is written to that file, and `on_error` is
+// told once. What was committed before stays readable; the surgery file survives a crash at any
+// instant.
 #pragma once
 
 #include <condition_variable>
@@ -40,8 +42,8 @@ using OpenSink = std::function<Result<std::unique_ptr<RecordSink>>(
 Result<std::unique_ptr<RecordSink>> open_surgery_file(const std::filesystem::path& path,
                                                       const JournalMeta& meta);
 
-// First free name "<case>-<session>.surgery", "<case>-<session>-2.surgery", ... in the folder; every
-// character of the case id that is not a letter, digit, '-', '_' or '.' becomes '_'.
+// First free name "<case>-<session>.surgery", "<case>-<session>-2.surgery", ... in the folder;
+// every character of the case id that is not a letter, digit, '-', '_' or '.' becomes '_'.
 std::filesystem::path journal_path(const std::filesystem::path& folder, const std::string& case_id,
                                    const std::string& session);
 

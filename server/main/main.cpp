@@ -79,6 +79,6 @@ int main(int argc, char** argv) {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {
     std::fprintf(stderr, "brainshiftd: unexpected failure: %s\n", exception.what());
-    return kExitFailure;
+    return brainshift::kExitFailure;
   }
 }

@@ -130,8 +130,8 @@ void print_table(const Outcome& outcome, const std::filesystem::path& out) {
     const auto& [t, full_solve_ms] = outcome.patient.boundaries[i];
     const CondensedOperators& condensed = outcome.patient.file.condensed[i];
     fmt::print("{:<10}{:>11.2f}{:>11.2f}{:>11.2f}{:>11.1f}{:>12}{:>13.1f}{:>7}{:>9.0f}\n",
-               to_string(kPreparedBoundaries[i]), t.assemble_s, t.analyse_s, t.factor_s, full_solve_ms,
-               t.factor_nonzeros, condensed.prepare_s, condensed.num_modes(),
+               to_string(kPreparedBoundaries[i]), t.assemble_s, t.analyse_s, t.factor_s,
+               full_solve_ms, t.factor_nonzeros, condensed.prepare_s, condensed.num_modes(),
                static_cast<double>(condensed.bytes()) / 1048576.0);
   }
   fmt::print("\nwrote {} ({:.0f} MiB) in {:.1f} s, peak memory {:.2f} GiB\n", out.string(),

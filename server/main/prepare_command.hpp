@@ -12,8 +12,9 @@ struct PrepareArguments {
   bool json = false;
 };
 
-// Builds the brain model, prepares it under both boundaries (a model that cannot be solved is refused and
-// not written), writes it, prints a table or one JSON object to stdout. Returns the exit status.
+// Calls patient::prepare_model, writes the model file, prints a table or one JSON object to stdout.
+// A model that cannot be solved is not written. An interrupted run leaves OUT.partial, from which the
+// next one goes on. Returns the exit status.
 int run_prepare(const PrepareArguments& arguments);
 
 }  // namespace brainshift::server

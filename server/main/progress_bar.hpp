@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Progress of a long command: a bar on stderr that redraws itself with the time its stage still needs, or one line per stage on stdout when
-// stderr is no terminal, so that stderr of a script holds nothing but errors; or nothing.
+// Progress of a long command: a bar on stderr that redraws itself with the time its stage still
+// needs, or one line per stage on stdout when stderr is no terminal, so that stderr of a script
+// holds nothing but errors; or nothing.
 #pragma once
 
 #include <chrono>

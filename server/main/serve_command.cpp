@@ -12,11 +12,11 @@
 #include "common/io/model/model_file.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/logging.hpp"
-#include "server/session/model_store.hpp"
 #include "server/main/stop_signals.hpp"
+#include "server/service/service.hpp"
+#include "server/session/model_store.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
-#include "server/service/service.hpp"
 
 namespace brainshift::server {
 namespace {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // SIGINT and SIGTERM as a file descriptor, so that the poll loop sees them like any other event.
 //
-// By handlers, not by a blocked mask and signalfd: a library may start threads before main() (OpenBLAS does),
-// which do not inherit a mask, and a signal to the process may be delivered to any of its threads.
+// By handlers, not by a blocked mask and signalfd: a library may start threads before main()
+// (OpenBLAS does), which do not inherit a mask, and a signal to the process may be delivered to any
+// of its threads.
 #pragma once
 
 #include "common/core/error.hpp"

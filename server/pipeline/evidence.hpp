@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Evidence: the newest registered observation of every source of a session, and what an update makes of
-// them.
+// Evidence: the newest registered observation of every source of a session, and what an update
+// makes of them.
 //
-// Sources are used together. An update that the tumour's boundary asks for also uses the newest view of
-// the cortex, as long as that view is not older than sensing.max_age_s by the observations' own clock.
-// Not thread-safe.
+// Sources are used together. An update that the tumour's boundary asks for also uses the newest
+// view of the cortex, as long as that view is not older than sensing.max_age_s by the observations'
+// own clock. Not thread-safe.
 #pragma once
 
 #include <map>
@@ -45,8 +45,8 @@ class Evidence {
 };
 
 // Data of several observations as one. Data that follow the deformation are measured for the
-// displacement of the cortex in the last estimate, and anew whenever the inversion asks with another
-// one.
+// displacement of the cortex in the last estimate, and anew whenever the inversion asks with
+// another one.
 class CombinedData {
  public:
   CombinedData(std::vector<const RegisteredObservation*> observations, const Evidence& evidence);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <string>
 
-#include "common/fem/biot_matrix.hpp"
 #include "common/contact/set_search.hpp"
+#include "common/fem/biot_matrix.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -70,10 +70,10 @@ std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig&
     omissions.push_back({"uncertainty", "scene.uncertainty = off", unaffected});
   }
   if (boundary == Boundary::kFixed) {
-    omissions.push_back({"contact",
-                         "fixed boundary: the brain surface cannot leave or approach the skull",
-                         "about 1.8 mm at the craniotomy: in the paper's five cases 3.4 mm of error "
-                         "remain there on average, 1.6 mm with contact"});
+    omissions.push_back(
+        {"contact", "fixed boundary: the brain surface cannot leave or approach the skull",
+         "about 1.8 mm at the craniotomy: in the paper's five cases 3.4 mm of error "
+         "remain there on average, 1.6 mm with contact"});
   }
   return omissions;
 }

@@ -4,22 +4,22 @@
 
 #include <vector>
 
+#include "common/inversion/contract/omission_errors.hpp"
+#include "common/registration/icp.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
-#include "common/registration/icp.hpp"
 
 namespace brainshift::server {
 
-// Time after which pore pressure has drained: R^2 / c_v with c_v = k / (S + alpha^2 / (lambda + 2 G)),
-// Biot's theory in one dimension. R: radius of the ball with the mesh's volume. Seconds.
+// Time after which pore pressure has drained: R^2 / c_v with c_v = k / (S + alpha^2 / (lambda + 2
+// G)), Biot's theory in one dimension. R: radius of the ball with the mesh's volume. Seconds.
 double consolidation_time_s(const TetMesh& mesh, const Material& material);
 
-// Upper bound of the part of a load's final displacement that is still missing `seconds` after it was
-// applied: exp(-(pi^2/4) t/T), T the consolidation time. Terzaghi's series for a layer of thickness R that
-// drains on one side, 8/pi^2 sum exp(-(2m+1)^2 (pi^2/4) t/T) / (2m+1)^2, with every exponential replaced
-// by the first.
+// Upper bound of the part of a load's final displacement that is still missing `seconds` after it
+// was applied: exp(-(pi^2/4) t/T), T the consolidation time. Terzaghi's series for a layer of
+// thickness R that drains on one side, 8/pi^2 sum exp(-(2m+1)^2 (pi^2/4) t/T) / (2m+1)^2, with
+// every exponential replaced by the first.
 double undrained_fraction(double seconds, double consolidation_time_s);
 
 // The same for one backward-Euler step of that length from rest, which scene.pressure = on takes:
@@ -35,8 +35,8 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
                                           const inversion::OmissionErrors& errors,
                                           int active_slaves);
 
-// What the alignment of one observation did not estimate: rotation (switched off, or not observable). It
-// is named too when it did not converge.
+// What the alignment of one observation did not estimate: rotation (switched off, or not
+// observable). It is named too when it did not converge.
 std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
                                              double rotation_prior_sd_deg);
 

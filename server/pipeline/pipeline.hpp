@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pipeline: Observation -> register -> SparseData -> invert -> Estimate -> Update, for one patient, one
-// method and one boundary condition.
+// Pipeline: Observation -> register -> SparseData -> invert -> Estimate -> Update, for one patient,
+// one method and one boundary condition.
 //
-//   fixed at build    patient, case, method, boundary, surfaces to register to, omissions of the scene
-//   state             evidence (the newest observation of every source) and what the inverter reuses;
-//                     reset() forgets both
+//   fixed at build    patient, case, method, boundary, surfaces to register to, omissions of the
+//                     scene
+//   state             evidence (the newest observation of every source) and what the inverter
+//                     reuses; reset() forgets both
 // It knows no socket, no log and no wire format. Not thread-safe: a session's worker owns it.
 #pragma once
 
@@ -33,16 +34,16 @@ struct RunOptions {
 
 class Pipeline {
  public:
-  // Indexes the surfaces; kEmptySet or kNotFinite when the model has no usable one. inverter: for this
-  // method and boundary.
+  // Indexes the surfaces; kEmptySet or kNotFinite when the model has no usable one. inverter: for
+  // this method and boundary.
   static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
                                 Method method, Boundary boundary,
                                 std::unique_ptr<inversion::Inverter> inverter);
 
-  // Fills everything of an Update except its sequence number and the encode and journal times, which
-  // belong to later stages. The inverter writes into the update's own estimate. Errors of registration
-  // and inversion pass through unchanged; an observation without an estimate is not used again.
-  // Precondition: the observation's numbers are finite (wire::decode_observation).
+  // Fills everything of an Update except its sequence number and the encode and journal times,
+  // which belong to later stages. The inverter writes into the update's own estimate. Errors of
+  // registration and inversion pass through unchanged; an observation without an estimate is not
+  // used again. Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
 
   // A session begins: forgets what earlier ones observed and estimated.

@@ -17,16 +17,18 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
-// Welsch weight exp(-r^2 / 2 s^2) of a point two scales off. A point with less lies on something else.
+// Welsch weight exp(-r^2 / 2 s^2) of a point two scales off. A point with less lies on something
+// else.
 const double kLeastWelschWeight = std::exp(-2.0);
 
-// The scale of a Welsch kernel in units of the median residual (2.7 standard deviations of a Gaussian,
-// whose median is 0.6745) and, at least, of the points' own standard deviation: either way the estimate
-// keeps 98 % of the efficiency that least squares has for Gaussian errors, (1 + 1/s^2)^-3
-// (1 + 2/s^2)^(3/2) (Holland & Welsch 1977, Comm. Stat. A6:813).
+// The scale of a Welsch kernel in units of the median residual (2.7 standard deviations of a
+// Gaussian, whose median is 0.6745) and, at least, of the points' own standard deviation: either
+// way the estimate keeps 98 % of the efficiency that least squares has for Gaussian errors, (1 +
+// 1/s^2)^-3 (1 + 2/s^2)^(3/2) (Holland & Welsch 1977, Comm. Stat. A6:813).
 constexpr double kScaleOverMedian = 4.0;
 constexpr double kScaleOverSd = 3.0;
-// A residual of seven scales. Welsch weights underflow far behind it, and a median does not need them.
+// A residual of seven scales. Welsch weights underflow far behind it, and a median does not need
+// them.
 constexpr double kSmallestWelschWeight = 1e-12;
 
 // Ascending, so that neighbouring data stay neighbours; the same for the same number of points.

@@ -1,41 +1,40 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // First stage: Observation -> SparseData.
 //
-//   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then a
-//                    random subset of inversion.sparse_points boundary points (paper 2.6), always the
-//                    same one for the same number of points. scene.rotation = off: translation only;
-//                    on: about every axis, however little the points show of it
+//   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then
+//                    a random subset of inversion.sparse_points boundary points (paper 2.6), always
+//                    the same one for the same number of points. scene.rotation = off: translation
+//                    only; on: about every axis, however little the points show of it
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
-//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise, and by
-//                    sensing.surface:
-//                    distances  along the normal of the model's cortex, made anew for every estimate
-//                               (registration/surface_distances.hpp; method condensed)
-//                    rigid      ICP to the undeformed cortex under the craniotomy, as for the tumour
-//                               (other methods)
+//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise,
+//                    and by sensing.surface:
+//                    distances  along the normal of the model's cortex, made anew for every
+//                               estimate (registration/surface_distances.hpp; method condensed)
+//                    rigid      ICP to the undeformed cortex under the craniotomy, as for the
+//                               tumour (other methods)
 //                    Rejected: scene.surface = off, and what check_cortical_surface rejects (units,
 //                    place, orientation)
 //   PatientPose      rejected: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the
-// observation's own where that is larger. The paper's method and its variants take the former whatever
-// the observation says.
-// Points that ICP takes for outliers guide nothing. Errors that aligned points have in common:
-// registration::sparse_data_from_alignment.
+// observation's own where that is larger. The paper's method and its variants take the former
+// whatever the observation says. Points that ICP takes for outliers guide nothing. Errors that
+// aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once
 
 #include <optional>
 #include <string>
 
-#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/estimate.hpp"
-#include "common/values/observation.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface_check.hpp"
 #include "common/registration/icp.hpp"
 #include "common/registration/surface_distances.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::server {
 
@@ -55,16 +54,17 @@ struct RegistrationTargets {
   static Result<RegistrationTargets> build(const BrainModel& model);
 
   geometry::ClosestPointIndex tumour;
-  // The same by interpolation, some thirty times faster. Models whose tumour is not closed have none.
+  // The same by interpolation, some thirty times faster. Models whose tumour is not closed have
+  // none.
   std::optional<geometry::DistanceVolume> tumour_distance;
   registration::SurfacePatch craniotomy;
   std::optional<geometry::CorticalSite> site;  // none: no cortical surface is taken
 };
 
-// kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3 points.
-// The sentence names the observation and the count. Precondition: the observation's numbers are finite,
-// as wire::decode_observation gives them. (Data that are not are rejected further on, by check_data or by
-// registration, with kNotFinite.)
+// kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3
+// points. The sentence names the observation and the count. Precondition: the observation's numbers
+// are finite, as wire::decode_observation gives them. (Data that are not are rejected further on,
+// by check_data or by registration, with kNotFinite.)
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config,

@@ -158,8 +158,8 @@ void Service::publish(wire::UpdateMessage message) {
     update.timings.journal_ms = journal_ms_;
   }
   wire::append_timings(update.timings, payload);
-  auto frame = std::make_shared<const std::string>(
-      wire::encode_frame(MessageType::kUpdate, 0, payload));
+  auto frame =
+      std::make_shared<const std::string>(wire::encode_frame(MessageType::kUpdate, 0, payload));
   if (estimated && journal_) {
     journal_->append(record(io::RecordKind::kUpdate, update.sequence, std::move(payload)));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ModelStore: one loaded model, and what sessions on it share. It is made piece by piece, when a session
-// first asks: the condensed method needs the operators of the model file only, the others factorise.
+// ModelStore: one loaded model, and what sessions on it share. It is made piece by piece, when a
+// session first asks: the condensed method needs the operators of the model file only, the others
+// factorise.
 //
 // Belongs to one thread, the session's worker.
 #pragma once
@@ -27,9 +28,9 @@ class ModelStore {
   ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
              std::vector<CondensedOperators> operators);
 
-  // For the request's method and boundary, with the parts that the scene carries. full_solve_ms of the
-  // info is measured when the request asks for it. Errors as plan_scene, PreparedModel::prepare,
-  // condensed_inverter and make_inverter.
+  // For the request's method and boundary, with the parts that the scene carries. full_solve_ms of
+  // the info is measured when the request asks for it. Errors as plan_scene,
+  // PreparedModel::prepare, condensed_inverter and make_inverter.
   Result<std::unique_ptr<SessionModel>> make(const wire::SessionRequest& request);
 
  private:

@@ -11,15 +11,15 @@
 
 namespace brainshift::server {
 
-// Ok, or kInvalidArgument for another case, a frame other than "ras", an empty or overlong source, or a
-// sequence number that is not above `last_sequence`. The sentence names the field and its value.
-// The numbers of the body are not looked at: wire::decode_observation has tested that they are finite and
-// that standard deviations are not negative.
+// Ok, or kInvalidArgument for another case, a frame other than "ras", an empty or overlong source,
+// or a sequence number that is not above `last_sequence`. The sentence names the field and its
+// value. The numbers of the body are not looked at: wire::decode_observation has tested that they
+// are finite and that standard deviations are not negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          std::uint64_t last_sequence);
 
-// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a one-line
-// message whatever a peer sent.
+// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a
+// one-line message whatever a peer sent.
 std::string in_quotes(std::string_view text);
 
 }  // namespace brainshift::server

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Session: one case under one boundary and method, worked on by one thread.
 //
-//   start()   ends the running session and makes the next one ready on the worker (seconds, once per
-//             boundary and method)
+//   start()   ends the running session and makes the next one ready on the worker (seconds, once
+//             per boundary and method)
 //   submit()  checks an observation and leaves it in the box of its source; never waits
-//   worker    takes the oldest waiting observation, runs the pipeline, hands the message to `publish`
+//   worker    takes the oldest waiting observation, runs the pipeline, hands the message to
+//             `publish`
 //
-// Every source has a box for one observation: a newer one replaces an older one that has not started, so
-// a slow inversion never works through a backlog. Only a new session and stop() end a running inversion
-// early, whatever its method: their stop token reaches every iteration and every contact set. The result
-// of such an inversion is not published. After an error the previous estimate stays the valid one.
-// All members may be called from any thread, except inside the hooks.
+// Every source has a box for one observation: a newer one replaces an older one that has not
+// started, so a slow inversion never works through a backlog. Only a new session and stop() end a
+// running inversion early, whatever its method: their stop token reaches every iteration and every
+// contact set. The result of such an inversion is not published. After an error the previous
+// estimate stays the valid one. All members may be called from any thread, except inside the hooks.
 #pragma once
 
 #include <condition_variable>
@@ -32,8 +33,8 @@
 
 namespace brainshift::server {
 
-// All that a session of one method and boundary needs: what its clients are told, and the pipeline with
-// its state. The session keeps it for the next session of the same kind, and resets it then.
+// All that a session of one method and boundary needs: what its clients are told, and the pipeline
+// with its state. The session keeps it for the next session of the same kind, and resets it then.
 struct SessionModel {
   wire::SessionInfo info;  // session_id is filled in by the session
   Pipeline pipeline;
@@ -65,14 +66,15 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // `done` is called exactly once: on the calling thread for another case (kInvalidArgument, the running
-  // session goes on), else on the worker; kUnavailable when a later start or stop() came first.
+  // `done` is called exactly once: on the calling thread for another case (kInvalidArgument, the
+  // running session goes on), else on the worker; kUnavailable when a later start or stop() came
+  // first.
   void start(const wire::SessionRequest& request, StartDone done);
 
   // kModelNotReady without a running session; the errors of check_observation; kUnavailable when
-  // kMaxSources other sources wait. `on_accepted` is called once before the worker can see an accepted
-  // observation; it must be quick and must not call back.
-  // Precondition: the observation's numbers are finite (wire::decode_observation).
+  // kMaxSources other sources wait. `on_accepted` is called once before the worker can see an
+  // accepted observation; it must be quick and must not call back. Precondition: the observation's
+  // numbers are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
                                           const std::function<void()>& on_accepted = {});
 

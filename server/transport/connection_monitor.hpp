@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ConnectionMonitor: which connections of a socket have closed, by the daemon's file descriptor of each.
-// ROUTER sockets forget a peer silently; without this a daemon would keep subscribers that are gone.
+// ConnectionMonitor: which connections of a socket have closed, by the daemon's file descriptor of
+// each. ROUTER sockets forget a peer silently; without this a daemon would keep subscribers that
+// are gone.
 //
-// libzmq reports a close before it can deliver a message of a later connection that reuses the descriptor,
-// so draining the monitor before each message is handled never takes a new peer for an old one.
+// libzmq reports a close before it can deliver a message of a later connection that reuses the
+// descriptor, so draining the monitor before each message is handled never takes a new peer for an
+// old one.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Outbox: messages on their way from the worker thread to the transport thread, with a file descriptor that
-// becomes readable while something waits. Bytes are complete frames (common/wire/frame.hpp).
+// Outbox: messages on their way from the worker thread to the transport thread, with a file
+// descriptor that becomes readable while something waits. Bytes are complete frames
+// (common/wire/frame.hpp).
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Peers: who talks to the daemon now, who subscribed, and what a slow subscriber is still owed. Plain
-// bookkeeping of the transport thread.
+// Peers: who talks to the daemon now, who subscribed, and what a slow subscriber is still owed.
+// Plain bookkeeping of the transport thread.
 #pragma once
 
 #include <cstddef>

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Router: the daemon's socket. One thread polls a ZeroMQ ROUTER socket, the outbox and a stop descriptor;
-// it decodes frames, asks the handler, sends replies and pushes updates. It never waits for a peer.
+// Router: the daemon's socket. One thread polls a ZeroMQ ROUTER socket, the outbox and a stop
+// descriptor; it decodes frames, asks the handler, sends replies and pushes updates. It never waits
+// for a peer.
 //
-// Peers may be hostile or broken: message size, number of parts and number of peers are capped; a frame
-// that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and unfinished
-// handshakes to a short limit. A subscriber that does not read loses iterates; it is owed the newest
-// few final updates, nothing older. ZeroMQ bounds the size of each part, not their number within one message: expose
-// the daemon to trusted networks only.
+// Peers may be hostile or broken: message size, number of parts and number of peers are capped; a
+// frame that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and
+// unfinished handshakes to a short limit. A subscriber that does not read loses iterates; it is
+// owed the newest few final updates, nothing older. ZeroMQ bounds the size of each part, not their
+// number within one message: expose the daemon to trusted networks only.
 #pragma once
 
 #include <chrono>
@@ -47,8 +48,8 @@ class RequestHandler {
 
 class Router {
  public:
-  // kInvalidArgument for an endpoint that is none, kUnavailable when it cannot be bound (in use, no such
-  // interface, no permission). The sentence names the endpoint.
+  // kInvalidArgument for a text that is not an endpoint, kUnavailable when it cannot be bound (in use, no
+  // such interface, no permission). The sentence names the endpoint.
   static Result<Router> bind(const RouterOptions& options);
   Router(Router&&) noexcept;
   Router& operator=(Router&&) noexcept;

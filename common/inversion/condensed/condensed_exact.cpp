@@ -22,8 +22,8 @@ namespace {
 namespace blas = linalg::blas;
 using Eigen::MatrixXd;
 
-// The location of a datum on a face or at a node has barycentric weights of rounding size, 1e-16 times
-// a mesh of some hundred elements across. Less than this is 0.
+// The location of a datum on a face or at a node has barycentric weights of rounding size, 1e-16
+// times a mesh of some hundred elements across. Less than this is 0.
 constexpr double kLeastBarycentric = 1e-12;
 
 // A over the rows of the data region.
@@ -99,7 +99,7 @@ struct CondensedExact::Impl {
   int slaves;
   double beta;
   VecX initial_penetration, diagonal;  // diagonal: of the slaves' compliance
-  std::vector<int> place;  // per node: in the region, or -1
+  std::vector<int> place;              // per node: in the region, or -1
   contact::SetSearch search;
 
   // Of the data; m of them.
@@ -325,10 +325,10 @@ Status CondensedExact::update(const SparseData& data, Estimate& estimate,
   }
   estimate.displacement = std::move(displacement);
   estimate.rebuild_ms = rebuilding.milliseconds();
-  impl.finish(data,
-              *end == SearchEnd::kSolved ? EstimateStatus::kConverged
-                                         : EstimateStatus::kIterationLimit,
-              estimate);
+  impl.finish(
+      data,
+      *end == SearchEnd::kSolved ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit,
+      estimate);
   return check_estimate(impl.model.model().mesh, impl.model.config().material, estimate);
 }
 

@@ -28,11 +28,12 @@
 namespace brainshift::inversion {
 namespace {
 
-// A greater misfit ratio is named in the reason. 600 independent residuals never exceed it by chance.
+// A greater misfit ratio is named in the reason. 600 independent residuals never exceed it by
+// chance.
 constexpr double kUnexplained = 1.5;
 
-// Contact, scales, robust weights and places of moving data settle in turn. Two rounds are the rule when
-// a surgery begins, one later.
+// Contact, scales, robust weights and places of moving data settle in turn. Two rounds are the rule
+// when a surgery begins, one later.
 constexpr int kMaxRounds = 6;
 
 // Sets of a cycle from whose mean of loads the search tries to leave it.
@@ -261,7 +262,8 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
     if (sample) sampled.sample(*data, scales.of_other(), weights.values());
     const auto settled = settle_contact(asked.stop);
     if (!settled || *settled != EstimateStatus::kConverged || round == kMaxRounds) return settled;
-    const bool rescaled = estimate_scales && scales.fit(posterior.gram(), posterior.right());
+    const bool rescaled =
+        estimate_scales && scales.fit(posterior.gram(), posterior.right_hand_side());
     const bool reweighed = reweigh(*data);
     bool relocated = false;
     if (asked.moving != nullptr) {

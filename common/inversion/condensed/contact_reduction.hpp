@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ContactReduction: contact forces of a set A of active slaves as an affine function of the prior modes z.
+// ContactReduction: contact forces of a set A of active slaves as an affine function of the prior
+// modes z.
 //
 //   D f = p_A - L_A z,   D = Phi_AA + I / beta        =>   f = f0 - T z,   [T f0] = D^-1 [L_A p_A]
 //   penetration          P = p - L z - Phi_:A f       of every slave, mm; f / beta for active ones
-// L = N^T U: s x r; p: initial penetration; D is symmetric positive definite. Everything is kept while the set
-// stays the same. D is factorised anew when it changes: k^3/3 flops, a few milliseconds for 600 slaves, less
-// than the rest of an update; low-rank updates of the factor would not pay (docs/decisions/0008).
-// Memory for all slaves is reserved by the constructor; nothing is allocated afterwards.
+// L = N^T U: s x r; p: initial penetration; D is symmetric positive definite. Everything is kept
+// while the set stays the same. D is factorised anew when it changes: k^3/3 flops, a few
+// milliseconds for 600 slaves, less than the rest of an update; low-rank updates of the factor
+// would not pay (docs/decisions/0008). Memory for all slaves is reserved by the constructor;
+// nothing is allocated afterwards.
 #pragma once
 
 #include <memory>
 #include <vector>
 
 #include "common/contact/penalty.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/inversion/condensed/mode_window.hpp"
+#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -35,7 +37,8 @@ class ContactReduction {
     return {response_.data(), size(), window_.count + 1};
   }
 
-  // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first. Allocates.
+  // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
+  // Allocates.
   Eigen::MatrixXd response_before() const;
 
   // f and P for the given z.

@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // FarField: which nodes a rebuild sums up from modes and contact forces, and which it interpolates.
 //
-// A scene may ask for a region of interest only. Then the nodes of the region, the control nodes and
-// kProbes probe nodes are rebuilt, as in the whole field (field_rebuild.hpp); every other node is
-// interpolated from the control nodes (CondensedOperators::control_neighbours). The probes measure the
-// price in every update:
-//   error <= kFarFieldSafety * max( |u_probe - interpolated|, |N_i . (u_i - interpolated)| over far slaves )
-// Probes are the far nodes where interpolating the modes is worst, sum_j |U_j - interpolated|^2 (the
-// variance of the interpolation error under the prior), no two between the same control nodes. The normal
-// displacement of a slave is known from its penetration without rebuilding it.
+// A scene may ask for a region of interest only. Then the nodes of the region, the control nodes
+// and kProbes probe nodes are rebuilt, as in the whole field (field_rebuild.hpp); every other node
+// is interpolated from the control nodes (CondensedOperators::control_neighbours). The probes
+// measure the price in every update:
+//   error <= kFarFieldSafety * max( |u_probe - interpolated|,
+//                                   |N_i . (u_i - interpolated)| over far slaves )
+// Probes are the far nodes where interpolating the modes is worst, sum_j |U_j - interpolated|^2
+// (the variance of the interpolation error under the prior), no two between the same control nodes.
+// The normal displacement of a slave is known from its penetration without rebuilding it.
 #pragma once
 
 #include <vector>
 
-#include "common/values/condensed_operators.hpp"
 #include "common/inversion/condensed/mode_window.hpp"
+#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
 inline constexpr int kProbes = 64;
-// Between probes the error may be larger: up to 1.2 times the greatest probe's on the toy patient, 1.04
-// times on the default head (tests/benchmarks/bench_scenes.cpp).
+// Between probes the error may be larger: up to 1.2 times the greatest probe's on the toy patient,
+// 1.04 times on the default head (tests/benchmarks/bench_scenes.cpp).
 inline constexpr double kFarFieldSafety = 2.0;
 
 struct FarField {

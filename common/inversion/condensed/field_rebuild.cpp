@@ -4,20 +4,22 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/linalg/blas.hpp"
 #include "common/inversion/condensed/gather_rows.hpp"
+#include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
-// Rows summed at a time: 16 KB of the result, which stays in the first cache while columns stream past.
+// Rows summed at a time: 16 KB of the result, which stays in the first cache while columns stream
+// past.
 constexpr long kChunk = 4096;
 
-// out += sum over j of factor[j] column[j], for `rows` numbers from `first` on. Plain loops in the place
-// of BLAS: its kernels round the last numbers of an array otherwise than the others, so that a node's
-// sum would depend on where it stands; and four columns in one pass take less time than four passes.
-void add_columns(const std::vector<const float*>& column, const std::vector<float>& factor, long first,
-                 long rows, float* __restrict out) {
+// out += sum over j of factor[j] column[j], for `rows` numbers from `first` on. Plain loops in the
+// place of BLAS: its kernels round the last numbers of an array otherwise than the others, so that
+// a node's sum would depend on where it stands; and four columns in one pass take less time than
+// four passes.
+void add_columns(const std::vector<const float*>& column, const std::vector<float>& factor,
+                 long first, long rows, float* __restrict out) {
   std::size_t j = 0;
   for (; j + 4 <= column.size(); j += 4) {
     const float *a = column[j] + first, *b = column[j + 1] + first, *c = column[j + 2] + first,

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// FieldRebuild: displacement at every node, and its standard deviation, from modes and contact forces.
+// FieldRebuild: displacement at every node, and its standard deviation, from modes and contact
+// forces.
 //
 //   u = U z + G_A f                                            every node, single precision
-//   Cov(u) = V (I + J^T J)^-1 V^T + left out,   V = U - G_A T   at the control nodes, interpolated to the
-//                                                               others
-// sd of a node: root mean square of its three components' standard deviations. Given the active set: which
-// slaves touch is taken as known.
+//   Cov(u) = V (I + J^T J)^-1 V^T + left out,   V = U - G_A T   at the control nodes, interpolated
+//                                                               to the others
+// sd of a node: root mean square of its three components' standard deviations. Given the active
+// set: which slaves touch is taken as known.
 //
-// Reads (r + k) columns of 3n floats once, split over the team by rows. Results do not depend on timing.
-// With a region of interest only its rows are read, gathered by the constructor, and the other nodes are
-// interpolated (far_field.hpp). For the same z and f the rebuilt nodes then have the displacement that
-// they have in the whole field, within 1e-9 mm (with the loops as they are, to the bit).
-// Does not allocate after construction, but for outputs of the wrong size.
+// Reads (r + k) columns of 3n floats once, split over the team by rows. Results do not depend on
+// timing. With a region of interest only its rows are read, gathered by the constructor, and the
+// other nodes are interpolated (far_field.hpp). For the same z and f the rebuilt nodes then have
+// the displacement that they have in the whole field, within 1e-9 mm (with the loops as they are,
+// to the bit). Does not allocate after construction, but for outputs of the wrong size.
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "common/values/condensed_operators.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/linalg/blas.hpp"
 #include "common/inversion/condensed/contact_reduction.hpp"
 #include "common/inversion/condensed/far_field.hpp"
 #include "common/inversion/condensed/mode_window.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -37,13 +38,14 @@ class FieldRebuild {
   // u: 3 x nodes, mm, at these nodes only.
   void displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
                        const ContactReduction& contact, Points& u) const;
-  // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was rebuilt.
+  // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was
+  // rebuilt.
   double far_field_error_mm() const { return far_field_error_mm_; }
   // Greatest |U_g dg + U dz + G_A df| at a control node, mm; U_g: the modes before the window.
   double greatest_control_move(const VecX& dg, const VecX& dz, const ContactReduction& contact,
                                const VecX& df) const;
-  // normal_factor: lower Cholesky factor of S^-2 + J^T J, r x r. left_out_scale: of the variance that
-  // the modes leave out. sd: n, mm.
+  // normal_factor: lower Cholesky factor of S^-2 + J^T J, r x r. left_out_scale: of the variance
+  // that the modes leave out. sd: n, mm.
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
                           const linalg::blas::In<double>& normal_factor, double left_out_scale,
                           VecX& sd);

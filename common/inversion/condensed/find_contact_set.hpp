@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// find_contact_set(): the loop that both condensed methods search their contact set with. The rule from
-// one set to the next is that of contact/set_search.hpp; the method solves for each set.
+// find_contact_set(): the loop that both condensed methods search their contact set with. The rule
+// from one set to the next is that of contact/set_search.hpp; the method solves for each set.
 #pragma once
 
 #include <stop_token>
@@ -23,8 +23,8 @@ enum class SearchEnd {
 //   void keep()          the search goes on to a new set: last chance to keep this solution
 //   void leave_cycle()   the sets repeat: chooses the next set by search.follow() or search.pivot()
 //   bool out_of_time() const
-// On return the method holds the solution of the set that the search ended with. Errors of evaluate();
-// stopped(), looked at before every set.
+// On return the method holds the solution of the set that the search ended with. Errors of
+// evaluate(); stopped(), looked at before every set.
 template <typename Method>
 Result<SearchEnd> find_contact_set(contact::SetSearch& search, Method& method,
                                    const std::stop_token& stop) {

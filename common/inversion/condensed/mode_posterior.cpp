@@ -93,7 +93,7 @@ bool ModePosterior::check_source(const SampledOperators& sampled, const PriorSca
   blas::gram(own, 0.0, own_gram_);
   own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
   fill_prior(scales);
-  return check_.run(gram(), right(), own_gram_, own_right_, prior_.head(size), out);
+  return check_.run(gram(), right_hand_side(), own_gram_, own_right_, prior_.head(size), out);
 }
 
 }  // namespace brainshift::inversion

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ModePosterior: prior modes z and amplitudes c of the common errors, given the data and a set of active slaves.
+// ModePosterior: prior modes z and amplitudes c of the common errors, given the data and a set of
+// active slaves.
 //
-//   whitened data   [common | J | d - A G f0] = R^-1/2 [common error | A U - A G_A T | d - A G_A f0],   rows x (q + r + 1)
+//   whitened data   [common | J | d - A G f0]                               rows x (q + r + 1)
+//                   = R^-1/2 [common error | A U - A G_A T | d - A G_A f0]
 //   posterior mean  (S^-2 + J^T J) (c, z) = J^T d,    S = diag(1 for c, prior scale for z)
-// with T and f0 of ContactReduction and everything whitened by SampledOperators. Contact does not touch the common
-// error. Nothing is allocated as long as the data fit what was reserved.
+// with T and f0 of ContactReduction and everything whitened by SampledOperators. Contact does not
+// touch the common error. Nothing is allocated as long as the data fit what was reserved.
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/inversion/condensed/contact_reduction.hpp"
 #include "common/inversion/condensed/prior_scales.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/source_check.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
 
@@ -32,9 +34,9 @@ class ModePosterior {
   Eigen::Map<const Eigen::MatrixXd> gram() const {
     return {gram_storage_.data(), unknowns(), unknowns()};
   }
-  auto right() const { return right_.head(unknowns()); }
-  // Lower Cholesky factor of the normal equations. The common error comes first, so that the last r x r block is the
-  // factor of the Schur complement of z.
+  auto right_hand_side() const { return right_.head(unknowns()); }
+  // Lower Cholesky factor of the normal equations. The common error comes first, so that the last r
+  // x r block is the factor of the Schur complement of z.
   Eigen::Map<const Eigen::MatrixXd> factor() const {
     return {factor_storage_.data(), unknowns(), unknowns()};
   }
@@ -48,7 +50,8 @@ class ModePosterior {
   // |d - A u - common error| of one datum, whitened.
   double residual_norm(const SampledOperators& sampled, int datum) const;
 
-  // Consistency of the rows of one source with the others (source_check.hpp); false when it cannot be computed.
+  // Consistency of the rows of one source with the others (source_check.hpp); false when it cannot
+  // be computed.
   [[nodiscard]] bool check_source(const SampledOperators& sampled, const PriorScales& scales,
                                   const DataSource& source, Consistency& out);
 

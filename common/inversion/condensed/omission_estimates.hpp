@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What leaving a part out may have changed: upper estimates of the greatest move of any node, mm, from
-// numbers that an update has anyway. tests/unit/inversion/condensed/scene_test.cpp compares each with the
-// true difference.
+// What leaving a part out may have changed: upper estimates of the greatest move of any node, mm,
+// from numbers that an update has anyway. tests/unit/inversion/condensed/scene_test.cpp compares
+// each with the true difference.
 //
-//   contact        kContactSafety * greatest ignored penetration. Contact pushes that slave back by it, so
-//                  the true difference is about that much at least; the data then pull the modes after it.
-//   gravity modes  one Newton step of the whole problem from the estimate without them, for the same
-//                  active set:
+//   contact        kContactSafety * greatest ignored penetration. Contact pushes that slave back by
+//                  it, so the true difference is about that much at least; the data then pull the
+//                  modes after it.
+//   gravity modes  one Newton step of the whole problem from the estimate without them, for the
+//                  same active set:
 //                    S dg = J_g^T r,  S = I + J_g^T J_g - C^T X,   dz = -X dg
 //                    C = J^T J_g,     X = (I + J^T J)^-1 C
 //                    du = (U_g - G_A T_g) dg + (U - G_A T) dz
-//                  exact where the set stays; kGravitySafety times its greatest size at the control nodes.
+//                  exact where the set stays; kGravitySafety times its greatest size at the control
+//                  nodes.
 //   far field      far_field.hpp
 #pragma once
 
@@ -20,17 +22,17 @@
 
 namespace brainshift::inversion {
 
-// Measured: the true difference is at most 1.5 times the penetration and 1.22 times the step on the toy
-// patient, 1.02 and 1.19 times on the default head (tests/benchmarks/bench_scenes.cpp).
+// Measured: the true difference is at most 1.5 times the penetration and 1.22 times the step on the
+// toy patient, 1.02 and 1.19 times on the default head (tests/benchmarks/bench_scenes.cpp).
 inline constexpr double kContactSafety = 2.0;
 inline constexpr double kGravitySafety = 2.0;
 
 // penetration: one per slave, mm.
 double contact_error_mm(const VecX& penetration);
 
-// jacobian: whitened [common J], rows x (q + r) with SampledOperators::rows() rows, three per whole datum
-// and one per datum along a direction. residual: whitened d - A u - common error, rows. normal_factor:
-// lower factor of I + [common J]^T [common J]. Allocates.
+// jacobian: whitened [common J], rows x (q + r) with SampledOperators::rows() rows, three per whole
+// datum and one per datum along a direction. residual: whitened d - A u - common error, rows.
+// normal_factor: lower factor of I + [common J]^T [common J]. Allocates.
 double gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction& contact,
                               const FieldRebuild& rebuild,
                               const Eigen::Ref<const Eigen::MatrixXd>& jacobian,

@@ -10,12 +10,14 @@ namespace {
 
 namespace blas = linalg::blas;
 
-// Gains in ln p. Below the first the present scales will do: they are those of the update before, as a rule, and
-// new ones cost another search for the contact set. The second is one that no estimate shows.
+// Gains in ln p. Below the first the present scales will do: they are those of the update before,
+// as a rule, and new ones cost another search for the contact set. The second is one that no
+// estimate shows.
 constexpr double kWorthwhile = 0.5;
 constexpr double kConverged = 0.02;
 constexpr int kMaxSteps = 12;
-// Scoring assumes that the data are as the scales say; far from that its steps are cut to a factor e in s.
+// Scoring assumes that the data are as the scales say; far from that its steps are cut to a factor
+// e in s.
 constexpr double kLongestStep = 2.0;
 
 }  // namespace

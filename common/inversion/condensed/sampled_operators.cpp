@@ -8,8 +8,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/condensed/gather_rows.hpp"
+#include "common/inversion/contract/data_check.hpp"
 
 namespace brainshift::inversion {
 SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,

@@ -3,25 +3,26 @@
 //
 //   free_body   R^-1/2 [common error | A U | d]     rows x (q + r + 1)
 //   contact     R^-1/2 A G_A         rows x k
-// A whole displacement has three rows, a datum along a direction n one, n . (A U) and so on; R holds sd^2 / weight.
-// Rows of U and G near the data region are kept in arrays of their own, small enough for the cache. A datum that
-// touches another node is sampled from the full arrays, and what the modes leave out of the prior there is
-// added to its variance (CondensedOperators::truncated_variance_mm2), so that it is not believed too much.
-// Does not allocate after reserve().
+// A whole displacement has three rows, a datum along a direction n one, n . (A U) and so on; R
+// holds sd^2 / weight. Rows of U and G near the data region are kept in arrays of their own, small
+// enough for the cache. A datum that touches another node is sampled from the full arrays, and what
+// the modes leave out of the prior there is added to its variance
+// (CondensedOperators::truncated_variance_mm2), so that it is not believed too much. Does not
+// allocate after reserve().
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/core/error.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/linalg/blas.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/mode_window.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/condensed_operators.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
 
@@ -32,12 +33,12 @@ class SampledOperators {
                    OutsideRegion outside, ThreadTeam& team);
 
   void reserve(int data);
-  // Locates the data. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside
-  // the brain, or outside the region where the case refuses that (named). Preconditions: check_data;
+  // Locates the data. kInvalidArgument for a datum farther than kOutsideTolerance_mm outside the
+  // brain, or outside the region where the case refuses that (named). Preconditions: check_data;
   // reserve(data.size()).
   Status locate(const SparseData& data);
-  // Fills free_body for the data that locate() was given. scale: of the prior's standard deviation, for what the modes
-  // leave out. weights: robust weight per datum, > 0.
+  // Fills free_body for the data that locate() was given. scale: of the prior's standard deviation,
+  // for what the modes leave out. weights: robust weight per datum, > 0.
   void sample(const SparseData& data, double scale, const Eigen::Ref<const VecX>& weights);
   int size() const { return size_; }
   int rows() const { return first_row_[static_cast<std::size_t>(size_)]; }
@@ -48,7 +49,8 @@ class SampledOperators {
   // mm, with what the modes leave out and the robust weight.
   double sd(int datum) const { return sd_[datum]; }
   auto free_body() const { return free_body_.topLeftCorner(rows(), common_ + window_.count + 1); }
-  // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), rows x window.first.
+  // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), rows x
+  // window.first.
   auto modes_before() const { return before_.topRows(rows()); }
   // Valid until the next call.
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
@@ -59,7 +61,8 @@ class SampledOperators {
   Status refuse(const SparseData& data, int datum, const std::string& where);
   // The rows of one datum in a column of rows().
   void put(const Vec3& value, int datum, double* column) const;
-  // out = R^-1/2 A (array column); `array` has 3n rows when any datum lies outside the region, else 3e rows.
+  // out = R^-1/2 A (array column); `array` has 3n rows when any datum lies outside the region, else
+  // 3e rows.
   void sample_column(const float* array, double* out) const;
 
   std::shared_ptr<const CondensedOperators> operators_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// MovingData: data that depend on where the brain is, such as distances to a measured surface, whose
-// closest points move with the estimate.
+// MovingData: data that depend on where the brain is, such as distances to a measured surface,
+// whose closest points move with the estimate.
 #pragma once
 
 #include <functional>

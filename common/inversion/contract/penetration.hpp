@@ -11,8 +11,8 @@ namespace brainshift::inversion {
 inline constexpr double kPenetrationTolerance_mm = 0.01;
 
 struct PenetrationSummary {
-  int penetrating = 0;   // slaves above the tolerance
-  double max_mm = 0.0;   // 0 when no slave penetrates
+  int penetrating = 0;  // slaves above the tolerance
+  double max_mm = 0.0;  // 0 when no slave penetrates
 };
 
 // penetration: one per slave, mm, negative where the slave is open.

@@ -45,7 +45,8 @@ class Direction {
 }  // namespace
 
 Result<Estimate> conjugate_gradients(const PreparedModel& model, const SparseData& data,
-                                     const InversionOptions& options, contact::PenalisedSystem& system) {
+                                     const InversionOptions& options,
+                                     contact::PenalisedSystem& system) {
   DescentLog log(model.config().inversion, options, data);
   const auto misfit = Misfit::build(model, data);
   if (!misfit) return tl::unexpected(misfit.error());

@@ -14,8 +14,8 @@
 
 namespace brainshift::inversion {
 
-// Precondition: check_data(data) and check_whole(data) are ok. Errors of the method; kInternal for a
-// method that is not in the table.
+// Precondition: check_data(data) and check_whole(data) are ok. Errors of the method; kInternal for
+// a method that is not in the table.
 Result<Estimate> descend(const PreparedModel& model, Method method, const SparseData& data,
                          const InversionOptions& options);
 

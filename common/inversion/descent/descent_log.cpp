@@ -32,9 +32,7 @@ void summarise_contact(const contact::PenalisedSystem& system, Estimate& estimat
 
 DescentLog::DescentLog(const InversionConfig& config, const InversionOptions& options,
                        const SparseData& data)
-    : config_(config),
-      options_(options),
-      previous_misfit_(3, 0) {
+    : config_(config), options_(options), previous_misfit_(3, 0) {
   estimate_.initial_misfit_mm = mean_std_of_norms(data.displacements);
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DescentLog: what every descent method does once per iteration beside its mathematics. It looks whether
-// the caller asked to stop, records the iterate, hands it to on_iterate, and tests the paper's stop rule
+// DescentLog: what every descent method does once per iteration beside its mathematics. It looks
+// whether the caller asked to stop, records the iterate, hands it to on_iterate, and tests the
+// paper's stop rule
 //
-//   mean_i |e_i^k - e_i^{k-1}| < relative_misfit_change mean_i |e_i^1|                         (eq. 17)
+//   mean_i |e_i^k - e_i^{k-1}| < relative_misfit_change mean_i |e_i^1|                     (eq. 17)
 //
 // where e^1 is the misfit before anything is estimated: the data themselves.
 #pragma once

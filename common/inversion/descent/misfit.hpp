@@ -6,17 +6,17 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/core/types.hpp"
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
 
 class Misfit {
  public:
-  // Errors as fem::sampling_matrix: a datum outside the brain by more than kOutsideTolerance_mm. Keeps a
-  // reference to `data`.
+  // Errors as fem::sampling_matrix: a datum outside the brain by more than kOutsideTolerance_mm.
+  // Keeps a reference to `data`.
   static Result<Misfit> build(const PreparedModel& model, const SparseData& data);
 
   // A u

@@ -9,7 +9,8 @@
 namespace brainshift::inversion {
 
 Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& data,
-                                  const InversionOptions& options, contact::PenalisedSystem& system) {
+                                  const InversionOptions& options,
+                                  contact::PenalisedSystem& system) {
   DescentLog log(model.config().inversion, options, data);
   const auto misfit = Misfit::build(model, data);
   if (!misfit) return tl::unexpected(misfit.error());

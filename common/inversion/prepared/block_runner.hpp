@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// BlockRunner: work on many columns, in blocks dealt to the cores in a fixed partition; every core has its own
-// solver. What a block gives does not depend on the core that worked on it: results are bit-identical for any
-// number of threads, as long as blocks write to different places.
+// BlockRunner: work on many columns, in blocks dealt to the cores in a fixed partition; every core
+// has its own solver. What a block gives does not depend on the core that worked on it: results are
+// bit-identical for any number of threads, as long as blocks write to different places.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,8 @@ namespace brainshift::inversion {
 
 class BlockRunner {
  public:
-  // Right-hand sides per block: from here on a solve is bound by arithmetic, no longer by reading the factor.
+  // Right-hand sides per block: from here on a solve is bound by arithmetic, no longer by reading
+  // the factor.
   static constexpr int kBlock = 64;
 
   // Keeps a reference to the model. threads: 0 means as many as cores.
@@ -32,8 +33,8 @@ class BlockRunner {
           model.forward().stiffness(), model.forward().factor(), model.forward().dofs()));
     }
   }
-  // Status work(first, count, solver) for column ranges that cover [0, columns). kUnavailable when stopped; else
-  // the error of a block, after which no other is begun.
+  // Status work(first, count, solver) for column ranges that cover [0, columns). kUnavailable when
+  // stopped; else the error of a block, after which no other is begun.
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
     const int blocks = (columns + kBlock - 1) / kBlock;

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "common/core/random.hpp"
-#include "common/linalg/blas.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/control_nodes.hpp"
 #include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/memory_limit.hpp"
+#include "common/linalg/blas.hpp"
 #include "common/prior/load_modes.hpp"
 
 namespace brainshift::inversion {
@@ -22,16 +22,17 @@ using Eigen::MatrixXd;
 using Eigen::MatrixXf;
 
 constexpr int kBlock = BlockRunner::kBlock;
-// Test vectors beyond the modes that are kept. Far more than the 5 to 10 that Halko et al. recommend, because the
-// spectrum falls slowly: 32 left 0.013 mm in a swollen brain with 659 active slaves, about 200 left 0.008 mm.
+// Test vectors beyond the modes that are kept. Far more than the 5 to 10 that Halko et al.
+// recommend, because the spectrum falls slowly: 32 left 0.013 mm in a swollen brain with 659 active
+// slaves, about 200 left 0.008 mm.
 constexpr int kOversampling = 192;
-// Weight of slaves in the test vectors, against 1 near the data: they matter through contact only. On the default
-// head 0.1 halves the error of 0 and of 0.3 (docs/decisions/0008).
+// Weight of slaves in the test vectors, against 1 near the data: they matter through contact only.
+// On the default head 0.1 halves the error of 0 and of 0.3 (docs/decisions/0008).
 constexpr double kSlaveWeight = 0.1;
 // Control nodes at which diag(C) is computed; it is smooth, and interpolated to the others.
 constexpr int kVarianceNodes = 128;
-// A control node with less weight in the interpolation at a node has no say there. At a control node
-// its own weight is all but 1.
+// A control node with less weight in the interpolation at a node has no say there. At a control
+// node its own weight is all but 1.
 constexpr float kLeastControlWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PreparedModel -> CondensedOperators: the long work before surgery, blocked multi-right-hand-side solves.
+// PreparedModel -> CondensedOperators: the long work before surgery, blocked multi-right-hand-side
+// solves.
 //
-// Right-hand sides are solved in blocks of kBlock columns, blocks dealt to the cores in a fixed partition, one
-// BLAS thread each, so the result is bit-identical from run to run. Only G (float), the sketch (3n x q,
-// double) and two blocks per core are held at a time.
+// Right-hand sides are solved in blocks of kBlock columns, blocks dealt to the cores in a fixed
+// partition, one BLAS thread each, so the result is bit-identical from run to run. Only G (float),
+// the sketch (3n x q, double) and two blocks per core are held at a time.
 //   1. G = K^-1 N block by block; Phi from the same blocks
-//   2. sketch F = K^-1 Sigma_k K^-1 Omega; Omega^T F = V Lambda V^T; U_k = F V Lambda^-1/2, leading columns
+//   2. sketch F = K^-1 Sigma_k K^-1 Omega; Omega^T F = V Lambda V^T;
+//      U_k = F V Lambda^-1/2, leading columns
 //   3. load modes K^-1 M
 //   4. diag(C) at the control nodes: |Sigma_k^1/2 K^-1 e|^2 by one more solve per control dof
 #pragma once
@@ -14,15 +16,15 @@
 #include <functional>
 #include <stop_token>
 
-#include "common/values/condensed_operators.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
-// Keeps finished blocks of contact columns, so that an interrupted preparation can go on. Called by one thread
-// at a time.
+// Keeps finished blocks of contact columns, so that an interrupted preparation can go on. Called by
+// one thread at a time.
 struct BlockStore {
   // Fills both arrays, which have the shape of the block; false when block `index` is not kept.
   std::function<bool(int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance)> load;
@@ -37,8 +39,8 @@ struct CondenseOptions {
   int threads = 0;       // 0: as many as cores
 };
 
-// kInvalidArgument when condensed.memory_limit_gib is below the factor and condense_memory_bytes (the sentence
-// names both); kUnavailable when stopped; kNotFinite.
+// kInvalidArgument when condensed.memory_limit_gib is below the factor and condense_memory_bytes
+// (the sentence names both); kUnavailable when stopped; kNotFinite.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A few nodes spread over the mesh, and interpolation from them to every node; for fields that vary slowly, such
-// as a standard deviation.
+// A few nodes spread over the mesh, and interpolation from them to every node; for fields that vary
+// slowly, such as a standard deviation.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace brainshift::inversion {
 
-// `count` nodes (all, if there are fewer), each the farthest from those before it, beginning with node 0: every
-// leading part of the list is spread over the mesh too. nodes: 3 x n, mm.
+// `count` nodes (all, if there are fewer), each the farthest from those before it, beginning with
+// node 0: every leading part of the list is spread over the mesh too. nodes: 3 x n, mm.
 std::vector<NodeIndex> spread_nodes(const Points& nodes, int count);
 
 // Interpolation by inverse squared distance to the four nearest sources (Shepard 1968).

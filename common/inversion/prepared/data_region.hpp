@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The data region: the nodes near the places where data are measured. Condensed operators are prepared
-// for them. (A scene's region of interest is something else: the nodes where an answer is wanted.)
+// The data region: the nodes near the places where data are measured. Condensed operators are
+// prepared for them. (A scene's region of interest is something else: the nodes where an answer is
+// wanted.)
 #pragma once
 
 #include <vector>

@@ -6,8 +6,8 @@
 
 namespace brainshift::inversion {
 
-// Median of 15 single solves after one that warms up, ms. Takes 16 solves of time: about half a second
-// on the default head.
+// Median of 15 single solves after one that warms up, ms. Takes 16 solves of time: about half a
+// second on the default head.
 double measure_full_solve_ms(const PreparedModel& model);
 
 }  // namespace brainshift::inversion

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
-#include "common/linalg/blas.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/memory_limit.hpp"
+#include "common/linalg/blas.hpp"
+#include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -86,7 +86,7 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
     MatrixXd forces;
     model.prior().apply_kernel(x.middleCols(first, count), forces);
     linalg::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
-                                   result.covariance.block(first, first, h - first, count));
+                                      result.covariance.block(first, first, h - first, count));
     return {};
   };
   auto status = runner.run("influence columns", h, solve_block);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// OutputOperators: the whole prior, seen through the outputs y = H u that data and contact can touch.
+// OutputOperators: the whole prior, seen through the outputs y = H u that data and contact can
+// touch.
 //
-//   H = [E; Q]              E: the three components at each node of the data region; Q: N^T, slave normals
+//   H = [E; Q]              E: the three components at each node of the data region; Q: N^T, slave
+//                           normals
 //   Phi = H K^-1 H^T        what unit forces at the outputs move there, mm/N
 //   Psi = H C H^T           prior covariance of the free body's outputs, mm^2;  C = K^-1 Sigma K^-1
-// h = 3 |region| + s rows: first the region, node by node, then the slaves. Double precision throughout.
+// h = 3 |region| + s rows: first the region, node by node, then the slaves. Double precision
+// throughout.
 #pragma once
 
 #include <cstdint>
@@ -25,10 +28,10 @@ struct OutputOperators {
   Eigen::Index region_rows() const { return 3 * static_cast<Eigen::Index>(region.size()); }
 };
 
-// h solves and 3 n h^2 multiplications, dealt to the cores in a fixed partition: bit-identical for any number of
-// threads. progress: stages "influence columns" and "prior covariance". kInvalidArgument when
-// condensed.memory_limit_gib is below the factor and output_operators_bytes (the sentence names both);
-// kUnavailable when stopped; kNotFinite.
+// h solves and 3 n h^2 multiplications, dealt to the cores in a fixed partition: bit-identical for
+// any number of threads. progress: stages "influence columns" and "prior covariance".
+// kInvalidArgument when condensed.memory_limit_gib is below the factor and output_operators_bytes
+// (the sentence names both); kUnavailable when stopped; kNotFinite.
 Result<OutputOperators> output_operators(const PreparedModel& model, const Progress& progress = {},
                                          const std::stop_token& stop = {}, int threads = 0);
 

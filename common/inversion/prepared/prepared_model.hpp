@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// PreparedModel: forward model, factorised, and prior of a patient: all that the methods which solve with
-// the factor need and that does not depend on what is measured during surgery. Built once per boundary
-// condition (contact or fixed); inversions only read it. The condensed method prepares more, from it:
-// condense.hpp.
+// PreparedModel: forward model, factorised, and prior of a patient: all that the methods which
+// solve with the factor need and that does not depend on what is measured during surgery. Built
+// once per boundary condition (contact or fixed); inversions only read it. The condensed method
+// prepares more, from it: condense.hpp.
 //
-// Not thread-safe: solves share the factor's workspace. One PreparedModel serves one thread at a time.
+// Not thread-safe: solves share the factor's workspace. One PreparedModel serves one thread at a
+// time.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 
 #include "common/contact/forward_model.hpp"
-#include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/estimate.hpp"
 #include "common/core/progress.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/prior/force_prior.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/case_config.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {
 

@@ -10,8 +10,8 @@
 #include "common/core/random.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/fem/sampling.hpp"
-#include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/prepared/condense.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {

@@ -39,8 +39,8 @@ TEST(Invert, ChecksTheDataBeforeItPrepares) {
   small.condensed.memory_limit_gib = 1e-6;  // any preparation would fail
   const PreparedModel model = prepare(Boundary::kContact, small);
   const SparseData good = sagging_data(model, 0.1);
-  const auto few = invert(model, {good.positions.leftCols(2), good.displacements.leftCols(2),
-                                  good.sd_mm.head(2)});
+  const auto few = invert(
+      model, {good.positions.leftCols(2), good.displacements.leftCols(2), good.sd_mm.head(2)});
   ASSERT_FALSE(few.has_value());
   EXPECT_THAT(few.error().message, testing::HasSubstr("2 points"));
   const auto large = invert(model, good);

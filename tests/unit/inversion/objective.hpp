@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Omega (paper eq. 4) and its gradient for a given active set, from the product's parts: what steps 2 to
-// 5 of steepest_descent.hpp compute, for comparison with finite differences.
+// Omega (paper eq. 4) and its gradient for a given active set, from the product's parts: what steps
+// 2 to 5 of steepest_descent.hpp compute, for comparison with finite differences.
 #pragma once
 
 #include "common/contact/refactorised_system.hpp"

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "common/core/random.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/sparse_data.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {

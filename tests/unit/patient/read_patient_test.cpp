@@ -15,8 +15,8 @@ using ::testing::HasSubstr;
 
 TEST_F(BoxCase, IsReadAndBuiltFromItsFile) {
   std::set<std::string> stages;
-  const auto patient = read_patient(
-      case_file_, [&](std::string_view stage, double) { stages.emplace(stage); });
+  const auto patient =
+      read_patient(case_file_, [&](std::string_view stage, double) { stages.emplace(stage); });
   ASSERT_TRUE(patient.has_value()) << patient.error().message;
   EXPECT_EQ(patient->config.file, case_file_);
   EXPECT_EQ(patient->model.case_id, patient->config.case_id);

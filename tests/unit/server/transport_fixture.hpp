@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A daemon on a free loopback port, with a fake inversion, and raw sockets that may say anything to it.
+// A daemon on a free loopback port, with a fake inversion, and raw sockets that may say anything to
+// it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,9 +18,9 @@
 
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
+#include "server/service/service.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
-#include "server/service/service.hpp"
 #include "tests/unit/server/fake_session.hpp"
 #include "tests/unit/server/sample_values.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <gmock/gmock.h>
 
-#include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/output_operators.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
@@ -20,7 +20,8 @@ class CondensedExactly : public Condensed {
     EXPECT_TRUE(made.has_value());
     return std::move(*made);
   }
-  // The data moved off the nodes, into the tetrahedra: all weights count. Those that leave the region stay.
+  // The data moved off the nodes, into the tetrahedra: all weights count. Those that leave the
+  // region stay.
   static SparseData between_nodes(SparseData data) {
     Random random(11);
     std::vector<char> in_region(static_cast<std::size_t>(patient()->mesh.num_nodes()), 0);

@@ -119,8 +119,8 @@ TEST_P(Condensed, ASourceThatContradictsTheOthersIsSaid) {
   EXPECT_THAT(estimate.reason, HasSubstr("\"pointer\" contradicts the other sources"));
 }
 
-// Data given as a function of the displacement converge to the fixed point; here the place of each datum shifts by a
-// tenth of the displacement at one node.
+// Data given as a function of the displacement converge to the fixed point; here the place of each
+// datum shifts by a tenth of the displacement at one node.
 TEST_P(Condensed, MovingDataAreMeasuredAnewUntilTheyStay) {
   const SparseData start = sagging_data(GetParam(), 0.2);
   const NodeIndex node = operators(GetParam())->region.front();
@@ -182,7 +182,8 @@ TEST_P(Condensed, EstimateWithEstimatedScalesEqualsTheDirectPosteriorOfTheScaled
             kFloatTolerance * direct.mean.cwiseAbs().maxCoeff());
 }
 
-// Equal in the data region; elsewhere the modes leave variance out, which is added as that of the free body.
+// Equal in the data region; elsewhere the modes leave variance out, which is added as that of the
+// free body.
 TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
   const SparseData data = sagging_data(GetParam(), 0.3);
   Estimate estimate;
@@ -243,8 +244,11 @@ TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
   }
 }
 
-// With estimated scales, the default, the scales and the contact set settle in turn: a warm start may
-// settle elsewhere. See kWarmScales.
+// With estimated scales, the default, the scales and the contact set settle in turn, and a fit that
+// gains less than kWorthwhile in ln p is not made (prior_scales.cpp): a warm start may stay at
+// scales that a cold start would not find. A warm answer is not the cold one. On this patient they
+// are 2 % of the largest displacement apart at most; on a head up to a quarter of the field error
+// has been seen.
 TEST_P(Condensed, WarmStartWithEstimatedScalesStaysNearAColdStart) {
   CaseConfig with = config();
   with.prior.estimate_scales = true;
@@ -260,12 +264,11 @@ TEST_P(Condensed, WarmStartWithEstimatedScalesStaysNearAColdStart) {
     ASSERT_TRUE(warm.update(data, a));
     ASSERT_TRUE(cold.update(data, b));
     const double largest_mm = b.displacement.colwise().norm().maxCoeff();
-    worst = std::max(worst,
-                     (a.displacement - b.displacement).colwise().norm().maxCoeff() / largest_mm);
+    worst =
+        std::max(worst, (a.displacement - b.displacement).colwise().norm().maxCoeff() / largest_mm);
   }
-  RecordProperty("worst", std::to_string(worst));
-  std::printf("warm against cold: %g of the largest displacement\n", worst);
-  EXPECT_LT(worst, 0.1);
+  EXPECT_LT(worst, 0.03) << "of the largest displacement";
+  EXPECT_GT(worst, 1e-3) << "if they agree, say so in the headers";
 }
 
 TEST_P(Condensed, ResetMakesRunsBitIdentical) {
@@ -396,49 +399,54 @@ TEST_F(Condensed, DataOutsideTheRegionAreRefusedWhereTheCaseSaysSo) {
   EXPECT_TRUE(estimate.displacement == before);
 }
 
-// condensed.outside_region = extend: a datum away from the region is sampled from the whole arrays, and
-// the variance that the modes leave out of the prior there is added to its own.
+// condensed.outside_region = extend: a datum away from the region is sampled from the whole arrays,
+// and the variance that the modes leave out of the prior there is added to its own.
 TEST_F(Condensed, DataFarFromTheRegionAreBelievedLess) {
-  CondensedOptions few;
-  few.rank = 12;
+  CaseConfig coarse = config();
+  coarse.condensed.max_rank = 12;  // so few modes leave much of the prior out
+  const auto model = PreparedModel::prepare(patient(), coarse, Boundary::kContact);
+  ASSERT_TRUE(model.has_value());
+  const CondensedOperators given = std::move(*condense(*model));
+  const auto update = [&](const CondensedOperators& with, const SparseData& data) {
+    auto inverter = CondensedInverter::build(
+        std::make_shared<const CondensedOperators>(with),
+        std::make_shared<const geometry::TetLocator>(patient()->mesh), coarse);
+    Estimate estimate;
+    EXPECT_TRUE(inverter->update(data, estimate));
+    return estimate;
+  };
+  // The modes' own field, so that no datum is an outlier, but for the one that is far.
   SparseData data = sagging_data(Boundary::kContact, 0.0);
+  data.displacements *= 0.05;
   const Vec3 far(5, 5, 5);  // from tumour and craniotomy
   data.positions.col(0) = far;
-  Estimate extended;
-  ASSERT_TRUE(Condensed::inverter(Boundary::kContact, few).update(data, extended));
+  data.displacements.col(0) = Vec3(0.5, -0.5, 0.5);
+  const Estimate extended = update(given, data);
 
-  const auto& given = *operators(Boundary::kContact);
-  const geometry::TetLocation at = prepared(Boundary::kContact).locator().locate(far);
+  const geometry::TetLocation at = model->locator().locate(far);
   double left_out_mm2 = 0.0;
   for (int k = 0; k < 4; ++k) {
     const int node = at.nodes[k];
     if (std::binary_search(given.region.begin(), given.region.end(), node)) continue;
     for (int c = 0; c < 4; ++c) {
-      left_out_mm2 += at.weights[k] * given.control_weights(c, node) *
+      left_out_mm2 += at.weights[k] * static_cast<double>(given.control_weights(c, node)) *
                       given.truncated_variance_mm2[given.control_neighbours(c, node)];
     }
   }
   ASSERT_GT(std::sqrt(left_out_mm2), data.sd_mm[0]) << "the test shows nothing";
 
   // Operators that leave nothing out, and a datum that says itself how little it is worth.
-  auto complete = given;
+  CondensedOperators complete = given;
   complete.truncated_variance_mm2.setZero();
-  const auto update_complete = [&](const SparseData& with) {
-    auto inverter = CondensedInverter::build(
-        std::make_shared<const CondensedOperators>(complete),
-        std::make_shared<const geometry::TetLocator>(patient()->mesh), config(), few);
-    Estimate estimate;
-    EXPECT_TRUE(inverter->update(with, estimate));
-    return estimate;
-  };
   SparseData worth_less = data;
   worth_less.sd_mm[0] = std::sqrt(data.sd_mm[0] * data.sd_mm[0] + left_out_mm2);
   const double scale_mm = extended.displacement.cwiseAbs().maxCoeff();
-  // The same equations in another order of sums.
-  EXPECT_LT((update_complete(worth_less).displacement - extended.displacement).cwiseAbs().maxCoeff(),
-            1e-6 * scale_mm);
+  // The same equations; the sums of the variance are in another order.
+  EXPECT_LT(
+      (update(complete, worth_less).displacement - extended.displacement).cwiseAbs().maxCoeff(),
+      1e-6 * scale_mm);
   // Believed as it stands, the datum would move the estimate.
-  EXPECT_GT((update_complete(data).displacement - extended.displacement).cwiseAbs().maxCoeff(),
+  EXPECT_GT((update(complete, data).displacement - extended.displacement).cwiseAbs().maxCoeff(),
             0.01 * scale_mm);
 }
 

@@ -11,8 +11,8 @@ namespace {
 
 using testing::ElementsAre;
 
-// Three slaves. Slave i penetrates by its depth until it is active and then presses, but for the slaves
-// of `flips`, which pull as soon as they are active.
+// Three slaves. Slave i penetrates by its depth until it is active and then presses, but for the
+// slaves of `flips`, which pull as soon as they are active.
 struct ScriptedMethod {
   explicit ScriptedMethod(VecX when_open, std::vector<bool> pulling = {false, false, false})
       : depths(std::move(when_open)), flips(std::move(pulling)) {}

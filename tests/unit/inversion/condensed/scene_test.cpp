@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a scene leaves out costs no more than the update says: true differences on many scenes of the toy patient.
+// What a scene leaves out costs no more than the update says: true differences on many scenes of
+// the toy patient.
 #include <gmock/gmock.h>
 
 #include "common/inversion/condensed/omission_estimates.hpp"
@@ -35,7 +36,8 @@ class Scene : public ::testing::Test {
     return std::move(*made);
   }
 
-  // Noisy displacements of the tumour's vertices; sag in units of the brain's weight, sideways a uniform force.
+  // Noisy displacements of the tumour's vertices; sag in units of the brain's weight, sideways a
+  // uniform force.
   struct Truth {
     double sag;
     Vec3 sideways_n;
@@ -81,8 +83,8 @@ class Scene : public ::testing::Test {
     return (a.displacement - b.displacement).colwise().norm().maxCoeff();
   }
 
-  // The estimate bounds the true difference in every scene, and is not more than `silly` times it where that is
-  // worth speaking of (0.1 mm). Returns the greatest difference.
+  // The estimate bounds the true difference in every scene, and is not more than `silly` times it
+  // where that is worth speaking of (0.1 mm). Returns the greatest difference.
   static double check_bound(const CondensedOptions& options, double OmissionErrors::*error,
                             double silly) {
     auto everything = inverter(), without = inverter(options);
@@ -116,7 +118,8 @@ class Scene : public ::testing::Test {
   }
 };
 
-// The true difference is 0.9 to 1.5 times the greatest ignored penetration, of which the estimate is twice.
+// The true difference is 0.9 to 1.5 times the greatest ignored penetration, of which the estimate
+// is twice.
 TEST_F(Scene, EstimateForContactForcedOffBoundsTheTrueDifference) {
   CondensedOptions options;
   options.contact = false;
@@ -138,8 +141,8 @@ TEST_F(Scene, EstimateForTheFarFieldBoundsTheTrueDifference) {
   }
 }
 
-// What field_rebuild.hpp promises: a node of the region has the displacement that it has in the whole
-// field, whatever the shape of the arrays that it is summed in.
+// What field_rebuild.hpp promises: a node of the region has the displacement that it has in the
+// whole field, whatever the shape of the arrays that it is summed in.
 TEST_F(Scene, RegionOfInterestIsRebuiltAsInTheWholeField) {
   CondensedOptions options;
   options.region_of_interest = near_tumour(20.0);
@@ -196,7 +199,8 @@ TEST_F(Scene, UncertaintyForcedOffLeavesDisplacementsAsTheyAre) {
   }
 }
 
-// Where no slave penetrates the free body is the answer: one set, no force, and no difference to contact off.
+// Where no slave penetrates the free body is the answer: one set, no force, and no difference to
+// contact off.
 TEST_F(Scene, ContactThatDoesNotTouchIsLeftOutExactly) {
   CondensedOptions off;
   off.contact = false;

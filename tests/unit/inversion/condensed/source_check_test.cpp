@@ -67,8 +67,8 @@ TEST(SourceCheck, DegreesOfFreedomAreWhatTheSourceCanSay) {
   EXPECT_NEAR(drawn(3).check_second().degrees_of_freedom, 10.0, 0.1);
 }
 
-// The statistic for a source with all its rows, from the covariance of the innovation, minus the rows that are noise to
-// everyone, is the same up to the damping.
+// The statistic for a source with all its rows, from the covariance of the innovation, minus the
+// rows that are noise to everyone, is the same up to the damping.
 TEST(SourceCheck, EqualsTheInnovationStatisticOfTheRowsThatSeeTheUnknowns) {
   const Problem problem = drawn(11);
   const MatrixXd first = problem.jacobian.topRows(kFirst);

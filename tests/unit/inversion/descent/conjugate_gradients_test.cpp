@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "common/inversion/invert.hpp"
-#include "common/inversion/descent/misfit.hpp"
 #include "common/contact/refactorised_system.hpp"
+#include "common/inversion/descent/misfit.hpp"
+#include "common/inversion/invert.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {
@@ -57,8 +57,9 @@ TEST(ConjugateGradients, NeedFewerIterationsThanSteepestDescentForTheSameError) 
   RecordProperty("steepest", steepest);
 }
 
-// With contact no dense formula exists, but a minimum for the last active set satisfies w = W_b b = lambda / 2: the
-// forcing that the misfit of the estimate implies must give the estimate back. Other code evaluates it.
+// With contact no dense formula exists, but a minimum for the last active set satisfies w = W_b b =
+// lambda / 2: the forcing that the misfit of the estimate implies must give the estimate back.
+// Other code evaluates it.
 TEST(ConjugateGradients, EndAtAFixedPointOfTheirLastActiveSet) {
   const PreparedModel model = prepare(Boundary::kContact, tight_config(400));
   SparseData data = sagging_data(model, 0.1);
@@ -87,7 +88,8 @@ TEST(ConjugateGradients, EndAtAFixedPointOfTheirLastActiveSet) {
   EXPECT_LT((u - estimate->displacement).cwiseAbs().maxCoeff(), 1e-3);
 }
 
-// Where both settle, contact included; the paper's own stop rule ends steepest descent long before on stiff data.
+// Where both settle, contact included; the paper's own stop rule ends steepest descent long before
+// on stiff data.
 TEST(ConjugateGradients, MeetSteepestDescentAtTheSameMinimumWithContact) {
   const PreparedModel model = prepare(Boundary::kContact, tight_config(2000));
   SparseData data = sagging_data(model, 0.1);

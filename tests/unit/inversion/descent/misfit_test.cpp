@@ -51,7 +51,8 @@ TEST(Misfit, RefusesADatumOutsideTheBrain) {
   EXPECT_FALSE(Misfit::build(model, data).has_value());
 }
 
-// Omega is quadratic for a given set: it must be higher on either side of the exact step, by the same amount.
+// Omega is quadratic for a given set: it must be higher on either side of the exact step, by the
+// same amount.
 TEST(LineSearch, StepsToTheMinimumOfTheObjective) {
   const PreparedModel model = prepare(Boundary::kContact);
   const SparseData data = uneven_data(model);

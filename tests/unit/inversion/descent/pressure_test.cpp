@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inversion with pore pressure: one implicit step of consolidation in the place of drained elasticity.
+// Inversion with pore pressure: one implicit step of consolidation in the place of drained
+// elasticity.
 #include <gmock/gmock.h>
 
 #include <Eigen/LU>
 
-#include "common/inversion/prepared/condense.hpp"
-#include "common/inversion/condensed/condensed_inverter.hpp"
-#include "common/inversion/prepared/data_region.hpp"
-#include "common/inversion/invert.hpp"
 #include "common/contact/refactorised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
+#include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/invert.hpp"
+#include "common/inversion/prepared/condense.hpp"
+#include "common/inversion/prepared/data_region.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {
@@ -54,7 +55,8 @@ double relative_difference(const Points& a, const Points& b) {
   return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
 }
 
-// K_b = K + G C^-1 G^T, and the contact stiffness of the active slaves, as a dense matrix in the unknowns.
+// K_b = K + G C^-1 G^T, and the contact stiffness of the active slaves, as a dense matrix in the
+// unknowns.
 Eigen::MatrixXd dense_stiffness(const PreparedModel& model, const contact::ActiveSet& active) {
   const contact::ForwardModel& forward = model.forward();
   const TetMesh& mesh = model.model().mesh;
@@ -188,8 +190,8 @@ TEST(Pressure, EveryMethodWithAFactorCarriesIt) {
   ASSERT_GT(exact.contact.active, 0);
   EXPECT_LT(relative_difference(condensed_estimate(model, data).displacement, exact.displacement),
             1e-3);
-  // The minimum of the same objective for their own active set, when they are let run until they are
-  // there and the data pull weakly enough for that to take hundreds of iterations only.
+  // The minimum of the same objective for their own active set, when they are let run until they
+  // are there and the data pull weakly enough for that to take hundreds of iterations only.
   CaseConfig patience = with_pressure(0.2);
   patience.inversion.relative_misfit_change = 1e-10;
   patience.inversion.max_iterations = 2000;

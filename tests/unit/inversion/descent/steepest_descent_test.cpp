@@ -30,8 +30,8 @@ TEST_P(Inversion, ForwardSolveIsSelfAdjoint) {
   EXPECT_NEAR(left, right, 1e-11 * std::abs(left));
 }
 
-// gradient . direction against central differences of Omega(b), b = Sigma w. Omega is quadratic for a given
-// active set, so central differences are exact up to rounding.
+// gradient . direction against central differences of Omega(b), b = Sigma w. Omega is quadratic for
+// a given active set, so central differences are exact up to rounding.
 TEST_P(Inversion, GradientEqualsFiniteDifferences) {
   const PreparedModel model = prepare(GetParam());
   const SparseData data = sagging_data(model, 0.3);
@@ -62,8 +62,8 @@ TEST_F(Inversion, ContactForcesOfTheGradientDependOnTheActiveSet) {
   EXPECT_GT((open->gradient - closed->gradient).norm(), 1e-3 * open->gradient.norm());
 }
 
-// Independent reference: with the fixed boundary the minimiser is linear in the data. Steepest descent with a tiny
-// stop tolerance must approach it.
+// Independent reference: with the fixed boundary the minimiser is linear in the data. Steepest
+// descent with a tiny stop tolerance must approach it.
 TEST_F(Inversion, ApproachesTheDensePosteriorMean) {
   CaseConfig config = test_support::toy_config();
   config.inversion.relative_misfit_change = 1e-9;

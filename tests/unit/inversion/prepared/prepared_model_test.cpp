@@ -11,9 +11,9 @@ namespace {
 
 TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
   std::set<std::string> stages;
-  const auto model = PreparedModel::prepare(
-      patient(), test_support::toy_config(), Boundary::kFixed,
-      [&](std::string_view stage, double) { stages.emplace(stage); });
+  const auto model =
+      PreparedModel::prepare(patient(), test_support::toy_config(), Boundary::kFixed,
+                             [&](std::string_view stage, double) { stages.emplace(stage); });
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(model->boundary(), Boundary::kFixed);
   EXPECT_EQ(&model->model(), patient().get());
@@ -34,7 +34,8 @@ TEST(PreparedModel, ABodyThatFloatsIsNamed) {
   EXPECT_EQ(model.error().code, ErrorCode::kFloatingBody) << model.error().message;
 }
 
-// The scales multiply standard deviations: twice the scale of all parts is four times the covariance.
+// The scales multiply standard deviations: twice the scale of all parts is four times the
+// covariance.
 TEST(ScaledPrior, MultipliesTheStandardDeviationOfEveryPart) {
   const PreparedModel model = prepare(Boundary::kContact);
   const Points load = Points::Ones(3, patient()->mesh.num_nodes());

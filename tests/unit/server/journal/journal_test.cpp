@@ -216,7 +216,8 @@ void journal_on_a_full_disk(const std::filesystem::path& path) {
 
 TEST(JournalDeathTest, AFullDiskIsReportedAndLeavesAReadableFile) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
-  // The dying process runs this test from its start: it must find the folder of the one that watches.
+  // The dying process runs this test from its start: it must find the folder of the one that
+  // watches.
   constexpr const char* kVariable = "BRAINSHIFT_FULL_DISK_FOLDER";
   std::optional<TemporaryFolder> folder;
   if (getenv(kVariable) == nullptr) setenv(kVariable, folder.emplace().path().c_str(), 1);

@@ -55,8 +55,8 @@ Observation cortex(std::uint64_t sequence, double time_s) {
   return made;
 }
 
-// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers with
-// it.
+// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers
+// with it.
 struct FakeInversion {
   SparseData seen;
   bool fails = false;
@@ -83,10 +83,10 @@ class Sources : public testing::Test {
   Pipeline pipeline(Method method) {
     return std::move(*Pipeline::build(
         patient(), config_, method, Boundary::kContact,
-        std::make_unique<FakeInverter>([this](int call, const SparseData& data, const auto& options,
-                                              Estimate& estimate) {
-          return inversion_(call, data, options, estimate);
-        })));
+        std::make_unique<FakeInverter>(
+            [this](int call, const SparseData& data, const auto& options, Estimate& estimate) {
+              return inversion_(call, data, options, estimate);
+            })));
   }
   Result<Update> run(const Observation& one) { return pipeline_.run(one); }
   std::vector<std::string> used() const {

@@ -18,7 +18,8 @@ namespace {
 
 using testing::HasSubstr;
 
-// Ellipsoid about the origin, latitude and longitude triangles; closed up to its two small polar caps.
+// Ellipsoid about the origin, latitude and longitude triangles; closed up to its two small polar
+// caps.
 TriangleSurface ellipsoid(const Vec3& axes) {
   constexpr int kRings = 24;
   constexpr int kSectors = 48;
@@ -210,8 +211,8 @@ TEST(Pipeline, RefusesLandmarksThatDoNotPairUpOrAreTooFew) {
 }
 
 TEST(Pipeline, AnErrorOfTheInversionPassesThroughUnchanged) {
-  auto failing = std::make_unique<FakeInverter>(
-      [](int, const SparseData&, const auto&, Estimate&) -> Status {
+  auto failing =
+      std::make_unique<FakeInverter>([](int, const SparseData&, const auto&, Estimate&) -> Status {
         return fail(ErrorCode::kNotConverged, "the reason");
       });
   const auto update = pipeline_on(model(), {}, std::move(failing)).run(landmarks(1));
@@ -314,8 +315,7 @@ TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
 
 TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
   for (const Method method : kAllMethods) {
-    const auto update =
-        pipeline(FakeInversion{}, Boundary::kContact, {}, method).run(landmarks(1));
+    const auto update = pipeline(FakeInversion{}, Boundary::kContact, {}, method).run(landmarks(1));
     ASSERT_TRUE(update.has_value());
     EXPECT_EQ(leaves_out(*update, "uncertainty"), method != Method::kCondensed)
         << to_string(method);
@@ -381,8 +381,8 @@ TEST(Pipeline, RotationForcedOnIsNotLeftOutWhereASphereCannotShowIt) {
 TEST(Pipeline, NeedsATumourSurface) {
   auto without = std::make_shared<BrainModel>(*model());
   without->tumour = {};
-  const auto built = Pipeline::build(without, {}, Method::kPaper, Boundary::kContact,
-                                     FakeInversion{}.make());
+  const auto built =
+      Pipeline::build(without, {}, Method::kPaper, Boundary::kContact, FakeInversion{}.make());
   ASSERT_FALSE(built.has_value());
   EXPECT_EQ(built.error().code, ErrorCode::kEmptySet);
 }
@@ -413,8 +413,8 @@ TEST(ConsolidationTime, GrowsWithTheSquareOfTheSize) {
   EXPECT_NEAR(consolidation_time_s(cube(100.0), Material{}) / small, 4.0, 1e-12);
 }
 
-// Terzaghi's layer of thickness 1, drained at x = 0, sealed at x = 1, in finite differences: the pressure that is
-// left is the settlement that is missing.
+// Terzaghi's layer of thickness 1, drained at x = 0, sealed at x = 1, in finite differences: the
+// pressure that is left is the settlement that is missing.
 TEST(UndrainedFraction, BoundsWhatALayerThatConsolidatesIsMissing) {
   constexpr int kCells = 100;
   constexpr double kStep = 0.4 / (kCells * kCells);  // explicit Euler is stable below 0.5 h^2

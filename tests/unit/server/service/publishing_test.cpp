@@ -27,7 +27,8 @@ TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {
   subscribe(sender);
   subscribe(watcher);
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
-    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence, "pointer", static_cast<double>(sequence))));
+    sender.request(MessageType::kObservation,
+                   wire::encode(landmarks(sequence, "pointer", static_cast<double>(sequence))));
     for (RawPeer* peer : {&sender, &watcher}) {
       const auto message = next_update(*peer);
       EXPECT_EQ(message.update.observation_sequence, sequence);

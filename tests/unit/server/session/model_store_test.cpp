@@ -28,7 +28,8 @@ std::shared_ptr<const BrainModel> patient() {
 
 const CondensedOperators& operators() {
   static const CondensedOperators made = [] {
-    const auto prepared = inversion::PreparedModel::prepare(patient(), config(), Boundary::kContact);
+    const auto prepared =
+        inversion::PreparedModel::prepare(patient(), config(), Boundary::kContact);
     return std::move(*inversion::condense(*prepared));
   }();
   return made;
@@ -114,15 +115,15 @@ class StoppedOnTheWay final : public inversion::Inverter {
 // The default method, from Session::start() down to its loop over contact sets.
 TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-  auto real = inversion::condensed_inverter(
-      std::make_shared<const CondensedOperators>(operators()), locator, config());
+  auto real = inversion::condensed_inverter(std::make_shared<const CondensedOperators>(operators()),
+                                            locator, config());
   ASSERT_TRUE(real.has_value());
   auto inverter = std::make_unique<StoppedOnTheWay>(std::move(*real));
   StoppedOnTheWay& watched = *inverter;
   SessionHooks hooks;
   hooks.make_model = [&](const wire::SessionRequest& request) {
-    auto pipeline = Pipeline::build(patient(), config(), request.method, request.boundary,
-                                    std::move(inverter));
+    auto pipeline =
+        Pipeline::build(patient(), config(), request.method, request.boundary, std::move(inverter));
     EXPECT_TRUE(pipeline.has_value());
     return std::make_unique<SessionModel>(SessionModel{{}, std::move(*pipeline)});
   };

@@ -38,17 +38,17 @@ TEST_P(ObservationRules, AreNamedWhenBroken) {
 
 INSTANTIATE_TEST_SUITE_P(
     Table, ObservationRules,
-    testing::Values(
-        BadObservation{"OtherCase", [](Observation& o) { o.case_id = "x\ny"; },
-                       ErrorCode::kInvalidArgument, "case_id = \"x?y\""},
-        BadObservation{"OtherFrame", [](Observation& o) { o.frame = "lps"; },
-                       ErrorCode::kInvalidArgument, "frame = \"lps\""},
-        BadObservation{"NoSource", [](Observation& o) { o.source.clear(); },
-                       ErrorCode::kInvalidArgument, "source"},
-        BadObservation{"EndlessSource", [](Observation& o) { o.source.assign(1000, 'a'); },
-                       ErrorCode::kInvalidArgument, "1 to 64 characters"},
-        BadObservation{"OldSequence", [](Observation& o) { o.sequence = 1; },
-                       ErrorCode::kInvalidArgument, "sequence = 1"}),
+    testing::Values(BadObservation{"OtherCase", [](Observation& o) { o.case_id = "x\ny"; },
+                                   ErrorCode::kInvalidArgument, "case_id = \"x?y\""},
+                    BadObservation{"OtherFrame", [](Observation& o) { o.frame = "lps"; },
+                                   ErrorCode::kInvalidArgument, "frame = \"lps\""},
+                    BadObservation{"NoSource", [](Observation& o) { o.source.clear(); },
+                                   ErrorCode::kInvalidArgument, "source"},
+                    BadObservation{"EndlessSource",
+                                   [](Observation& o) { o.source.assign(1000, 'a'); },
+                                   ErrorCode::kInvalidArgument, "1 to 64 characters"},
+                    BadObservation{"OldSequence", [](Observation& o) { o.sequence = 1; },
+                                   ErrorCode::kInvalidArgument, "sequence = 1"}),
     [](const auto& row) { return row.param.name; });
 
 TEST(InQuotes, IsOneShortLineWhateverItHolds) {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes through the whole line: case file's words -> session -> observation -> what the update says it left out.
+// Scenes through the whole line: case file's words -> session -> observation -> what the update
+// says it left out.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/fem/gravity.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "server/session/model_store.hpp"
 #include "server/pipeline/left_out.hpp"
+#include "server/session/model_store.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/sample_values.hpp"
 

@@ -228,11 +228,11 @@ TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
 }
 
 TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
-  Session session(
-      kCase, hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
-        if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
-        return follow_the_data(data, out, 4);
-      }));
+  Session session(kCase,
+                  hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
+                    if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
+                    return follow_the_data(data, out, 4);
+                  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   const auto failed = published_.wait_for(1);
@@ -265,11 +265,11 @@ TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
 
 TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished) {
   std::promise<void> entered;
-  Session session(
-      kCase, hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
-        if (call == 1) wait_for_stop(options, entered);
-        return follow_the_data(data, out, 4);
-      }));
+  Session session(kCase,
+                  hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
+                    if (call == 1) wait_for_stop(options, entered);
+                    return follow_the_data(data, out, 4);
+                  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
@@ -282,11 +282,11 @@ TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished)
 
 TEST_F(SessionTest, StopEndsARunningInversion) {
   std::promise<void> entered;
-  Session session(
-      kCase, hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
-        wait_for_stop(options, entered);
-        return fail(ErrorCode::kNotConverged, "stopped");
-      }));
+  Session session(kCase,
+                  hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
+                    wait_for_stop(options, entered);
+                    return fail(ErrorCode::kNotConverged, "stopped");
+                  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
@@ -307,8 +307,9 @@ TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
 TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   int attempts = 0;
   SessionHooks failing = hooks(echo);
-  failing.make_model = [&, make = failing.make_model](const wire::SessionRequest& request)
-      -> Result<std::unique_ptr<SessionModel>> {
+  failing.make_model =
+      [&, make = failing.make_model](
+          const wire::SessionRequest& request) -> Result<std::unique_ptr<SessionModel>> {
     if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
     return make(request);
   };
