@@ -90,16 +90,18 @@ TEST(Contradictions, TheCommonErrorCountsAsFarAsThePairDoesNotShareIt) {
 }
 
 TEST(Contradictions, TheWorstOfSeveralIsNamedInWhateverOrderTheDataCome) {
-  SparseData data = pair_of(Vec3::Zero(), Vec3(0, 4, 0));
-  data.positions.col(0) = data.positions.col(11);
-  data.displacements.col(0) = data.displacements.col(11) + Vec3(9, 0, 0);
-  const Contradiction found = find(data);
-  EXPECT_EQ(found.first, 0);
-  EXPECT_EQ(found.second, 11);
-  EXPECT_EQ(found.pairs, 2);
-  std::string reason;
-  append_contradiction(found, data, reason);
-  EXPECT_THAT(reason, testing::HasSubstr("the worst of 2 such pairs"));
+  for (const double other_mm : {2.0, 9.0}) {
+    SparseData data = pair_of(Vec3::Zero(), Vec3(0, 4, 0));
+    data.positions.col(0) = data.positions.col(11);
+    data.displacements.col(0) = data.displacements.col(11) + Vec3(other_mm, 0, 0);
+    const Contradiction found = find(data);
+    EXPECT_EQ(found.first, other_mm < 4.0 ? 3 : 0);
+    EXPECT_EQ(found.second, other_mm < 4.0 ? 7 : 11);
+    EXPECT_EQ(found.pairs, 2);
+    std::string reason;
+    append_contradiction(found, data, reason);
+    EXPECT_THAT(reason, testing::HasSubstr("the worst of 2 such pairs"));
+  }
 }
 
 }  // namespace
