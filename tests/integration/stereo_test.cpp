@@ -177,7 +177,7 @@ TEST(Stereo, PicturesBecomeObservationsOfASurgery) {
   // Only the sources that a surgery has can be played by themselves.
   expect_refused(run({brainshift(), "replay", files.path("out/case.surgery"), "--sources", "ius",
                       "--report", files.path("r.json")}),
-                 "holds no observation of source \"ius\"; it has: stereopsis");
+                 "holds no observation of source \"ius\"; it has: scanner, stereopsis");
 }
 
 TEST(Stereo, BoardsBecomeACalibration) {
