@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/stability/linear_body.hpp"
 
-#include "common/values/case_config.hpp"
-#include "common/linalg/checked_solve.hpp"
+#include <cmath>
+
 #include "common/fem/deformation.hpp"
 #include "common/geometry/mesh_quality.hpp"
+#include "common/linalg/checked_solve.hpp"
+#include "common/values/case_config.hpp"
 #include "tests/stability/toy_problem.hpp"
 #include "tests/support/box_mesh.hpp"
 
@@ -14,7 +16,7 @@ namespace {
 constexpr double kSize_mm = 60.0;
 constexpr double kMove_mm = 5.0;
 
-// What the product makes of the body: matrix, factor, checked solve.
+// The product's side: mesh check, factor, checked solve.
 Result<Points> answer(const LinearBody& body, const linalg::SymmetricMatrix& matrix,
                       const Points& load, Point& point) {
   if (auto status = geometry::check_mesh(body.mesh); !status) {
@@ -24,8 +26,8 @@ Result<Points> answer(const LinearBody& body, const linalg::SymmetricMatrix& mat
   if (!factor) return tl::unexpected(factor.error());
   point.rcond = factor->rcond();
   VecX x;
-  const auto quality =
-      linalg::checked_solve(matrix, linalg::max_norm(matrix), *factor, body.dofs.restrict_to(load), x);
+  const auto quality = linalg::checked_solve(matrix, linalg::max_norm(matrix), *factor,
+                                             body.dofs.restrict_to(load), x);
   if (!quality) return tl::unexpected(quality.error());
   point.backward_error = quality->backward_error;
   point.iterations = 1 + quality->refinements;
@@ -47,10 +49,39 @@ LinearBody standing_block(int cells) {
   return body;
 }
 
+void flip_one_sign(linalg::SymmetricMatrix& lower) {
+  const VecX diagonal = lower.diagonal();
+  double* chosen = nullptr;
+  double least = 1.0;
+  for (Eigen::Index j = 0; j < lower.outerSize(); ++j) {
+    for (linalg::SymmetricMatrix::InnerIterator it(lower, j); it; ++it) {
+      if (it.row() == it.col()) continue;
+      const double share =
+          std::abs(it.value()) / std::sqrt(std::abs(diagonal[it.row()] * diagonal[it.col()]));
+      if (share < 1e-3 || share >= least) continue;
+      least = share;
+      chosen = &it.valueRef();
+    }
+  }
+  if (chosen != nullptr) *chosen = -*chosen;
+}
+
+Vec3 turned(const Vec3& vector) {
+  constexpr double kTurn_rad = 0.2;
+  return Eigen::AngleAxisd(kTurn_rad, vector.unitOrthogonal()) * vector;
+}
+
+void turn_one_force(Points& load) {
+  Eigen::Index node = 0;
+  load.colwise().norm().maxCoeff(&node);
+  load.col(node) = turned(load.col(node));
+}
+
 void solve_linear(const LinearBody& body, Point point, const Options& options) {
   point.unit = "relative";
   const bool uniform = body.materials.size() == 1;
-  MatrixR full = reference_stiffness(body.mesh, body.materials, body.dofs);
+  const Unknowns unknowns = unknowns_of(body.dofs);
+  MatrixR full = reference_stiffness(body.mesh, body.materials, unknowns);
   linalg::SymmetricMatrix matrix =
       uniform ? fem::assemble_stiffness(body.mesh, body.materials.front(), body.dofs)
               : lower_triangle(full);
@@ -66,21 +97,24 @@ void solve_linear(const LinearBody& body, Point point, const Options& options) {
   for (Eigen::Index i = 0; i < load.cols(); ++i) {
     load.col(i) = 1e-8 * volumes[i] * Vec3(1.0, 0.3, -0.5);
   }
-  Reference reference(std::move(full), body.dofs, nullptr);
+  const Reference reference(std::move(full), unknowns);
   VectorR right = reference.displacement(load);
   const double scale = kMove_mm / static_cast<double>(right.cwiseAbs().maxCoeff());
   if (std::isfinite(scale) && scale > 0.0) {
     load *= scale;
     right = reference.displacement(load);
   }
-  auto u = answer(body, matrix, load, point);
+  Points given = load;
+  if (options.fault == Fault::kSign) flip_one_sign(matrix);
+  if (options.fault == Fault::kNormal) turn_one_force(given);
+  if (options.fault == Fault::kScale) matrix *= 1.01;
+  const auto u = answer(body, matrix, given, point);
   if (!u) {
     set_refused(u.error(), point);
     return options.record(point);
   }
   point.answered = true;
   point.status = "solved";
-  if (options.faults != nullptr) options.faults->field(*u, point);
   point.min_volume_ratio = fem::measure_deformation(body.mesh, *u).min_volume_ratio;
   point.difference = relative_difference(*u, right);
   point.bound = rounding_bound(reference.condition());

@@ -1,83 +1,103 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The answer of another method: assembled by B^T D B element by element, solved by a dense Cholesky factor, all in
-// long double (64-bit mantissa, 5e-20); nothing is shared with the product but the mesh, the frames of the fixed
-// nodes, the contact pairs and the kernel of the prior.
+// The answer of another method: element matrices as B^T D B, a dense Cholesky factor, all in long
+// double (64-bit mantissa, unit roundoff 5e-20).
 //
-//   K_p = K + beta sum_A N N^T,   b_p = b + beta sum_A 0p N
-//   posterior   u = s + C A^T (A C A^T + R)^-1 (d - A s),   C = K_p^-1 Sigma K_p^-1,   s = K_p^-1 beta sum_A 0p N
+//   K_p = K + beta sum_A N N^T,   b_p = b + beta sum_A 0p N,   P = 0p - N . u
 //
-// Long double takes cubes of the unknowns: some hundred. For larger meshes the same in double with a sparse factor.
+// A dense factor takes cubes of the unknowns: some hundred of them take a tenth of a second.
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
+#include <array>
 #include <memory>
 #include <vector>
 
 #include "common/contact/penalty.hpp"
 #include "common/core/mesh.hpp"
-#include "common/values/sparse_data.hpp"
 #include "common/fem/dof_map.hpp"
-#include "common/inversion/prepared/prepared_model.hpp"
+#include "common/fem/elasticity.hpp"
 
 namespace brainshift::stability {
 
 using Real = long double;
 using MatrixR = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 using VectorR = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+using Vec3R = Eigen::Matrix<Real, 3, 1>;
+using Mat3R = Eigen::Matrix<Real, 3, 3>;
+using PointsR = Eigen::Matrix<Real, 3, Eigen::Dynamic>;
 
-// One material per tetrahedron, or one for all.
+// u_node = frame * q_node; index: of the unknown, or -1 where a component is zero.
+struct Unknowns {
+  std::vector<Mat3R> frames;
+  std::vector<std::array<int, 3>> index;
+  int count = 0;
+
+  int num_nodes() const { return static_cast<int>(frames.size()); }
+  // T^T f and T q; nodal vectors have 3n entries, node by node.
+  VectorR restrict_to(const Eigen::Ref<const VectorR>& nodal) const;
+  VectorR expand(const Eigen::Ref<const VectorR>& unknowns) const;
+};
+// Of a body whose supports the sweep itself chose.
+Unknowns unknowns_of(const fem::DofMap& dofs);
+
+// lambda = 2 G nu / (1 - 2 nu); G in Pa.
+fem::Elasticity reference_elasticity(double shear_pa, double poisson_ratio);
+// materials: one per tetrahedron, or one for all.
 MatrixR reference_stiffness(const TetMesh& mesh, const std::vector<fem::Elasticity>& materials,
-                            const fem::DofMap& dofs);
-// The same matrix in double as the product takes it, for problems that it cannot assemble itself (materials per
-// element).
+                            const Unknowns& unknowns);
+// The same matrix in double as the product takes it, for problems that it cannot assemble itself
+// (materials per element).
 linalg::SymmetricMatrix lower_triangle(const MatrixR& full);
 
-// T^T f and T q in long double.
-VectorR restrict_to(const fem::DofMap& dofs, const Eigen::Ref<const MatrixR>& nodal);
-VectorR expand(const fem::DofMap& dofs, const VectorR& unknowns);
+struct ReferencePair {
+  NodeIndex slave = -1;
+  Vec3R normal = Vec3R::Zero();     // N, from skull into brain
+  Real initial_penetration_mm = 0;  // 0p, negative when open
+};
 
 class Reference {
  public:
-  // contact: may be null.
-  Reference(MatrixR stiffness, const fem::DofMap& dofs, const contact::PenaltyContact* contact);
+  Reference(MatrixR stiffness, Unknowns unknowns, std::vector<ReferencePair> pairs = {},
+            Real beta = 0);
 
   // K_p of a set; false when it is not positive definite.
   bool activate(const contact::ActiveSet& active);
-  VectorR solve(const VectorR& rhs) const { return factor_.solve(rhs); }
-  MatrixR solve(const MatrixR& rhs) const { return factor_.solve(rhs); }
+  const contact::ActiveSet& active() const { return active_; }
+  // K_p^-1 of the set.
+  MatrixR solve(const MatrixR& rhs) const;
+  // K^-1, whatever the set.
+  MatrixR solve_free(const MatrixR& rhs) const { return free_.solve(rhs); }
   // u = K_p^-1 b_p, 3n; load: 3 x n.
   VectorR displacement(const Points& load) const;
-  // P of every slave.
+  // P of every slave; u: 3n.
   VectorR penetration(const VectorR& u) const;
-  // Contact by the same semi-smooth Newton method; false when it cycles.
+  // Contact by a semi-smooth Newton method; false when it cycles.
   bool solve_contact(const Points& load, VectorR& u);
-  const contact::ActiveSet& active() const { return active_; }
-  // Estimates of the extreme eigenvalues' ratio of K_p, 40 power iterations each.
+  // Ratio of the extreme eigenvalues of K_p, by 40 power iterations each.
   double condition() const;
 
+  const Unknowns& unknowns() const { return unknowns_; }
+  const std::vector<ReferencePair>& pairs() const { return pairs_; }
+  int num_slaves() const { return static_cast<int>(pairs_.size()); }
+  Real beta() const { return beta_; }
+
  private:
-  const MatrixR stiffness_;
-  const fem::DofMap& dofs_;
-  const contact::PenaltyContact* contact_;
+  bool any_active() const;
+  // beta sum_A 0p N added to a nodal load.
+  void add_gaps(VectorR& nodal) const;
+
+  MatrixR stiffness_;
+  Unknowns unknowns_;
+  std::vector<ReferencePair> pairs_;
+  Real beta_;
   contact::ActiveSet active_;
-  MatrixR matrix_;
-  Eigen::LLT<MatrixR> factor_;
+  Eigen::LLT<MatrixR> free_, factor_;  // of K and, for a set that is not empty, of K_p
+  MatrixR matrix_;                     // K_p
 };
 
-// Of one prepared toy patient.
-struct PosteriorReference {
-  VectorR displacement;  // 3n
-  VectorR penetration;   // of every slave, mm
-};
-// The posterior mean for the active set and the prior's scales of an estimate; false when a factor fails.
-bool reference_posterior(Reference& reference, const inversion::PreparedModel& model,
-                         const SparseData& data, const Estimate& estimate,
-                         PosteriorReference& result);
-
-// |u - v|_2 / |v|_2
+// |u - v|_2 / |v|_2; v: 3n.
 double relative_difference(const Points& u, const VectorR& v);
-// Greatest distance at a node, mm.
+// Greatest distance at a node, mm; NaN when a value is not finite.
 double greatest_difference(const Points& u, const VectorR& v);
 
 }  // namespace brainshift::stability

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/stability/stability_point.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace brainshift::stability {
@@ -16,11 +15,21 @@ std::string to_string(Verdict verdict) {
   return "red";
 }
 
+std::string to_string(Fault fault) {
+  switch (fault) {
+    case Fault::kNone: return "none";
+    case Fault::kSign: return "sign";
+    case Fault::kNormal: return "normal";
+    case Fault::kScale: return "scale";
+  }
+  return "none";
+}
+
 Verdict judge(const Point& point) {
   if (point.reason.empty() && point.status != "solved") return Verdict::kRed;
   if (!point.answered) return Verdict::kGrey;
   if (point.warned) return Verdict::kYellow;
-  if (point.must_warn) return Verdict::kRed;
+  if (point.must_warn || !point.objection.empty()) return Verdict::kRed;
   return point.difference <= point.bound ? Verdict::kGreen : Verdict::kRed;
 }
 
@@ -30,7 +39,7 @@ void set_refused(const Error& error, Point& point) {
   point.reason = error.message;
 }
 
-// The reason's first clause says why the method stopped; every further one is a warning.
+// The reason's first clause states why the method stopped; every further one is a warning.
 void set_answered(const Estimate& estimate, Point& point) {
   point.answered = true;
   point.status = std::string(to_string(estimate.status));
@@ -41,34 +50,10 @@ void set_answered(const Estimate& estimate, Point& point) {
   point.min_volume_ratio = estimate.min_volume_ratio;
 }
 
-bool FaultSeeder::strikes() { return on_ && random_.uniform() < 0.2; }
-
-void FaultSeeder::field(Points& displacement, Point& point) {
-  if (!strikes()) return;
-  point.seeded = true;
-  const auto node =
-      static_cast<Eigen::Index>(random_.index(static_cast<std::uint64_t>(displacement.cols())));
-  displacement.col(node) += 1e-3 * displacement.cwiseAbs().maxCoeff() * random_.direction();
-}
-
-void FaultSeeder::estimate(Estimate& estimate, Point& point) {
-  if (!strikes()) return;
-  point.seeded = true;
-  if (estimate.contact_force_n.size() > 0) {
-    const auto slave = static_cast<Eigen::Index>(
-        random_.index(static_cast<std::uint64_t>(estimate.contact_force_n.size())));
-    estimate.contact_force_n[slave] += 0.1 * estimate.contact_force_n.cwiseAbs().maxCoeff();
-    return;
-  }
-  // Above the accuracy of the reduced method, 0.01 mm.
-  const auto node = static_cast<Eigen::Index>(
-      random_.index(static_cast<std::uint64_t>(estimate.displacement.cols())));
-  estimate.displacement.col(node) += 0.05 * random_.direction();
-}
-
-std::vector<double> thinned(const std::vector<double>& grid, bool coarse) {
-  if (!coarse || grid.size() <= 3) return grid;
-  return {grid.front(), grid[grid.size() / 2], grid.back()};
+std::vector<double> thinned(const std::vector<double>& values, Grid grid) {
+  if (grid == Grid::kMiddle) return {values[(values.size() - 1) / 2]};
+  if (grid == Grid::kFull || values.size() <= 3) return values;
+  return {values.front(), values[values.size() / 2], values.back()};
 }
 
 std::vector<double> decades(int from, int to) {

@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One point of a stability sweep: what was asked, what the product answered, what is right, and the verdict.
+// One point of a stability sweep: what was asked, what the product answered, what is right, and
+// the verdict.
 //
 //   green   answered, within the bound of its sweep
 //   yellow  answered with a warning, in status or reason
 //   grey    refused, with a reason
-//   red     wrong without saying so: outside the bound, or a warning that had to be there is not, or no reason
+//   red     wrong without a warning: outside the bound, an objection of the reference, a warning that
+//           is missing, or no reason
 //
-// The bounds are derived in docs/stability.md before anything is measured.
+// docs/stability.md derives the bounds. None was fitted to what is measured.
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/values/estimate.hpp"
-#include "common/core/random.hpp"
 #include "common/core/types.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::stability {
 
@@ -24,6 +26,13 @@ enum class Verdict { kGreen, kYellow, kGrey, kRed };
 inline constexpr Verdict kVerdicts[] = {Verdict::kGreen, Verdict::kYellow, Verdict::kGrey,
                                         Verdict::kRed};
 std::string to_string(Verdict verdict);
+
+// One operator of the product is made wrong before it solves; the reference stays right. What
+// each sheet makes wrong is said where it is done: toy_problem.hpp, linear_body.hpp,
+// sweep_elements.cpp and sweep_consolidation.cpp.
+enum class Fault { kNone, kSign, kNormal, kScale };
+inline constexpr Fault kFaults[] = {Fault::kSign, Fault::kNormal, Fault::kScale};
+std::string to_string(Fault fault);  // "none", "sign", "normal", "scale"
 
 struct Point {
   // Where it stands on the maps.
@@ -43,39 +52,37 @@ struct Point {
   double min_volume_ratio = 1.0;
   double difference = 0.0;  // to the reference, in `unit`
   double bound = 0.0;
-  std::string unit;  // "relative" or "mm"
-  bool seeded = false;
+  std::string unit;       // "relative" or "mm"
+  std::string objection;  // of the reference, beyond the difference; empty: none
+  // Contact set that the difference is taken for: "own", found by the reference alone, or
+  // "product's", which the reference confirmed.
+  std::string sets = "own";
+  // Descent methods: greatest distance at a node from the posterior mean, which they approach and
+  // do not promise. NaN: does not apply. Recorded, not judged.
+  double from_posterior_mm = std::numeric_limits<double>::quiet_NaN();
+  // What the prior's scales leave to gain in ln p. NaN: the method does not estimate them.
+  double scales_gain = std::numeric_limits<double>::quiet_NaN();
 };
 
 Verdict judge(const Point& point);
 
-// Cuts what the product says apart: refusal, warning or answer.
+// Cuts what the product reports apart: refusal, warning or answer.
 void set_refused(const Error& error, Point& point);
 void set_answered(const Estimate& estimate, Point& point);
 
-// Changes answers behind the product's back, at random points: the suite must notice.
-class FaultSeeder {
- public:
-  explicit FaultSeeder(bool on) : on_(on), random_(20260101) {}
-  // One node of the field by a thousandth of its largest value.
-  void field(Points& displacement, Point& point);
-  // As field(); or, where there is contact, one contact force by a tenth of the largest.
-  void estimate(Estimate& estimate, Point& point);
-
- private:
-  bool strikes();
-  bool on_;
-  Random random_;
+enum class Grid {
+  kFull,
+  kCoarse,  // both ends and one in between: the CTest subset
+  kMiddle,  // one value per sweep: seeded faults
 };
 
 struct Options {
-  bool coarse = false;  // the grid of the CTest subset
-  FaultSeeder* faults = nullptr;
+  Grid grid = Grid::kFull;
+  Fault fault = Fault::kNone;
   std::function<void(const Point&)> record;
 };
 
-// Every k-th of a full grid, both ends kept.
-std::vector<double> thinned(const std::vector<double>& grid, bool coarse);
+std::vector<double> thinned(const std::vector<double>& values, Grid grid);
 // 10^from ... 10^to, one per decade.
 std::vector<double> decades(int from, int to);
 

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sweeps the product to the edges of what may be asked of it and compares every answer with another method. Writes
-// points.csv, a map per sheet and summary.json. Exit status 0 only if no point is wrong without saying so.
+// Sweeps the product to the edges of what may be asked of it and compares every answer with
+// another method; then makes one operator of the product wrong at a time and looks whether the
+// comparison notices. Writes points.csv, faults.csv, a map per sheet and summary.json. Exit
+// status 0 only if no point is wrong without a warning and every fault was found.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "client/replay/write_file.hpp"
+#include "common/io/files/file_access.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
@@ -42,7 +45,11 @@ struct Arguments {
   fs::path out = "out/stability";
   std::vector<std::string> sheets;
   bool coarse = false;
-  bool seed_fault = false;
+  Fault fault = Fault::kNone;
+
+  bool chosen(const std::string& sheet) const {
+    return sheets.empty() || std::find(sheets.begin(), sheets.end(), sheet) != sheets.end();
+  }
 };
 
 // A cell of a table holds no comma, quote or line break.
@@ -57,7 +64,7 @@ Status write_points(const fs::path& file, const std::vector<Point>& points) {
   auto csv = bench::CsvWriter::create(
       file,
       "sheet,parameter,x,row,verdict,status,backward_error,rcond,iterations,min_volume_ratio,"
-      "difference,bound,unit,must_warn,seeded,reason");
+      "difference,bound,unit,must_warn,set,from_posterior_mm,scales_gain,objection,reason");
   if (!csv) return tl::unexpected(csv.error());
   const auto number = [](double value) { return bench::csv_number(value, 4); };
   for (const Point& p : points) {
@@ -67,7 +74,8 @@ Status write_points(const fs::path& file, const std::vector<Point>& points) {
             {p.sheet, cell(p.parameter), number(p.x), cell(p.row), to_string(judge(p)), p.status,
              only(number(p.backward_error)), number(p.rcond), only(std::to_string(p.iterations)),
              only(number(p.min_volume_ratio)), only(number(p.difference)), only(number(p.bound)),
-             p.unit, p.must_warn ? "1" : "0", p.seeded ? "1" : "0", cell(p.reason)});
+             p.unit, p.must_warn ? "1" : "0", only(p.sets), only(number(p.from_posterior_mm)),
+             only(number(p.scales_gain)), cell(p.objection), cell(p.reason)});
         !ok) {
       return ok;
     }
@@ -81,29 +89,87 @@ long count(const std::vector<Point>& points, const std::string& sheet, Verdict v
   });
 }
 
-// Seeded faults, and those that turned their point red.
-std::pair<long, long> faults(const std::vector<Point>& points) {
-  const auto seeded = [](const Point& p) { return p.seeded && !p.warned; };
-  return {std::count_if(points.begin(), points.end(), seeded),
-          std::count_if(points.begin(), points.end(),
-                        [&](const Point& p) { return seeded(p) && judge(p) == Verdict::kRed; })};
-}
-
-std::vector<Point> sweep(const Sheet& sheet, bool coarse, FaultSeeder* seeder) {
+std::vector<Point> sweep(const Sheet& sheet, Grid grid, Fault fault, bool print) {
   std::vector<Point> points;
-  sheet.sweep({coarse, seeder, [&](const Point& point) {
+  sheet.sweep({grid, fault, [&](const Point& point) {
                  points.push_back(point);
-                 if (judge(point) != Verdict::kRed) return;
-                 std::printf("  red: %s = %g, %s: %s, difference %.3g above %.3g %s%s; %s\n",
+                 if (!print || judge(point) != Verdict::kRed) return;
+                 std::printf("  red: %s = %g, %s: %s, difference %.3g, bound %.3g %s; %s; %s\n",
                              point.parameter.c_str(), point.x, point.row.c_str(),
                              point.status.c_str(), point.difference, point.bound,
-                             point.unit.c_str(), point.seeded ? " (seeded)" : "",
-                             point.reason.c_str());
+                             point.unit.c_str(), point.objection.c_str(), point.reason.c_str());
+                 std::fflush(stdout);
                }});
   return points;
 }
 
-std::vector<bench::Check> checks(const std::vector<Point>& points, const Arguments& arguments) {
+// One fault on one sheet. A row with answers that carry no warning must turn red at one point or
+// more.
+struct FaultRun {
+  std::string sheet;
+  Fault fault = Fault::kNone;
+  long answers = 0, red = 0;  // without a warning; of those
+  long rows = 0, red_rows = 0;
+  std::string missed;  // rows that stayed green
+
+  bool found() const { return rows > 0 && red_rows == rows; }
+};
+
+FaultRun seed(const Sheet& sheet, Fault fault) {
+  FaultRun run;
+  run.sheet = sheet.name;
+  run.fault = fault;
+  std::map<std::string, long> red_of_row;
+  for (const Point& point : sweep(sheet, Grid::kMiddle, fault, false)) {
+    if (!point.answered || point.warned) continue;
+    const bool red = judge(point) == Verdict::kRed;
+    ++run.answers;
+    run.red += red ? 1 : 0;
+    red_of_row[point.parameter + ": " + point.row] += red ? 1 : 0;
+  }
+  for (const auto& [row, red] : red_of_row) {
+    ++run.rows;
+    if (red > 0) {
+      ++run.red_rows;
+    } else {
+      run.missed += (run.missed.empty() ? "" : "; ") + row;
+    }
+  }
+  return run;
+}
+
+Status write_faults(const fs::path& file, const std::vector<FaultRun>& runs) {
+  auto csv = bench::CsvWriter::create(file, "sheet,fault,answers,red,rows,red_rows,missed");
+  if (!csv) return tl::unexpected(csv.error());
+  for (const FaultRun& run : runs) {
+    if (auto ok = csv->row({run.sheet, to_string(run.fault), std::to_string(run.answers),
+                            std::to_string(run.red), std::to_string(run.rows),
+                            std::to_string(run.red_rows), cell(run.missed)});
+        !ok) {
+      return ok;
+    }
+  }
+  return {};
+}
+
+std::vector<FaultRun> seed_all(const Arguments& arguments) {
+  std::vector<FaultRun> runs;
+  for (const Sheet& sheet : kSheets) {
+    if (!arguments.chosen(sheet.name)) continue;
+    for (const Fault fault : kFaults) {
+      runs.push_back(seed(sheet, fault));
+      const FaultRun& run = runs.back();
+      std::printf("%-13s fault %-6s: %ld of %ld answers red, %ld of %ld rows%s%s\n",
+                  run.sheet.c_str(), to_string(fault).c_str(), run.red, run.answers, run.red_rows,
+                  run.rows, run.missed.empty() ? "" : "; missed: ", run.missed.c_str());
+      std::fflush(stdout);
+    }
+  }
+  return runs;
+}
+
+std::vector<bench::Check> checks(const std::vector<Point>& points,
+                                 const std::vector<FaultRun>& faults, const Arguments& arguments) {
   const std::string command = "build/release/bin/stability_suite --out " + arguments.out.string();
   std::vector<bench::Check> all;
   for (const Sheet& sheet : kSheets) {
@@ -115,7 +181,18 @@ std::vector<bench::Check> checks(const std::vector<Point>& points, const Argumen
                        std::to_string(points_there),
                    static_cast<double>(red), "0", red == 0, command + " --sheet " + sheet.name});
   }
-  if (arguments.seed_fault || arguments.coarse) return all;
+  for (const Sheet& sheet : kSheets) {
+    const auto of_sheet = [&](const FaultRun& run) { return run.sheet == sheet.name; };
+    const long seeded = std::count_if(faults.begin(), faults.end(), of_sheet);
+    if (seeded == 0) continue;
+    const long found = std::count_if(faults.begin(), faults.end(), [&](const FaultRun& run) {
+      return of_sheet(run) && run.found();
+    });
+    all.push_back({"stability, " + sheet.name + ": seeded faults found (sign, normal, scale)",
+                   static_cast<double>(found), std::to_string(seeded), found == seeded,
+                   command + " --sheet " + sheet.name});
+  }
+  if (arguments.fault != Fault::kNone || arguments.coarse || !arguments.sheets.empty()) return all;
   // A product that refuses everything is never wrong.
   const double green = 100.0 * static_cast<double>(count(points, "", Verdict::kGreen)) /
                        static_cast<double>(points.size());
@@ -130,32 +207,22 @@ std::vector<bench::Check> checks(const std::vector<Point>& points, const Argumen
                      share <= 3.0, "build/release/bin/bench_guards"});
     }
   }
-  // The proof that the maps can turn red.
-  FaultSeeder seeder(true);
-  const auto [seeded, seen] = faults(sweep(kSheets.front(), false, &seeder));
-  all.push_back(
-      {"stability: seeded faults that turned their point red, of " + std::to_string(seeded),
-       static_cast<double>(seen), ">= 0.9 of them", seeded > 0 && 10 * seen >= 9 * seeded,
-       command + " --sheet penalty --seed-fault"});
   return all;
 }
 
 Result<bool> run(const Arguments& arguments) {
   std::error_code error;
   fs::create_directories(arguments.out, error);
-  FaultSeeder seeder(arguments.seed_fault);
   std::vector<Point> points;
   for (const Sheet& sheet : kSheets) {
-    const auto& chosen = arguments.sheets;
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), sheet.name) == chosen.end()) {
-      continue;
-    }
+    if (!arguments.chosen(sheet.name)) continue;
     const auto start = std::chrono::steady_clock::now();
-    const std::vector<Point> some = sweep(sheet, arguments.coarse, &seeder);
+    const std::vector<Point> some =
+        sweep(sheet, arguments.coarse ? Grid::kCoarse : Grid::kFull, arguments.fault, true);
     points.insert(points.end(), some.begin(), some.end());
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    std::printf("%-9s %4zu points, %.1f s\n", sheet.name.c_str(), some.size(), seconds);
+    std::printf("%-13s %4zu points, %.1f s\n", sheet.name.c_str(), some.size(), seconds);
     std::fflush(stdout);
     const fs::path picture = arguments.out / (sheet.name + ".png");
     if (!cv::imwrite(picture.string(), draw_map(sheet.name, sheet.title, points))) {
@@ -165,17 +232,19 @@ Result<bool> run(const Arguments& arguments) {
   if (auto ok = write_points(arguments.out / "points.csv", points); !ok) {
     return tl::unexpected(ok.error());
   }
-  const auto all = checks(points, arguments);
-  if (auto ok = client::write_file(arguments.out / "summary.json", bench::to_json(all, {})); !ok) {
+  // The coarse grid is the one of CTest, which seeds single faults by itself.
+  std::vector<FaultRun> faults;
+  if (arguments.fault == Fault::kNone && !arguments.coarse) faults = seed_all(arguments);
+  if (auto ok = write_faults(arguments.out / "faults.csv", faults); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  const auto all = checks(points, faults, arguments);
+  if (auto ok = io::write_file(arguments.out / "summary.json", bench::to_json(all, {})); !ok) {
     return tl::unexpected(ok.error());
   }
   for (const Verdict verdict : kVerdicts) {
     std::printf("%ld %s%s", count(points, "", verdict), to_string(verdict).c_str(),
                 verdict == Verdict::kRed ? "\n" : ", ");
-  }
-  if (arguments.seed_fault) {
-    const auto [seeded, seen] = faults(points);
-    std::printf("%ld faults seeded in answers without a warning, %ld seen\n", seeded, seen);
   }
   return !points.empty() &&
          std::all_of(all.begin(), all.end(), [](const bench::Check& check) { return check.pass; });
@@ -188,7 +257,7 @@ int main(int argc, char** argv) {
   using namespace brainshift;
   CLI::App app{
       "Sweeps to the edges of what may be asked; exit status 1 where an answer is wrong "
-      "without saying so.",
+      "without a warning, or a seeded fault goes unnoticed.",
       "stability_suite"};
   stability::Arguments arguments;
   std::vector<std::string> names;
@@ -197,9 +266,13 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--sheet", arguments.sheets, "only these sheets; see docs/stability.md")
       ->check(CLI::IsMember(names));
-  app.add_flag("--coarse", arguments.coarse, "ends and middle of every sweep");
-  app.add_flag("--seed-fault", arguments.seed_fault,
-               "change answers behind the product's back at random points: must end red");
+  app.add_flag("--coarse", arguments.coarse, "ends and middle of every sweep, no seeded faults");
+  app.add_option("--seed-fault", arguments.fault,
+                 "make one operator of the product wrong before it solves: must end red")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, stability::Fault>{{"sign", stability::Fault::kSign},
+                                                  {"normal", stability::Fault::kNormal},
+                                                  {"scale", stability::Fault::kScale}}));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Warm starts from the wrong set: each update begins with the contact of another surgery, up to hundreds of slaves
-// away from its own.
+// Warm starts from the wrong set: each update begins with the contact of another surgery, up to
+// hundreds of slaves away from its own.
 #include <algorithm>
 
-#include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
+#include "common/inversion/prepared/condense.hpp"
 #include "tests/stability/toy_problem.hpp"
 
 namespace brainshift::stability {
@@ -22,7 +22,7 @@ double changes(std::vector<NodeIndex> a, std::vector<NodeIndex> b) {
 // `update` starts from the set that it left.
 template <typename Update>
 void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries, const std::string& row,
-            const Update& update, const Options& options) {
+            const Update& update, bool estimated_scales, const Options& options) {
   std::vector<NodeIndex> before;
   for (const SparseData& data : surgeries) {
     Point point;
@@ -41,8 +41,7 @@ void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries, const
     set_answered(estimate, point);
     point.x = 1.0 + changes(before, estimate.active_slaves);  // a logarithmic axis has no 0
     before = estimate.active_slaves;
-    if (options.faults != nullptr) options.faults->estimate(estimate, point);
-    compare_with_posterior(problem, data, estimate, point);
+    compare_with_posterior(problem, data, estimate, estimated_scales, point);
     options.record(point);
   }
 }
@@ -50,24 +49,27 @@ void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries, const
 }  // namespace
 
 void sweep_contact(const Options& options) {
-  CaseConfig config = stability_config();
-  auto problem = ToyProblem::make(config, options.coarse ? 5 : 8);
+  auto problem =
+      ToyProblem::make(stability_config(), options.fault, options.grid == Grid::kFull ? 8 : 5);
   std::vector<SparseData> surgeries;
   const std::vector<double> moves_mm = {8.0, -30.0, 30.0, -8.0, 2.0, -60.0, 1.0, 20.0, -3.0};
-  for (const double move_mm : thinned(moves_mm, options.coarse)) {
+  // A fault must not meet a move that leaves its slave open.
+  const bool first = options.grid == Grid::kMiddle;
+  for (const double move_mm :
+       first ? std::vector{moves_mm.front()} : thinned(moves_mm, options.grid)) {
     if (auto data = sagging_data(*problem, {.largest_mm = move_mm})) surgeries.push_back(*data);
   }
   auto operators = inversion::condense(*problem->model);
   auto inverter = inversion::CondensedInverter::build(
       std::make_shared<const CondensedOperators>(std::move(*operators)),
-      std::make_shared<const geometry::TetLocator>(problem->brain->mesh), config);
+      std::make_shared<const geometry::TetLocator>(problem->brain->mesh), problem->config);
   follow(
       *problem, surgeries, "condensed, warm start",
-      [&](const SparseData& d, Estimate& e) { return inverter->update(d, e); }, options);
-  auto exact = inversion::CondensedExact::prepare(*problem->model);
+      [&](const SparseData& d, Estimate& e) { return inverter->update(d, e); }, true, options);
+  auto exact = inversion::CondensedExact::build(*problem->model);
   follow(
       *problem, surgeries, "condensed-exact, warm start",
-      [&](const SparseData& d, Estimate& e) { return exact->update(d, e); }, options);
+      [&](const SparseData& d, Estimate& e) { return exact->update(d, e); }, false, options);
 }
 
 }  // namespace brainshift::stability

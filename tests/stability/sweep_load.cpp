@@ -8,9 +8,9 @@ namespace brainshift::stability {
 namespace {
 
 void large_displacements(const Options& options) {
-  auto problem = ToyProblem::make(stability_config());
+  auto problem = ToyProblem::make(stability_config(), options.fault);
   const std::vector<double> grid = {0.1, 0.3, 1.0, 3.0, 10.0, 20.0, 40.0, 60.0, 100.0, 200.0};
-  for (const double largest_mm : thinned(grid, options.coarse)) {
+  for (const double largest_mm : thinned(grid, options.grid)) {
     for (const double direction : {1.0, -1.0}) {
       const std::string way = direction > 0.0 ? ", sinking" : ", rising";
       Point point;
@@ -36,7 +36,7 @@ void large_displacements(const Options& options) {
 
 // Nothing is fixed; springs at four corners are all that holds the block.
 void nearly_floating(const Options& options) {
-  for (const double support : thinned(decades(-18, 0), options.coarse)) {
+  for (const double support : thinned(decades(-18, 0), options.grid)) {
     LinearBody body = standing_block(4);
     body.dofs = fem::DofMap(body.mesh.num_nodes());
     body.dofs.finalise();

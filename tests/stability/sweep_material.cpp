@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Poisson's ratio to 0.4999, shear modulus over what a case file allows, tumour against brain over ten decades.
+// Poisson's ratio to 0.4999, shear modulus over what a case file allows, tumour against brain
+// over ten decades.
 //
-// Linear tetrahedra lock above 0.48, whatever the solver: there an estimate must warn. (quadratic ones:
-// sweep_elements.cpp)
+// Linear tetrahedra lock above 0.48, whatever the solver: there an estimate must warn. (quadratic
+// ones: sweep_elements.cpp)
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/toy_problem.hpp"
 
@@ -10,7 +11,7 @@ namespace brainshift::stability {
 namespace {
 
 void one_patient(const CaseConfig& config, Point point, const Options& options) {
-  auto problem = ToyProblem::make(config);
+  auto problem = ToyProblem::make(config, options.fault);
   if (!problem) {
     set_refused(problem.error(), point);
     return options.record(point);
@@ -32,7 +33,7 @@ void one_patient(const CaseConfig& config, Point point, const Options& options) 
 void poisson_ratio(const Options& options) {
   const std::vector<double> grid = {0.0,  0.1,   0.2,  0.3,   0.4,   0.45,   0.46,  0.47,
                                     0.48, 0.485, 0.49, 0.495, 0.499, 0.4995, 0.4999};
-  for (const double nu : thinned(grid, options.coarse)) {
+  for (const double nu : thinned(grid, options.grid)) {
     CaseConfig config = stability_config();
     config.material.poisson_ratio = nu;
     Point point;
@@ -45,7 +46,7 @@ void poisson_ratio(const Options& options) {
 }
 
 void shear_modulus(const Options& options) {
-  for (const double shear_pa : thinned({1e2, 1e3, 1e4, 1e5, 1e6}, options.coarse)) {
+  for (const double shear_pa : thinned({1e2, 1e3, 1e4, 1e5, 1e6}, options.grid)) {
     CaseConfig config = stability_config();
     config.material.shear_modulus_pa = shear_pa;
     // As stiff against the skull as Table 1's tissue, as heavy against its stiffness.
@@ -60,7 +61,7 @@ void shear_modulus(const Options& options) {
 }
 
 void tumour_contrast(const Options& options) {
-  for (const double ratio : thinned(decades(-4, 6), options.coarse)) {
+  for (const double ratio : thinned(decades(-4, 6), options.grid)) {
     for (const double radius_mm : {10.0, 20.0}) {
       LinearBody body = standing_block(5);
       const fem::Elasticity brain = body.materials.front();

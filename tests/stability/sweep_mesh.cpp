@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bad elements: one node pressed into the face opposite (slivers) or into a neighbour (needles), and layers whose
-// thickness jumps.
+// Bad elements: one node pressed into the face opposite (slivers) or into a neighbour (needles),
+// and layers whose thickness jumps.
 #include <cmath>
 
 #include "tests/stability/linear_body.hpp"
@@ -12,8 +12,8 @@ constexpr int kCells = 4;
 
 NodeIndex node_at(int i, int j, int k) { return i + (kCells + 1) * (j + (kCells + 1) * k); }
 
-// The star of an interior node of Kuhn's mesh is convex, so a node that moves to a point of its boundary flattens the
-// elements there and inverts none.
+// The star of an interior node of Kuhn's mesh is convex, so a node that moves to a point of its
+// boundary flattens the elements there and inverts none.
 LinearBody pressed(const Vec3& towards, double part_left) {
   LinearBody body = standing_block(kCells);
   auto x = body.mesh.nodes.col(node_at(2, 2, 2));
@@ -42,7 +42,7 @@ Vec3 opposite_face_centre() {
 void flat_elements(const Options& options) {
   const LinearBody body = standing_block(kCells);
   const Vec3 face = opposite_face_centre(), neighbour = body.mesh.nodes.col(node_at(3, 2, 2));
-  for (const double left : thinned(decades(-12, 0), options.coarse)) {
+  for (const double left : thinned(decades(-12, 0), options.grid)) {
     Point point;
     point.sheet = "mesh";
     point.parameter = "height (sliver) or edge (needle) over mesh size";
@@ -55,7 +55,7 @@ void flat_elements(const Options& options) {
 }
 
 void size_jumps(const Options& options) {
-  for (const double ratio : thinned(decades(0, 10), options.coarse)) {
+  for (const double ratio : thinned(decades(0, 10), options.grid)) {
     LinearBody body = standing_block(kCells);
     // Thick and thin layers in turn along x, 60 mm in all.
     std::vector<double> border = {0.0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Contact penalty over 15 decades, all that a case file may ask for: the three ways to apply K_p^-1 to one set, contact
-// from an empty set, and inversions.
+// Contact penalty over 15 decades, all that a case file may ask for: the three ways to apply
+// K_p^-1 to one set, contact from an empty set, and inversions.
 #include <limits>
 
 #include "common/contact/iterative_system.hpp"
@@ -17,7 +17,9 @@ void system_point(ToyProblem& problem, contact::PenalisedSystem& system, const P
                   Point point, bool iterative, const Options& options) {
   const auto& contact = problem.model->forward().contact();
   contact::ActiveSet active(static_cast<std::size_t>(contact.num_slaves()), 0);
-  for (std::size_t i = 0; i < active.size(); i += 3) active[i] = 1;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    active[i] = i % 3 == static_cast<std::size_t>(problem.weighty_slaves.front()) % 3;
+  }
   point.unit = "relative";
   point.rcond = problem.model->forward().factor().rcond();
   point.backward_error = std::numeric_limits<double>::quiet_NaN();
@@ -30,11 +32,11 @@ void system_point(ToyProblem& problem, contact::PenalisedSystem& system, const P
   }
   point.answered = true;
   point.status = "solved";
-  if (options.faults != nullptr) options.faults->field(u, point);
-  problem.reference->activate(active);
-  point.difference = relative_difference(u, problem.reference->displacement(load));
-  const double condition = problem.reference->condition();
-  // An iterative solver stops at its residual, and says so in its options.
+  Reference& reference = problem.patient->system;
+  reference.activate(active);
+  point.difference = relative_difference(u, reference.displacement(load));
+  const double condition = reference.condition();
+  // An iterative solver stops at its residual, which its options state.
   point.bound = iterative ? std::min(condition * contact::IterativeOptions{}.tolerance, 1e-3)
                           : rounding_bound(condition);
   options.record(point);
@@ -43,14 +45,17 @@ void system_point(ToyProblem& problem, contact::PenalisedSystem& system, const P
 }  // namespace
 
 void sweep_penalty(const Options& options) {
-  for (const double beta : thinned(decades(-6, 9), options.coarse)) {
+  // Data of a moderately stiff skull, so that every penalty is asked the same.
+  const auto moderate = ToyProblem::make(stability_config(), Fault::kNone);
+  const auto data = sagging_data(*moderate, {});
+  for (const double beta : thinned(decades(-6, 9), options.grid)) {
     CaseConfig config = stability_config();
     config.contact.penalty_n_per_mm = beta;
     Point point;
     point.sheet = "penalty";
     point.parameter = kParameter;
     point.x = beta;
-    auto problem = ToyProblem::make(config);
+    auto problem = ToyProblem::make(config, options.fault);
     if (!problem) {
       set_refused(problem.error(), point);
       options.record(point);
@@ -74,9 +79,6 @@ void sweep_penalty(const Options& options) {
     point.row = "contact from an empty set";
     solve_and_record(*problem, load, point, options);
 
-    // Data of a moderately stiff skull, so that every penalty is asked the same.
-    const auto moderate = ToyProblem::make(stability_config());
-    const auto data = sagging_data(*moderate, {});
     point.row.clear();
     for (const Method method : {Method::kCondensed, Method::kCondensedExact, Method::kPaper,
                                 Method::kPaperWoodbury, Method::kConjugateGradients}) {

@@ -3,55 +3,106 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
-#include "common/core/statistics.hpp"
+#include "common/core/random.hpp"
 #include "common/fem/deformation.hpp"
 #include "common/fem/gravity.hpp"
-#include "common/fem/sampling.hpp"
-#include "common/inversion/prepared/condense.hpp"
-#include "common/inversion/condensed/condensed_inverter.hpp"
-#include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/invert.hpp"
+#include "common/inversion/prepared/data_region.hpp"
+#include "tests/stability/linear_body.hpp"
+#include "tests/stability/reference_descent.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::stability {
 namespace {
 
-Result<Estimate> condensed(const ToyProblem& problem, const SparseData& data) {
-  auto operators = inversion::condense(*problem.model);
-  if (!operators) return tl::unexpected(operators.error());
-  auto inverter = inversion::CondensedInverter::build(
-      std::make_shared<const CondensedOperators>(std::move(*operators)),
-      std::make_shared<const geometry::TetLocator>(problem.brain->mesh), problem.config);
-  if (!inverter) return tl::unexpected(inverter.error());
-  Estimate estimate;
-  if (auto status = inverter->update(data, estimate); !status) {
-    return tl::unexpected(status.error());
+constexpr double kWrongScale = 1.1;
+constexpr PriorScaleValues kAsTheCaseSays{1.0, 1.0, 1.0, 1.0};
+
+// The model was not built const. No input of the product gives one slave a wrong normal or gap
+// alone.
+void spoil_contact(inversion::PreparedModel& model, Fault fault, const std::vector<int>& slaves) {
+  auto& contact = const_cast<contact::PenaltyContact&>(model.forward().contact());
+  std::vector<contact::ContactPair> pairs = contact.pairs();
+  for (const int slave : slaves) {
+    contact::ContactPair& pair = pairs[static_cast<std::size_t>(slave)];
+    if (fault == Fault::kSign) pair.initial_penetration_mm = -pair.initial_penetration_mm;
+    if (fault == Fault::kNormal) pair.normal = turned(pair.normal);
   }
-  return estimate;
+  contact = contact::PenaltyContact(std::move(pairs), contact.beta());
 }
 
-// Misfit and contact forces recomputed from the field.
-void compare_with_itself(const ToyProblem& problem, const SparseData& data,
-                         const Estimate& estimate, Point& point) {
-  const auto sampling = fem::sampling_matrix(problem.model->locator(),
-                                             problem.brain->mesh.num_nodes(), data.positions, 5.0);
-  const Points sampled = (*sampling * estimate.displacement.transpose()).transpose();
-  const MeanStd misfit = mean_std_of_norms(data.displacements - sampled);
-  point.difference = std::abs(misfit.mean - estimate.misfit_mm.mean);
-  const contact::PenaltyContact& contact = problem.model->forward().contact();
-  const VecX penetration = contact.penetration(estimate.displacement);
-  for (int i = 0; i < contact.num_slaves(); ++i) {
-    const auto found = std::find(estimate.active_slaves.begin(), estimate.active_slaves.end(),
-                                 contact.pairs()[static_cast<std::size_t>(i)].slave);
+int most_pressing(const inversion::PreparedModel& model, const Points& load) {
+  const auto solution = model.forward().solve_with_contact(load);
+  if (!solution) return 0;
+  Eigen::Index slave = 0;
+  model.forward().contact().penetration(solution->displacement).maxCoeff(&slave);
+  return static_cast<int>(slave);
+}
+
+// Forces of all slaves, N: 0 where open.
+VecX forces_of(const ToyProblem& problem, const Estimate& estimate) {
+  const auto& pairs = problem.patient->system.pairs();
+  VecX forces = VecX::Zero(static_cast<Eigen::Index>(pairs.size()));
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto found =
+        std::find(estimate.active_slaves.begin(), estimate.active_slaves.end(), pairs[i].slave);
     if (found == estimate.active_slaves.end()) continue;
-    const double force = estimate.contact_force_n[found - estimate.active_slaves.begin()];
-    point.difference =
-        std::max(point.difference,
-                 std::abs(force - contact.beta() * penetration[i]) * problem.slave_compliance[i]);
+    forces[static_cast<Eigen::Index>(i)] =
+        estimate.contact_force_n[found - estimate.active_slaves.begin()];
   }
-  point.bound = 1e-6;
+  return forces;
+}
+
+contact::ActiveSet set_of(const ToyProblem& problem, const Estimate& estimate) {
+  const auto& pairs = problem.patient->system.pairs();
+  contact::ActiveSet set(pairs.size(), 0);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    set[i] = std::count(estimate.active_slaves.begin(), estimate.active_slaves.end(),
+                        pairs[i].slave) > 0;
+  }
+  return set;
+}
+
+// Of fields, and of contact forces as lengths.
+double difference_mm(const ToyProblem& problem, const Estimate& estimate,
+                     const VectorR& displacement, const VectorR& penetration,
+                     const contact::ActiveSet& set) {
+  double worst = greatest_difference(estimate.displacement, displacement);
+  const VecX forces = forces_of(problem, estimate);
+  for (Eigen::Index i = 0; i < forces.size(); ++i) {
+    const bool active = set[static_cast<std::size_t>(i)] != 0;
+    const Real right = active ? problem.patient->system.beta() * penetration[i] : Real(0);
+    const Real apart =
+        std::abs(static_cast<Real>(forces[i]) - right) * problem.patient->compliance(i, i);
+    worst = std::max(worst, static_cast<double>(apart));
+  }
+  return worst;
+}
+
+void compare_with_descent(ToyProblem& problem, const SparseData& data, Method method,
+                          const Estimate& estimate, Point& point) {
+  point.bound = kInversionBound_mm;
+  point.difference = std::numeric_limits<double>::quiet_NaN();
+  const Steps steps = method == Method::kConjugateGradients ? Steps::kConjugate : Steps::kSteepest;
+  const auto right = descend(*problem.patient, data, problem.config.inversion, steps);
+  if (!right) return;
+  const double misfit =
+      std::abs(static_cast<double>(right->mean_misfit_mm) - estimate.misfit_mm.mean);
+  point.difference = std::max(misfit, difference_mm(problem, estimate, right->displacement,
+                                                    right->penetration, right->active));
+  if (right->converged != (estimate.status == EstimateStatus::kConverged)) {
+    point.objection = "the same descent in long double stops otherwise, at iteration " +
+                      std::to_string(right->iterations);
+  }
+  ReferencePosterior posterior(*problem.patient, data);
+  if (const auto set = posterior.find_set(kAsTheCaseSays)) {
+    if (const auto minimum = posterior.of_set(*set, kAsTheCaseSays)) {
+      point.from_posterior_mm = greatest_difference(estimate.displacement, minimum->displacement);
+    }
+  }
 }
 
 }  // namespace
@@ -65,41 +116,45 @@ CaseConfig stability_config() {
   return config;
 }
 
-Result<ToyProblem> ToyProblem::make(const CaseConfig& config, int cells) {
+Result<ToyProblem> ToyProblem::make(const CaseConfig& config, Fault fault, int cells) {
   if (auto status = validate(config); !status) return tl::unexpected(status.error());
   ToyProblem problem;
   problem.brain = std::make_shared<const BrainModel>(test_support::toy_patient(cells));
   problem.config = config;
-  auto model = inversion::PreparedModel::prepare(problem.brain, config, Boundary::kContact);
-  if (!model) return tl::unexpected(model.error());
-  problem.model = std::make_unique<const inversion::PreparedModel>(std::move(*model));
-  const contact::ForwardModel& forward = problem.model->forward();
-  problem.reference = std::make_unique<Reference>(
-      reference_stiffness(problem.brain->mesh, {fem::elasticity_from(config.material)},
-                          forward.dofs()),
-      forward.dofs(), &forward.contact());
-  problem.slave_compliance.resize(forward.contact().num_slaves());
-  for (int i = 0; i < forward.contact().num_slaves(); ++i) {
-    const contact::ContactPair& pair = forward.contact().pairs()[static_cast<std::size_t>(i)];
-    Points unit = Points::Zero(3, problem.brain->mesh.num_nodes());
-    unit.col(pair.slave) = pair.normal;
-    problem.slave_compliance[i] = pair.normal.dot(forward.solve(unit).col(pair.slave));
+  auto truth = inversion::PreparedModel::prepare(problem.brain, config, Boundary::kContact);
+  if (!truth) return tl::unexpected(truth.error());
+  problem.truth = std::make_shared<const inversion::PreparedModel>(std::move(*truth));
+  problem.weighty_slaves = {most_pressing(*problem.truth, sagging_load(problem, 8.0)),
+                            most_pressing(*problem.truth, sagging_load(problem, -8.0))};
+  if (problem.weighty_slaves[0] == problem.weighty_slaves[1]) problem.weighty_slaves.pop_back();
+  problem.model = problem.truth;
+  if (fault != Fault::kNone) {
+    if (fault == Fault::kScale) problem.config.material.shear_modulus_pa *= kWrongScale;
+    auto wrong =
+        inversion::PreparedModel::prepare(problem.brain, problem.config, Boundary::kContact);
+    if (!wrong) return tl::unexpected(wrong.error());
+    auto spoilt = std::make_shared<inversion::PreparedModel>(std::move(*wrong));
+    if (fault != Fault::kScale) spoil_contact(*spoilt, fault, problem.weighty_slaves);
+    problem.model = std::move(spoilt);
   }
+  problem.patient = std::make_unique<ReferencePatient>(
+      *problem.brain, config,
+      patient_matrices(*problem.brain, config, problem.model->forward().contact().pairs()));
   return problem;
 }
 
 Points sagging_load(const ToyProblem& problem, double largest_mm) {
   const BrainModel& brain = *problem.brain;
   const Points load =
-      fem::buoyancy_load(brain.mesh, problem.config.material, brain.gravity_direction,
+      fem::buoyancy_load(brain.mesh, problem.truth->config().material, brain.gravity_direction,
                          brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-  const Points u = problem.model->forward().solve(load);
+  const Points u = problem.truth->forward().solve(load);
   return largest_mm / u.colwise().norm().maxCoeff() * load;
 }
 
 Result<SparseData> sagging_data(const ToyProblem& problem, const DataOptions& options) {
   const auto truth =
-      problem.model->forward().solve_with_contact(sagging_load(problem, options.largest_mm));
+      problem.truth->forward().solve_with_contact(sagging_load(problem, options.largest_mm));
   if (!truth) return tl::unexpected(truth.error());
   const std::vector<NodeIndex> region = inversion::data_region(*problem.brain);
   Random random(options.seed);
@@ -116,35 +171,45 @@ Result<SparseData> sagging_data(const ToyProblem& problem, const DataOptions& op
 }
 
 void compare_with_posterior(ToyProblem& problem, const SparseData& data, const Estimate& estimate,
-                            Point& point) {
+                            bool estimated_scales, Point& point) {
   point.bound = kInversionBound_mm;
-  PosteriorReference right;
-  if (!reference_posterior(*problem.reference, *problem.model, data, estimate, right)) {
-    point.difference = std::numeric_limits<double>::quiet_NaN();
-    return;
-  }
-  point.difference = greatest_difference(estimate.displacement, right.displacement);
-  const contact::PenaltyContact& contact = problem.model->forward().contact();
-  for (int i = 0; i < contact.num_slaves(); ++i) {
-    const auto found = std::find(estimate.active_slaves.begin(), estimate.active_slaves.end(),
-                                 contact.pairs()[static_cast<std::size_t>(i)].slave);
-    const double penetration = static_cast<double>(right.penetration[i]);
-    double wrong = penetration;  // of an open slave
-    if (found != estimate.active_slaves.end()) {
-      const double force =
-          static_cast<double>(static_cast<Real>(contact.beta()) * right.penetration[i]);
-      const double answer = estimate.contact_force_n[found - estimate.active_slaves.begin()];
-      point.difference =
-          std::max(point.difference, std::abs(answer - force) * problem.slave_compliance[i]);
-      wrong = -force * problem.slave_compliance[i];
-    }
-    if (estimate.status == EstimateStatus::kConverged) {
-      point.difference = std::max(point.difference, wrong);
-    }
-  }
+  point.difference = std::numeric_limits<double>::quiet_NaN();
   point.must_warn =
       point.must_warn ||
       fem::measure_deformation(problem.brain->mesh, estimate.displacement).inverted > 0;
+  ReferencePosterior reference(*problem.patient, data);
+  const PriorScaleValues& scales = estimate.prior_scales;
+  const contact::ActiveSet product_set = set_of(problem, estimate);
+  const auto difference = [&](const Posterior& right) {
+    return difference_mm(problem, estimate, right.displacement, right.penetration, right.active);
+  };
+  contact::ActiveSet judged = product_set;
+  const auto own_set = reference.find_set(scales);
+  if (own_set) {
+    if (const auto right = reference.of_set(*own_set, scales)) {
+      point.difference = difference(*right);
+      judged = *own_set;
+    }
+  }
+  if (!(point.difference <= point.bound) && own_set != product_set) {
+    // Another set may repeat itself too, and some data have none that does.
+    const auto right = reference.of_set(product_set, scales);
+    if (!right) return;
+    judged = product_set;
+    point.difference = difference(*right);
+    point.sets = "product's";
+    if (estimate.status == EstimateStatus::kConverged) {
+      point.difference = std::max(point.difference, static_cast<double>(right->violation_mm));
+    }
+  }
+  if (!estimated_scales) return;
+  const auto gain = reference.gain_left(judged, scales);
+  if (gain) point.scales_gain = static_cast<double>(*gain);
+  if (point.scales_gain <= kScalesBound) return;
+  char text[100];
+  std::snprintf(text, sizeof text, "the prior's scales leave %.2f to gain in ln p",
+                point.scales_gain);
+  point.objection = text;
 }
 
 void invert_and_record(ToyProblem& problem, const SparseData& data, Method method, Point point,
@@ -153,21 +218,16 @@ void invert_and_record(ToyProblem& problem, const SparseData& data, Method metho
   point.unit = "mm";
   point.rcond = problem.model->forward().factor().rcond();
   point.backward_error = std::numeric_limits<double>::quiet_NaN();
-  inversion::InversionOptions inversion_options;
-  inversion_options.method = method;
-  auto estimate = method == Method::kCondensed
-                      ? condensed(problem, data)
-                      : inversion::invert(*problem.model, data, inversion_options);
+  const auto estimate = inversion::invert(*problem.model, data, method);
   if (!estimate) {
     set_refused(estimate.error(), point);
     return options.record(point);
   }
   set_answered(*estimate, point);
-  if (options.faults != nullptr) options.faults->estimate(*estimate, point);
   if (method == Method::kCondensed || method == Method::kCondensedExact) {
-    compare_with_posterior(problem, data, *estimate, point);
+    compare_with_posterior(problem, data, *estimate, method == Method::kCondensed, point);
   } else {
-    compare_with_itself(problem, data, *estimate, point);
+    compare_with_descent(problem, data, method, *estimate, point);
   }
   options.record(point);
 }
@@ -176,7 +236,7 @@ void solve_and_record(ToyProblem& problem, const Points& load, Point point,
                       const Options& options) {
   point.unit = "relative";
   point.rcond = problem.model->forward().factor().rcond();
-  auto solution = problem.model->forward().solve_with_contact(load);
+  const auto solution = problem.model->forward().solve_with_contact(load);
   if (!solution) {
     set_refused(solution.error(), point);
     return options.record(point);
@@ -187,14 +247,14 @@ void solve_and_record(ToyProblem& problem, const Points& load, Point point,
   point.reason = solution->converged ? "" : "contact did not settle";
   point.backward_error = solution->backward_error;
   point.iterations = solution->iterations;
-  if (options.faults != nullptr) options.faults->field(solution->displacement, point);
   point.min_volume_ratio =
       fem::measure_deformation(problem.brain->mesh, solution->displacement).min_volume_ratio;
+  Reference& reference = problem.patient->system;
   VectorR right;
-  point.difference = problem.reference->solve_contact(load, right)
+  point.difference = reference.solve_contact(load, right)
                          ? relative_difference(solution->displacement, right)
                          : std::numeric_limits<double>::quiet_NaN();
-  point.bound = rounding_bound(problem.reference->condition());
+  point.bound = rounding_bound(reference.condition());
   options.record(point);
 }
 
