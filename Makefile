@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test bench verify stability sensing format format-check tidy image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -27,6 +27,9 @@ demo: configure ## build the binaries and run the whole job on the default case,
 
 test: build ## build and run all tests
 	ctest --preset $(PRESET) -j 2
+
+test-kernels: build ## all tests again with OpenBLAS kernels of other processors; KERNELS="Haswell SkylakeX Nehalem"
+	cmake/scripts/test-kernels.sh $(PRESET) $(KERNELS)
 
 bench: configure ## error against run time, latency, memory, into out/bench; QUICK=1 for a short run
 	cmake --build --preset $(PRESET) -j $(JOBS) --target bench_programs

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "common/fem/dof_map.hpp"
-#include "common/fem/elasticity.hpp"
+#include "common/linalg/symmetric_matrix.hpp"
 
 namespace brainshift::fem {
 

@@ -17,7 +17,7 @@
 // Precondition: finite points.
 #pragma once
 
-#include "common/core/distance_grid.hpp"
+#include "common/values/distance_grid.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 

@@ -13,7 +13,7 @@
 // The same surface gives the same bits, whatever the number of threads.
 #pragma once
 
-#include "common/core/distance_grid.hpp"
+#include "common/values/distance_grid.hpp"
 #include "common/core/error.hpp"
 #include "common/geometry/closest_point.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/intensity_samples.hpp"
+#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::registration {

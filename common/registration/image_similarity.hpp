@@ -10,7 +10,7 @@
 #pragma once
 
 #include <optional>
-#include "common/core/intensity_samples.hpp"
+#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/registration/joint_histogram.hpp"
 #include "common/registration/rigid_increment.hpp"

@@ -7,7 +7,7 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/core/intensity_samples.hpp"
+#include "common/values/intensity_samples.hpp"
 #include "common/ultrasound/compound.hpp"
 
 namespace brainshift::ultrasound {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "common/core/distance_grid.hpp"
+#include "common/values/distance_grid.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 

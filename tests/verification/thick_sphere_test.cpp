@@ -109,12 +109,13 @@ Outcome nodal_average(double nu, int cells) {
       }
     }
   }
-  linalg::SymmetricMatrix divergence(space.num_nodes(), dofs.num_unknowns());
+  using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, long>;
+  Sparse divergence(space.num_nodes(), dofs.num_unknowns());
   divergence.setFromTriplets(entries.begin(), entries.end());
   const VecX weights =
       (tissue.lambda + 2.0 / 3.0 * tissue.shear) * fem::nodal_volumes(space.mesh).cwiseInverse();
-  const linalg::SymmetricMatrix scaled = weights.asDiagonal() * divergence;
-  const linalg::SymmetricMatrix full = divergence.transpose() * scaled;
+  const Sparse scaled = weights.asDiagonal() * divergence;
+  const Sparse full = divergence.transpose() * scaled;
   linalg::SymmetricMatrix lower = fem::assemble_stiffness(space, deviatoric, dofs);
   lower += linalg::SymmetricMatrix(full.triangularView<Eigen::Lower>());
   const auto factor = linalg::SparseCholesky::factorise(lower);

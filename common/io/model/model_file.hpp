@@ -19,7 +19,7 @@
 //   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles},
 //   /tumour/{vertices,triangles}, /sets/{craniotomy,brainstem,slaves,fixed}
 //   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); the model may have none
-//     values_mm               dims 1*2*3  float32  signed distance, core/distance_grid.hpp
+//     values_mm               dims 1*2*3  float32  signed distance, values/distance_grid.hpp
 //   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes
 //                                         (int32), prepare_s (float64, s)
 //     modes                   r x 3n      float32  mm     U, one mode per row

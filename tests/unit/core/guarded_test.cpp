@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/core/guarded.hpp"
 
 #include <gtest/gtest.h>
@@ -8,24 +8,25 @@
 namespace brainshift {
 namespace {
 
-TEST(Guarded, PassesResultsAndErrorsOn) {
+TEST(Guarded, PassesValuesAndErrorsThrough) {
   const auto value = guarded(ErrorCode::kInternal, "context", []() -> Result<int> { return 7; });
   ASSERT_TRUE(value.has_value());
   EXPECT_EQ(*value, 7);
   const Status error = guarded(ErrorCode::kInternal, "context", []() -> Status {
-    return fail(ErrorCode::kNotFound, "no such file");
+    return fail(ErrorCode::kNotFound, "own");
   });
   ASSERT_FALSE(error.has_value());
   EXPECT_EQ(error.error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(error.error().message, "no such file");
+  EXPECT_EQ(error.error().message, "own");
 }
 
-TEST(Guarded, AnExceptionBecomesAnErrorWithItsContext) {
-  const Status error = guarded(ErrorCode::kWriteFailed, "journal",
-                               []() -> Status { throw std::runtime_error("disk full"); });
+TEST(Guarded, TurnsAnExceptionIntoAnErrorOfTheGivenCode) {
+  const Status error = guarded(ErrorCode::kWriteFailed, "journal", []() -> Status {
+    throw std::runtime_error("disk");
+  });
   ASSERT_FALSE(error.has_value());
   EXPECT_EQ(error.error().code, ErrorCode::kWriteFailed);
-  EXPECT_EQ(error.error().message, "journal: disk full");
+  EXPECT_EQ(error.error().message, "journal: disk");
 }
 
 }  // namespace

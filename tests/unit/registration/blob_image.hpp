@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "common/core/intensity_samples.hpp"
+#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/random.hpp"
 

@@ -212,7 +212,7 @@ std::string check_message(const std::string& message, const json& value, std::st
 class Golden : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(Golden, FrameHoldsTheDescribedValuesAndIsReproducedByteForByte) {
-  const fs::path stem = fs::path(GOLDEN_DIR) / GetParam();
+  const fs::path stem = fs::path(BRAINSHIFT_SOURCE_DIR) / "tests/data/wire" / GetParam();
   const std::string bytes = read(fs::path(stem) += ".bin");
   const json description = json::parse(read(fs::path(stem) += ".json"));
   const auto frame = decode_frame(bytes);

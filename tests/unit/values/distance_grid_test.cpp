@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "common/core/distance_grid.hpp"
+#include "common/values/distance_grid.hpp"
 
 #include <gtest/gtest.h>
 
