@@ -13,8 +13,8 @@ struct PrepareArguments {
 };
 
 // Calls patient::prepare_model, writes the model file, prints a table or one JSON object to stdout.
-// A model that cannot be solved is not written. An interrupted run leaves OUT.partial, from which the
-// next one goes on. Returns the exit status.
+// A model that cannot be solved is not written. An interrupted run leaves OUT.partial, from which
+// the next one goes on. Returns the exit status.
 int run_prepare(const PrepareArguments& arguments);
 
 }  // namespace brainshift::server

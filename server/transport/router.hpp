@@ -48,8 +48,8 @@ class RequestHandler {
 
 class Router {
  public:
-  // kInvalidArgument for a text that is not an endpoint, kUnavailable when it cannot be bound (in use, no
-  // such interface, no permission). The sentence names the endpoint.
+  // kInvalidArgument for a text that is not an endpoint, kUnavailable when it cannot be bound (in
+  // use, no such interface, no permission). The sentence names the endpoint.
   static Result<Router> bind(const RouterOptions& options);
   Router(Router&&) noexcept;
   Router& operator=(Router&&) noexcept;

@@ -29,8 +29,8 @@ namespace brainshift::inversion {
 inline constexpr double kLogVarianceSd = 2.1972245773362196;  // 2 ln 3
 
 // The case gives the greatest strength of a part; of swelling it gives the usual one
-// (docs/decisions/0014). Where other forces may be many times stronger than in the case, the contact
-// set does not settle (docs/decisions/0012).
+// (docs/decisions/0014). Where other forces may be many times stronger than in the case, the
+// contact set does not settle (docs/decisions/0012).
 inline constexpr PriorScaleValues kLargestScales = {1.0, 1.0, 4.0, 1.0};
 
 class PriorScales {
