@@ -37,7 +37,7 @@ class PenalisedSystem {
   // solvers ignore it. kNotConverged from an iterative solver.
   virtual Status solve(const Points& f, Points& u) const = 0;
   // u = K_p^-1 b_p
-  Status solve_with_gaps(const Points& b, Points& u) const;
+  virtual Status solve_with_gaps(const Points& b, Points& u) const;
 
   // One contact iteration (paper section 2.4), given u = K_p^-1 b_p. The slaves that penetrate
   // become the active set. If that changes the set, u is solved anew and the result is true.

@@ -76,12 +76,12 @@ Status WoodburySystem::refresh() {
   return {};
 }
 
-Status WoodburySystem::apply(const Points& f, Points& u, VecX& c) const {
+Status WoodburySystem::apply(const Points& f, const VecX& gaps, Points& u, VecX& c) const {
   if (auto status = forward().solve(f, u); !status) return status;
   const auto& pairs = forward().contact().pairs();
   c.resize(static_cast<Eigen::Index>(set_.size()));
   for (std::size_t i = 0; i < set_.size(); ++i) {
-    c[i] = pairs[set_[i]].normal.dot(u.col(pairs[set_[i]].slave));
+    c[i] = pairs[set_[i]].normal.dot(u.col(pairs[set_[i]].slave)) - gaps[i];
   }
   capacitance_.solveInPlace(c);
   Points corrected = f;
@@ -91,23 +91,36 @@ Status WoodburySystem::apply(const Points& f, Points& u, VecX& c) const {
   return forward().solve(corrected, u);
 }
 
-VecX WoodburySystem::imbalance(const Points& u, const VecX& c) const {
+VecX WoodburySystem::imbalance(const Points& u, const VecX& c, const VecX& gaps) const {
   const auto& pairs = forward().contact().pairs();
   VecX left = c;
   for (std::size_t i = 0; i < set_.size(); ++i) {
     const ContactPair& pair = pairs[set_[i]];
-    left[i] -= forward().contact().beta() * pair.normal.dot(u.col(pair.slave));
+    left[i] -= forward().contact().beta() * (pair.normal.dot(u.col(pair.slave)) - gaps[i]);
   }
   return left;
 }
 
 Status WoodburySystem::solve(const Points& f, Points& u) const {
+  return solve_with(f, VecX::Zero(static_cast<Eigen::Index>(set_.size())), u);
+}
+
+Status WoodburySystem::solve_with_gaps(const Points& b, Points& u) const {
+  VecX gaps(static_cast<Eigen::Index>(set_.size()));
+  for (std::size_t i = 0; i < set_.size(); ++i) {
+    gaps[i] = forward().contact().pairs()[set_[i]].initial_penetration_mm;
+  }
+  return solve_with(b, gaps, u);
+}
+
+Status WoodburySystem::solve_with(const Points& f, const VecX& gaps, Points& u) const {
   if (set_.empty()) return forward().solve(f, u);
+  const VecX none = VecX::Zero(gaps.size());
   VecX c;
-  if (auto status = apply(f, u, c); !status) return status;
+  if (auto status = apply(f, gaps, u, c); !status) return status;
   const double beta = forward().contact().beta();
   for (int refinements = 0;; ++refinements) {
-    const VecX left = imbalance(u, c);
+    const VecX left = imbalance(u, c, gaps);
     const double scale = beta * u.cwiseAbs().maxCoeff() + f.cwiseAbs().maxCoeff();
     const double eta = left.cwiseAbs().maxCoeff();
     if (eta <= linalg::kRefuseAbove * scale) return {};
@@ -124,7 +137,7 @@ Status WoodburySystem::solve(const Points& f, Points& u) const {
     }
     Points du;
     VecX dc;
-    if (auto status = apply(residual, du, dc); !status) return status;
+    if (auto status = apply(residual, none, du, dc); !status) return status;
     u += du;
     c += dc - left;  // K du = N_A (left - dc), so that K u + N_A c = f still holds
   }

@@ -12,14 +12,21 @@
 // ever active (0.4 MB each for the default head). The dense matrix Phi_AA + I / beta is
 // factorised when the set changes.
 //
+// Initial penetrations 0p go into the small system instead of the load:
+//
+//   K_p^-1 b_p = K^-1 (b - N_A c),   (Phi_AA + I / beta) c = N_A^T K^-1 b - 0p_A
+//
+// -c is then the contact force itself. In b_p = b + beta N_A 0p_A it would be the difference of
+// numbers of size beta, and nothing would be left of it from beta = 1e8 N/mm on.
+//
 // Checks: the backward error of every solve with K and of every block of columns
 // (checked_solve.hpp). So K u + N_A c = f holds. u also solves the penalised equations when c =
-// beta N_A^T u, up to
+// beta (N_A^T u - 0p_A), up to
 //
-//   eta = max_A |c - beta N_A^T u| / (beta max|u| + max|f|)
+//   eta = max_A |c - beta (N_A^T u - 0p_A)| / (beta max|u| + max|f|)
 //
-// A solve with eta above kRefuseAbove is refined, u += K_p^-1 N_A (c - beta N_A^T u), and
-// rejected if eta stays above it after kMaxRefinements.
+// with 0p = 0 for solve(). A solve with eta above kRefuseAbove is refined, u += K_p^-1 N_A r with
+// r the difference above, and rejected if eta stays above it after kMaxRefinements.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -35,14 +42,17 @@ class WoodburySystem final : public PenalisedSystem {
   explicit WoodburySystem(const ForwardModel& forward);
   // Errors as ForwardModel::solve; kSingularMatrix: eta above kRefuseAbove.
   Status solve(const Points& f, Points& u) const override;
+  Status solve_with_gaps(const Points& b, Points& u) const override;
   // Columns of Phi computed so far.
   int columns() const;
 
  private:
-  // f: 3 x n; u = K_p^-1 f and c by the formula above, without the check of eta.
-  Status apply(const Points& f, Points& u, VecX& c) const;
-  // c - beta N_A^T u.
-  VecX imbalance(const Points& u, const VecX& c) const;
+  // f: 3 x n; gaps: 0p of the set. u = K_p^-1 (f + beta N_A gaps), checked and refined.
+  Status solve_with(const Points& f, const VecX& gaps, Points& u) const;
+  // The same, and c, by the formula above without the check of eta.
+  Status apply(const Points& f, const VecX& gaps, Points& u, VecX& c) const;
+  // c - beta (N_A^T u - gaps).
+  VecX imbalance(const Points& u, const VecX& c, const VecX& gaps) const;
   Status refresh() override;
   Status solve_columns(const std::vector<int>& slaves);
 
