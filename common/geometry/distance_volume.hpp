@@ -17,9 +17,9 @@
 // Precondition: finite points.
 #pragma once
 
-#include "common/values/distance_grid.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
+#include "common/values/distance_grid.hpp"
 
 namespace brainshift::geometry {
 

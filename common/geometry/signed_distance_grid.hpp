@@ -13,9 +13,9 @@
 // The same surface gives the same bits, whatever the number of threads.
 #pragma once
 
-#include "common/values/distance_grid.hpp"
 #include "common/core/error.hpp"
 #include "common/geometry/closest_point.hpp"
+#include "common/values/distance_grid.hpp"
 
 namespace brainshift::geometry {
 

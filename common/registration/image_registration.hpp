@@ -24,10 +24,10 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 #include "common/registration/image_registration_input.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {
 

@@ -10,10 +10,10 @@
 #pragma once
 
 #include <optional>
-#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/registration/joint_histogram.hpp"
 #include "common/registration/rigid_increment.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {
 

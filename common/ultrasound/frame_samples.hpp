@@ -7,8 +7,8 @@
 #pragma once
 
 #include "common/core/error.hpp"
-#include "common/values/intensity_samples.hpp"
 #include "common/ultrasound/compound.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::ultrasound {
 

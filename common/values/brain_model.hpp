@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "common/values/distance_grid.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
+#include "common/values/distance_grid.hpp"
 
 namespace brainshift {
 

@@ -34,9 +34,9 @@ std::vector<double> finite(const CsvTable& table, const std::vector<std::size_t>
   return values;
 }
 
-// The numbers of the repetitions in which every method of one mesh and scenario gave an estimate. A method
-// that gave none at all does not count. Each repetition has its own noise, which moves the error more
-// than the choice of method does.
+// The numbers of the repetitions in which every method of one mesh and scenario gave an estimate.
+// A method that gave none at all does not count. Each repetition has its own noise, which moves the
+// error more than the choice of method does.
 std::set<std::string> shared_repetitions(const CsvTable& table,
                                          const std::vector<std::vector<std::size_t>>& methods) {
   std::optional<std::set<std::string>> shared;

@@ -9,7 +9,8 @@
 
 namespace brainshift::bench {
 
-// Median time of one call of `work`, ms, over `repetitions` calls that follow `warm_up` uncounted ones.
+// Median time of one call of `work`, ms, over `repetitions` calls. `warm_up` uncounted calls come
+// first.
 template <typename Work>
 double median_ms(const Work& work, int repetitions, int warm_up = 0) {
   std::vector<double> times_ms;

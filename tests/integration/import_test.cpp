@@ -131,7 +131,7 @@ TEST_F(ImportCommand, BadOptionsExitTwoWithOneLine) {
   with("--device", "", "no chain from Image to Ras");
   with("--contours", files.write("bad.csv", "1,2\n"), "bad.csv: line 1");
   with("--seeds", files.write("s.csv", "1,2,3\n"), "exactly one of --contours and --seeds");
-  with("--registration", files.write("bad.txt", "1 2 3"), "holds 3 numbers");
+  with("--registration", files.write("bad.txt", "1 2 3"), "T_ras_reference has 3 numbers");
   with("--case", files.path("none.yaml"), "none.yaml");
   with("--sd-mm", "-1", "--sd-mm -1");
   with("--latency-ms", "soon", "--latency-ms");

@@ -56,8 +56,8 @@ struct Errors {
 };
 
 // One set of landmarks: the distances of the left-out ones from where they were measured.
-Status try_once(const bench::Head& head, const Points& truth, Random& random, server::Pipeline& session,
-                std::uint64_t& sequence, Errors& errors) {
+Status try_once(const bench::Head& head, const Points& truth, Random& random,
+                server::Pipeline& session, std::uint64_t& sequence, Errors& errors) {
   const std::vector<NodeIndex> nodes = choose_landmarks(*head.model, random);
   const LandmarkPairs all = client::measure_displacements(
       head.model->mesh.nodes(Eigen::all, nodes), truth(Eigen::all, nodes), kNoise_mm, random);

@@ -5,8 +5,8 @@
 //   green   answered, within the bound of its sweep
 //   yellow  answered with a warning, in status or reason
 //   grey    refused, with a reason
-//   red     wrong without a warning: outside the bound, an objection of the reference, a warning that
-//           is missing, or no reason
+//   red     wrong without a warning: outside the bound, an objection of the reference, a warning
+//           that is missing, or no reason
 //
 // docs/stability.md derives the bounds. None was fitted to what is measured.
 #pragma once

@@ -44,8 +44,8 @@ Result<std::vector<double>> parse_numbers(std::string_view rest, const std::stri
     double number = 0.0;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (error != std::errc() || stop != word.data() + word.size()) {
-      return fail(ErrorCode::kUnreadable,
-                  fmt::format("\"{}\" is no number of a 4 x 4 matrix {}", word.substr(0, 30), name));
+      return fail(ErrorCode::kUnreadable, fmt::format("\"{}\" is no number of a 4 x 4 matrix {}",
+                                                      word.substr(0, 30), name));
     }
     numbers.push_back(number);
     rest.remove_prefix(end);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/model/model_layout.hpp"
 
-#include "common/values/model_id.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/values/model_id.hpp"
 
 namespace brainshift::io {
 namespace {

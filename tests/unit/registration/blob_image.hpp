@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "common/values/intensity_samples.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/random.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration::test {
 
