@@ -8,7 +8,7 @@
 //   red     wrong without a warning: outside the bound, an objection of the reference, a warning
 //           that is missing, or no reason
 //
-// docs/stability.md derives the bounds. None was fitted to what is measured.
+// docs/stability.md derives the bounds.
 #pragma once
 
 #include <functional>
