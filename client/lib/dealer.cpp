@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 #include "common/wire/frame.hpp"
@@ -107,7 +108,8 @@ Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heart
 Status Dealer::open_monitor() {
   monitor_ = zmq_socket(context_, ZMQ_PAIR);
   if (monitor_ == nullptr || !set_option(monitor_, ZMQ_LINGER, 0) ||
-      zmq_socket_monitor(socket_, kMonitorAddress, ZMQ_EVENT_DISCONNECTED) != 0 ||
+      zmq_socket_monitor(socket_, kMonitorAddress,
+                         ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED) != 0 ||
       zmq_connect(monitor_, kMonitorAddress) != 0) {
     return fail(ErrorCode::kInternal,
                 endpoint_ + ": cannot watch the connection: " + zmq_strerror(errno));
@@ -121,18 +123,31 @@ Dealer::~Dealer() {
   if (context_ != nullptr) zmq_ctx_term(context_);
 }
 
-void Dealer::drain_monitor() {
+bool Dealer::read_monitor() {
+  bool lost = false;
   Message event;
   while (event.receive(monitor_)) {
+    // First part: the event's number in 16 bits, then its value; second part: the endpoint.
+    if (!event.more()) continue;
+    const std::string bytes = event.bytes();
+    std::uint16_t number = 0;
+    if (bytes.size() >= sizeof number) std::memcpy(&number, bytes.data(), sizeof number);
+    connected_ = number == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
+    lost = lost || number == ZMQ_EVENT_DISCONNECTED;
   }
+  return lost;
 }
 
 Status Dealer::send(std::string_view message, Deadline deadline) {
   do {
-    zmq_pollitem_t item{socket_, 0, ZMQ_POLLOUT, 0};
-    zmq_poll(&item, 1, remaining_ms(deadline));
-    // A connection that accepts messages was made after every loss that the monitor has reported.
-    drain_monitor();
+    // The monitor reports a loss before the socket has dropped the pipe of the lost connection, and a
+    // message into that pipe would vanish. So a message waits for the next handshake; a loss that the
+    // monitor has not reported yet ends receive().
+    (void)read_monitor();
+    zmq_pollitem_t ready{connected_ ? socket_ : monitor_, 0,
+                         static_cast<short>(connected_ ? ZMQ_POLLOUT : ZMQ_POLLIN), 0};
+    zmq_poll(&ready, 1, remaining_ms(deadline));
+    if (!connected_) continue;
     if (zmq_send(socket_, message.data(), message.size(), ZMQ_DONTWAIT) >= 0) return {};
     if (errno != EAGAIN && errno != EINTR) {
       return fail(ErrorCode::kUnavailable, endpoint_ + ": cannot send: " + zmq_strerror(errno));
@@ -149,7 +164,7 @@ Result<std::string> Dealer::receive(Deadline deadline) {
     // What arrived before the connection was lost is still good.
     if ((items[0].revents & ZMQ_POLLIN) != 0) return receive_waiting();
     if ((items[1].revents & ZMQ_POLLIN) != 0) {
-      drain_monitor();
+      if (!read_monitor()) continue;
       return fail(ErrorCode::kUnavailable, "lost the connection to " + endpoint_);
     }
     if (remaining_ms(deadline) == 0) {

@@ -40,14 +40,15 @@ class Dealer {
   Dealer() = default;
   Status open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval);
   Status open_monitor();
-  // Forgets connections lost in the past.
-  void drain_monitor();
+  // Takes in what the monitor has to report. True when a connection was lost.
+  bool read_monitor();
   Result<std::string> receive_waiting();
 
   std::string endpoint_;
   void* context_ = nullptr;
   void* socket_ = nullptr;
   void* monitor_ = nullptr;
+  bool connected_ = false;  // a handshake, and no loss since, in the order of the monitor's reports
 };
 
 }  // namespace brainshift::client
