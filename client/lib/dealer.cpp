@@ -140,9 +140,9 @@ bool Dealer::read_monitor() {
 
 Status Dealer::send(std::string_view message, Deadline deadline) {
   do {
-    // The monitor reports a loss before the socket has dropped the pipe of the lost connection, and a
-    // message into that pipe would vanish. So a message waits for the next handshake; a loss that the
-    // monitor has not reported yet ends receive().
+    // The monitor reports a loss before the socket has dropped the pipe of the lost connection, and
+    // a message into that pipe would vanish. So a message waits for the next handshake. A loss that
+    // the monitor has not reported yet ends receive().
     (void)read_monitor();
     zmq_pollitem_t ready{connected_ ? socket_ : monitor_, 0,
                          static_cast<short>(connected_ ? ZMQ_POLLOUT : ZMQ_POLLIN), 0};
