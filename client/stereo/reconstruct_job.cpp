@@ -10,6 +10,9 @@
 namespace brainshift::client {
 namespace {
 
+// A camera looks from some 300 mm: a rotation off by 1e-4 moves the cortex by 0.03 mm.
+constexpr double kCameraPoseTolerance = 1e-4;
+
 // What goes wrong with a pair is told with its left picture's name.
 tl::unexpected<Error> of_pair(const ReconstructJob& job, const Error& error) {
   return io::file_error(error.code, job.left, error.message);
@@ -20,7 +23,7 @@ tl::unexpected<Error> of_pair(const ReconstructJob& job, const Error& error) {
 Result<ReconstructSummary> reconstruct_files(const ReconstructJob& job, const Progress& progress) {
   const auto calibration = io::read_calibration(job.calibration);
   if (!calibration) return tl::unexpected(calibration.error());
-  const auto T_ras_camera = io::read_pose(job.pose, "T_ras_camera");
+  const auto T_ras_camera = io::read_pose(job.pose, "T_ras_camera", kCameraPoseTolerance);
   if (!T_ras_camera) return tl::unexpected(T_ras_camera.error());
   const auto left = read_picture(job.left);
   if (!left) return tl::unexpected(left.error());

@@ -67,7 +67,8 @@ std::string without_comments(std::string_view text) {
 
 }  // namespace
 
-Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name) {
+Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name,
+                                 double tolerance) {
   const auto content = read_file(path);
   if (!content) return tl::unexpected(content.error());
   const auto numbers = parse_numbers(without_comments(*content), name);
@@ -79,7 +80,7 @@ Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::s
   }
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
-  if (Status rigid = check_rigid(matrix); !rigid) {
+  if (Status rigid = check_rigid(matrix, tolerance); !rigid) {
     return file_error(ErrorCode::kUnreadable, path, name + " " + rigid.error().message);
   }
   return nearest_rigid(matrix);

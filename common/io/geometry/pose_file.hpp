@@ -14,13 +14,16 @@
 #include <string>
 
 #include "common/core/error.hpp"
+#include "common/core/rigid_motion.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift::io {
 
-// `name`: "T_ras_camera". Rotations with three decimals are accepted (core/rigid_motion.hpp) and
-// made orthonormal. kNotFound; kUnreadable, which names the file and what is wrong: a word that
-// is no number, another number of numbers, not a rigid motion.
-Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name);
+// `name`: "T_ras_camera". tolerance: of check_rigid (core/rigid_motion.hpp); by default a rotation
+// with three decimals is accepted. The pose is made orthonormal. kNotFound;
+// kUnreadable, which names the file and what is wrong: a word that is no number, another number of
+// numbers, not a rigid motion.
+Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name,
+                                 double tolerance = kThreeDecimals);
 
 }  // namespace brainshift::io

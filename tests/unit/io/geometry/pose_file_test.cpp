@@ -90,5 +90,13 @@ TEST_F(PoseFile, OtherTextsAreRefused) {
   EXPECT_EQ(read_pose(temporary_.path() / "absent.txt", "T").error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(PoseFile, TheCallerSaysHowRigidAPoseMustBe) {
+  std::ofstream(temporary_.path() / "t.txt") << "0.866 -0.5 0 1  0.5 0.866 0 2  0 0 1 3  0 0 0 1";
+  EXPECT_TRUE(read_pose(temporary_.path() / "t.txt", "T_ras_reference"));
+  const auto strict = read_pose(temporary_.path() / "t.txt", "T_ras_camera", 1e-5);
+  ASSERT_FALSE(strict);
+  EXPECT_EQ(strict.error().code, ErrorCode::kUnreadable);
+}
+
 }  // namespace
 }  // namespace brainshift::io
