@@ -26,3 +26,13 @@ if(BRAINSHIFT_SANITIZE)
   add_compile_options(-fsanitize=${BRAINSHIFT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${BRAINSHIFT_SANITIZE})
 endif()
+
+# A compiler cache, where one is installed. Precompiled headers need both settings to be cached.
+find_program(BRAINSHIFT_CCACHE ccache DOC "Compiler cache; empty: none")
+if(BRAINSHIFT_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${BRAINSHIFT_CCACHE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)
+  endif()
+endif()

@@ -49,10 +49,10 @@ Result<SparseData> sagging_data(const ToyProblem& problem, const DataOptions& op
 // The bound of every inversion, mm: a hundredth of the gap and a twentieth of the misfit's
 // standard deviation, below what surgery can see. It is what the reduced method promises.
 inline constexpr double kInversionBound_mm = 0.01;
-// What the product may leave to gain in ln p over the prior's scales: its scales lie within the
-// 68 % region of their own posterior, half the 0.68 quantile of chi-square with three degrees of
-// freedom (along gravity, across it, other).
-inline constexpr double kScalesBound = 1.75;
+// What the product may leave to gain in ln p over the prior's scales: well within the 68 % region
+// of their own posterior, whose edge is at 1.75, half the 0.68 quantile of chi-square with three
+// degrees of freedom (along gravity, across it, other).
+inline constexpr double kScalesBound = 1.0;
 
 // One inversion from a cold start, compared with the reference.
 //   condensed, condensed-exact    the posterior mean, by compare_with_posterior()
