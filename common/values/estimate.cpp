@@ -19,6 +19,16 @@ std::string_view to_string(Method method) {
   return "condensed";
 }
 
+std::string_view to_string(PriorPart part) {
+  switch (part) {
+    case PriorPart::kAlongGravity: return "along_gravity";
+    case PriorPart::kAcrossGravity: return "across_gravity";
+    case PriorPart::kSwelling: return "swelling";
+    case PriorPart::kOther: return "other";
+  }
+  return "other";
+}
+
 std::string_view to_string(EstimateStatus status) {
   switch (status) {
     case EstimateStatus::kNotRun: return "not_run";

@@ -62,7 +62,16 @@ struct IterationRecord {
 // forces.
 enum class PriorPart { kAlongGravity, kAcrossGravity, kSwelling, kOther };
 inline constexpr int kPriorParts = 4;
+std::string_view to_string(PriorPart part);  // "along_gravity", "across_gravity", ...
+// One value for each part, in units of the case's standard deviations.
 using PriorScaleValues = std::array<double, kPriorParts>;
+inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1};
+
+// One set of strengths, and how probable the data make it.
+struct Hypothesis {
+  PriorScaleValues scales = kAsInTheCase;  // 0: the part is absent
+  double weight = 1.0;                     // of all hypotheses of an estimate: sum 1
+};
 
 struct ContactSummary {
   int active = 0;  // slaves that carry a contact force
@@ -75,6 +84,11 @@ struct ContactSummary {
   //   condensed, condensed-exact: active sets evaluated, i.e. the length of Estimate::history. At
   //     least 1, also without contact; the best set counts again when it is evaluated once more.
   int iterations = 0;
+  // Certificate of method condensed (inversion/condensed). decrement: how far the loads are from
+  // the minimum of J, in posterior standard deviations; NaN for other methods. max_violation_mm:
+  // largest depth of an open slave, or pull of an active one times its compliance.
+  double decrement = std::numeric_limits<double>::quiet_NaN();
+  double max_violation_mm = std::numeric_limits<double>::quiet_NaN();
 };
 
 // How the data of one instrument fared in an update.
@@ -111,9 +125,19 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
-  // Estimated strength of the prior's parts, in units of the case's standard deviations.
+  // Strength of the prior's parts, mean over the hypotheses; 0 for a part that the model lacks.
   // Estimated by method condensed only; 1 otherwise.
-  PriorScaleValues prior_scales{1.0, 1.0, 1.0, 1.0};
+  PriorScaleValues prior_scales = kAsInTheCase;
+  // Probability that a part is absent; 0 where it is not estimated.
+  PriorScaleValues prior_absent{};
+  // Parts whose most probable strength is the greatest that is allowed.
+  std::array<bool, kPriorParts> prior_at_bound{};
+  // The most probable one first. Method condensed with estimated strengths only.
+  std::vector<Hypothesis> hypotheses;
+  // Root mean square of the whitened residuals: 1 when the data lie as far off as their standard
+  // deviations say. NaN: not computed.
+  double misfit_ratio = std::numeric_limits<double>::quiet_NaN();
+  int data_outside_region = 0;  // data outside the region that was prepared
   // Smallest ratio of an element's volume after to before (det F). At 0 and below the element is
   // inverted, and the estimate there is no deformation of tissue. NaN: not measured.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
