@@ -6,6 +6,7 @@
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
+#include "common/inversion/contract/quality_check.hpp"
 #include "common/inversion/descent/descend.hpp"
 #include "common/inversion/prepared/condense.hpp"
 
@@ -16,10 +17,6 @@ class Condensed final : public Inverter {
  public:
   Condensed(CondensedInverter inverter, std::uint64_t bytes)
       : inverter_(std::move(inverter)), bytes_(bytes) {}
-  Status update(const SparseData& data, const InversionOptions& options,
-                Estimate& estimate) override {
-    return inverter_.update(data, estimate, options);
-  }
   void reset() override { inverter_.reset(); }
   std::optional<OmissionErrors> omission_errors() const override {
     return inverter_.omission_errors();
@@ -27,6 +24,11 @@ class Condensed final : public Inverter {
   std::uint64_t bytes() const override { return bytes_; }
 
  private:
+  Status invert(const SparseData& data, const InversionOptions& options,
+                Estimate& estimate) override {
+    return inverter_.update(data, estimate, options);
+  }
+
   CondensedInverter inverter_;
   std::uint64_t bytes_;  // of the operators, which the inverter shares
 };
@@ -35,15 +37,16 @@ class Exact final : public Inverter {
  public:
   Exact(std::shared_ptr<const PreparedModel> model, CondensedExact inverter)
       : model_(std::move(model)), inverter_(std::move(inverter)) {}
-  Status update(const SparseData& data, const InversionOptions& options,
-                Estimate& estimate) override {
-    return inverter_.update(data, estimate, options);
-  }
   void reset() override { inverter_.reset(); }
   std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
   std::uint64_t bytes() const override { return model_->timings().bytes + inverter_.bytes(); }
 
  private:
+  Status invert(const SparseData& data, const InversionOptions& options,
+                Estimate& estimate) override {
+    return inverter_.update(data, estimate, options);
+  }
+
   std::shared_ptr<const PreparedModel> model_;  // the inverter refers to it
   CondensedExact inverter_;
 };
@@ -53,7 +56,12 @@ class Descent final : public Inverter {
  public:
   Descent(std::shared_ptr<const PreparedModel> model, Method method)
       : model_(std::move(model)), method_(method) {}
-  Status update(const SparseData& data, const InversionOptions& options,
+  void reset() override {}
+  std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
+  std::uint64_t bytes() const override { return model_->timings().bytes; }
+
+ private:
+  Status invert(const SparseData& data, const InversionOptions& options,
                 Estimate& estimate) override {
     if (auto status = check_data(data); !status) return status;
     if (auto status = check_whole(data); !status) return status;
@@ -62,11 +70,7 @@ class Descent final : public Inverter {
     estimate = std::move(*made);
     return check_estimate(model_->model().mesh, model_->config().material, estimate);
   }
-  void reset() override {}
-  std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
-  std::uint64_t bytes() const override { return model_->timings().bytes; }
 
- private:
   std::shared_ptr<const PreparedModel> model_;
   Method method_;
 };
@@ -92,6 +96,14 @@ Result<std::unique_ptr<Inverter>> build_exact(std::shared_ptr<const PreparedMode
 }
 
 }  // namespace
+
+Status Inverter::update(const SparseData& data, const InversionOptions& options,
+                        Estimate& estimate) {
+  if (auto status = invert(data, options, estimate); !status) return status;
+  judge(estimate, estimate.quality);
+  if (!estimate.quality.usable()) reset();
+  return {};
+}
 
 Result<std::unique_ptr<Inverter>> condensed_inverter(
     std::shared_ptr<const CondensedOperators> operators,

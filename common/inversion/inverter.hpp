@@ -27,13 +27,14 @@ class Inverter {
  public:
   virtual ~Inverter() = default;
 
-  // Fills every member of `estimate`, into memory that it has already where the method can.
+  // Fills every member of `estimate`, its verdict too (contract/quality_check.hpp), into memory
+  // that it has already where the method can. After an unusable estimate the inverter is reset, so
+  // that the next update does not start from it.
   // Errors: as check_data; kInvalidArgument for data outside the brain, which names the datum, and,
   // but for method condensed, for data along a direction; kNotFinite; kSingularMatrix; stopped()
   // when options.stop was requested, however little time a deadline had left. After an error the
   // estimate is not valid, and the next update works as if this one had not been tried.
-  virtual Status update(const SparseData& data, const InversionOptions& options,
-                        Estimate& estimate) = 0;
+  Status update(const SparseData& data, const InversionOptions& options, Estimate& estimate);
   // Forgets earlier updates: what follows is what a new inverter would give.
   virtual void reset() = 0;
   // What the last update may have lost by the parts that its scene leaves out; empty for the
@@ -41,6 +42,11 @@ class Inverter {
   virtual std::optional<OmissionErrors> omission_errors() const = 0;
   // Memory of what was prepared for it: operators, or factor, matrix and prior.
   virtual std::uint64_t bytes() const = 0;
+
+ private:
+  // What the method does: all of update() but the verdict.
+  virtual Status invert(const SparseData& data, const InversionOptions& options,
+                        Estimate& estimate) = 0;
 };
 
 // Method condensed, over operators that were prepared before surgery. Errors as

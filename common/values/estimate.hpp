@@ -11,6 +11,7 @@
 
 #include "common/core/statistics.hpp"
 #include "common/core/types.hpp"
+#include "common/values/quality.hpp"
 
 namespace brainshift {
 
@@ -146,6 +147,8 @@ struct Estimate {
   std::vector<SourceSummary> sources;
   // Time spent on displacement and sd_mm, part of the inversion's time. Condensed methods only.
   double rebuild_ms = 0.0;
+  // Whether the field may be used. `status` speaks of the algorithm only. kNotJudged for iterates.
+  QualityVerdict quality;
 };
 
 // A part of the model that an update left out, the reason, and an estimate of the error it
@@ -176,6 +179,10 @@ struct Update {
   StageTimings timings;
   RigidTransform T_undeformed_deformed = RigidTransform::Identity();  // from ICP; identity without
   std::vector<Omission> left_out;
+
+  // Whether the field may be shown and kept: final, and judged good or with caution. Every other
+  // update is for its reasons only, and the usable one before it stays the valid one.
+  bool usable() const { return final && estimate.quality.usable(); }
 };
 
 }  // namespace brainshift

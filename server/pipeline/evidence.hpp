@@ -23,7 +23,7 @@ class Evidence {
   void clear();
   // Replaces the earlier observation of the same source.
   void put(RegisteredObservation observation);
-  // Forgets the source's observation: no estimate could be made with it.
+  // Forgets the source's observation: no usable estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
 
   // Observations to use together with one of this time, in the order of their sources' names.
@@ -31,7 +31,7 @@ class Evidence {
   // Why the others are not used, for Update::left_out.
   std::vector<Omission> stale(std::int64_t now_ns) const;
 
-  // Displacement of the cortex in the last estimate, 3 x nodes; zero before the first one.
+  // Displacement of the cortex in the last usable estimate, 3 x nodes; zero before the first one.
   Points cortex(const std::vector<NodeIndex>& nodes) const;
   // Keeps the displacement (3 x n) at these nodes of the cortex.
   void remember(const Points& displacement, const std::vector<NodeIndex>& nodes);

@@ -98,7 +98,11 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
   Estimate& estimate = update.estimate;
   if (auto status = inverter_->update(combined.data(), asked, estimate); !status) return status;
   combined.describe(observation.acquired_ns, estimate.sources);
-  evidence_.remember(estimate.displacement, targets_.craniotomy.nodes);
+  if (estimate.quality.usable()) {
+    evidence_.remember(estimate.displacement, targets_.craniotomy.nodes);
+  } else {
+    evidence_.drop(observation.source);
+  }
   if (const auto errors = inverter_->omission_errors()) {
     append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
   }

@@ -42,8 +42,9 @@ class Pipeline {
 
   // Fills everything of an Update except its sequence number and the encode and journal times,
   // which belong to later stages. The inverter writes into the update's own estimate. Errors of
-  // registration and inversion pass through unchanged; an observation without an estimate is not
-  // used again. Precondition: the observation's numbers are finite (wire::decode_observation).
+  // registration and inversion pass through unchanged; an observation without a usable estimate
+  // (values/quality.hpp) is not used again, and no later update starts from an unusable field.
+  // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
 
   // A session begins: forgets what earlier ones observed and estimated.

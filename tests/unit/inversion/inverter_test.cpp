@@ -86,6 +86,37 @@ TEST_P(Inverters, FillEveryMemberOfAnEstimateThatHeldAnother) {
   EXPECT_TRUE(used.displacement == fresh.displacement) << "reset() did not forget";
 }
 
+TEST_P(Inverters, JudgeTheirEstimate) {
+  auto made = inverter();
+  Estimate estimate;
+  estimate.quality.reason = "somebody else's";
+  estimate.quality.flags.set(QualityFlag::kNotFinite);
+  ASSERT_TRUE(made->update(data(), {}, estimate));
+  EXPECT_TRUE(estimate.quality.usable()) << estimate.quality.reason;
+  EXPECT_EQ(estimate.quality.quality, estimate.quality.flags.quality());
+  EXPECT_EQ(estimate.quality.reason.empty(), estimate.quality.flags.empty());
+}
+
+// Neighbours that are asked to change places, within what check_data lets pass.
+TEST_F(Inverters, ForgetAnUnusableEstimate) {
+  const auto made = make_inverter(model(), Method::kCondensed);
+  ASSERT_TRUE(made.has_value());
+  Estimate cold, unusable, after;
+  ASSERT_TRUE((*made)->update(data(), {}, cold));
+  SparseData torn = data();
+  for (Eigen::Index i = 0; i < torn.positions.cols(); ++i) {
+    torn.displacements.col(i) = Vec3(i % 2 == 0 ? 9.0 : -9.0, 0.0, 0.0);
+  }
+  torn.sd_mm.setConstant(1e-3);
+  ASSERT_TRUE((*made)->update(torn, {}, unusable));
+  ASSERT_EQ(unusable.quality.quality, Quality::kUnusable);
+  EXPECT_TRUE(unusable.quality.flags.has(QualityFlag::kInvertedElements));
+  ASSERT_TRUE((*made)->update(data(), {}, after));
+  EXPECT_TRUE(after.quality.usable());
+  EXPECT_EQ(after.history.size(), cold.history.size());
+  EXPECT_TRUE(after.displacement == cold.displacement) << "the next update began from it";
+}
+
 TEST_P(Inverters, AStopEndsTheUpdateWithItsOwnReason) {
   auto made = inverter();
   std::stop_source source;

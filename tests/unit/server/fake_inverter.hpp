@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An inverter without a model, and what a session makes of it.
+// An inverter without a model, whose estimates are judged as any other's.
 #pragma once
 
 #include <functional>
@@ -32,10 +32,6 @@ class FakeInverter final : public inversion::Inverter {
           return follow_the_data(data, estimate, nodes);
         }) {}
 
-  Status update(const SparseData& data, const inversion::InversionOptions& options,
-                Estimate& estimate) override {
-    return update_(++calls_, data, options, estimate);
-  }
   void reset() override { ++resets; }
   std::optional<inversion::OmissionErrors> omission_errors() const override { return errors; }
   std::uint64_t bytes() const override { return 0; }
@@ -44,6 +40,11 @@ class FakeInverter final : public inversion::Inverter {
   int resets = 0;
 
  private:
+  Status invert(const SparseData& data, const inversion::InversionOptions& options,
+                Estimate& estimate) override {
+    return update_(++calls_, data, options, estimate);
+  }
+
   Update update_;
   int calls_ = 0;
 };

@@ -55,16 +55,18 @@ Observation cortex(std::uint64_t sequence, double time_s) {
   return made;
 }
 
-// Remembers what it was given, asks moving data once for a displacement of (0, 0, -1), and answers
-// with it.
+// Remembers what it was given, asks moving data once for a displacement of (0, 0, -motion_mm), and
+// answers with it.
 struct FakeInversion {
   SparseData seen;
   bool fails = false;
+  double motion_mm = 1.0;
   Status operator()(int, const SparseData& data, const inversion::InversionOptions& options,
                     Estimate& estimate) {
     if (fails) return fail(ErrorCode::kNotConverged, "no");
     seen = data;
-    estimate.displacement = Points(Vec3(0, 0, -1).replicate(1, patient()->mesh.num_nodes()));
+    estimate.displacement =
+        Points(Vec3(0, 0, -motion_mm).replicate(1, patient()->mesh.num_nodes()));
     if (options.moving != nullptr) {
       const Points u = estimate.displacement(Eigen::all, options.moving->nodes);
       while (options.moving->relocate(u, seen)) {
@@ -143,6 +145,20 @@ TEST_F(Sources, AnObservationWithoutAnEstimateIsForgotten) {
   EXPECT_FALSE(run(landmarks_at(2, "pointer", 1)));
   inversion_.fails = false;
   ASSERT_TRUE(run(landmarks_at(3, "ius", 2)));
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+}
+
+TEST_F(Sources, AnObservationWithAnUnusableEstimateIsForgotten) {
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
+  inversion_.motion_mm = 2.0 * kMostMotion_mm;
+  const auto unusable = run(landmarks_at(2, "pointer", 1));
+  ASSERT_TRUE(unusable) << "it is reported, with its reasons";
+  EXPECT_EQ(unusable->estimate.quality.quality, Quality::kUnusable);
+  EXPECT_FALSE(unusable->estimate.quality.reason.empty());
+  inversion_.motion_mm = 1.0;
+  const auto after = run(landmarks_at(3, "ius", 2));
+  ASSERT_TRUE(after);
+  EXPECT_TRUE(after->usable());
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/values/quality.hpp"
+
+namespace brainshift {
+namespace {
+
+constexpr std::uint32_t kUnusableBits = 0xffff0000u;
+
+}  // namespace
+
+std::string_view to_string(Quality quality) {
+  switch (quality) {
+    case Quality::kNotJudged: return "not_judged";
+    case Quality::kGood: return "good";
+    case Quality::kCaution: return "caution";
+    case Quality::kUnusable: return "unusable";
+  }
+  return "not_judged";
+}
+
+std::string_view to_string(QualityFlag flag) {
+  switch (flag) {
+    case QualityFlag::kMisfitUnexplained: return "misfit_unexplained";
+    case QualityFlag::kStrengthAtBound: return "strength_at_bound";
+    case QualityFlag::kSourcesContradict: return "sources_contradict";
+    case QualityFlag::kDataOutsideRegion: return "data_outside_region";
+    case QualityFlag::kDeadline: return "deadline";
+    case QualityFlag::kContactNotCertified: return "contact_not_certified";
+    case QualityFlag::kIterationLimit: return "iteration_limit";
+    case QualityFlag::kInvertedElements: return "inverted_elements";
+    case QualityFlag::kVolumeLost: return "volume_lost";
+    case QualityFlag::kBeyondSkull: return "beyond_skull";
+    case QualityFlag::kNotFinite: return "not_finite";
+  }
+  return "not_finite";
+}
+
+std::string_view sentence(QualityFlag flag) {
+  switch (flag) {
+    case QualityFlag::kMisfitUnexplained:
+      return "the data lie farther off than their errors and the prior allow";
+    case QualityFlag::kStrengthAtBound:
+      return "a part of the prior has the greatest strength that is allowed";
+    case QualityFlag::kSourcesContradict: return "a source contradicts the others";
+    case QualityFlag::kDataOutsideRegion: return "data lie outside the region that was prepared";
+    case QualityFlag::kDeadline: return "the time ran out before the inversion settled";
+    case QualityFlag::kContactNotCertified:
+      return "contact holds less well than its certificate asks";
+    case QualityFlag::kIterationLimit: return "the inversion ended at its limit of iterations";
+    case QualityFlag::kInvertedElements: return "elements are turned inside out";
+    case QualityFlag::kVolumeLost: return "an element loses more volume than tissue can";
+    case QualityFlag::kBeyondSkull: return "the brain moves farther than a skull allows";
+    case QualityFlag::kNotFinite: return "a number of the estimate is not finite";
+  }
+  return "a number of the estimate is not finite";
+}
+
+Quality QualityFlags::quality() const {
+  if (bits_ == 0) return Quality::kGood;
+  return (bits_ & kUnusableBits) != 0 ? Quality::kUnusable : Quality::kCaution;
+}
+
+}  // namespace brainshift
