@@ -12,8 +12,8 @@
 // decode(encode(x)) == x, except that
 //   - the displacement field, its sd and the contact forces travel as 32-bit floats;
 //   - an update with an error carries no estimate;
-//   - BrainModel::tumour_distance and Estimate::prior_scales, min_volume_ratio, inverted_elements
-//     and rebuild_ms do not travel;
+//   - an estimate with the flag not_finite travels without its numbers: status, reason and verdict;
+//   - BrainModel::tumour_distance and Estimate::rebuild_ms do not travel;
 //   - in text that is not UTF-8, '?' replaces every bad byte.
 // Protobuf headers stay private to this folder.
 #pragma once
@@ -32,6 +32,8 @@ namespace brainshift::wire {
 
 // Most points, and most numbers of one field of floats, that a peer may send.
 inline constexpr int kMaxPoints = 2'000'000;
+// Most hypotheses of an update.
+inline constexpr int kMaxHypotheses = 4096;
 
 struct DaemonStatus {
   std::string version;

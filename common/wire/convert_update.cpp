@@ -5,6 +5,7 @@
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/convert_verdict.hpp"
 #include "common/wire/names.hpp"
 #include "common/wire/payload_scan.hpp"
 #include "common/wire/text.hpp"
@@ -23,6 +24,10 @@ void set_contact(const Estimate& estimate, pb::Contact* out) {
   out->set_iterations(unsigned_count(estimate.contact.iterations));
   set(estimate.active_slaves, out->mutable_active_slaves());
   set(estimate.contact_force_n, out->mutable_force_n());
+  if (!std::isnan(estimate.contact.decrement)) out->set_decrement(estimate.contact.decrement);
+  if (!std::isnan(estimate.contact.max_violation_mm)) {
+    out->set_max_violation_mm(estimate.contact.max_violation_mm);
+  }
 }
 
 void set_iteration(const IterationRecord& record, pb::Iteration* out) {
@@ -58,6 +63,9 @@ void set_source(const SourceSummary& source, pb::SourceSummary* out) {
 void set_estimate(const Estimate& estimate, pb::Update& out) {
   out.set_status(std::string(to_string(estimate.status)));
   out.set_reason(to_utf8(estimate.reason));
+  set_verdict(estimate.quality, out);
+  // The receiver rejects numbers that are not finite, and with them would reject the verdict.
+  if (estimate.quality.flags.has(QualityFlag::kNotFinite)) return;
   set(estimate.displacement, out.mutable_displacement()->mutable_xyz_mm());
   set(estimate.sd_mm, out.mutable_sd_mm());
   set_contact(estimate, out.mutable_contact());
@@ -65,6 +73,11 @@ void set_estimate(const Estimate& estimate, pb::Update& out) {
   set(estimate.misfit_mm, out.mutable_misfit());
   for (const auto& record : estimate.history) set_iteration(record, out.add_history());
   for (const auto& source : estimate.sources) set_source(source, out.add_sources());
+  set_prior(estimate, out);
+  if (!std::isnan(estimate.min_volume_ratio)) out.set_min_volume_ratio(estimate.min_volume_ratio);
+  out.set_inverted_elements(unsigned_count(estimate.inverted_elements));
+  if (!std::isnan(estimate.misfit_ratio)) out.set_misfit_ratio(estimate.misfit_ratio);
+  out.set_data_outside_region(unsigned_count(estimate.data_outside_region));
 }
 
 StageTimings get_timings(const pb::StageTimings& message, Checked& checked) {
@@ -98,6 +111,14 @@ void get_contact(const pb::Contact& message, int nodes, Estimate& estimate, Chec
   checked.require(message.active_slaves_size() == message.force_n_size(), "update.contact.force_n",
                   std::to_string(message.force_n_size()) + " forces for " +
                       std::to_string(message.active_slaves_size()) + " active slaves");
+  if (message.has_decrement()) {
+    estimate.contact.decrement =
+        checked.non_negative(message.decrement(), "update.contact.decrement");
+  }
+  if (message.has_max_violation_mm()) {
+    estimate.contact.max_violation_mm =
+        checked.number(message.max_violation_mm(), "update.contact.max_violation_mm");
+  }
 }
 
 SourceSummary get_source(const pb::SourceSummary& message, Checked& checked) {
@@ -140,6 +161,19 @@ Estimate get_estimate(const pb::Update& message, Checked& checked) {
   for (const auto& source : message.sources()) {
     estimate.sources.push_back(get_source(source, checked));
   }
+  estimate.quality = get_verdict(message, checked);
+  get_prior(message, estimate, checked);
+  if (message.has_min_volume_ratio()) {
+    estimate.min_volume_ratio =
+        checked.number(message.min_volume_ratio(), "update.min_volume_ratio");
+  }
+  estimate.inverted_elements =
+      checked.count(message.inverted_elements(), "update.inverted_elements");
+  if (message.has_misfit_ratio()) {
+    estimate.misfit_ratio = checked.non_negative(message.misfit_ratio(), "update.misfit_ratio");
+  }
+  estimate.data_outside_region =
+      checked.count(message.data_outside_region(), "update.data_outside_region");
   return estimate;
 }
 
@@ -234,6 +268,8 @@ Result<UpdateMessage> decode_update(std::string_view payload) {
     checked.require(!message.error_code().empty(), "update.error_code",
                     "is absent although status is \"failed\"");
     checked.require(message.displacement().xyz_mm().empty(), "update.displacement",
+                    "is present although status is \"failed\"");
+    checked.require(message.quality() == pb::QUALITY_UNSPECIFIED, "update.quality",
                     "is present although status is \"failed\"");
     decoded.error = make_error(message.error_code(), message.reason());
   } else {

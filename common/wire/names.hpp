@@ -32,6 +32,9 @@ inline std::optional<Boundary> boundary_from(std::string_view name) {
 inline std::optional<EstimateStatus> estimate_status_from(std::string_view name) {
   return from_name(name, EstimateStatus::kNotRun, EstimateStatus::kDeadline);
 }
+inline std::optional<PriorPart> prior_part_from(std::string_view name) {
+  return from_name(name, PriorPart{}, static_cast<PriorPart>(kPriorParts - 1));
+}
 
 // The error that a peer reported, on one line. An unknown code (a newer version's) becomes
 // kInternal and stays in the sentence.

@@ -55,7 +55,8 @@ SCHEMA = {
         "max_penetration_mm": (4, "double"), "elapsed_ms": (5, "double")},
     "Contact": {
         "active": (1, "int"), "penetrating": (2, "int"), "max_penetration_mm": (3, "double"),
-        "iterations": (4, "int"), "active_slaves": (5, "*int"), "force_n": (6, "*float")},
+        "iterations": (4, "int"), "active_slaves": (5, "*int"), "force_n": (6, "*float"),
+        "decrement": (7, "?double"), "max_violation_mm": (8, "?double")},
     "StageTimings": {
         "register_ms": (1, "double"), "invert_ms": (2, "double"), "rebuild_ms": (3, "double"),
         "encode_ms": (4, "double"), "journal_ms": (5, "double")},
@@ -67,7 +68,10 @@ SCHEMA = {
         "displacement": (11, "Displacements"), "sd_mm": (12, "*float"), "contact": (13, "Contact"),
         "initial_misfit": (14, "MeanStd"), "misfit": (15, "MeanStd"), "history": (16, "*Iteration"),
         "timings": (17, "StageTimings"), "t_undeformed_deformed": (18, "Rigid"),
-        "left_out": (19, "*Omission"), "error_code": (20, "text")},
+        "left_out": (19, "*Omission"), "error_code": (20, "text"), "quality": (22, "int"),
+        "quality_flags": (23, "*int"), "quality_reason": (24, "text"),
+        "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
+        "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int")},
 }
 
 OBSERVATION = {
@@ -139,6 +143,20 @@ MESSAGES = {
             "translation_mm": [0.5, -1.25, 3.3]},
         "left_out": [{"part": "pore pressure", "reason": "updates are at least 10 s apart",
                       "estimated_error": "0.02 % in energy"}]}),
+    "update_unusable": (12, 0, "Update", UPDATE | {
+        "status": "converged", "reason": "contact holds to 0.001 mm at iteration 4",
+        "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]}, "sd_mm": [0.125, 2.0],
+        "contact": {"active": 1, "penetrating": 0, "max_penetration_mm": 0.0, "iterations": 4,
+                    "active_slaves": [1], "force_n": [0.03125], "decrement": 0.0,
+                    "max_violation_mm": -0.7},
+        "initial_misfit": {"mean_mm": 3.1, "std_mm": 0.9}, "misfit": {"mean_mm": 0.09, "std_mm": 0.04},
+        "history": [], "timings": TIMINGS,
+        "t_undeformed_deformed": {
+            "rotation_row_major": [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            "translation_mm": [0.5, -1.25, 3.3]},
+        "left_out": [], "quality": 3, "quality_flags": [1, 17],
+        "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
+        "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7}),
     "update_failed": (12, 0, "Update", UPDATE | {
         "status": "failed", "reason": "observation 2: no point is inside the brain",
         "timings": TIMINGS, "error_code": "empty_set"}),

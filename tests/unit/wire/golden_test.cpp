@@ -115,6 +115,19 @@ Estimate estimate_from(const json& value) {
                                 entry["penetrating"], entry["max_penetration_mm"],
                                 entry["elapsed_ms"]});
   }
+  if (!value.contains("quality")) return estimate;  // a daemon that gives no verdicts
+  EXPECT_EQ(value["quality"], 3);
+  EXPECT_EQ(value["quality_flags"], (json{1, 17}));
+  estimate.quality.quality = Quality::kUnusable;
+  estimate.quality.flags.set(QualityFlag::kMisfitUnexplained);
+  estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  estimate.quality.reason = value["quality_reason"];
+  estimate.contact.decrement = contact["decrement"];
+  estimate.contact.max_violation_mm = contact["max_violation_mm"];
+  estimate.min_volume_ratio = value["min_volume_ratio"];
+  estimate.inverted_elements = value["inverted_elements"];
+  estimate.misfit_ratio = value["misfit_ratio"];
+  estimate.data_outside_region = value["data_outside_region"];
   return estimate;
 }
 
@@ -231,7 +244,7 @@ INSTANTIATE_TEST_SUITE_P(Frames, Golden,
                                            "subscribe_reply", "observation_tumour",
                                            "observation_cortex", "observation_landmarks",
                                            "observation_pose", "observation_reply", "error_reply",
-                                           "update", "update_failed"));
+                                           "update", "update_unusable", "update_failed"));
 
 }  // namespace
 }  // namespace brainshift::wire

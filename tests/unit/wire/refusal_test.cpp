@@ -9,30 +9,13 @@
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/core/stopwatch.hpp"
 #include "common/wire/frame.hpp"
+#include "tests/unit/wire/refusals.hpp"
 #include "tests/unit/wire/sample_values.hpp"
 
 namespace brainshift::wire {
 namespace {
 
 namespace pb = brainshift::v1;
-using ::testing::HasSubstr;
-
-template <typename T>
-void expect_refused(const Result<T>& result, ErrorCode code, const std::string& text) {
-  ASSERT_FALSE(result) << "accepted: " << text;
-  EXPECT_EQ(result.error().code, code) << result.error().message;
-  EXPECT_THAT(result.error().message, HasSubstr(text));
-  EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
-}
-
-// The sample message, parsed, changed, and serialised again.
-template <typename Message>
-std::string changed(const std::string& payload, const std::function<void(Message&)>& change) {
-  Message message;
-  EXPECT_TRUE(message.ParseFromString(payload));
-  change(message);
-  return message.SerializeAsString();
-}
 
 // A length-delimited field as raw bytes; `tag` is its first byte.
 std::string raw_field(char tag, const std::string& content) {
@@ -310,7 +293,7 @@ TEST(Hostile, TwoBodiesAreRefused) {
 }
 
 TEST(Hostile, EveryFlippedBitIsRefusedOrDecodesToAValue) {
-  const std::string payload = encode(sample_update());
+  const std::string payload = encode(sample_judged_update());
   for (std::size_t offset = 0; offset < payload.size(); ++offset) {
     for (int bit = 0; bit < 8; ++bit) {
       std::string damaged = payload;

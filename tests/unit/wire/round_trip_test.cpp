@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <random>
 
+#include "brainshift/v1/brainshift.pb.h"
 #include "tests/unit/wire/same_values.hpp"
 #include "tests/unit/wire/sample_values.hpp"
 
 namespace brainshift::wire {
 namespace {
+
+namespace pb = brainshift::v1;
 
 template <typename T>
 void expect_round_trip(const T& value, Result<T> (*decode)(std::string_view)) {
@@ -60,6 +64,70 @@ TEST(RoundTrip, ModelWithoutLabelsIsReproduced) {
 }
 
 TEST(RoundTrip, UpdateIsReproduced) { expect_round_trip(sample_update(), decode_update); }
+
+TEST(RoundTrip, VerdictStrengthsAndCertificateAreReproduced) {
+  expect_round_trip(sample_judged_update(), decode_update);
+}
+
+TEST(RoundTrip, EveryVerdictIsReproduced) {
+  UpdateMessage message = sample_update();
+  message.update.estimate.quality.quality = Quality::kGood;
+  expect_round_trip(message, decode_update);
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (flag == QualityFlag::kNotFinite) continue;
+    SCOPED_TRACE(to_string(flag));
+    QualityVerdict verdict;
+    verdict.flags.set(flag);
+    verdict.quality = verdict.flags.quality();
+    message.update.estimate.quality = verdict;
+    expect_round_trip(message, decode_update);
+  }
+}
+
+TEST(RoundTrip, StrengthsThatAreTheCasesAreNotSent) {
+  UpdateMessage message = sample_update();
+  const std::string plain = encode(message);
+  message.update.estimate.prior_at_bound.back() = true;
+  EXPECT_GT(encode(message).size(), plain.size());
+  expect_round_trip(message, decode_update);
+}
+
+// Else the receiver would reject the numbers, and the verdict with them.
+TEST(RoundTrip, AnEstimateThatIsNotFiniteTravelsWithoutItsNumbers) {
+  UpdateMessage message = sample_judged_update();
+  Estimate& estimate = message.update.estimate;
+  estimate.sd_mm[1] = std::numeric_limits<double>::quiet_NaN();
+  estimate.misfit_mm.mean = std::numeric_limits<double>::infinity();
+  estimate.quality.flags.set(QualityFlag::kNotFinite);
+  const auto decoded = decode_update(encode(message));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  const Estimate& received = decoded->update.estimate;
+  EXPECT_EQ(received.status, EstimateStatus::kDeadline);
+  EXPECT_EQ(received.quality.quality, Quality::kUnusable);
+  EXPECT_EQ(received.quality.flags, estimate.quality.flags);
+  EXPECT_EQ(received.quality.reason, estimate.quality.reason);
+  EXPECT_EQ(received.displacement.cols(), 0);
+  EXPECT_EQ(received.sd_mm.size(), 0);
+  EXPECT_EQ(decoded->update.left_out.size(), message.update.left_out.size());
+}
+
+// The names of the messages are those of the library; the numbers are bits, counted from 1.
+TEST(RoundTrip, NumbersOfTheVerdictAreThoseOfItsNames) {
+  for (const QualityFlag flag : kAllQualityFlags) {
+    UpdateMessage message = sample_update();
+    message.update.estimate.quality.flags.set(flag);
+    message.update.estimate.quality.quality = message.update.estimate.quality.flags.quality();
+    pb::Update sent;
+    ASSERT_TRUE(sent.ParseFromString(encode(message)));
+    ASSERT_EQ(sent.quality_flags_size(), 1);
+    std::string name = "QUALITY_FLAG_" + std::string(to_string(flag));
+    for (char& c : name) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    EXPECT_EQ(pb::QualityFlag_Name(sent.quality_flags(0)), name);
+    EXPECT_EQ(pb::Quality_Name(sent.quality()),
+              message.update.estimate.quality.quality == Quality::kUnusable ? "QUALITY_UNUSABLE"
+                                                                            : "QUALITY_CAUTION");
+  }
+}
 
 TEST(RoundTrip, FailedUpdateCarriesItsErrorAndNoEstimate) {
   expect_round_trip(sample_failure(), decode_update);

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/wire/convert.hpp"
 
 namespace brainshift::wire {
@@ -117,6 +119,14 @@ inline void expect_same(const MeanStd& a, const MeanStd& b) {
   EXPECT_EQ(a.std, b.std);
 }
 
+// NaN: not computed.
+inline void expect_same_or_absent(double a, double b) {
+  EXPECT_EQ(std::isnan(a), std::isnan(b));
+  if (!std::isnan(a)) {
+    EXPECT_EQ(a, b);
+  }
+}
+
 inline void expect_same(const Estimate& a, const Estimate& b) {
   EXPECT_EQ(a.status, b.status);
   EXPECT_EQ(a.reason, b.reason);
@@ -137,6 +147,23 @@ inline void expect_same(const Estimate& a, const Estimate& b) {
     EXPECT_EQ(a.history[i].penetrating, b.history[i].penetrating);
     EXPECT_EQ(a.history[i].max_penetration_mm, b.history[i].max_penetration_mm);
     EXPECT_EQ(a.history[i].elapsed_ms, b.history[i].elapsed_ms);
+  }
+  EXPECT_EQ(a.quality.quality, b.quality.quality);
+  EXPECT_EQ(a.quality.flags, b.quality.flags);
+  EXPECT_EQ(a.quality.reason, b.quality.reason);
+  expect_same_or_absent(a.contact.decrement, b.contact.decrement);
+  expect_same_or_absent(a.contact.max_violation_mm, b.contact.max_violation_mm);
+  expect_same_or_absent(a.misfit_ratio, b.misfit_ratio);
+  expect_same_or_absent(a.min_volume_ratio, b.min_volume_ratio);
+  EXPECT_EQ(a.inverted_elements, b.inverted_elements);
+  EXPECT_EQ(a.data_outside_region, b.data_outside_region);
+  EXPECT_EQ(a.prior_scales, b.prior_scales);
+  EXPECT_EQ(a.prior_absent, b.prior_absent);
+  EXPECT_EQ(a.prior_at_bound, b.prior_at_bound);
+  ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
+  for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
+    EXPECT_EQ(a.hypotheses[i].scales, b.hypotheses[i].scales);
+    EXPECT_EQ(a.hypotheses[i].weight, b.hypotheses[i].weight);
   }
 }
 

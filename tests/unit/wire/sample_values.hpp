@@ -128,6 +128,37 @@ inline UpdateMessage sample_update() {
   return message;
 }
 
+// The sample with a verdict, strengths for whatever parts there are, and every figure behind them.
+inline UpdateMessage sample_judged_update() {
+  UpdateMessage message = sample_update();
+  message.update.final = true;
+  Estimate& estimate = message.update.estimate;
+  estimate.status = EstimateStatus::kDeadline;
+  estimate.quality.flags.set(QualityFlag::kDeadline);
+  estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  estimate.quality.quality = Quality::kUnusable;
+  estimate.quality.reason = "éléments retournés (3)";
+  estimate.contact.decrement = 1.0 / 3.0;
+  estimate.contact.max_violation_mm = -0.1;  // every slave is open
+  estimate.misfit_ratio = 1.7;
+  estimate.min_volume_ratio = -0.25;
+  estimate.inverted_elements = 3;
+  estimate.data_outside_region = 12;
+  estimate.hypotheses.resize(3);
+  for (std::size_t part = 0; part < kPriorParts; ++part) {
+    estimate.prior_scales[part] = 0.1 * static_cast<double>(part);
+    estimate.prior_absent[part] = 1.0 / (1.0 + static_cast<double>(part));
+    estimate.prior_at_bound[part] = part % 2 == 1;
+    for (std::size_t i = 0; i < estimate.hypotheses.size(); ++i) {
+      estimate.hypotheses[i].scales[part] = static_cast<double>(i * part) / 3.0;
+    }
+  }
+  estimate.hypotheses[0].weight = 0.7;
+  estimate.hypotheses[1].weight = 0.3;
+  estimate.hypotheses[2].weight = 0.0;
+  return message;
+}
+
 inline UpdateMessage sample_failure() {
   UpdateMessage message;
   message.session_id = 3;

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a test damages a message, and what it expects of the answer.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "common/core/error.hpp"
+
+namespace brainshift::wire {
+
+template <typename T>
+void expect_refused(const Result<T>& result, ErrorCode code, const std::string& text) {
+  ASSERT_FALSE(result) << "accepted: " << text;
+  EXPECT_EQ(result.error().code, code) << result.error().message;
+  EXPECT_THAT(result.error().message, ::testing::HasSubstr(text));
+  EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
+}
+
+// The sample message, parsed, changed, and serialised again.
+template <typename Message>
+std::string changed(const std::string& payload, const std::function<void(Message&)>& change) {
+  Message message;
+  EXPECT_TRUE(message.ParseFromString(payload));
+  change(message);
+  return message.SerializeAsString();
+}
+
+}  // namespace brainshift::wire
