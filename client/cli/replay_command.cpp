@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -37,7 +38,8 @@ Status run(Arguments arguments) {
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
-  return replay(options, terminal_progress());
+  return replay(options, terminal_progress(),
+                [](const RunReport& report) { std::puts(summary_line(report).c_str()); });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/lib/dealer.hpp"
+#include "client/lib/latest_usable.hpp"
 #include "client/lib/update_queue.hpp"
 #include "common/wire/frame.hpp"
 
@@ -42,6 +43,7 @@ struct Client::Impl {
   std::unique_ptr<Dealer> dealer;
   std::uint64_t last_request_id = 0;
   UpdateQueue updates{kMaxQueuedUpdates};
+  LatestUsable latest_usable;
 
   // Sends a request and waits for its reply's payload. Updates met on the way are queued.
   Result<std::string> request(MessageType type, const std::string& payload, MessageType reply_type,
@@ -49,6 +51,8 @@ struct Client::Impl {
   // The payload if `message` answers request `id`; nullopt if it is an update or a late reply.
   std::optional<Result<std::string>> answer(const std::string& message, std::uint64_t id,
                                             MessageType reply_type);
+  // The oldest queued update, on its way to the caller.
+  std::optional<Result<wire::UpdateMessage>> hand_out();
 
   tl::unexpected<Error> protocol_error(const std::string& detail) const {
     return fail(ErrorCode::kProtocol, dealer->endpoint() + ": " + detail);
@@ -99,6 +103,12 @@ std::optional<Result<std::string>> Client::Impl::answer(const std::string& messa
   return std::string(frame->payload);
 }
 
+std::optional<Result<wire::UpdateMessage>> Client::Impl::hand_out() {
+  auto update = updates.pop();
+  if (update && *update) latest_usable.take(**update);
+  return update;
+}
+
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
@@ -125,7 +135,11 @@ Result<wire::SessionInfo> Client::start_session(const wire::SessionRequest& requ
   return impl_
       ->request(MessageType::kStartSessionRequest, wire::encode(request),
                 MessageType::kStartSessionReply, impl_->options.session_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_session_info(payload); });
+      .and_then([](const std::string& payload) { return wire::decode_session_info(payload); })
+      .map([this](wire::SessionInfo info) {
+        impl_->latest_usable.begin(info.session_id);
+        return info;
+      });
 }
 
 Result<BrainModel> Client::model() {
@@ -140,7 +154,7 @@ Status Client::subscribe() {
       ->request(MessageType::kSubscribeRequest, "", MessageType::kSubscribeReply,
                 impl_->options.request_timeout)
       .and_then([](const std::string& payload) { return wire::decode_subscribe_reply(payload); })
-      .map([](std::uint64_t) {});
+      .map([this](std::uint64_t session_id) { impl_->latest_usable.follow(session_id); });
 }
 
 Result<wire::ObservationReceipt> Client::submit(const Observation& observation) {
@@ -152,7 +166,7 @@ Result<wire::ObservationReceipt> Client::submit(const Observation& observation) 
 }
 
 Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
-  if (auto update = impl_->updates.pop()) return *std::move(update);
+  if (auto update = impl_->hand_out()) return *std::move(update);
   const Deadline deadline = deadline_after(timeout);
   while (true) {
     const auto message = impl_->dealer->receive(deadline);
@@ -160,8 +174,12 @@ Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
     // No request is open: a reply with an old id is late, one with the next id is unasked for.
     auto unexpected = impl_->answer(*message, impl_->last_request_id + 1, MessageType::kUpdate);
     if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
-    if (auto update = impl_->updates.pop()) return *std::move(update);
+    if (auto update = impl_->hand_out()) return *std::move(update);
   }
+}
+
+const std::optional<wire::UpdateMessage>& Client::latest_usable() const {
+  return impl_->latest_usable.get();
 }
 
 }  // namespace brainshift::client

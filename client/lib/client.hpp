@@ -16,10 +16,17 @@
 //   if (auto taken = client->submit(seen); !taken) return show(taken.error().message);
 //
 //   auto message = client->next_update(std::chrono::seconds(60));
-//   if (message && !message->error) {
-//     const Points& u = message->update.estimate.displacement;   // 3 x nodes, mm
+//   if (message && message->error) warn(message->error->message);
+//   else if (message) tell(message->update.estimate.quality);      // verdict, flags, reason
+//   if (const auto& shown = client->latest_usable()) {
+//     const Points& u = shown->update.estimate.displacement;       // 3 x nodes, mm
 //     draw(model->mesh.nodes + u);
 //   }
+//
+// Quality. Every final update carries a verdict on its field (common/values/quality.hpp): good,
+// caution, unusable. An unusable field is no deformation of a brain. It arrives like any other, so
+// that the user can be told why; latest_usable() keeps the field before it. Draw that one. When it
+// is older than the newest message, say so: what is drawn is then the last that was usable.
 //
 // Conventions. Coordinates are patient RAS in millimetres. Points are 3 x n matrices, a column per
 // point. A displacement moves an undeformed point to its deformed place; its columns are in the
@@ -30,7 +37,7 @@
 //   kProtocol       the answer could not be understood
 //   any other code  the daemon's own answer, e.g. kModelNotReady, kInvalidArgument
 // An observation from which no estimate could be made is not an error of next_update(): its
-// message arrives with UpdateMessage::error set. The estimate before it stays the valid one.
+// message arrives with UpdateMessage::error set. The usable estimate before it stays the valid one.
 //
 // Threads. A Client is not thread-safe: use each from one thread at a time. Several Clients may
 // talk to one daemon, which has one session at a time for all of them.
@@ -48,6 +55,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/core/error.hpp"
@@ -88,8 +96,8 @@ class Client {
   // The undeformed mesh with its node sets, skull and tumour: some MiB.
   Result<BrainModel> model();
 
-  // From now on the daemon pushes updates to this client. If the session has a final update
-  // already, the newest one comes at once.
+  // From now on the daemon pushes updates to this client. If there is a usable update already, the
+  // newest one comes at once, and after it the newest error or unusable update since.
   Status subscribe();
 
   // Hands an observation over. Returns when the daemon has accepted it, not when it has been
@@ -97,9 +105,15 @@ class Client {
   // waited. kInvalidArgument and others: the daemon rejects the observation and names the field.
   Result<wire::ObservationReceipt> submit(const Observation& observation);
 
-  // The next pushed update in order of arrival: an iterate, a final update (Update::final), or the
-  // error that an observation ended in. kUnavailable when none arrives within the timeout.
+  // The next pushed update in order of arrival: an iterate, a final update (Update::final) of any
+  // quality, or the error that an observation ended in. Only Update::usable() ones may be shown.
+  // kUnavailable when none arrives within the timeout.
   Result<wire::UpdateMessage> next_update(std::chrono::milliseconds timeout);
+
+  // The newest usable update of the running session among those that next_update() has returned.
+  // Neither errors, iterates and unusable updates nor a lost connection replace it; the start of
+  // another session does. Empty before the first one.
+  const std::optional<wire::UpdateMessage>& latest_usable() const;
 
  private:
   struct Impl;

@@ -154,6 +154,8 @@ class Player {
       observation.status = update.estimate.status;
       observation.active = update.estimate.contact.active;
       observation.contact_iterations = update.estimate.contact.iterations;
+      observation.quality = update.estimate.quality;
+      if (!update.usable()) return;
       session_.last_recorded_sequence = recorded(i).observation.sequence;
       if (iterates_of_ != i) iterates_.clear();
       session_.iterates = std::move(iterates_);

@@ -3,7 +3,8 @@
 //
 // Latency is taken on the client's monotonic clock, from just before an observation is sent until
 // its final update has been received and decoded. Fields and iterates are kept for the latest
-// answered observation only: the others leave some hundred bytes each, however large the mesh.
+// observation with a usable answer only: the others leave some hundred bytes each, however large
+// the mesh.
 #pragma once
 
 #include <chrono>
@@ -60,6 +61,7 @@ struct PlayedObservation {
   std::optional<double> first_iterate_ms;
   StageTimings timings;
   EstimateStatus status = EstimateStatus::kNotRun;
+  QualityVerdict quality;
   int active = 0;              // slaves that carry a contact force
   int contact_iterations = 0;  // active-set changes
   std::optional<Error> error;
@@ -69,7 +71,7 @@ struct PlayedObservation {
 struct PlayedSession {
   // In the order sent: `repeat` times the recording.
   std::vector<PlayedObservation> observations;
-  std::optional<Update> last;                // the last final update that carries an estimate
+  std::optional<Update> last;                // the last usable update (Update::usable)
   std::uint64_t last_recorded_sequence = 0;  // of the recorded observation that `last` answers
   std::vector<Iterate> iterates;             // of the observation that `last` answers
 };

@@ -169,7 +169,7 @@ RunReport describe_run(const Surgery& surgery, const Session& session, const Rep
   return run;
 }
 
-// Everything that the last update says, with truth where the surgery carries it.
+// Everything that the last usable update says, with truth where the surgery carries it.
 Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSession& played,
                 const fs::path& field_file, RunReport& run) {
   const Update& update = *played.last;
@@ -260,7 +260,8 @@ Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
 
 }  // namespace
 
-Status replay(const ReplayOptions& options, const Progress& progress) {
+Status replay(const ReplayOptions& options, const Progress& progress,
+              const std::function<void(const RunReport&)>& on_run) {
   const auto surgery = open_surgery(options);
   if (!surgery) return tl::unexpected<Error>(surgery.error());
   if (Status ok = check_repeat(options, *surgery); !ok) return ok;
@@ -268,6 +269,7 @@ Status replay(const ReplayOptions& options, const Progress& progress) {
   for (const Boundary boundary : options.boundaries) {
     auto run = run_boundary(*surgery, options, boundary, progress);
     if (!run) return tl::unexpected<Error>(run.error());
+    if (on_run) on_run(*run);
     runs.push_back(std::move(*run));
   }
   if (Status ok = write_reports(options.report, runs); !ok) return ok;

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,9 @@ struct ReplayOptions {
 // `<stem>-<scenario>-<boundary>.vtu` beside it, with the point arrays displacement_estimated and,
 // where truth is recorded, displacement_true (both mm, RAS, undeformed to deformed) and error_mm.
 //
-// The score is that of the last answered observation (of the last
-// cycle), against the truth recorded with that observation.
+// The score is that of the last observation (of the last cycle) whose answer was usable
+// (Update::usable), against the truth recorded with that observation. A run whose every field was
+// unusable has no score and no field file. It is no failure of the replay: its report says so.
 //
 //   kNotFound, kUnreadable  the surgery file cannot be read
 //   kEmptySet               nothing is left to play; the sentence names the sources there are
@@ -52,12 +54,17 @@ struct ReplayOptions {
 //   kWriteFailed            a file cannot be written
 // Otherwise an observation that fails is an entry of
 // RunReport::failures, and the status is success.
-Status replay(const ReplayOptions& options, const Progress& progress = {});
+// on_run: called with each run's report when that run has ended; may be empty.
+Status replay(const ReplayOptions& options, const Progress& progress = {},
+              const std::function<void(const RunReport&)>& on_run = {});
 
-// Adds latencies, stage medians and failures of a played session to
-// `run`. The first update is the cold one (cold_ms). latency_ms is
+// Adds latencies, stage medians, verdicts and failures of a played session to `run`, and the status
+// of its last update. The first update is the cold one (cold_ms). latency_ms is
 // taken over the others, or over the cold one when there are no others.
 void summarise(const PlayedSession& session, RunReport& run);
+
+// One line for people: the run, how many updates of which quality, the flags, what was recovered.
+std::string summary_line(const RunReport& run);
 
 // A heading and one row per observation sent:
 //   update,observation_sequence,latency_ms,register_ms,invert_ms,rebuild_ms,encode_ms,active,

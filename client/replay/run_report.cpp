@@ -74,6 +74,24 @@ void visit(A& a, TracePoint& v) {
   a("elapsed_ms", v.elapsed_ms);
 }
 template <typename A>
+void visit(A& a, QualityCounts& v) {
+  a("good", v.good), a("caution", v.caution), a("unusable", v.unusable);
+  a("not_judged", v.not_judged);
+}
+template <typename A>
+void visit(A& a, RunQuality& v) {
+  a("worst", v.worst), a("last", v.last), a("reason", v.reason), a("counts", v.counts);
+  a("flags", v.flags);
+}
+template <typename A>
+void visit(A& a, PartStrength& v) {
+  a("part", v.part), a("mean", v.mean), a("absent", v.absent), a("at_bound", v.at_bound);
+}
+template <typename A>
+void visit(A& a, WeightedStrengths& v) {
+  a("scales", v.scales), a("weight", v.weight);
+}
+template <typename A>
 void visit(A& a, RunReport& v) {
   a("case", v.case_id, Need::kRequired), a("scenario", v.scenario, Need::kRequired);
   a("method", v.method, Need::kRequired), a("boundary", v.boundary, Need::kRequired);
@@ -82,7 +100,8 @@ void visit(A& a, RunReport& v) {
   a("mesh", v.mesh), a("prepare_s", v.prepare_s), a("factor_s", v.factor_s);
   a("model_bytes", v.model_bytes), a("full_solve_ms", v.full_solve_ms);
   a("updates", v.updates), a("superseded", v.superseded), a("status", v.status);
-  a("reason", v.reason), a("latency_ms", v.latency_ms), a("cold_ms", v.cold_ms);
+  a("reason", v.reason), a("quality", v.quality);
+  a("latency_ms", v.latency_ms), a("cold_ms", v.cold_ms);
   a("first_iterate_ms", v.first_iterate_ms), a("stages_ms", v.stages_ms);
   a("error_mm", v.error_mm), a("recovery_pct", v.recovery_pct);
   a("craniotomy_recovery_pct", v.craniotomy_recovery_pct);
@@ -93,7 +112,8 @@ void visit(A& a, RunReport& v) {
   a("principal_direction_deg", v.principal_direction_deg);
   a("principal_direction_true_deg", v.principal_direction_true_deg);
   a("truth_scalars", v.truth_scalars), a("left_out", v.left_out), a("failures", v.failures);
-  a("sources", v.sources), a("trace", v.trace);
+  a("sources", v.sources), a("prior_strengths", v.prior_strengths);
+  a("hypotheses", v.hypotheses), a("trace", v.trace);
 }
 
 struct Writer {
@@ -120,7 +140,8 @@ struct Writer {
     for (T& value : values) array.push_back(encode(value));
     return array;
   }
-  static Json encode(std::map<std::string, double>& values) {
+  template <typename T>
+  static Json encode(std::map<std::string, T>& values) {
     Json map = Json::object();
     for (auto& [key, value] : values) map[key] = encode(value);
     return map;
@@ -197,8 +218,8 @@ struct Reader {
       decode(json[i], here + "[" + std::to_string(i) + "]", values[i]);
     }
   }
-  void decode(const Json& json, const std::string& here,
-              std::map<std::string, double>& values) const {
+  template <typename T>
+  void decode(const Json& json, const std::string& here, std::map<std::string, T>& values) const {
     if (!json.is_object()) return complain(here + " must be an object");
     values.clear();
     for (const auto& [key, value] : json.items()) decode(value, here + "." + key, values[key]);

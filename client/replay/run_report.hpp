@@ -81,6 +81,37 @@ struct RunFailure {
   std::string message;
 };
 
+// Final updates by their verdict.
+struct QualityCounts {
+  int good = 0;
+  int caution = 0;
+  int unusable = 0;
+  int not_judged = 0;
+};
+
+// Whether the fields of a run could be used (common/values/quality.hpp).
+struct RunQuality {
+  std::string worst;   // "unusable" if any update was, then "not_judged", "caution", "good"
+  std::string last;    // of the last final update
+  std::string reason;  // of the last final update
+  QualityCounts counts;
+  std::map<std::string, int> flags;  // name of each flag that was set -> number of updates
+};
+
+// Strength of one part of the prior in the last usable update.
+struct PartStrength {
+  std::string part;
+  double mean = 1.0;
+  double absent = 0.0;  // probability
+  bool at_bound = false;
+};
+
+// One set of strengths, and how probable the data of the last usable update make it.
+struct WeightedStrengths {
+  std::map<std::string, double> scales;  // by part
+  double weight = 1.0;
+};
+
 struct RunReport {
   std::string case_id;
   std::string scenario;
@@ -90,7 +121,7 @@ struct RunReport {
   std::string model_id;
   std::string case_file;
   std::string surgery_file;
-  std::string field_file;  // relative to the report; empty when no update came
+  std::string field_file;  // relative to the report; empty when no usable update came
 
   MeshSize mesh;
   std::optional<double> prepare_s;
@@ -100,8 +131,10 @@ struct RunReport {
 
   int updates = 0;     // final updates received
   int superseded = 0;  // observations dropped by the daemon in favour of newer ones
-  std::string status;  // of the last final update
+  // Status, reason, contact, sources and everything scored are those of the last usable update.
+  std::string status;
   std::string reason;
+  std::optional<RunQuality> quality;             // null without updates
   std::optional<LatencyPercentiles> latency_ms;  // message sent -> final update received
   std::optional<double> cold_ms;                 // the first of them
   std::optional<double> first_iterate_ms;        // median; message sent -> first iterate received
@@ -121,7 +154,9 @@ struct RunReport {
 
   std::map<std::string, double> truth_scalars;
   std::vector<Omission> left_out;
-  std::vector<SourceSummary> sources;  // of the last final update
+  std::vector<SourceSummary> sources;
+  std::vector<PartStrength> prior_strengths;
+  std::vector<WeightedStrengths> hypotheses;  // the most probable first
   std::vector<RunFailure> failures;
   std::vector<TracePoint> trace;
 };

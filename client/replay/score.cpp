@@ -92,6 +92,23 @@ std::optional<double> coverage_90(const Points& error, const VecX& sd_mm) {
   return static_cast<double>(inside) / static_cast<double>(error.size());
 }
 
+void describe_prior(const Estimate& estimate, RunReport& run) {
+  run.prior_strengths.clear();
+  for (std::size_t part = 0; part < kPriorParts; ++part) {
+    run.prior_strengths.push_back({std::string(to_string(static_cast<PriorPart>(part))),
+                                   estimate.prior_scales[part], estimate.prior_absent[part],
+                                   estimate.prior_at_bound[part]});
+  }
+  run.hypotheses.clear();
+  for (const Hypothesis& hypothesis : estimate.hypotheses) {
+    WeightedStrengths& entry = run.hypotheses.emplace_back();
+    entry.weight = hypothesis.weight;
+    for (std::size_t part = 0; part < kPriorParts; ++part) {
+      entry.scales[run.prior_strengths[part].part] = hypothesis.scales[part];
+    }
+  }
+}
+
 std::optional<double> angle_to_gravity(const Points& displacement, const Vec3& gravity) {
   const Vec3 direction = principal_direction(displacement);
   if (direction.isZero() || gravity.isZero()) return std::nullopt;
@@ -154,6 +171,7 @@ void describe(const BrainModel& model, const Estimate& estimate, RunReport& run)
   run.error_mm.sparse_initial = estimate.initial_misfit_mm;
   run.error_mm.sparse = estimate.misfit_mm;
   run.principal_direction_deg = angle_to_gravity(estimate.displacement, model.gravity_direction);
+  describe_prior(estimate, run);
 }
 
 Status score(const BrainModel& model, const io::SurgeryTruth& truth, const Estimate& estimate,

@@ -46,7 +46,8 @@ std::optional<MeanStd> cross_error(const io::SurgeryTruth& truth, const Points& 
 Status score(const BrainModel& model, const io::SurgeryTruth& truth, const Estimate& estimate,
              RunReport& run);
 
-// Fills what needs no truth: status, sparse misfit, contact, direction of the estimate.
+// Fills what needs no truth: status, sparse misfit, contact, direction of the estimate, strengths
+// of the prior.
 void describe(const BrainModel& model, const Estimate& estimate, RunReport& run);
 
 // Principal direction of the displacements (paper 3.2.4, principal component

@@ -12,10 +12,12 @@ namespace {
 // Colours by role, given twice: light and dark. Pictures keep their own white ground in both.
 constexpr const char* kStyle = R"(
 :root { color-scheme: light dark; --ground: #ffffff; --ink: #1c1c1c; --soft: #5a5a5a; --rule: #d4d4d4;
-        --head: #f1f3f5; --paper: #eef4fa; --warn: #b34700; }
+        --head: #f1f3f5; --paper: #eef4fa; --warn: #b34700;
+        --good: #0072b2; --caution: #e69f00; --unusable: #a50f15; }
 @media (prefers-color-scheme: dark) {
   :root { --ground: #16181b; --ink: #e8e8e8; --soft: #a8a8a8; --rule: #3a3e44; --head: #22262b;
-          --paper: #1b2733; --warn: #ffb066; } }
+          --paper: #1b2733; --warn: #ffb066;
+          --good: #56b4e9; --caution: #f0c75e; --unusable: #ff7b6b; } }
 body { background: var(--ground); color: var(--ink); font: 16px/1.5 system-ui, sans-serif;
        max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; margin-bottom: 0.2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
@@ -30,6 +32,10 @@ tbody th { text-align: left; font-weight: normal; white-space: normal; min-width
 figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; border: 1px solid var(--rule); border-radius: 6px; background: #ffffff; }
 figcaption { font-size: 0.9rem; }
 .failures { color: var(--warn); }
+.words { display: inline-block; max-width: 24rem; white-space: normal; text-align: left; }
+.verdict { border: 2px solid var(--rule); border-radius: 6px; padding: 0.05rem 0.45rem; white-space: nowrap; }
+.verdict.good { border-color: var(--good); } .verdict.caution { border-color: var(--caution); border-style: dashed; }
+.verdict.unusable { border-color: var(--unusable); border-style: double; border-width: 4px; font-weight: bold; }
 )";
 
 constexpr const char* kCitation =
@@ -93,6 +99,14 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
       "must not guide the treatment of patients.</p>\n";
   html += scenario_list(runs, groups);
   html += section("Failures", failure_list(runs));
+  html +=
+      section("Quality of the fields",
+              quality_table(runs) +
+                  "<p class=\"soft\">What the daemon says of each final update's field. "
+                  "&ldquo;Converged&rdquo; "
+                  "speaks of the algorithm only. Everything else on this page is taken from the "
+                  "last update "
+                  "that was usable. Strengths: in units of the case's standard deviations.</p>\n");
   html +=
       section("Errors, beside the published ones",
               error_table(runs) +

@@ -22,6 +22,8 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
 
 // The page's parts, as HTML.
 std::string error_table(const std::vector<ReportedRun>& runs);  // beside the paper's values
+// Verdicts and flags of each run's updates; strengths of the prior of the last usable one.
+std::string quality_table(const std::vector<ReportedRun>& runs);
 std::string timing_table(const std::vector<ReportedRun>& runs);
 std::string left_out_list(const std::vector<ReportedRun>& runs);
 // One row per instrument of each run's last update; empty when no update had named sources.

@@ -1,68 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <functional>
 
 #include "client/report/html_page.hpp"
+#include "client/report/html_table.hpp"
 #include "client/report/paper_values.hpp"
 
 namespace brainshift::client {
 namespace {
-
-const char* const kNothing = "&ndash;";
-
-std::string number(double value, int decimals) {
-  if (!std::isfinite(value)) return kNothing;
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
-  return buffer;
-}
-std::string number(const std::optional<double>& value, int decimals) {
-  return value ? number(*value, decimals) : kNothing;
-}
-std::string number(const std::optional<MeanStd>& value) {
-  if (!value) return kNothing;
-  return number(value->mean, 2) + "&nbsp;&plusmn;&nbsp;" + number(value->std, 2);
-}
-
-std::string plain(const std::string& text) { return text.empty() ? kNothing : escape_html(text); }
-
-using Cell = std::function<std::string(const RunReport&)>;
-
-// A row: its name, a cell for each run, then the paper's columns (contact, fixed, ICP) if wanted.
-class Table {
- public:
-  Table(const std::vector<ReportedRun>& runs, bool with_paper)
-      : runs_(runs), with_paper_(with_paper) {
-    html_ = "<div class=\"scroll\"><table>\n<thead><tr><th></th>";
-    for (const ReportedRun& run : runs) {
-      html_ += "<th>" + escape_html(run.report.scenario) + "<br>" + escape_html(run.report.method) +
-               "<br>" + escape_html(run.report.boundary) + "</th>";
-    }
-    if (with_paper) {
-      for (const char* name : {"contact", "fixed", "ICP, contact"}) {
-        html_ += std::string("<th class=\"paper\">Ji et al.<br>") + name + "</th>";
-      }
-    }
-    html_ += "</tr></thead>\n<tbody>\n";
-  }
-  void row(const std::string& name, const Cell& cell, const std::vector<std::string>& paper = {}) {
-    html_ += "<tr><th>" + name + "</th>";
-    for (const ReportedRun& run : runs_) html_ += "<td>" + cell(run.report) + "</td>";
-    for (std::size_t i = 0; with_paper_ && i < 3; ++i) {
-      html_ += "<td class=\"paper\">" +
-               (i < paper.size() && !paper[i].empty() ? paper[i] : kNothing) + "</td>";
-    }
-    html_ += "</tr>\n";
-  }
-  std::string finish() { return html_ + "</tbody></table></div>\n"; }
-
- private:
-  const std::vector<ReportedRun>& runs_;
-  bool with_paper_;
-  std::string html_;
-};
 
 void add_tumour_rows(Table& table) {
   table.row("tumour shift to recover (mm)",
@@ -136,7 +81,7 @@ void add_contact_rows(Table& table) {
               return r.trace.empty() ? kNothing : std::to_string(r.trace.back().iteration);
             },
             {std::to_string(paper::kIterations), "", std::to_string(paper::kIterations)});
-  table.row("status", [](const RunReport& r) { return plain(r.status); });
+  table.row("status of the algorithm", [](const RunReport& r) { return plain(r.status); });
 }
 
 }  // namespace

@@ -163,9 +163,14 @@ void Service::publish(wire::UpdateMessage message) {
   if (estimated && journal_) {
     journal_->append(record(io::RecordKind::kUpdate, update.sequence, std::move(payload)));
   }
-  const Delivery delivery = message.error  ? Delivery::kFailure
-                            : update.final ? Delivery::kFinal
-                                           : Delivery::kIterate;
+  // An unusable field travels as a failure does: everyone is told, nobody keeps it.
+  const Delivery delivery = !update.final     ? Delivery::kIterate
+                            : update.usable() ? Delivery::kFinal
+                                              : Delivery::kFailure;
+  if (estimated && !update.usable()) {
+    spdlog::warn("unusable update sequence={} reason=\"{}\"", update.sequence,
+                 update.estimate.quality.reason);
+  }
   outbox_.post({delivery, {}, std::move(frame)});
 }
 

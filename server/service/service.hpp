@@ -16,6 +16,9 @@
 // the newest observation took to queue for the journal, which lies on the way to this update. The
 // update's own record can only be queued when its bytes are final; it moves them and takes no time.
 //
+// Every subscriber receives every final update with its verdict, the unusable ones too. A late
+// subscriber's first field is the last usable one.
+//
 // An error of the journal is added to the left_out of every update until the next session.
 #pragma once
 

@@ -10,8 +10,9 @@
 // Every source has a box for one observation: a newer one replaces an older one that has not
 // started, so a slow inversion never works through a backlog. Only a new session and stop() end a
 // running inversion early, whatever its method: their stop token reaches every iteration and every
-// contact set. The result of such an inversion is not published. After an error the previous
-// estimate stays the valid one. All members may be called from any thread, except inside the hooks.
+// contact set. The result of such an inversion is not published. After an error, and after an
+// unusable estimate, the usable one before it stays the valid one. All members may be called from
+// any thread, except inside the hooks.
 #pragma once
 
 #include <condition_variable>

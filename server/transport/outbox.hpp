@@ -17,8 +17,8 @@ using Bytes = std::shared_ptr<const std::string>;
 
 enum class Delivery {
   kReply,    // to one peer
-  kFinal,    // to every subscriber; kept for those who come late
-  kFailure,  // to every subscriber: an observation that became no estimate
+  kFinal,    // to every subscriber: a usable field; kept for those who come late
+  kFailure,  // to every subscriber: an observation that became no estimate, or no usable one
   kIterate,  // to every subscriber; may be lost
 };
 

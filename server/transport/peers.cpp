@@ -2,8 +2,18 @@
 #include "server/transport/peers.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace brainshift::server {
+
+void Peer::owe(Bytes bytes, bool usable) {
+  owed.push_back({std::move(bytes), usable});
+  if (owed.size() <= kMaxOwed) return;
+  const bool only_usable =
+      owed.front().usable &&
+      std::none_of(owed.begin() + 1, owed.end(), [](const Owed& entry) { return entry.usable; });
+  owed.erase(owed.begin() + (only_usable ? 1 : 0));
+}
 
 Peer* Peers::admit(const std::string& routing_id, int connection_fd) {
   if (Peer* known = find(routing_id)) {

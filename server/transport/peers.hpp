@@ -17,8 +17,16 @@ struct Peer {
       -1;  // the daemon's descriptor of the peer's connection; names it until it closes
   bool subscribed = false;
   // Final updates and failures that did not fit into the peer's queue, oldest first.
-  std::deque<Bytes> owed;
+  struct Owed {
+    Bytes bytes;
+    bool usable = false;  // a usable field (Delivery::kFinal)
+  };
+  std::deque<Owed> owed;
   static constexpr std::size_t kMaxOwed = 4;
+
+  // Beyond kMaxOwed the oldest gives way, but never the newest usable field: it stays the valid one
+  // however many failures follow.
+  void owe(Bytes bytes, bool usable);
 };
 
 class Peers {

@@ -117,7 +117,7 @@ struct Router::Impl {
   void answer(RequestHandler& handler, const Incoming& incoming);
   void reply(const std::string& peer, const Bytes& bytes);
   void deliver(const Outgoing& message);
-  void push(const std::string& routing_id, Peer& peer, const Bytes& bytes, bool may_be_lost);
+  void push(const std::string& routing_id, Peer& peer, const Bytes& bytes, Delivery delivery);
   void pay_owed();
   void pay(const std::string& routing_id, Peer& peer);
   void forget_closed();
@@ -128,7 +128,9 @@ struct Router::Impl {
   ConnectionMonitor monitor;
   Peers peers;
   std::string endpoint;
+  // What a late subscriber gets: the last usable field, and the newest failure since.
   Bytes last_final;
+  Bytes failure_since;
 };
 
 Router::Router(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -218,7 +220,11 @@ void Router::Impl::answer(RequestHandler& handler, const Incoming& incoming) {
   peer = peers.find(incoming.peer);  // gone when the reply found no route
   if (!answer->subscribe || peer == nullptr) return;
   peer->subscribed = true;
-  if (last_final) push(incoming.peer, *peer, last_final, false);
+  if (last_final) push(incoming.peer, *peer, last_final, Delivery::kFinal);
+  peer = peers.find(incoming.peer);
+  if (failure_since && peer != nullptr) {
+    push(incoming.peer, *peer, failure_since, Delivery::kFailure);
+  }
 }
 
 void Router::Impl::reply(const std::string& peer, const Bytes& bytes) {
@@ -231,30 +237,32 @@ void Router::Impl::reply(const std::string& peer, const Bytes& bytes) {
 
 void Router::Impl::deliver(const Outgoing& message) {
   if (message.delivery == Delivery::kReply) return reply(message.peer, message.bytes);
-  if (message.delivery == Delivery::kFinal) last_final = message.bytes;
-  const bool may_be_lost = message.delivery == Delivery::kIterate;
+  if (message.delivery == Delivery::kFinal) {
+    last_final = message.bytes;
+    failure_since.reset();
+  }
+  if (message.delivery == Delivery::kFailure) failure_since = message.bytes;
   for (auto next = peers.all().begin(); next != peers.all().end();) {
     const auto peer = next++;  // push may remove it
-    if (peer->second.subscribed) push(peer->first, peer->second, message.bytes, may_be_lost);
+    if (peer->second.subscribed) push(peer->first, peer->second, message.bytes, message.delivery);
   }
 }
 
 void Router::Impl::push(const std::string& routing_id, Peer& peer, const Bytes& bytes,
-                        bool may_be_lost) {
-  if (may_be_lost) {
+                        Delivery delivery) {
+  if (delivery == Delivery::kIterate) {
     // What is owed goes first: nothing may overtake it.
     if (!peer.owed.empty()) return;
     if (send(socket, routing_id, bytes) == Sent::kPeerGone) peers.remove(std::string(routing_id));
     return;
   }
-  peer.owed.push_back(bytes);
-  if (peer.owed.size() > Peer::kMaxOwed) peer.owed.pop_front();
+  peer.owe(bytes, delivery == Delivery::kFinal);
   pay(routing_id, peer);
 }
 
 void Router::Impl::pay(const std::string& routing_id, Peer& peer) {
   while (!peer.owed.empty()) {
-    const Sent sent = send(socket, routing_id, peer.owed.front());
+    const Sent sent = send(socket, routing_id, peer.owed.front().bytes);
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return peers.remove(std::string(routing_id));
     peer.owed.pop_front();

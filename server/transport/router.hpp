@@ -6,7 +6,8 @@
 // Peers may be hostile or broken: message size, number of parts and number of peers are capped; a
 // frame that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and
 // unfinished handshakes to a short limit. A subscriber that does not read loses iterates; it is
-// owed the newest few final updates, nothing older. ZeroMQ bounds the size of each part, not their
+// owed the newest few final updates and failures, the newest usable field among them. A late one
+// receives that field, and the newest failure since. ZeroMQ bounds the size of each part, not their
 // number within one message: expose the daemon to trusted networks only.
 #pragma once
 
@@ -35,7 +36,7 @@ struct RouterOptions {
 struct Reply {
   wire::MessageType type = wire::MessageType::kErrorReply;
   std::string payload;
-  bool subscribe = false;  // the peer receives updates from now on, the last final one first
+  bool subscribe = false;  // the peer receives updates from now on, the last usable one first
 };
 
 // Answers requests; called on the router's thread and must not block.

@@ -39,12 +39,18 @@ const json& run_with_boundary(const json& report, const std::string& boundary) {
 }
 
 void expect_contract(const json& run) {
-  for (const char* key : {"case", "scenario", "method", "boundary", "mesh", "prepare_s",
-                          "model_bytes", "full_solve_ms", "updates", "latency_ms", "cold_ms",
-                          "stages_ms", "error_mm", "recovery_pct", "field_error_pct", "coverage_90",
-                          "contact", "principal_direction_deg", "left_out"}) {
+  for (const char* key : {"case",        "scenario",      "method",
+                          "boundary",    "mesh",          "prepare_s",
+                          "model_bytes", "full_solve_ms", "updates",
+                          "latency_ms",  "cold_ms",       "stages_ms",
+                          "error_mm",    "recovery_pct",  "field_error_pct",
+                          "coverage_90", "contact",       "principal_direction_deg",
+                          "left_out",    "quality",       "prior_strengths",
+                          "hypotheses"}) {
     EXPECT_TRUE(run.contains(key)) << key;
   }
+  EXPECT_THAT(run.at("quality").at("worst"), testing::AnyOf("good", "caution"));
+  EXPECT_EQ(run.at("quality").at("counts").at("unusable"), 0);
   for (const char* key : {"initial", "sparse", "cross", "craniotomy_initial", "craniotomy"}) {
     ASSERT_TRUE(run.at("error_mm").contains(key)) << key;
     EXPECT_TRUE(run.at("error_mm").at(key).at("mean").is_number()) << key;
@@ -101,6 +107,7 @@ class EndToEnd : public testing::Test {
     const auto replayed =
         run({brainshift(), "replay", surgery, "--endpoint", endpoint(daemon), "--report", report});
     EXPECT_EQ(replayed.exit_status, 0) << replayed.err;
+    EXPECT_THAT(replayed.out, HasSubstr(", condensed, contact: "));
     return read_json(report);
   }
 

@@ -32,8 +32,13 @@ std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3")
   return encode_frame(MessageType::kStatusReply, id, encode(status));
 }
 
-std::string update_frame(std::uint64_t sequence, bool final = true) {
+std::string update_frame(std::uint64_t sequence, bool final = true,
+                         Quality quality = Quality::kNotJudged) {
   wire::UpdateMessage message;
+  message.update.estimate.quality.quality = quality;
+  if (quality == Quality::kUnusable) {
+    message.update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  }
   message.update.sequence = sequence;
   message.update.final = final;
   message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
@@ -204,6 +209,32 @@ TEST(Client, UpdatesBetweenRepliesAreKeptInOrder) {
               Points::Constant(3, 2, static_cast<double>(expected)));
   }
   expect_error(client.next_update(milliseconds(1)), ErrorCode::kUnavailable, daemon.endpoint());
+}
+
+TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    const std::uint64_t id = request.request_id;
+    if (request.type == MessageType::kStartSessionRequest) {
+      return {encode_frame(MessageType::kStartSessionReply, id, encode(wire::SessionInfo{}))};
+    }
+    return {update_frame(1, true, Quality::kGood), update_frame(2, true, Quality::kUnusable),
+            update_frame(3, false), status_reply(id)};
+  });
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.status());
+  EXPECT_FALSE(client.latest_usable()) << "queued, not handed out yet";
+  for (const std::uint64_t sequence : {1, 2, 3}) {
+    const auto message = client.next_update(kPatient);
+    ASSERT_TRUE(message) << message.error().message;
+    EXPECT_EQ(message->update.sequence, sequence);
+    EXPECT_EQ(message->update.usable(), sequence == 1);
+    ASSERT_TRUE(client.latest_usable());
+    EXPECT_EQ(client.latest_usable()->update.estimate.displacement, Points::Constant(3, 2, 1.0));
+  }
+  expect_error(client.next_update(milliseconds(1)), ErrorCode::kUnavailable, daemon.endpoint());
+  EXPECT_TRUE(client.latest_usable());
+  ASSERT_TRUE(client.start_session({.case_id = "c"}));
+  EXPECT_FALSE(client.latest_usable()) << "of the session before";
 }
 
 TEST(Client, ABadUpdateIsReportedByNextUpdateAndNotByTheRequestItMet) {

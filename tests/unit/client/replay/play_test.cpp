@@ -79,6 +79,45 @@ TEST(Play, IteratesOfAFailedObservationAreNotTakenForTheNextOne) {
   EXPECT_EQ(played.iterates.size(), 1u);
 }
 
+TEST(Play, AnUnusableUpdateIsCountedAndTheUsableOneBeforeItIsScored) {
+  ScriptedDaemon daemon;
+  daemon.script = [](const Observation& o) {
+    return std::vector{update(o.sequence, false, static_cast<int>(o.sequence)),
+                       o.sequence == 2 ? update(2, true, 5) : unusable_update(o.sequence)};
+  };
+  const PlayedSession played = play(daemon.link(), recording(4), kOptions);
+  for (const PlayedObservation& o : played.observations) EXPECT_TRUE(o.latency_ms);
+  ASSERT_TRUE(played.last);
+  EXPECT_EQ(played.last->observation_sequence, 2u);
+  EXPECT_EQ(played.last_recorded_sequence, 2u);
+  ASSERT_EQ(played.iterates.size(), 1u);
+  EXPECT_EQ(played.iterates[0].iteration, 2);
+
+  RunReport run;
+  summarise(played, run);
+  EXPECT_EQ(run.updates, 4);
+  EXPECT_TRUE(run.failures.empty());
+  ASSERT_TRUE(run.quality);
+  EXPECT_EQ(run.quality->worst, "unusable");
+  EXPECT_EQ(run.quality->last, "unusable");
+  EXPECT_EQ(run.quality->reason, "elements are turned inside out (9)");
+  EXPECT_EQ(run.quality->counts.good, 1);
+  EXPECT_EQ(run.quality->counts.unusable, 3);
+  EXPECT_EQ(run.quality->flags, (std::map<std::string, int>{{"inverted_elements", 3}}));
+}
+
+TEST(Play, WithoutAnyUsableUpdateThereIsNothingToScore) {
+  ScriptedDaemon daemon;
+  daemon.script = [](const Observation& o) { return std::vector{unusable_update(o.sequence)}; };
+  const PlayedSession played = play(daemon.link(), recording(2), kOptions);
+  EXPECT_FALSE(played.last);
+  RunReport run;
+  summarise(played, run);
+  EXPECT_EQ(run.updates, 2);
+  EXPECT_EQ(run.status, "not_run");
+  EXPECT_EQ(run.quality->worst, "unusable");
+}
+
 TEST(Play, RefusedObservationIsRecordedAndTheRestGoesOn) {
   ScriptedDaemon daemon;
   daemon.on_submit = [](const Observation& o) -> Result<wire::ObservationReceipt> {

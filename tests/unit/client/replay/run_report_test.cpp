@@ -44,6 +44,14 @@ RunReport full_run() {
   run.left_out = {{"pressure", "drained", "0.02 %"}};
   run.sources = {{"ius", 41, 0.25, 200, 3, 31.5, 28.75, 0.125, true}, {"stereopsis", 40, 2.0, 300}};
   run.sources[1].consistent = false;
+  run.quality = RunQuality{"unusable",
+                           "caution",
+                           "the time ran out",
+                           {5, 2, 1, 0},
+                           {{"deadline", 2}, {"inverted_elements", 1}}};
+  run.prior_strengths = {{"along_gravity", 1.25, 0.5, false}, {"other", 3.0, 0.0, true}};
+  run.hypotheses = {{{{"along_gravity", 2.5}, {"other", 3.0}}, 0.75},
+                    {{{"along_gravity", 0.0}, {"other", 3.0}}, 0.25}};
   run.failures = {{3, "unavailable", "no update \"in\" time"}};
   run.trace = {{1, {2.0, 0.5}, MeanStd{1.9, 0.4}, 12, 0.3, 100.0},
                {2, {1.0, 0.5}, std::nullopt, 2, 0.1, 200.0}};
@@ -68,10 +76,14 @@ TEST(RunReport, ReadsBackWhatItWrote) {
 
 TEST(RunReport, HasEveryKeyOfTheContract) {
   const json run = json::parse(to_json({full_run()}))[0];
-  for (const char* key : {"case", "scenario", "method", "boundary", "mesh", "prepare_s",
-                          "model_bytes", "full_solve_ms", "updates", "latency_ms", "cold_ms",
-                          "stages_ms", "error_mm", "recovery_pct", "field_error_pct", "coverage_90",
-                          "contact", "principal_direction_deg", "left_out"}) {
+  for (const char* key : {"case",        "scenario",      "method",
+                          "boundary",    "mesh",          "prepare_s",
+                          "model_bytes", "full_solve_ms", "updates",
+                          "latency_ms",  "cold_ms",       "stages_ms",
+                          "error_mm",    "recovery_pct",  "field_error_pct",
+                          "coverage_90", "contact",       "principal_direction_deg",
+                          "left_out",    "quality",       "prior_strengths",
+                          "hypotheses"}) {
     EXPECT_TRUE(run.contains(key)) << key;
   }
   const auto keys_of = [&](const char* object, std::initializer_list<const char*> keys) {
@@ -83,6 +95,14 @@ TEST(RunReport, HasEveryKeyOfTheContract) {
   keys_of("error_mm", {"initial", "sparse", "cross", "craniotomy_initial", "craniotomy"});
   keys_of("field_error_pct", {"p50", "p99", "max"});
   keys_of("contact", {"active", "penetrating", "max_penetration_mm", "iterations"});
+  keys_of("quality", {"worst", "last", "reason", "counts", "flags"});
+  EXPECT_EQ(run["quality"]["counts"],
+            (json{{"good", 5}, {"caution", 2}, {"unusable", 1}, {"not_judged", 0}}));
+  EXPECT_EQ(run["quality"]["flags"], (json{{"deadline", 2}, {"inverted_elements", 1}}));
+  EXPECT_EQ(run["prior_strengths"][1],
+            (json{{"part", "other"}, {"mean", 3.0}, {"absent", 0.0}, {"at_bound", true}}));
+  EXPECT_EQ(run["hypotheses"][0]["scales"]["along_gravity"], 2.5);
+  EXPECT_EQ(run["hypotheses"][0]["weight"], 0.75);
   EXPECT_TRUE(run["left_out"][0].contains("estimated_error"));
   EXPECT_EQ(run["error_mm"]["initial"]["mean"], 2.9);
 }
@@ -99,6 +119,16 @@ TEST(RunReport, NotApplicableAndNotFiniteAreNull) {
   const auto read = from_json(text, "R.json");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_TRUE(std::isnan((*read)[0].error_mm.cross->std));
+}
+
+TEST(RunReport, OfAnOlderWriterHasNoQuality) {
+  json runs = json::parse(to_json({full_run()}));
+  for (const char* key : {"quality", "prior_strengths", "hypotheses"}) runs[0].erase(key);
+  const auto read = from_json(runs.dump(), "R.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_FALSE((*read)[0].quality);
+  EXPECT_TRUE((*read)[0].prior_strengths.empty());
+  EXPECT_TRUE((*read)[0].hypotheses.empty());
 }
 
 TEST(RunReport, IgnoresKeysOfNewerWriters) {
@@ -127,15 +157,20 @@ TEST_P(MalformedReport, IsRefusedInOneLineNamingTheKey) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Keys, MalformedReport,
-    testing::Values(BadReport{"number", "/0/error_mm/cross/mean", "\"small\"",
-                              "[0].error_mm.cross.mean"},
-                    BadReport{"string", "/0/case", "7", "[0].case"},
-                    BadReport{"null", "/0/scenario", "null", "[0].scenario"},
-                    BadReport{"object", "/0/latency_ms", "[1, 2]", "[0].latency_ms"},
-                    BadReport{"array", "/0/trace", "{}", "[0].trace"},
-                    BadReport{"element", "/0/trace/1/iteration", "1.5", "[0].trace[1].iteration"},
-                    BadReport{"negative", "/0/seed", "-1", "[0].seed"},
-                    BadReport{"run", "/0", "3", "[0]"}),
+    testing::Values(
+        BadReport{"number", "/0/error_mm/cross/mean", "\"small\"", "[0].error_mm.cross.mean"},
+        BadReport{"string", "/0/case", "7", "[0].case"},
+        BadReport{"null", "/0/scenario", "null", "[0].scenario"},
+        BadReport{"object", "/0/latency_ms", "[1, 2]", "[0].latency_ms"},
+        BadReport{"array", "/0/trace", "{}", "[0].trace"},
+        BadReport{"element", "/0/trace/1/iteration", "1.5", "[0].trace[1].iteration"},
+        BadReport{"negative", "/0/seed", "-1", "[0].seed"},
+        BadReport{"count", "/0/quality/counts/good", "\"all\"", "[0].quality.counts.good"},
+        BadReport{"flags", "/0/quality/flags", "[\"deadline\"]", "[0].quality.flags"},
+        BadReport{"flag", "/0/quality/flags/deadline", "1.5", "[0].quality.flags.deadline"},
+        BadReport{"strength", "/0/prior_strengths/0/mean", "true", "[0].prior_strengths[0].mean"},
+        BadReport{"weight", "/0/hypotheses/1/weight", "{}", "[0].hypotheses[1].weight"},
+        BadReport{"run", "/0", "3", "[0]"}),
     [](const auto& param) { return param.param.name; });
 
 TEST(RunReport, MissingRequiredKeyIsNamed) {

@@ -21,11 +21,21 @@ inline wire::UpdateMessage update(std::uint64_t observation, bool final, int ite
   message.session_id = kSession;
   message.update.observation_sequence = observation;
   message.update.final = final;
+  if (final) message.update.estimate.quality.quality = Quality::kGood;
   message.update.timings.invert_ms = 10.0 * static_cast<double>(observation);
   message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(iteration));
   for (int i = 1; i <= iteration; ++i) {
     message.update.estimate.history.push_back({i, {1.0 / i, 0.1}, 10 - i, 0.5 / i, 100.0 * i});
   }
+  return message;
+}
+
+inline wire::UpdateMessage unusable_update(std::uint64_t observation) {
+  wire::UpdateMessage message = update(observation, true, 9);
+  QualityVerdict& verdict = message.update.estimate.quality;
+  verdict.flags.set(QualityFlag::kInvertedElements);
+  verdict.quality = Quality::kUnusable;
+  verdict.reason = "elements are turned inside out (9)";
   return message;
 }
 

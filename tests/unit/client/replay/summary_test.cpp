@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "client/replay/replay.hpp"
 #include "tests/unit/client/replay/scripted_daemon.hpp"
 
@@ -47,6 +49,49 @@ TEST(Summary, WithoutUpdatesTimesStayEmpty) {
   EXPECT_FALSE(run.latency_ms);
   EXPECT_FALSE(run.cold_ms);
   EXPECT_FALSE(run.stages_ms);
+}
+
+TEST(Summary, TheWorstVerdictOfARunStands) {
+  const Quality order[] = {Quality::kGood, Quality::kCaution, Quality::kNotJudged,
+                           Quality::kUnusable};  // ever worse
+  PlayedSession session;
+  for (const Quality quality : order) {
+    PlayedObservation observation;
+    observation.latency_ms = 1.0;
+    observation.quality.quality = quality;
+    session.observations.push_back(observation);
+    std::rotate(session.observations.rbegin(), session.observations.rbegin() + 1,
+                session.observations.rend());
+    RunReport run;
+    summarise(session, run);
+    ASSERT_TRUE(run.quality);
+    EXPECT_EQ(run.quality->worst, to_string(quality));
+  }
+}
+
+TEST(Summary, WithoutUpdatesThereIsNoQuality) {
+  RunReport run;
+  summarise(PlayedSession{}, run);
+  EXPECT_FALSE(run.quality);
+}
+
+TEST(SummaryLine, CountsVerdictsFlagsAndFailures) {
+  RunReport run;
+  run.scenario = "paper";
+  run.method = "condensed";
+  run.boundary = "contact";
+  EXPECT_EQ(summary_line(run), "paper, condensed, contact: 0 updates");
+  run.updates = 1;
+  run.quality = RunQuality{"good", "good", "", {1, 0, 0, 0}, {}};
+  EXPECT_EQ(summary_line(run), "paper, condensed, contact: 1 update (1 good)");
+  run.updates = 12;
+  run.quality = RunQuality{
+      "unusable", "caution", "", {7, 2, 1, 2}, {{"deadline", 2}, {"inverted_elements", 1}}};
+  run.failures.resize(3);
+  run.recovery_pct = 97.66;
+  EXPECT_EQ(summary_line(run),
+            "paper, condensed, contact: 12 updates (7 good, 2 with caution, 1 unusable, 2 not "
+            "judged); deadline 2, inverted_elements 1; 3 failed; 97.7 % recovered at the tumour");
 }
 
 TEST(Trace, PairsHistoryWithTheIteratesThatArrived) {

@@ -13,6 +13,7 @@ inline RunReport small_run(const char* boundary) {
   run.method = "paper";
   run.boundary = boundary;
   run.updates = 1;
+  run.quality = RunQuality{"good", "good", "", {1, 0, 0, 0}, {}};
   run.error_mm.initial = MeanStd{2.0, 0.5};
   run.error_mm.cross = MeanStd{0.125, 0.06};
   run.recovery_pct = 93.75;

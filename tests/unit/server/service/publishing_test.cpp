@@ -77,6 +77,44 @@ TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   EXPECT_EQ(next_update(late).update.observation_sequence, 1u);
 }
 
+TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {
+  serve(with_model());
+  RawPeer sender(endpoint_);
+  RawPeer watcher(endpoint_);
+  start_session(sender);
+  subscribe(sender);
+  subscribe(watcher);
+  sender.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  for (RawPeer* peer : {&sender, &watcher}) EXPECT_TRUE(next_update(*peer).update.usable());
+  for (std::uint64_t sequence = 2; sequence <= 7; ++sequence) {
+    sender.request(MessageType::kObservation,
+                   wire::encode(landmarks(sequence, "pointer", kMostMotion_mm + 1.0)));
+    for (RawPeer* peer : {&sender, &watcher}) {
+      const auto message = next_update(*peer);
+      EXPECT_EQ(message.update.observation_sequence, sequence);
+      EXPECT_FALSE(message.error.has_value());
+      EXPECT_EQ(message.update.estimate.status, EstimateStatus::kConverged);
+      EXPECT_EQ(message.update.estimate.quality.quality, Quality::kUnusable);
+      EXPECT_TRUE(message.update.estimate.quality.flags.has(QualityFlag::kBeyondSkull));
+      EXPECT_THAT(message.update.estimate.quality.reason, HasSubstr("motion 51 mm"));
+    }
+  }
+  // One who comes late sees the usable field, and what has come of it since.
+  RawPeer late(endpoint_);
+  subscribe(late);
+  const auto snapshot = next_update(late);
+  EXPECT_EQ(snapshot.update.observation_sequence, 1u);
+  EXPECT_TRUE(snapshot.update.usable());
+  EXPECT_EQ(next_update(late).update.observation_sequence, 7u);
+  sender.request(MessageType::kObservation, wire::encode(landmarks(8)));
+  EXPECT_EQ(next_update(late).update.observation_sequence, 8u);
+  RawPeer later(endpoint_);
+  subscribe(later);
+  EXPECT_EQ(next_update(later).update.observation_sequence, 8u);
+  EXPECT_EQ(later.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply)
+      << "the failures before the snapshot are over";
+}
+
 TEST_F(TransportTest, ASubscriberThatDoesNotReadDelaysNobodyAndIsOwedTheNewestUpdate) {
   constexpr int kNodes = 40'000;  // 0.5 MB per update
   constexpr std::uint64_t kUpdates = 60;

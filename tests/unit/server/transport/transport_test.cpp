@@ -205,6 +205,26 @@ TEST(Outbox, KeepsTheNewestIteratesAndEverythingElse) {
   EXPECT_TRUE(outbox.take().empty());
 }
 
+TEST(Peers, AreOwedTheNewestUsableFieldHoweverManyFailuresFollow) {
+  Peer peer;
+  const auto owe = [&](const std::string& text, bool usable) {
+    peer.owe(std::make_shared<const std::string>(text), usable);
+  };
+  const auto owed = [&] {
+    std::vector<std::string> texts;
+    for (const Peer::Owed& entry : peer.owed) texts.push_back(*entry.bytes);
+    return texts;
+  };
+  owe("f0", true);
+  owe("f1", true);
+  for (const char* text : {"e2", "e3", "e4", "e5", "e6"}) owe(text, false);
+  EXPECT_THAT(owed(), testing::ElementsAre("f1", "e4", "e5", "e6"));
+  owe("f7", true);
+  EXPECT_THAT(owed(), testing::ElementsAre("e4", "e5", "e6", "f7"));
+  for (const char* text : {"e8", "e9", "e10", "e11"}) owe(text, false);
+  EXPECT_THAT(owed(), testing::ElementsAre("f7", "e9", "e10", "e11"));
+}
+
 TEST(Peers, AConnectionThatClosesTakesItsPeerAlong) {
   Peers peers(2);
   ASSERT_NE(peers.admit("a", 10), nullptr);

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/lib/latest_usable.hpp"
+
+#include <gtest/gtest.h>
+
+namespace brainshift::client {
+namespace {
+
+wire::UpdateMessage update(std::uint64_t session, std::uint64_t sequence,
+                           Quality quality = Quality::kGood, bool final = true) {
+  wire::UpdateMessage message;
+  message.session_id = session;
+  message.update.sequence = sequence;
+  message.update.final = final;
+  message.update.estimate.quality.quality = quality;
+  return message;
+}
+
+std::uint64_t sequence_of(const LatestUsable& latest) {
+  return latest.get() ? latest.get()->update.sequence : 0;
+}
+
+TEST(LatestUsable, IsEmptyUntilAUsableUpdateComes) {
+  LatestUsable latest;
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 1, Quality::kUnusable));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 2, Quality::kCaution));
+  EXPECT_EQ(sequence_of(latest), 2u);
+}
+
+TEST(LatestUsable, OnlyAnotherUsableUpdateReplacesIt) {
+  LatestUsable latest;
+  latest.take(update(1, 1));
+  latest.take(update(1, 2, Quality::kUnusable));
+  latest.take(update(1, 3, Quality::kNotJudged));
+  latest.take(update(1, 4, Quality::kGood, false));
+  auto failed = update(1, 5);
+  failed.error = Error{ErrorCode::kEmptySet, "no point"};
+  latest.take(failed);
+  EXPECT_EQ(sequence_of(latest), 1u);
+  latest.take(update(1, 6));
+  EXPECT_EQ(sequence_of(latest), 6u);
+}
+
+TEST(LatestUsable, OfAnotherSessionIsForgottenAndDoesNotComeBack) {
+  LatestUsable latest;
+  latest.begin(4);
+  latest.take(update(4, 9));
+  latest.take(update(5, 1, Quality::kUnusable));  // another client has started session 5
+  EXPECT_FALSE(latest.get());
+  latest.take(update(4, 10));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(5, 2));
+  EXPECT_EQ(sequence_of(latest), 2u);
+}
+
+// Session numbers of a restarted daemon begin again.
+TEST(LatestUsable, BeginForgetsWhateverTheNumber) {
+  LatestUsable latest;
+  latest.begin(7);
+  latest.take(update(7, 3));
+  latest.follow(7);  // subscribed again
+  EXPECT_EQ(sequence_of(latest), 3u);
+  latest.begin(7);
+  EXPECT_FALSE(latest.get());
+  latest.take(update(7, 4));
+  latest.follow(1);
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 1));
+  EXPECT_EQ(sequence_of(latest), 1u);
+}
+
+}  // namespace
+}  // namespace brainshift::client
