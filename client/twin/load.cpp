@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/load.hpp"
 
+#include <cmath>
+
 #include "common/fem/swelling.hpp"
 
 namespace brainshift::client {
@@ -13,8 +15,9 @@ Vec3 craniotomy_centre(const BrainModel& model) {
 
 Vec3 swelling_centre(const BrainModel& model, const Swelling& swelling) {
   const Vec3 tumour = model.tumour.vertices.rowwise().mean();
-  if (swelling.depth_mm == 0.0) return tumour;
-  return tumour + swelling.depth_mm * (tumour - craniotomy_centre(model)).normalized();
+  if (swelling.depth_mm == 0.0) return tumour + swelling.offset_mm;
+  return tumour + swelling.depth_mm * (tumour - craniotomy_centre(model)).normalized() +
+         swelling.offset_mm;
 }
 
 double volume_strain_at(const Swelling& swelling, double distance_mm) {
@@ -28,6 +31,16 @@ Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& 
                      const Swelling& swelling) {
   return fem::swelling_load(mesh, material, [&](const Vec3& x) {
     return volume_strain_at(swelling, (x - centre).norm());
+  });
+}
+
+Points volume_change_load(const TetMesh& mesh, const Material& material, const Vec3& tumour,
+                          const VolumeChange& change) {
+  const double middle = 0.5 * (mesh.nodes.row(0).minCoeff() + mesh.nodes.row(0).maxCoeff());
+  const double side = tumour[0] < middle ? -1.0 : 1.0;
+  return fem::swelling_load(mesh, material, [&](const Vec3& x) {
+    if (!change.one_hemisphere) return change.strain;
+    return 0.5 * change.strain * (1.0 + std::tanh(side * (x[0] - middle) / kFalx_mm));
   });
 }
 

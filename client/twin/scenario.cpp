@@ -107,6 +107,18 @@ Scenario joint_mixed() {
   scenario.fluid_levels_mm = {30.0};
   scenario.gravity_tilt_deg = 12.0;
   scenario.swelling = {0.25, 45.0, 15.0};
+  // Mannitol and breathing take a few parts in a hundred of the brain's water at most.
+  scenario.largest_shrinkage = 0.02;
+  return scenario;
+}
+
+// The paper's sag while the superficial part of the tumour is gone.
+Scenario resection() {
+  Scenario scenario =
+      joint(paper(), "resection",
+            "the paper's sag with the superficial 70 % of the tumour removed; ultrasound of what "
+            "is left and of the cavity's wall, stereo camera, vessel forks");
+  scenario.resection = Resection{};
   return scenario;
 }
 
@@ -115,7 +127,7 @@ Scenario joint_mixed() {
 const std::vector<Scenario>& all_scenarios() {
   static const std::vector<Scenario> scenarios = {
       paper(),     paper_icp(),        distension(),       sag_progress(), no_contact(),
-      joint_sag(), joint_distension(), joint_tangential(), joint_mixed()};
+      joint_sag(), joint_distension(), joint_tangential(), joint_mixed(),  resection()};
   return scenarios;
 }
 

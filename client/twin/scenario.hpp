@@ -3,8 +3,9 @@
 //
 // A surgery is a series of moments. Every instrument makes one observation at
 // each of them. The brain is in equilibrium (drained, common/fem/elasticity.hpp)
-// under gravity, with the fluid at the moment's level, and under one swelling
-// that does not change. Each moment has its own truth, points and noise.
+// under gravity, with the fluid at the moment's level, and under one swelling and one volume
+// change that do not change. Part of the tumour may be gone (resection.hpp). Each moment has its
+// own truth, points and noise.
 #pragma once
 
 #include <optional>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "client/twin/load.hpp"
+#include "client/twin/resection.hpp"
 
 namespace brainshift::client {
 
@@ -42,6 +44,10 @@ struct Scenario {
   std::vector<double> fluid_levels_mm;
   double interval_s = 30.0;  // between moments
   Swelling swelling;         // around the tumour's centroid
+  VolumeChange volume;       // of the brain or a half of it
+  // Largest volume strain by which a variation (variation.hpp) lets the brain shrink.
+  double largest_shrinkage = 0.0;
+  std::optional<Resection> resection;  // absent: all tissue is there
   // Unknown stiffness: ln of the shear modulus varies smoothly, with this standard deviation over
   // this length (stiffness.hpp). Grey and white matter differ by some 30 %, and so do patients.
   double stiffness_sd = 0.0;
@@ -49,6 +55,9 @@ struct Scenario {
   // Error of the known pose: gravity pulls at this angle to the direction that the case states.
   // The head is turned about the axis from the tumour to the craniotomy.
   double gravity_tilt_deg = 0.0;
+  // A further error of the pose, after that one: gravity turns about this axis (RAS) by the
+  // vector's length.
+  Vec3 gravity_turn_deg = Vec3::Zero();
   // The scenario promises that no slave touches the skull. Where one does, playing it is an error.
   bool contact_free = false;
   Measurement measurement = Measurement::kDisplacements;

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "client/twin/scenario.hpp"
+#include "client/twin/truth.hpp"
+#include "client/twin/truth_brain.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
@@ -27,18 +29,27 @@ struct SimulatedSurgery {
 // Truth scalars: fluid_level_mm, noise_sd_mm, max_displacement_mm,
 // tumour_displacement_mm (mean over the tumour's surface), active_slaves,
 // max_penetration_mm (negative: minus the least distance between slave and
-// skull); with a swelling also swelling_volume_strain and swelling_radius_mm.
+// skull); with a swelling also swelling_volume_strain and swelling_radius_mm; with a volume change
+// brain_volume_strain; with a resection resected_fraction and removed_nodes.
+// Points where truth is scored: sparse and cross, which part the tumour's surface as far as an
+// instrument sees it, craniotomy, and removed: nodes inside a cavity, where nothing is scored.
 //
 // kInvalidArgument when a scenario that promises no contact has some; kNotConverged when a contact
-// search does not settle. Other errors: of contact::ForwardModel.
+// search does not settle. Other errors: of truth_brain and contact::ForwardModel.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
-// The same with a forward model that exists already. Precondition: it
-// was built for this model and case with the contact boundary. Where
-// the scenario varies the stiffness, the truth needs another one.
+// The same with a forward model that exists already. Precondition: it was built for this model and
+// case with the contact boundary. Where the scenario changes the brain (stiffness, resection), the
+// truth needs another one.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
                                        const contact::ForwardModel& forward,
+                                       const Scenario& scenario, std::uint64_t seed,
+                                       const Progress& progress = {});
+// The same with a brain and a solver that exist already, for several scenarios on one brain.
+// Precondition: truth_brain() made the brain for the same stiffness, resection and seed; the
+// solver's forward model was built for it with the contact boundary.
+Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSolver& solver,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 

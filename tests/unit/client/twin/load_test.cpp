@@ -55,6 +55,33 @@ TEST_F(SwellingLoad, PushesAwayFromItsCentreAndShrinkagePulls) {
   EXPECT_NEAR(outward(-0.1), -outward(0.1), 1e-12 * outward(0.1));
 }
 
+// Its work along u = x is int kappa theta div x dV = 3 kappa int theta dV: of all the volume, or of
+// the half in which the tumour lies. The box is symmetric about x = 20; the rest of 1 % is left to
+// the middle, where the strain changes within an element.
+TEST(VolumeChangeLoad, ActsOnTheWholeBrainOrOnTheTumoursHalf) {
+  const TetMesh mesh = test_support::box_mesh(16, 6, 8, Vec3(40, 30, 50));
+  const Material material;
+  const fem::Elasticity elasticity = fem::elasticity_from(material);
+  const double kappa = elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
+  const double whole = 3.0 * kappa * -0.015 * 40.0 * 30.0 * 50.0;
+  const auto work = [&](const Points& f) { return (f.array() * mesh.nodes.array()).sum(); };
+  const Vec3 left(8, 15, 25), right(32, 15, 25);
+  EXPECT_NEAR(work(volume_change_load(mesh, material, left, {-0.015, false})), whole,
+              1e-9 * std::abs(whole));
+  const Points f_left = volume_change_load(mesh, material, left, {-0.015, true});
+  const Points f_right = volume_change_load(mesh, material, right, {-0.015, true});
+  EXPECT_NEAR(work(f_left), 0.5 * whole, 0.01 * std::abs(whole));
+  EXPECT_NEAR(work(f_right), 0.5 * whole, 0.01 * std::abs(whole));
+  // At the outer faces only the half that changes pulls.
+  double at_left = 0.0, at_right = 0.0;
+  for (int i = 0; i < mesh.num_nodes(); ++i) {
+    if (mesh.nodes(0, i) == 0.0) at_left += f_left(0, i);
+    if (mesh.nodes(0, i) == 40.0) at_right += f_left(0, i);
+  }
+  EXPECT_GT(at_left, 0.0);  // inwards: it shrinks
+  EXPECT_LT(std::abs(at_right), 0.01 * at_left);
+}
+
 TEST(VolumeStrain, FadesFromTheCentreToNothingAtTheRadius) {
   const Swelling swelling{0.4, 20.0};
   EXPECT_DOUBLE_EQ(volume_strain_at(swelling, 0.0), 0.4);

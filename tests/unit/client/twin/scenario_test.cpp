@@ -19,7 +19,7 @@ TEST(Scenarios, AreNamedOnceAndDescribedInOneLine) {
   }
   EXPECT_EQ(names, (std::set<std::string>{"paper", "paper-icp", "distension", "sag-progress",
                                           "no-contact", "joint-sag", "joint-distension",
-                                          "joint-tangential", "joint-mixed"}));
+                                          "joint-tangential", "joint-mixed", "resection"}));
 }
 
 TEST(SagProgress, TheFluidFallsSteadilyFrom15To55InTwentyObservations) {
