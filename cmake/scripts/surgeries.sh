@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# surgeries.sh BUILD_DIR [OUT_DIR]: many different simulated surgeries on two heads, estimated with the
+# defaults (docs/surgeries.md). Empties OUT_DIR (default: out/surgeries) and writes to it:
+# rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures, tables.md,
+# summary.json. Exit status 0 only if every check holds.
+#   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/; without it the second head is left out
+#   RESUME=1         keep the surgeries that OUT_DIR has, after an interruption
+#   BEFORE=DIR       rows-*.csv of an earlier estimate on the same surgeries, to compare with
+#                    (default: docs/surgeries/before)
+#   QUICK=1          2 places x 2 seeds from 1001 on 6 thousand nodes
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+build=${1:?usage: surgeries.sh BUILD_DIR [OUT_DIR]}
+bin=$build/bin
+out=${2:-out/surgeries}
+name=surgeries
+. cmake/scripts/steps.sh
+
+options=(--resume)
+before=${BEFORE:-docs/surgeries/before}
+if [ "${QUICK:-0}" = 1 ]; then
+  options+=(--places 2 --seeds 2 --first-seed 1001 --thousand-nodes 6)
+fi
+kept=$(mktemp -d)
+if [ "${RESUME:-0}" = 1 ]; then
+  cp "$out"/rows-*.csv "$kept" 2>/dev/null || true
+fi
+empty_study "$out"
+cp "$kept"/rows-*.csv "$out" 2>/dev/null || true
+rm -rf "$kept"
+BRAINSHIFT_STUDY_DIR=$(realpath "$out")
+export BRAINSHIFT_STUDY_DIR
+
+status=0
+head_of() {
+  step "$1" "$bin/surgeries" --head "config/cases/$1.yaml" --out "$out/rows-$1.csv" "${options[@]}" \
+    || status=1
+}
+head_of colin27
+if [ -n "${BRAINSHIFT_EXTERNAL_DATA:-}" ]; then
+  head_of mni152
+else
+  echo "mni152,BRAINSHIFT_EXTERNAL_DATA is not set" >>"$out/left_out.csv"
+fi
+earlier=()
+for table in "$before"/rows-*.csv; do
+  if [ -e "$table" ]; then earlier+=(--before "$table"); fi
+done
+step summary "$bin/surgeries_summary" "$out"/rows-*.csv "${earlier[@]}" || status=1
+current=summary
+"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make surgeries" \
+  --title Surgeries || status=1
+exit "$status"

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// surgeries: many different simulated surgeries on one head, estimated by the default method with
+// the case's defaults, one row of a table per update.
+//
+// Place k of a run is the patient of seed `first_seed` + k - 1 (client/twin/varied_patient.hpp);
+// its surgeries have the seeds that follow those of the place before, from `first_seed`
+// (client/twin/variation.hpp). The run that is published begins at seed 1. While the estimate is
+// being worked on, runs begin at 1001, so that nothing is fitted to what is published.
+//
+// A file that the case names and that is not there is looked for below $BRAINSHIFT_EXTERNAL_DATA,
+// by its path relative to the case file.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/twin/varied_patient.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/patient/read_patient.hpp"
+#include "tests/surgeries/surgery_place.hpp"
+
+namespace brainshift::surgeries {
+namespace {
+
+namespace fs = std::filesystem;
+
+// As in the table; joint-distension is the same truth as distension with more to see.
+const std::vector<std::string> kScenarios = {"paper",     "paper-icp",        "distension",
+                                             "joint-sag", "joint-tangential", "joint-mixed",
+                                             "resection"};
+
+struct Arguments {
+  fs::path head = BRAINSHIFT_DEFAULT_CASE;
+  int places = 5;
+  int seeds = 4;  // per place
+  std::uint64_t first_seed = 1;
+  double thousand_nodes = 18.0;
+  std::vector<std::string> scenarios = kScenarios;
+  fs::path out = "rows.csv";
+  bool resume = false;
+};
+
+void find_external(fs::path& file, const fs::path& folder) {
+  const char* external = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
+  if (file.empty() || external == nullptr || fs::exists(file)) return;
+  const fs::path elsewhere = fs::path(external) / file.lexically_relative(folder);
+  if (fs::exists(elsewhere)) file = elsewhere;
+}
+
+Result<CaseConfig> read_head(const fs::path& path) {
+  auto config = io::read_case_config(path);
+  if (!config) return config;
+  const fs::path folder = config->file.parent_path();
+  find_external(config->mri, folder);
+  find_external(config->brain, folder);
+  return config;
+}
+
+std::vector<std::uint64_t> seeds_of(const Arguments& arguments, int place) {
+  std::vector<std::uint64_t> seeds;
+  for (int i = 0; i < arguments.seeds; ++i) {
+    seeds.push_back(arguments.first_seed +
+                    static_cast<std::uint64_t>((place - 1) * arguments.seeds + i));
+  }
+  return seeds;
+}
+
+bool finished(const PlacePlan& plan, const RowFile& rows) {
+  for (const std::uint64_t seed : plan.seeds) {
+    for (const std::string& scenario : plan.scenarios) {
+      if (!rows.has({plan.head, plan.place, seed, scenario})) return false;
+    }
+  }
+  return true;
+}
+
+std::string text_of(const Row& row, const char* column) {
+  for (const auto& [name, text] : row) {
+    if (name == column) return text;
+  }
+  return "";
+}
+
+void tell(const SurgeryKey& key, const Row& last, double seconds) {
+  std::fprintf(stderr,
+               "  seed %llu %-17s recovered %s %%, field %s mm (at most %s), coverage %s, %s; "
+               "%.1f s\n",
+               static_cast<unsigned long long>(key.seed), key.scenario.c_str(),
+               text_of(last, "recovered_pct").c_str(), text_of(last, "field_mean_mm").c_str(),
+               text_of(last, "field_max_mm").c_str(), text_of(last, "coverage_90").c_str(),
+               text_of(last, "status").c_str(), seconds);
+}
+
+Status run_place(const Arguments& arguments, const CaseConfig& config, const TetMesh& brain,
+                 const PlacePlan& plan, RowFile& rows) {
+  auto patient = client::vary_patient(config, brain, plan.patient_seed);
+  if (!patient) return tl::unexpected(patient.error());
+  const auto& tumour = std::get<TumourEllipsoid>(patient->tumour);
+  const Stopwatch watch;
+  bench::MeshWish wish;
+  wish.name = patient->case_id;
+  wish.thousand_nodes = arguments.thousand_nodes;
+  const auto head = bench::make_head(*patient, wish);
+  if (!head) return tl::unexpected(head.error());
+  std::fprintf(stderr,
+               "place %d: tumour at (%.0f %.0f %.0f) mm with half axes %.0f %.0f %.0f mm; %d "
+               "nodes, %zu slaves; prepared in %.0f s\n",
+               plan.place, tumour.centre_mm[0], tumour.centre_mm[1], tumour.centre_mm[2],
+               tumour.semi_axes_mm[0], tumour.semi_axes_mm[1], tumour.semi_axes_mm[2],
+               head->model->mesh.num_nodes(), head->model->slaves.size(), watch.seconds());
+  return play_place(*head, plan, rows, tell);
+}
+
+Status run(const Arguments& arguments) {
+  for (const std::string& name : arguments.scenarios) {
+    if (client::find_scenario(name) == nullptr) {
+      return fail(ErrorCode::kNotFound, "--scenarios: " + name + " is unknown");
+    }
+  }
+  linalg::use_single_threaded_blas();
+  const auto config = read_head(arguments.head);
+  if (!config) return tl::unexpected(config.error());
+  auto rows = RowFile::open(arguments.out, arguments.resume);
+  if (!rows) return tl::unexpected(rows.error());
+  const auto brain = patient::build_patient(*config);
+  if (!brain) return tl::unexpected(brain.error());
+  for (int place = 1; place <= arguments.places; ++place) {
+    PlacePlan plan{config->case_id, place,
+                   arguments.first_seed + static_cast<std::uint64_t>(place - 1),
+                   seeds_of(arguments, place), arguments.scenarios};
+    if (finished(plan, *rows)) continue;
+    if (Status ok = run_place(arguments, *config, brain->mesh, plan, *rows); !ok) {
+      return fail(ok.error().code,
+                  config->case_id + ", place " + std::to_string(place) + ": " + ok.error().message);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+}  // namespace brainshift::surgeries
+
+int main(int argc, char** argv) {
+  brainshift::surgeries::Arguments arguments;
+  CLI::App app{"Different simulated surgeries on one head, scored: a row per update.", "surgeries"};
+  app.add_option("--head", arguments.head, "case file of the head")->capture_default_str();
+  app.add_option("--places", arguments.places, "tumours with their openings")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--seeds", arguments.seeds, "surgeries per place and scenario")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--first-seed", arguments.first_seed, "of places and surgeries; 1001 for a trial")
+      ->capture_default_str();
+  app.add_option("--thousand-nodes", arguments.thousand_nodes,
+                 "size of the mesh; 18: the case's own edge length")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces");
+  app.add_option("--out", arguments.out, "table to write")->capture_default_str();
+  app.add_flag("--resume", arguments.resume, "keep the surgeries that the table has");
+  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "surgeries: %s (see surgeries --help)\n", error.what());
+    return 2;
+  }
+  const auto ok = brainshift::surgeries::run(arguments);
+  if (ok) return 0;
+  std::fprintf(stderr, "surgeries: %s\n", ok.error().message.c_str());
+  return 1;
+}

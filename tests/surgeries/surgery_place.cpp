@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/surgeries/surgery_place.hpp"
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "client/twin/surgery.hpp"
+#include "client/twin/variation.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/inversion/prepared/full_solve.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "tests/surgeries/sleeping_inverter.hpp"
+#include "tests/surgeries/surgery_score.hpp"
+
+namespace brainshift::surgeries {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A brain that several scenarios of one seed share, and the factor of its stiffness.
+struct PlayedBrain {
+  client::TruthBrain brain;
+  contact::ForwardModel forward;
+  client::TruthSolver solver;
+
+  PlayedBrain(client::TruthBrain of, contact::ForwardModel model)
+      : brain(std::move(of)), forward(std::move(model)), solver(forward) {}
+};
+
+// The brains of one seed. They differ by the resection alone: every variation has the same
+// stiffness.
+class PlayedBrains {
+ public:
+  PlayedBrains(const bench::Head& head, std::uint64_t seed) : head_(head), seed_(seed) {}
+
+  Result<PlayedBrain*> of(const client::Scenario& scenario) {
+    auto& place = brains_[scenario.resection.has_value()];
+    if (place) return place.get();
+    auto brain = client::truth_brain(*head_.model, head_.config, scenario, seed_);
+    if (!brain) return tl::unexpected(brain.error());
+    auto forward = contact::ForwardModel::build(brain->model, brain->config, Boundary::kContact);
+    if (!forward) return tl::unexpected(forward.error());
+    place = std::make_unique<PlayedBrain>(std::move(*brain), std::move(*forward));
+    return place.get();
+  }
+
+ private:
+  const bench::Head& head_;
+  std::uint64_t seed_;
+  std::map<bool, std::unique_ptr<PlayedBrain>> brains_;
+};
+
+// The pipeline of the daemon's default session, and one that starts cold at the last update.
+class Sessions {
+ public:
+  static Result<std::unique_ptr<Sessions>> begin(const bench::Head& head) {
+    auto sessions = std::unique_ptr<Sessions>(new Sessions);
+    auto warm = build(head, inverter(head));
+    if (!warm) return tl::unexpected(warm.error());
+    auto sleeper = inverter(head);
+    if (!sleeper) return tl::unexpected(sleeper.error());
+    auto cold =
+        build(head, std::make_unique<SleepingInverter>(std::move(*sleeper), sessions->awake_,
+                                                       head.model->mesh.num_nodes()));
+    if (!cold) return tl::unexpected(cold.error());
+    sessions->warm_ = std::make_unique<server::Pipeline>(std::move(*warm));
+    sessions->cold_ = std::make_unique<server::Pipeline>(std::move(*cold));
+    return sessions;
+  }
+
+  void reset() {
+    warm_->reset();
+    cold_->reset();
+  }
+  Result<Update> run(const Observation& observation) { return warm_->run(observation); }
+
+  // Largest distance of a node between the estimates of all observations, one after the last
+  // update, the other cold. A surgery of one observation is measured a second time for the first.
+  // NaN when an update is refused.
+  double warm_against_cold(const std::vector<Observation>& observations, const Points& last) {
+    Points warm = last;
+    if (observations.size() == 1) {
+      Observation again = observations.front();
+      ++again.sequence;
+      const auto update = run(again);
+      if (!update) return kNaN;
+      warm = update->estimate.displacement;
+    }
+    cold_->reset();
+    double distance = kNaN;
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      awake_ = i + 1 == observations.size();
+      const auto update = cold_->run(observations[i]);
+      if (!update) return kNaN;
+      if (awake_) distance = (update->estimate.displacement - warm).colwise().norm().maxCoeff();
+    }
+    return distance;
+  }
+
+ private:
+  Sessions() = default;
+  static Result<std::unique_ptr<inversion::Inverter>> inverter(const bench::Head& head) {
+    return inversion::condensed_inverter(head.operators, head.locator, head.config);
+  }
+  static Result<server::Pipeline> build(const bench::Head& head,
+                                        Result<std::unique_ptr<inversion::Inverter>> inverter) {
+    if (!inverter) return tl::unexpected(inverter.error());
+    return server::Pipeline::build(head.model, head.config, Method::kCondensed, Boundary::kContact,
+                                   std::move(*inverter));
+  }
+
+  bool awake_ = false;
+  std::unique_ptr<server::Pipeline> warm_, cold_;
+};
+
+Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts,
+                              const client::Scenario& scenario, PlayedBrain& played,
+                              Sessions& sessions) {
+  const auto surgery = client::play_scenario(played.brain, played.solver, scenario, facts.key.seed);
+  if (!surgery) return tl::unexpected(surgery.error());
+  sessions.reset();
+  const auto& observations = surgery->observations;
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const int stage = static_cast<int>(i);
+    const auto update = sessions.run(observations[i]);
+    if (!update) {
+      rows.push_back(refused_row(facts, stage, update.error().message));
+      continue;
+    }
+    const auto score = score_update(*head.model, surgery->truths[i], update->estimate);
+    if (!score) return tl::unexpected(score.error());
+    const bool last = i + 1 == observations.size();
+    const double warm_cold =
+        last ? sessions.warm_against_cold(observations, update->estimate.displacement) : kNaN;
+    rows.push_back(row_of(facts, scenario, surgery->truths[i], stage, *update, *score, warm_cold));
+  }
+  return rows;
+}
+
+}  // namespace
+
+Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows, const Told& told) {
+  auto sessions = Sessions::begin(head);
+  if (!sessions) return tl::unexpected(sessions.error());
+  SurgeryFacts facts;
+  facts.patient_seed = plan.patient_seed;
+  facts.nodes = head.model->mesh.num_nodes();
+  facts.slaves = static_cast<int>(head.model->slaves.size());
+  facts.full_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
+  for (const std::uint64_t seed : plan.seeds) {
+    PlayedBrains brains(head, seed);
+    for (const std::string& name : plan.scenarios) {
+      facts.key = {plan.head, plan.place, seed, name};
+      if (rows.has(facts.key)) continue;
+      const Stopwatch watch;
+      const client::Scenario scenario = client::vary(*client::find_scenario(name), seed);
+      const auto brain = brains.of(scenario);
+      if (!brain) return fail(brain.error().code, name + ": " + brain.error().message);
+      const auto played = play(head, facts, scenario, **brain, **sessions);
+      if (!played) return fail(played.error().code, name + ": " + played.error().message);
+      if (Status ok = rows.append(facts.key, *played); !ok) return ok;
+      if (told) told(facts.key, played->back(), watch.seconds());
+    }
+  }
+  return {};
+}
+
+}  // namespace brainshift::surgeries

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/surgeries/surgery_rows.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <tuple>
+
+#include "tests/benchmarks/csv_table.hpp"
+
+namespace brainshift::surgeries {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Cells hold no commas, quotes or line breaks.
+std::string cell(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == ',' || c == '"' || c == '\n'; }, ';');
+  return text;
+}
+
+class Cells {
+ public:
+  void add(const std::string& name, const std::string& text) {
+    row_.emplace_back(name, cell(text));
+  }
+  void add(const std::string& name, double value) {
+    row_.emplace_back(name, bench::csv_number(value));
+  }
+  void add(const std::string& prefix, const FieldErrors& errors) {
+    add(prefix + "tumour_mm", errors.tumour_mm);
+    add(prefix + "craniotomy_mm", errors.craniotomy_mm);
+    add(prefix + "craniotomy_closest_mm", errors.craniotomy_closest_mm);
+    add(prefix + "field_mean_mm", errors.mean_mm);
+    add(prefix + "field_p50_mm", errors.p50_mm);
+    add(prefix + "field_max_mm", errors.max_mm);
+  }
+  Row take() { return std::move(row_); }
+
+ private:
+  Row row_;
+};
+
+void add_key(const SurgeryFacts& facts, int stage, Cells& cells) {
+  cells.add("head", facts.key.head);
+  cells.add("place", facts.key.place);
+  cells.add("patient_seed", std::to_string(facts.patient_seed));
+  cells.add("seed", std::to_string(facts.key.seed));
+  cells.add("scenario", facts.key.scenario);
+  cells.add("stage", stage_name(stage));
+}
+
+void add_truth(const SurgeryFacts& facts, const client::Scenario& scenario,
+               const io::SurgeryTruth& truth, Cells& cells) {
+  const auto scalar = [&](const char* name) {
+    const auto found = truth.scalars.find(name);
+    return found == truth.scalars.end() ? 0.0 : found->second;
+  };
+  cells.add("nodes", facts.nodes);
+  cells.add("slaves", facts.slaves);
+  cells.add("fluid_level_mm", scalar("fluid_level_mm"));
+  cells.add("gravity_turn_deg", scenario.gravity_turn_deg.norm());
+  cells.add("swelling_strain", scenario.swelling.volume_strain);
+  cells.add("volume_strain", scenario.volume.strain);
+  cells.add("one_hemisphere", scenario.volume.one_hemisphere ? 1.0 : 0.0);
+  cells.add("resected_fraction", scalar("resected_fraction"));
+  cells.add("removed_nodes", scalar("removed_nodes"));
+  cells.add("true_active", scalar("active_slaves"));
+  cells.add("true_max_mm", scalar("max_displacement_mm"));
+}
+
+void add_score(const UpdateScore& score, Cells& cells) {
+  cells.add("recovered_pct", score.recovered_pct);
+  cells.add("", score.estimate);
+  cells.add("none_", score.none);
+  cells.add("rigid_", score.rigid);
+  cells.add("worse_nodes", score.worse_nodes);
+  cells.add("worst_excess_mm", score.worst_excess_mm);
+  cells.add("coverage_90", score.coverage_90);
+  cells.add("mean_sd_mm", score.mean_sd_mm);
+}
+
+void add_quality(const Estimate& estimate, Cells& cells) {
+  double contradictions = 0.0, outliers = 0.0, data = 0.0, least_p = 1.0;
+  for (const SourceSummary& source : estimate.sources) {
+    contradictions += source.consistent ? 0.0 : 1.0;
+    outliers += source.outliers;
+    data += source.data;
+    if (source.p_value < least_p) least_p = source.p_value;
+  }
+  cells.add("inverted", estimate.inverted_elements);
+  cells.add("min_volume_ratio", estimate.min_volume_ratio);
+  cells.add("sources", static_cast<double>(estimate.sources.size()));
+  cells.add("contradictions", contradictions);
+  cells.add("least_p_value", least_p);
+  cells.add("data", data);
+  cells.add("outliers", outliers);
+  cells.add("outside_region", estimate.data_outside_region);
+  cells.add("misfit_mm", estimate.misfit_mm.mean);
+  cells.add("misfit_ratio", estimate.misfit_ratio);
+  cells.add("active", estimate.contact.active);
+  cells.add("contact_sets", estimate.contact.iterations);
+  cells.add("contact_decrement", estimate.contact.decrement);
+  cells.add("contact_violation_mm", estimate.contact.max_violation_mm);
+}
+
+void add_prior(const Estimate& estimate, Cells& cells) {
+  cells.add("hypotheses", static_cast<double>(estimate.hypotheses.size()));
+  for (int i = 0; i < kPriorParts; ++i) {
+    const auto part = static_cast<std::size_t>(i);
+    const std::string name(to_string(static_cast<PriorPart>(i)));
+    cells.add("scale_" + name, estimate.prior_scales[part]);
+    cells.add("absent_" + name, estimate.prior_absent[part]);
+    cells.add("at_bound_" + name, estimate.prior_at_bound[part] ? 1.0 : 0.0);
+  }
+}
+
+std::string line_of(const Row& row, bool heading) {
+  std::string line;
+  for (const auto& [name, text] : row) line += (heading ? name : text) + ",";
+  line.back() = '\n';
+  return line;
+}
+
+}  // namespace
+
+bool SurgeryKey::operator<(const SurgeryKey& other) const {
+  return std::tie(head, place, seed, scenario) <
+         std::tie(other.head, other.place, other.seed, other.scenario);
+}
+
+std::string stage_name(int update) {
+  return update == 0 ? "tumour" : update == 1 ? "tumour+cortex" : "tumour+cortex+tracks";
+}
+
+Row row_of(const SurgeryFacts& facts, const client::Scenario& scenario,
+           const io::SurgeryTruth& truth, int stage, const Update& update, const UpdateScore& score,
+           double warm_cold_mm) {
+  const StageTimings& time = update.timings;
+  Cells cells;
+  add_key(facts, stage, cells);
+  cells.add("status", std::string(to_string(update.estimate.status)));
+  cells.add("reason", update.estimate.reason);
+  add_score(score, cells);
+  add_quality(update.estimate, cells);
+  add_prior(update.estimate, cells);
+  cells.add("update_ms", time.register_ms + time.invert_ms + time.rebuild_ms);
+  cells.add("t_solve_ms", facts.full_solve_ms);
+  cells.add("warm_cold_mm", warm_cold_mm);
+  add_truth(facts, scenario, truth, cells);
+  return cells.take();
+}
+
+Row refused_row(const SurgeryFacts& facts, int stage, const std::string& reason) {
+  Row row = row_of(facts, {}, {}, stage, {}, {}, kNaN);
+  for (auto& [name, text] : row) {
+    if (name == "status") text = "refused";
+    if (name == "reason") text = cell(reason);
+  }
+  const auto after =
+      std::find_if(row.begin(), row.end(), [](const auto& one) { return one.first == "reason"; });
+  for (auto one = after + 1; one != row.end(); ++one) one->second.clear();
+  return row;
+}
+
+Result<RowFile> RowFile::open(const std::filesystem::path& path, bool resume) {
+  RowFile file;
+  file.path_ = path;
+  const std::string heading = line_of(refused_row({}, 0, ""), true);
+  if (resume && std::filesystem::exists(path)) {
+    const auto table = bench::CsvTable::read(path);
+    if (!table) return tl::unexpected(table.error());
+    std::ifstream stream(path);
+    std::string first;
+    std::getline(stream, first);
+    if (first + "\n" != heading) {
+      return fail(ErrorCode::kUnreadable,
+                  path.string() + ": its columns are those of another version");
+    }
+    for (std::size_t row = 0; row < table->rows(); ++row) {
+      file.done_.insert({table->text(row, "head"), static_cast<int>(table->number(row, "place")),
+                         std::stoull(table->text(row, "seed")), table->text(row, "scenario")});
+    }
+    return file;
+  }
+  std::ofstream stream(path, std::ios::trunc);
+  stream << heading << std::flush;
+  if (!stream) return fail(ErrorCode::kWriteFailed, path.string() + ": cannot be written");
+  return file;
+}
+
+Status RowFile::append(const SurgeryKey& key, const std::vector<Row>& rows) {
+  std::string text;
+  for (const Row& row : rows) text += line_of(row, false);
+  std::ofstream stream(path_, std::ios::app);
+  stream << text << std::flush;
+  if (!stream) return fail(ErrorCode::kWriteFailed, path_.string() + ": cannot be written");
+  done_.insert(key);
+  return {};
+}
+
+}  // namespace brainshift::surgeries
