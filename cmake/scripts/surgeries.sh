@@ -8,7 +8,7 @@
 #   RESUME=1         keep the surgeries that OUT_DIR has, after an interruption
 #   BEFORE=DIR       rows-*.csv of an earlier estimate on the same surgeries, to compare with
 #                    (default: docs/surgeries/before)
-#   QUICK=1          2 places x 2 seeds from 1001 on 6 thousand nodes
+#   QUICK=1          2 places x 2 seeds, from 1001 and 1101, on 6 thousand nodes
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -19,9 +19,11 @@ name=surgeries
 . cmake/scripts/steps.sh
 
 options=(--resume)
+first=1  # seed; the second head has other ones, from `first` + 100
 before=${BEFORE:-docs/surgeries/before}
 if [ "${QUICK:-0}" = 1 ]; then
-  options+=(--places 2 --seeds 2 --first-seed 1001 --thousand-nodes 6)
+  options+=(--places 2 --seeds 2 --thousand-nodes 6)
+  first=1001
 fi
 kept=$(mktemp -d)
 if [ "${RESUME:-0}" = 1 ]; then
@@ -34,13 +36,13 @@ BRAINSHIFT_STUDY_DIR=$(realpath "$out")
 export BRAINSHIFT_STUDY_DIR
 
 status=0
-head_of() {
-  step "$1" "$bin/surgeries" --head "config/cases/$1.yaml" --out "$out/rows-$1.csv" "${options[@]}" \
-    || status=1
+head_of() {  # CASE FIRST_SEED
+  step "$1" "$bin/surgeries" --head "config/cases/$1.yaml" --first-seed "$2" \
+    --out "$out/rows-$1.csv" "${options[@]}" || status=1
 }
-head_of colin27
+head_of colin27 "$first"
 if [ -n "${BRAINSHIFT_EXTERNAL_DATA:-}" ]; then
-  head_of mni152
+  head_of mni152 "$((first + 100))"
 else
   echo "mni152,BRAINSHIFT_EXTERNAL_DATA is not set" >>"$out/left_out.csv"
 fi

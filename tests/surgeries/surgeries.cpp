@@ -116,11 +116,6 @@ Status run_place(const Arguments& arguments, const CaseConfig& config, const Tet
 }
 
 Status run(const Arguments& arguments) {
-  for (const std::string& name : arguments.scenarios) {
-    if (client::find_scenario(name) == nullptr) {
-      return fail(ErrorCode::kNotFound, "--scenarios: " + name + " is unknown");
-    }
-  }
   linalg::use_single_threaded_blas();
   const auto config = read_head(arguments.head);
   if (!config) return tl::unexpected(config.error());
@@ -160,7 +155,10 @@ int main(int argc, char** argv) {
                  "size of the mesh; 18: the case's own edge length")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
-  app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces");
+  app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces")
+      ->check([](const std::string& name) {
+        return brainshift::client::find_scenario(name) ? "" : name + " is unknown";
+      });
   app.add_option("--out", arguments.out, "table to write")->capture_default_str();
   app.add_flag("--resume", arguments.resume, "keep the surgeries that the table has");
   app.footer("Exit status: 0 measured, 1 failure, 2 bad usage.");

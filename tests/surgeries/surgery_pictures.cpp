@@ -68,6 +68,7 @@ Status draw(const Rows& rows, const Picture& picture, const std::filesystem::pat
   spec.x.names = scenarios;
   spec.x.from_zero = false;
   spec.y = picture.y;
+  spec.size = {2200, 1000};  // room for the names
   const cv::Scalar colours[] = {palette::kBlue, palette::kVermillion, palette::kGreen};
   const client::Marker markers[] = {client::Marker::kCircle, client::Marker::kTriangle,
                                     client::Marker::kSquare};
