@@ -27,7 +27,7 @@ struct Sheet {
   std::string colour_label;
 };
 
-// 8-bit BGR, as large as its parts need.
+// 8-bit BGR, as large as its parts need. Narrow panels: subtitle and legend are wrapped.
 cv::Mat compose(const Sheet& sheet);
 
 }  // namespace brainshift::client

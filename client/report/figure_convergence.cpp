@@ -40,8 +40,11 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run) {
   if (run.error_mm.sparse_initial) add(sparse, 0, run.error_mm.sparse_initial->mean);
   if (run.error_mm.initial) add(cross, 0, run.error_mm.initial->mean);
   for (const TracePoint& point : run.trace) {
+    // Methods that stream no iterates: the error is known before and after.
+    const bool last = &point == &run.trace.back();
+    const std::optional<MeanStd>& at_cross = last ? run.error_mm.cross : point.cross;
     add(sparse, point.iteration, point.sparse.mean);
-    add(cross, point.iteration, point.cross ? point.cross->mean : kGapInLine);
+    add(cross, point.iteration, at_cross ? at_cross->mean : kGapInLine);
     add(penetrating, point.iteration, point.penetrating);
   }
   spec.series = {sparse};

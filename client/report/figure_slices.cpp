@@ -37,6 +37,7 @@ struct Scene {
   const Points* truth = nullptr;
   std::vector<Estimated> estimates;
   std::string scenario;
+  std::string method;
 };
 
 SliceWindow whole_head(const Scene& scene, Plane plane) {
@@ -129,10 +130,10 @@ std::vector<LegendEntry> outline_legend(const Scene& scene, const std::string& w
   return legend;
 }
 
-std::string slice_name(const SliceWindow& window, const char* through) {
+std::string slice_name(const Scene& scene, const SliceWindow& window, const char* through) {
   const bool axial = window.plane == Plane::kAxial;
-  return std::string(axial ? "axial" : "coronal") + " slice through the " + through + ", " +
-         (axial ? "S = " : "A = ") + fixed_decimals(window.offset_mm, 1) + " mm";
+  return "method " + scene.method + "; " + (axial ? "axial" : "coronal") + " slice through the " +
+         through + ", " + (axial ? "S = " : "A = ") + fixed_decimals(window.offset_mm, 1) + " mm";
 }
 
 cv::Mat shift_sheet(const Scene& scene, Plane plane) {
@@ -150,7 +151,7 @@ cv::Mat shift_sheet(const Scene& scene, Plane plane) {
   const double magnification = arrow_magnification(largest_arrow);
   Sheet sheet;
   sheet.title = "Brain shift: " + scene.scenario;
-  sheet.subtitle = slice_name(window, "craniotomy centre") + "; arrows drawn " +
+  sheet.subtitle = slice_name(scene, window, "craniotomy centre") + "; arrows drawn " +
                    trimmed(magnification) + "x: their part in the plane, coloured by full length";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "displacement (mm)";
@@ -175,7 +176,7 @@ cv::Mat close_up_sheet(const Scene& scene, Plane plane) {
   const SliceWindow window = close_up(scene, plane);
   Sheet sheet;
   sheet.title = "Tumour and brain surface: " + scene.scenario;
-  sheet.subtitle = slice_name(window, "tumour centre") + "; displacements at true scale";
+  sheet.subtitle = slice_name(scene, window, "tumour centre") + "; displacements at true scale";
   sheet.legend = outline_legend(scene, "outline");
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.8);
@@ -203,9 +204,9 @@ cv::Mat difference_sheet(const Scene& scene) {
   const double magnification = arrow_magnification(largest_in_plane(samples, *scene.truth, window));
   Sheet sheet;
   sheet.title = "True displacement and the errors: " + scene.scenario;
-  sheet.subtitle = slice_name(window, "craniotomy centre") + "; all arrows drawn " +
+  sheet.subtitle = slice_name(scene, window, "craniotomy centre") + "; all arrows drawn " +
                    trimmed(magnification) +
-                   "x, differences multiplied by the factor in their title before";
+                   "x, differences first multiplied by the factor in their title";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "length, with the title's factor (mm)";
   const auto add = [&](const std::string& title, const Points& field) {
@@ -234,7 +235,8 @@ cv::Mat error_sheet(const Scene& scene) {
   }
   Sheet sheet;
   sheet.title = "Error of the estimate: " + scene.scenario;
-  sheet.subtitle = slice_name(window, "craniotomy centre") + "; one colour scale for all panels";
+  sheet.subtitle =
+      slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "|estimated - true| (mm)";
   sheet.legend = {{"tumour before", kBefore}};
@@ -258,8 +260,15 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
   }
   if (shown.empty()) return {};
   const RunField& first = *shown.front()->field;
-  Scene scene{head,    first.mesh, geometry::TetLocator(first.mesh), {}, {},
-              nullptr, {},         shown.front()->report.scenario};
+  Scene scene{head,
+              first.mesh,
+              geometry::TetLocator(first.mesh),
+              {},
+              {},
+              nullptr,
+              {},
+              shown.front()->report.scenario,
+              shown.front()->report.method};
   scene.brain = geometry::boundary_surface(first.mesh, &scene.node_of_vertex);
   scene.truth = first.truth ? &*first.truth : nullptr;
   for (const ReportedRun* run : shown) {
@@ -268,7 +277,10 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
     scene.estimates.push_back({run->report.boundary, &run->field->estimated});
   }
 
-  const std::string what = scene.scenario + ", contact and fixed boundary side by side";
+  const std::string what =
+      scene.scenario + ", method " + scene.method + ", " +
+      (scene.estimates.size() > 1 ? "contact and fixed boundary side by side"
+                                  : scene.estimates.front().boundary + " boundary");
   std::vector<Figure> figures;
   for (const auto& [plane, infix, shown_in] :
        {std::tuple{Plane::kAxial, "", " (compare Fig. 4a and e)."},

@@ -41,5 +41,41 @@ TEST(Sheet, HasRoomForTheColourBarAndTheLegendOnlyWhereTheyAreWanted) {
   EXPECT_GT(count_colour(with_legend, palette::kOrange, whole(with_legend)), 100);
 }
 
+// The same words on wide panels, where nothing has to be wrapped, are the measure.
+TEST(Sheet, TitleSubtitleAndLegendAreWholeOnNarrowPanels) {
+  Sheet sheet;
+  sheet.title = "A title that is wider than the panel";
+  sheet.subtitle = "a subtitle of many words; it goes on and on, and ends with these words";
+  sheet.legend = {{"outline before", {palette::kGreen, 4, 0.0}},
+                  {"outline estimated", {palette::kOrange, 4, 0.0}},
+                  {"outline true", {palette::kPurple, 4, 0.0}}};
+  const auto composed = [&](int width) {
+    sheet.panels = {{"", panel(width, 100, palette::kBlue)}};
+    return compose(sheet);
+  };
+  const cv::Mat narrow = composed(100);
+  const cv::Mat wide = composed(3000);
+  ASSERT_LT(narrow.cols, 1000);
+  for (const cv::Scalar& colour : {palette::kGreen, palette::kOrange, palette::kPurple}) {
+    EXPECT_EQ(box_of_colour(narrow, colour, whole(narrow)).size(),
+              box_of_colour(wide, colour, whole(wide)).size());
+  }
+  const auto legend_of = [](const cv::Mat& image) {
+    cv::Rect strip = box_of_colour(image, palette::kInk, {0, 0, 1, image.rows});
+    strip.width = image.cols;
+    return image(strip).clone();
+  };
+  const auto expect_as_much = [](const cv::Scalar& colour, const cv::Mat& a, const cv::Mat& b) {
+    const int expected = count_colour(b, colour, whole(b));
+    EXPECT_GT(expected, 500);
+    // 5 %: the pixels of smoothed letters depend on where a word begins.
+    EXPECT_NEAR(count_colour(a, colour, whole(a)), expected, 0.05 * expected);
+  };
+  expect_as_much(palette::kGrey, narrow, wide);
+  expect_as_much(palette::kWhite, legend_of(narrow), legend_of(wide));
+  const cv::Rect ink = inked(narrow(cv::Rect(0, 0, narrow.cols, 150)));
+  EXPECT_LT(ink.br().x, narrow.cols - 20);
+}
+
 }  // namespace
 }  // namespace brainshift::client
