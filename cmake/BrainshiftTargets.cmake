@@ -32,8 +32,15 @@ function(brainshift_program name)
   brainshift_precompile(${name} brainshift_headers)
 endfunction()
 
+# How many times longer a test may take: sanitizers slow programs down.
+set(BRAINSHIFT_TIMEOUT_FACTOR 1)
+if(BRAINSHIFT_SANITIZE)
+  set(BRAINSHIFT_TIMEOUT_FACTOR 10)
+endif()
+
 # brainshift_test(<name> SOURCES ... LINKS ... [LABEL unit] [TIMEOUT 120])
 # A GoogleTest program whose cases become CTest tests named <name>.<Suite>.<Case>.
+# TIMEOUT: seconds, without sanitizers.
 function(brainshift_test name)
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
   if(NOT ARG_LABEL)
@@ -42,6 +49,7 @@ function(brainshift_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
+  math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * ${BRAINSHIFT_TIMEOUT_FACTOR}")
   add_executable(${name} ${ARG_SOURCES})
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE brainshift_warnings ${ARG_LINKS} GTest::gmock GTest::gtest_main)
