@@ -59,8 +59,8 @@ format: ## rewrite the C++ sources in the house format
 format-check: ## fail where a C++ source is not in the house format
 	@cmake/scripts/clang-format.sh check
 
-tidy: configure ## run clang-tidy over common/, server/ and client/
-	@cmake/scripts/clang-tidy.sh $(BUILD)
+tidy: setup ## run clang-tidy over common/, server/ and client/
+	@cmake/scripts/clang-tidy.sh build/tidy
 
 image: ## build the container image and start it once, without a container engine (root)
 	docker/build-image-without-engine.sh
