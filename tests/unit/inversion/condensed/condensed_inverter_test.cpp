@@ -247,8 +247,8 @@ TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
 // With estimated scales, the default, the scales and the contact set settle in turn, and a fit that
 // gains less than kWorthwhile in ln p is not made (prior_scales.cpp): a warm start may stay at
 // scales that a cold start would not find. A warm answer is not the cold one. On this patient they
-// are 2 % of the largest displacement apart at most; on a head up to a quarter of the field error
-// has been seen.
+// are 0.6 % (contact) and 0.07 % (fixed) of the largest displacement apart at most, and with fixed
+// scales 0; on a head up to a quarter of the field error has been seen.
 TEST_P(Condensed, WarmStartWithEstimatedScalesStaysNearAColdStart) {
   CaseConfig with = config();
   with.prior.estimate_scales = true;
@@ -268,7 +268,7 @@ TEST_P(Condensed, WarmStartWithEstimatedScalesStaysNearAColdStart) {
         std::max(worst, (a.displacement - b.displacement).colwise().norm().maxCoeff() / largest_mm);
   }
   EXPECT_LT(worst, 0.03) << "of the largest displacement";
-  EXPECT_GT(worst, 1e-3) << "if they agree, say so in the headers";
+  EXPECT_GT(worst, 1e-4) << "if they agree, say so in the headers";
 }
 
 TEST_P(Condensed, ResetMakesRunsBitIdentical) {

@@ -175,7 +175,10 @@ TEST(Pressure, LongAfterTheLoadTheEstimateIsTheDrainedOne) {
 }
 
 TEST(Pressure, EveryMethodWithAFactorCarriesIt) {
-  const PreparedModel model = prepare(Boundary::kContact, with_pressure(0.2));
+  // The prior's own scales, which condensed-exact keeps too.
+  CaseConfig config = with_pressure(0.2);
+  config.prior.estimate_scales = false;
+  const PreparedModel model = prepare(Boundary::kContact, config);
   // At nodes: method condensed-exact takes data inside its region only.
   const Estimate coarse = condensed_estimate(model, sagging_data(model, 0.1));
   const auto region = data_region(model.model());
@@ -189,7 +192,7 @@ TEST(Pressure, EveryMethodWithAFactorCarriesIt) {
   const Estimate exact = iterated_estimate(model, data, Method::kCondensedExact);
   ASSERT_GT(exact.contact.active, 0);
   EXPECT_LT(relative_difference(condensed_estimate(model, data).displacement, exact.displacement),
-            1e-3);
+            1e-5);  // 1.3e-6 was measured
   // The minimum of the same objective for their own active set, when they are let run until they
   // are there and the data pull weakly enough for that to take hundreds of iterations only.
   CaseConfig patience = with_pressure(0.2);
