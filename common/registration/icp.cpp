@@ -61,7 +61,7 @@ class Icp {
                             fit.T * centroid_, radius_mm_);
   }
   // An axis with less than `threshold` of curvature takes no step from the data.
-  Vec6 step(const Fit& fit, const PoseInformation& data, double threshold, bool rotates) const;
+  Vec6 step(const Fit& fit, const PoseInformation& points, double threshold, bool rotates) const;
   bool descend(const PoseInformation& data, Vec6 xi);
   double left_out_rotation(const Fit& fit, const PoseInformation& data, double threshold) const;
   double start_scale() const;
