@@ -59,7 +59,7 @@ Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted
   for (const std::string& source : wanted) {
     if (recorded.count(source)) continue;
     std::string known;
-    for (const std::string& one : recorded) known += (known.empty() ? "" : ", ") + one;
+    for (const std::string& one : recorded) known.append(known.empty() ? "" : ", ").append(one);
     return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation of source \"" +
                                           source + "\"; it has: " + known);
   }
