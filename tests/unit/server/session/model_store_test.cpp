@@ -86,18 +86,6 @@ TEST(ModelStore, CondensesWhenTheModelFileHoldsNoOperators) {
 class StoppedOnTheWay final : public inversion::Inverter {
  public:
   explicit StoppedOnTheWay(std::unique_ptr<inversion::Inverter> real) : real_(std::move(real)) {}
-  Status update(const SparseData& data, const inversion::InversionOptions& options,
-                Estimate& estimate) override {
-    if (++calls == 1) {
-      std::promise<void> stopped;
-      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
-      entered.set_value();
-      stopped.get_future().wait();
-    }
-    auto status = real_->update(data, options, estimate);
-    outcomes.push_back(status ? estimate.reason : status.error().message);
-    return status;
-  }
   void reset() override { real_->reset(); }
   std::optional<inversion::OmissionErrors> omission_errors() const override {
     return real_->omission_errors();
@@ -109,6 +97,19 @@ class StoppedOnTheWay final : public inversion::Inverter {
   std::vector<std::string> outcomes;  // of each update, in words
 
  private:
+  Status invert(const SparseData& data, const inversion::InversionOptions& options,
+                Estimate& estimate) override {
+    if (++calls == 1) {
+      std::promise<void> stopped;
+      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+      entered.set_value();
+      stopped.get_future().wait();
+    }
+    auto status = real_->update(data, options, estimate);
+    outcomes.push_back(status ? estimate.reason : status.error().message);
+    return status;
+  }
+
   std::unique_ptr<inversion::Inverter> real_;
 };
 
