@@ -18,13 +18,6 @@ class SleepingInverter final : public inversion::Inverter {
   SleepingInverter(std::unique_ptr<inversion::Inverter> inverter, const bool& awake, int nodes)
       : inverter_(std::move(inverter)), awake_(awake), nodes_(nodes) {}
 
-  Status update(const SparseData& data, const inversion::InversionOptions& options,
-                Estimate& estimate) override {
-    if (awake_) return inverter_->update(data, options, estimate);
-    estimate = Estimate{};
-    estimate.displacement = Points::Zero(3, nodes_);
-    return {};
-  }
   void reset() override { inverter_->reset(); }
   std::optional<inversion::OmissionErrors> omission_errors() const override {
     if (awake_) return inverter_->omission_errors();
@@ -33,6 +26,14 @@ class SleepingInverter final : public inversion::Inverter {
   std::uint64_t bytes() const override { return inverter_->bytes(); }
 
  private:
+  Status invert(const SparseData& data, const inversion::InversionOptions& options,
+                Estimate& estimate) override {
+    if (awake_) return inverter_->update(data, options, estimate);
+    estimate = Estimate{};
+    estimate.displacement = Points::Zero(3, nodes_);
+    return {};
+  }
+
   std::unique_ptr<inversion::Inverter> inverter_;
   const bool& awake_;
   int nodes_;

@@ -40,7 +40,7 @@ class HeadChecks {
     contact();
     warm_and_cold();
     time();
-    refused();
+    verdicts();
   }
 
  private:
@@ -160,9 +160,10 @@ class HeadChecks {
   }
 
   void inverted() {
-    const Rows rows = all_.where("status", "converged");
-    const int fields = rows.count("inverted", [](double n) { return n > 0.0; });
-    check("converged fields with inverted elements", fields, "0", fields == 0);
+    const Rows good = all_.where("quality", "good");
+    const int fields = good.count("inverted", [](double n) { return n > 0.0; });
+    check("fields of quality good with inverted elements", fields,
+          fmt::format("0 of {}", good.size()), fields == 0);
   }
 
   void contact() {
@@ -208,7 +209,12 @@ class HeadChecks {
           p50 <= 2.0);
   }
 
-  void refused() {
+  void verdicts() {
+    for (const char* quality : {"good", "caution", "unusable"}) {
+      record_figure(head_, fmt::format("updates of quality {}", quality),
+                    static_cast<double>(all_.where("quality", quality).size()),
+                    fmt::format("shown; of {}", all_.size()), source());
+    }
     record_figure(head_, "updates that were refused",
                   static_cast<double>(all_.where("status", "refused").size()), "shown", source());
   }

@@ -81,6 +81,14 @@ void add_score(const UpdateScore& score, Cells& cells) {
   cells.add("mean_sd_mm", score.mean_sd_mm);
 }
 
+std::string flag_names(const QualityFlags& flags) {
+  std::string names;
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (flags.has(flag)) names.append(names.empty() ? "" : ";").append(to_string(flag));
+  }
+  return names;
+}
+
 void add_quality(const Estimate& estimate, Cells& cells) {
   double contradictions = 0.0, outliers = 0.0, data = 0.0, least_p = 1.0;
   for (const SourceSummary& source : estimate.sources) {
@@ -89,6 +97,8 @@ void add_quality(const Estimate& estimate, Cells& cells) {
     data += source.data;
     if (source.p_value < least_p) least_p = source.p_value;
   }
+  cells.add("quality", std::string(to_string(estimate.quality.quality)));
+  cells.add("flags", flag_names(estimate.quality.flags));
   cells.add("inverted", estimate.inverted_elements);
   cells.add("min_volume_ratio", estimate.min_volume_ratio);
   cells.add("sources", static_cast<double>(estimate.sources.size()));

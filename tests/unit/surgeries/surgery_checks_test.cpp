@@ -32,6 +32,7 @@ const std::vector<std::string> kColumns = {"head",
                                            "coverage_90",
                                            "sources",
                                            "contradictions",
+                                           "quality",
                                            "inverted",
                                            "contact_decrement",
                                            "contact_violation_mm",
@@ -63,6 +64,7 @@ Cells good(const std::string& scenario, int seed, const std::string& stage) {
           {"coverage_90", "0.9"},
           {"sources", alone ? "1" : "3"},
           {"contradictions", "0"},
+          {"quality", "good"},
           {"inverted", "0"},
           {"contact_decrement", "1e-4"},
           {"contact_violation_mm", "0.001"},
@@ -169,10 +171,22 @@ TEST_F(Checks, EveryUpdateCountsWhereOneIsTooMany) {
   cells[2]["worse_nodes"] = "1";
   cells[2]["inverted"] = "3";
   cells[4]["contact_decrement"] = "0.01";
-  EXPECT_EQ(red(), (Names{"converged fields with inverted elements",
+  EXPECT_EQ(red(), (Names{"fields of quality good with inverted elements",
                           "joint-sag: updates somewhere worse than no correction by more than "
                           "their interval",
                           "updates without the contact certificate"}));
+}
+
+TEST_F(Checks, InvertedElementsAreAllowedInFieldsThatAreNotCalledGood) {
+  cells[0]["inverted"] = "3";
+  EXPECT_EQ(red(), Names{"fields of quality good with inverted elements"});
+  EXPECT_DOUBLE_EQ(values["fields of quality good with inverted elements"], 1.0);
+  cells[0]["quality"] = "unusable";
+  cells[1]["quality"] = "caution";
+  EXPECT_EQ(red(), Names{});
+  EXPECT_DOUBLE_EQ(values["updates of quality good"], 6.0);
+  EXPECT_DOUBLE_EQ(values["updates of quality caution"], 1.0);
+  EXPECT_DOUBLE_EQ(values["updates of quality unusable"], 1.0);
 }
 
 TEST_F(Checks, CoverageHasTwoSides) {

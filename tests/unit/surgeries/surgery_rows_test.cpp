@@ -24,6 +24,9 @@ SurgeryFacts facts(std::uint64_t seed, const std::string& scenario) {
 Row row(const SurgeryFacts& of) {
   Update update;
   update.estimate.reason = "settled, at last";
+  update.estimate.quality.flags.set(QualityFlag::kStrengthAtBound);
+  update.estimate.quality.flags.set(QualityFlag::kVolumeLost);
+  update.estimate.quality.quality = update.estimate.quality.flags.quality();
   update.timings.register_ms = 1.0;
   update.timings.invert_ms = 2.0;
   update.timings.rebuild_ms = 4.0;
@@ -55,11 +58,14 @@ TEST_F(RowTable, ReadsBackWhatAnUpdateWas) {
   EXPECT_EQ(table->number(0, "place"), 2.0);
   EXPECT_EQ(table->number(0, "seed"), 7.0);
   EXPECT_EQ(table->text(0, "reason"), "settled; at last");
+  EXPECT_EQ(table->text(0, "quality"), "unusable");
+  EXPECT_EQ(table->text(0, "flags"), "strength_at_bound;volume_lost");
   EXPECT_EQ(table->number(0, "recovered_pct"), 97.5);
   EXPECT_EQ(table->number(0, "update_ms"), 7.0);
   EXPECT_EQ(table->text(0, "warm_cold_mm"), "");
   EXPECT_EQ(table->text(1, "status"), "refused");
   EXPECT_EQ(table->text(1, "reason"), "no data; no estimate");
+  EXPECT_EQ(table->text(1, "quality"), "");
   EXPECT_EQ(table->text(1, "recovered_pct"), "");
   EXPECT_EQ(table->text(1, "stage"), "tumour+cortex");
 }
