@@ -103,10 +103,10 @@ struct PriorConfig {
   // Fluid planes below the reference plane.
   std::vector<double> gravity_levels_mm = {0.0, 20.0, 40.0};
   // Volume strain of swelling or shrinking tissue around the tumour: standard deviation at its
-  // centre. 0 switches the modes off. 0.05 is usual where oedema is to be expected; a single
-  // surgery may have four times as much (kLargestScales). Vasogenic oedema that raises the water
+  // centre. 0 switches the modes off. A single surgery may have four times as much
+  // (kLargestScales). Vasogenic oedema that raises the water
   // content of white matter from 0.70 to 0.75 adds 0.2.
-  double swelling_strain_sd = 0.0;
+  double swelling_strain_sd = 0.05;
   // Standard deviations of the Gaussians.
   std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};
   // Method condensed: the strength of the prior's parts is estimated from the data. It starts from

@@ -211,10 +211,9 @@ void visit(A& a, V& v) {
      "Volume strain of tissue that swells (oedema) or shrinks (mannitol) around the tumour, "
      "standard "
      "deviation at its centre",
-     "",
-     "0: no such modes. 0.05 where oedema is to be expected; a surgery may then have up to four "
-     "times "
-     "as much (oedema that raises the water content of white matter from 0.70 to 0.75 adds 0.2)."},
+     "docs/decisions/0014",
+     "0: no such modes. A surgery may have up to four times as much (oedema that raises the water "
+     "content of white matter from 0.70 to 0.75 adds 0.2)."},
     v.swelling_strain_sd, between(0.0, 2.0));
   a({"swelling_radii_mm", "mm",
      "Extents of these modes, standard deviations of Gaussians about the tumour's centre", "",

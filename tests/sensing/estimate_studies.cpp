@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // sensing_estimates [THOUSAND_NODES [STUDY...]]: the studies of estimate_studies.hpp, by default
-// all of them on 18 thousand nodes. Patients with expected oedema have it in their prior; the
-// others have the default case.
+// all of them on 18 thousand nodes, with the default case and its prior.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -18,27 +17,18 @@ struct Study {
   const char* name;
   Status (*run)(const bench::Head&);
 };
-struct Patient {
-  double swelling_strain_sd;
-  std::vector<Study> studies;
-};
 
 Status run(double thousand_nodes, const std::vector<std::string>& wanted) {
-  const Patient patients[] = {
-      {kExpectedSwelling, {{"joint", joint_study}, {"landmarks", landmark_study}}},
-      {0.0, {{"joint-without-oedema", joint_study_without_oedema}, {"outliers", outlier_study}}}};
-  for (const Patient& patient : patients) {
-    std::vector<Study> studies = patient.studies;
-    std::erase_if(studies, [&](const Study& study) {
-      return !wanted.empty() && std::find(wanted.begin(), wanted.end(), study.name) == wanted.end();
-    });
-    if (studies.empty()) continue;
-    const auto head = make_default_head(thousand_nodes, patient.swelling_strain_sd);
-    if (!head) return tl::unexpected(head.error());
-    for (const Study& study : studies) {
-      if (const Status ok = study.run(*head); !ok) {
-        return fail(ok.error().code, std::string(study.name) + ": " + ok.error().message);
-      }
+  const Study studies[] = {
+      {"joint", joint_study}, {"landmarks", landmark_study}, {"outliers", outlier_study}};
+  const auto head = make_default_head(thousand_nodes);
+  if (!head) return tl::unexpected(head.error());
+  for (const Study& study : studies) {
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), study.name) == wanted.end()) {
+      continue;
+    }
+    if (const Status ok = study.run(*head); !ok) {
+      return fail(ok.error().code, std::string(study.name) + ": " + ok.error().message);
     }
   }
   return {};

@@ -7,13 +7,8 @@
 
 namespace brainshift::sensing {
 
-// prior.swelling_strain_sd where oedema is to be expected (config/cases/colin27.yaml).
-inline constexpr double kExpectedSwelling = 0.05;
-
 // Tumour boundary and exposed cortex together, against the tumour alone.
 Status joint_study(const bench::Head& head);
-// The same with a prior without oedema: figures without a bound.
-Status joint_study_without_oedema(const bench::Head& head);
 // Fifteen landmark pairs, one of them left out, against the best rigid fit.
 Status landmark_study(const bench::Head& head);
 // Gross outliers among boundary points and among landmark pairs.

@@ -67,7 +67,7 @@ Result<Stages> play(const bench::Head& head, client::Scenario scenario) {
   return stages;
 }
 
-void check(const std::string& study, const std::string& scenario, const Stages& stages, bool held) {
+void check(const std::string& study, const std::string& scenario, const Stages& stages) {
   const Stage &alone = stages.front(), &all = stages.back();
   const auto ratio = [&](const char* what, const std::vector<double> Stage::*errors, double bound,
                          bool bounded = true) {
@@ -75,10 +75,10 @@ void check(const std::string& study, const std::string& scenario, const Stages& 
     const std::string name = scenario + ": " + what + " error over that of the tumour alone";
     const std::string source = "twin; mean of 6 measurements";
     char limit[20] = "shown", text[80];
-    if (held && bounded) std::snprintf(limit, sizeof limit, "<= %g", bound);
+    if (bounded) std::snprintf(limit, sizeof limit, "<= %g", bound);
     std::snprintf(text, sizeof text, "%s (%.3f to %.3f mm)", limit, mean(alone.*errors),
                   mean(all.*errors));
-    if (held && bounded)
+    if (bounded)
       record_check(study, name, value, text, value <= bound, source);
     else
       record_figure(study, name, value, text, source);
@@ -117,8 +117,8 @@ void draw(const std::vector<Stages>& results, const std::filesystem::path& file)
   cv::imwrite(file.string(), client::draw_bars(spec));
 }
 
-// `study`: file-name-like; `held`: to the bounds.
-Status measure(const bench::Head& head, const std::string& study, bool held) {
+// `study`: file-name-like.
+Status measure(const bench::Head& head, const std::string& study) {
   std::printf("%s: errors in mm, mean of %d measurements\n", study.c_str(), kMeasurements);
   std::vector<Stages> results;
   std::vector<double> joint_ms;
@@ -135,7 +135,7 @@ Status measure(const bench::Head& head, const std::string& study, bool held) {
           mean(stage.craniotomy_vector_mm), mean(stage.coverage), stage.contradictions,
           percentile(stage.time_ms, 50));
     }
-    check(study, name, *stages, held);
+    check(study, name, *stages);
     const auto& times = stages->back().time_ms;
     joint_ms.insert(joint_ms.end(), times.begin(), times.end());
     results.push_back(std::move(*stages));
@@ -151,10 +151,6 @@ Status measure(const bench::Head& head, const std::string& study, bool held) {
 
 }  // namespace
 
-Status joint_study(const bench::Head& head) { return measure(head, "joint", true); }
-
-Status joint_study_without_oedema(const bench::Head& head) {
-  return measure(head, "joint-without-oedema", false);
-}
+Status joint_study(const bench::Head& head) { return measure(head, "joint"); }
 
 }  // namespace brainshift::sensing

@@ -11,11 +11,10 @@
 
 namespace brainshift::sensing {
 
-Result<bench::Head> make_default_head(double thousand_nodes, double swelling_strain_sd) {
+Result<bench::Head> make_default_head(double thousand_nodes) {
   linalg::use_single_threaded_blas();
   auto config = io::read_case_config(BRAINSHIFT_DEFAULT_CASE);
   if (!config) return tl::unexpected(config.error());
-  config->prior.swelling_strain_sd = swelling_strain_sd;
   bench::MeshWish wish;
   wish.name = "sensing";
   wish.thousand_nodes = thousand_nodes;

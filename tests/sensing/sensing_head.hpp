@@ -9,10 +9,8 @@
 
 namespace brainshift::sensing {
 
-// Contact boundary. `thousand_nodes`: wanted size of the mesh. swelling_strain_sd:
-// prior.swelling_strain_sd of the case.
-// Prints how long it took.
-Result<bench::Head> make_default_head(double thousand_nodes, double swelling_strain_sd);
+// Contact boundary. `thousand_nodes`: wanted size of the mesh. Prints how long it took.
+Result<bench::Head> make_default_head(double thousand_nodes);
 
 // The pipeline of the daemon's default session on this head: method condensed, warm, with the
 // evidence of the other sources.

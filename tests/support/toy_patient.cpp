@@ -45,6 +45,7 @@ CaseConfig toy_config() {
   config.gravity_direction = Vec3(0, 0, -1);
   config.prior.correlation_length_mm = 10.0;
   config.prior.gravity_levels_mm = {10.0, 40.0};
+  config.prior.swelling_strain_sd = 0.0;  // dense references assemble gravity modes only
   return config;
 }
 
