@@ -56,12 +56,14 @@ Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted
   if (wanted.empty()) return {};
   std::set<std::string> recorded;
   for (const auto& one : observations) recorded.insert(one.observation.source);
-  for (const std::string& source : wanted) {
-    if (recorded.count(source)) continue;
+  const auto missing = std::find_if(wanted.begin(), wanted.end(), [&](const std::string& source) {
+    return recorded.count(source) == 0;
+  });
+  if (missing != wanted.end()) {
     std::string known;
     for (const std::string& one : recorded) known.append(known.empty() ? "" : ", ").append(one);
     return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation of source \"" +
-                                          source + "\"; it has: " + known);
+                                          *missing + "\"; it has: " + known);
   }
   std::erase_if(observations, [&](const RecordedObservation& one) {
     return std::find(wanted.begin(), wanted.end(), one.observation.source) == wanted.end();

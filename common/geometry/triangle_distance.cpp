@@ -14,8 +14,8 @@ double clamped(double along, double length_squared) {
 
 }  // namespace
 
-TriangleFrame::TriangleFrame(const Vec3& a_, const Vec3& b, const Vec3& c)
-    : a(a_), ab(b - a_), ac(c - a_), ab_ab(ab.squaredNorm()), ab_ac(ab.dot(ac)) {
+TriangleFrame::TriangleFrame(const Vec3& corner, const Vec3& b, const Vec3& c)
+    : a(corner), ab(b - corner), ac(c - corner), ab_ab(ab.squaredNorm()), ab_ac(ab.dot(ac)) {
   ac_ac = ac.squaredNorm();
   determinant = ab_ab * ac_ac - ab_ac * ab_ac;
 }

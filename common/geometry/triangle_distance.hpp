@@ -11,7 +11,7 @@ struct TriangleFrame {
   Vec3 a, ab, ac;
   double ab_ab, ab_ac, ac_ac, determinant;
 
-  TriangleFrame(const Vec3& a_, const Vec3& b, const Vec3& c);
+  TriangleFrame(const Vec3& corner, const Vec3& b, const Vec3& c);
 };
 
 // The point of the triangle closest to x. It is the foot of the perpendicular on the triangle's

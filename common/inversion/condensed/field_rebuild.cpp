@@ -52,7 +52,8 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       conditioned_(control_modes_.rows(), window.count),
       contact_storage_(new float[static_cast<std::size_t>(control_contact_.size())]),
       control_variance_(static_cast<Eigen::Index>(operators.control.size())) {
-  const auto most = static_cast<std::size_t>(window.count + operators.num_slaves());
+  const auto most =
+      static_cast<std::size_t>(window.count) + static_cast<std::size_t>(operators.num_slaves());
   columns_.reserve(most);
   factors_.reserve(most);
   if (far_.empty()) return;
@@ -116,7 +117,7 @@ Vec3 FieldRebuild::interpolated(NodeIndex node) const {
     const NodeIndex from =
         operators_.control[static_cast<std::size_t>(operators_.control_neighbours(c, node))];
     u += static_cast<double>(operators_.control_weights(c, node)) *
-         field_.segment<3>(3 * far_.row[static_cast<std::size_t>(from)]).cast<double>();
+         field_.segment<3>(3L * far_.row[static_cast<std::size_t>(from)]).cast<double>();
   }
   return u;
 }
@@ -126,7 +127,7 @@ void FieldRebuild::interpolate_far(ThreadTeam& team, const ContactReduction& con
     for (long i = begin; i < end; ++i) {
       const int row = far_.row[static_cast<std::size_t>(i)];
       if (row >= 0) {
-        u.col(i) = field_.segment<3>(3 * row).cast<double>();
+        u.col(i) = field_.segment<3>(3L * row).cast<double>();
       } else {
         u.col(i) = interpolated(static_cast<NodeIndex>(i));
       }

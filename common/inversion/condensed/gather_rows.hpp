@@ -14,7 +14,7 @@ inline Eigen::MatrixXf gather_rows(const Eigen::MatrixXf& array,
   for (Eigen::Index j = 0; j < array.cols(); ++j) {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       rows.col(j).segment<3>(3 * static_cast<Eigen::Index>(i)) =
-          array.col(j).segment<3>(3 * nodes[i]);
+          array.col(j).segment<3>(3L * nodes[i]);
     }
   }
   return rows;
