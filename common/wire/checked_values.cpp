@@ -67,7 +67,7 @@ Vec3 Checked::unit_vector(const RepeatedField<double>& xyz, std::string_view fie
   if (!require(xyz.size() == 3, field, std::to_string(xyz.size()) + " numbers, must be 3"))
     return {};
   if (!require_finite(*this, xyz, field)) return {};
-  const Vec3 vector(xyz[0], xyz[1], xyz[2]);
+  Vec3 vector(xyz[0], xyz[1], xyz[2]);
   require(std::abs(vector.norm() - 1.0) <= kUnitTolerance, field,
           "length " + show(vector.norm()) + ", must be 1");
   return vector;
