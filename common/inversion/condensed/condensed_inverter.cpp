@@ -342,6 +342,13 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   }
   estimate.history = history;
   estimate.prior_scales = scales.scales();
+  // A bound of 1 is the case's own strength, where the search begins: it tells nothing.
+  for (std::size_t part = 0; part < kLargestScales.size(); ++part) {
+    estimate.prior_at_bound[part] = estimate_scales && kLargestScales[part] > 1.0 &&
+                                    estimate.prior_scales[part] >= kLargestScales[part];
+  }
+  estimate.misfit_ratio = posterior.misfit_ratio();
+  estimate.data_outside_region = sampled.data_outside_region();
   summarise_sources(data, estimate);
   return {};
 }

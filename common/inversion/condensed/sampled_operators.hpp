@@ -45,6 +45,7 @@ class SampledOperators {
   int first_row(int datum) const { return first_row_[static_cast<std::size_t>(datum)]; }
   // Whether any datum's variance depends on `scale`.
   bool outside_region() const { return outside_region_ > 0; }
+  int data_outside_region() const { return outside_region_; }
   int common() const { return common_; }  // q
   // mm, with what the modes leave out and the robust weight.
   double sd(int datum) const { return sd_[datum]; }

@@ -209,6 +209,25 @@ TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
   }
 }
 
+TEST_P(Condensed, TheMisfitRatioIsThatOfTheResiduals) {
+  SparseData data = sagging_data(GetParam(), 0.3);
+  data.positions.col(3) = Vec3(5, 5, 5);  // away from the region
+  Estimate estimate;
+  CaseConfig plain = config();
+  plain.sensing.robust_weights = false;
+  ASSERT_TRUE(Condensed::inverter(GetParam(), {}, plain).update(data, estimate));
+  const auto& region = operators(GetParam())->region;
+  double squares = 0.0;
+  for (int i = 0; i < data.size(); ++i) {
+    if (i == 3) continue;  // its variance holds what the modes leave out too
+    const Vec3 off =
+        data.displacements.col(i) - estimate.displacement.col(region[static_cast<std::size_t>(i)]);
+    squares += off.squaredNorm() / (3.0 * data.size() * data.sd_mm[i] * data.sd_mm[i]);
+  }
+  EXPECT_GT(estimate.misfit_ratio, 0.99 * std::sqrt(squares));
+  EXPECT_EQ(estimate.data_outside_region, 1);
+}
+
 TEST_P(Condensed, ContactHolds) {
   Estimate estimate;
   auto inverter = Condensed::inverter(GetParam());
