@@ -85,9 +85,9 @@ struct ContactSummary {
   //   condensed, condensed-exact: active sets evaluated, i.e. the length of Estimate::history. At
   //     least 1, also without contact; the best set counts again when it is evaluated once more.
   int iterations = 0;
-  // Certificate of method condensed (inversion/condensed). decrement: how far the loads are from
-  // the minimum of J, in posterior standard deviations; NaN for other methods. max_violation_mm:
-  // largest depth of an open slave, or pull of an active one times its compliance.
+  // Certificate of contact; NaN: not computed. decrement: how far the loads are from the most
+  // probable ones, in posterior standard deviations (no method computes it yet). max_violation_mm:
+  // bound on an open slave's depth and an active one's pull times its compliance (condensed).
   double decrement = std::numeric_limits<double>::quiet_NaN();
   double max_violation_mm = std::numeric_limits<double>::quiet_NaN();
 };
@@ -126,14 +126,14 @@ struct Estimate {
   MeanStd initial_misfit_mm;  // of |d|
   MeanStd misfit_mm;          // of |d - A x|
   std::vector<IterationRecord> history;
-  // Strength of the prior's parts, mean over the hypotheses; 0 for a part that the model lacks.
+  // Estimated strength of the prior's parts, in units of the case's standard deviations.
   // Estimated by method condensed only; 1 otherwise.
   PriorScaleValues prior_scales = kAsInTheCase;
-  // Probability that a part is absent; 0 where it is not estimated.
+  // Probability that a part is absent; 0: not estimated, as by every method so far.
   PriorScaleValues prior_absent{};
-  // Parts whose most probable strength is the greatest that is allowed.
+  // Parts with the greatest strength that is allowed, where that is above the case's own.
   std::array<bool, kPriorParts> prior_at_bound{};
-  // The most probable one first. Method condensed with estimated strengths only.
+  // The most probable one first. Empty: no method compares hypotheses so far.
   std::vector<Hypothesis> hypotheses;
   // Root mean square of the whitened residuals: 1 when the data lie as far off as their standard
   // deviations say. NaN: not computed.

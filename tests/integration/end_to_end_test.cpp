@@ -16,6 +16,7 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
+#include "tests/support/report_keys.hpp"
 
 namespace brainshift::integration {
 namespace {
@@ -39,14 +40,7 @@ const json& run_with_boundary(const json& report, const std::string& boundary) {
 }
 
 void expect_contract(const json& run) {
-  for (const char* key : {"case",        "scenario",      "method",
-                          "boundary",    "mesh",          "prepare_s",
-                          "model_bytes", "full_solve_ms", "updates",
-                          "latency_ms",  "cold_ms",       "stages_ms",
-                          "error_mm",    "recovery_pct",  "field_error_pct",
-                          "coverage_90", "contact",       "principal_direction_deg",
-                          "left_out",    "quality",       "prior_strengths",
-                          "hypotheses"}) {
+  for (const char* key : test_support::kReportKeys) {
     EXPECT_TRUE(run.contains(key)) << key;
   }
   EXPECT_THAT(run.at("quality").at("worst"), testing::AnyOf("good", "caution"));

@@ -28,10 +28,6 @@
 namespace brainshift::inversion {
 namespace {
 
-// A greater misfit ratio is named in the reason. 600 independent residuals never exceed it by
-// chance.
-constexpr double kUnexplained = 1.5;
-
 // Contact, scales, robust weights and places of moving data settle in turn. Two rounds are the rule
 // when a surgery begins, one later.
 constexpr int kMaxRounds = 6;
@@ -60,7 +56,7 @@ void set_reason(EstimateStatus outcome, const contact::SetSearch& search,
                     search.iteration(), search.best_violation_mm());
   }
   reason.assign(text);
-  if (misfit_ratio > kUnexplained) {
+  if (misfit_ratio > kUnexplainedMisfit) {
     std::snprintf(text, sizeof text,
                   "; the prior does not explain the data: they lie %.1f standard deviations off",
                   misfit_ratio);
@@ -273,7 +269,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
       if (relocated) data = &moved;
     }
     if (!rescaled && !reweighed && !relocated) return settled;
-    sample = reweighed || relocated || sampled.outside_region();
+    sample = reweighed || relocated || sampled.data_outside_region() > 0;
   }
 }
 
@@ -335,6 +331,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   estimate.initial_misfit_mm = mean_std_of_norms(data.displacements);
   estimate.contact = {reduction.size(), last.penetrating, last.max_penetration_mm,
                       static_cast<int>(history.size())};
+  if (options.contact) estimate.contact.max_violation_mm = search.violation_mm();
   estimate.active_slaves.clear();
   estimate.contact_force_n = reduction.forces();
   for (const int slave : reduction.active()) {

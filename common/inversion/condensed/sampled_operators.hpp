@@ -43,8 +43,7 @@ class SampledOperators {
   int size() const { return size_; }
   int rows() const { return first_row_[static_cast<std::size_t>(size_)]; }
   int first_row(int datum) const { return first_row_[static_cast<std::size_t>(datum)]; }
-  // Whether any datum's variance depends on `scale`.
-  bool outside_region() const { return outside_region_ > 0; }
+  // Data whose variance depends on `scale`.
   int data_outside_region() const { return outside_region_; }
   int common() const { return common_; }  // q
   // mm, with what the modes leave out and the robust weight.

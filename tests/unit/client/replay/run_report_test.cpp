@@ -10,6 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/report_keys.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::client {
@@ -76,14 +77,7 @@ TEST(RunReport, ReadsBackWhatItWrote) {
 
 TEST(RunReport, HasEveryKeyOfTheContract) {
   const json run = json::parse(to_json({full_run()}))[0];
-  for (const char* key : {"case",        "scenario",      "method",
-                          "boundary",    "mesh",          "prepare_s",
-                          "model_bytes", "full_solve_ms", "updates",
-                          "latency_ms",  "cold_ms",       "stages_ms",
-                          "error_mm",    "recovery_pct",  "field_error_pct",
-                          "coverage_90", "contact",       "principal_direction_deg",
-                          "left_out",    "quality",       "prior_strengths",
-                          "hypotheses"}) {
+  for (const char* key : test_support::kReportKeys) {
     EXPECT_TRUE(run.contains(key)) << key;
   }
   const auto keys_of = [&](const char* object, std::initializer_list<const char*> keys) {

@@ -247,6 +247,7 @@ TEST_P(Condensed, ContactHolds) {
     }
   }
   EXPECT_EQ(active, estimate.contact_force_n.size());
+  EXPECT_LE(estimate.contact.max_violation_mm, contact::kContactTolerance_mm);
 }
 
 TEST_P(Condensed, WarmStartFindsWhatAColdStartFinds) {
