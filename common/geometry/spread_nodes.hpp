@@ -7,7 +7,7 @@
 
 #include "common/core/types.hpp"
 
-namespace brainshift::inversion {
+namespace brainshift::geometry {
 
 // `count` nodes (all, if there are fewer), each the farthest from those before it, beginning with
 // node 0: every leading part of the list is spread over the mesh too. nodes: 3 x n, mm.
@@ -21,4 +21,4 @@ struct Interpolation {
 // sources: 3 x c, c >= 1; targets: 3 x n.
 Interpolation interpolate(const Points& sources, const Points& targets);
 
-}  // namespace brainshift::inversion
+}  // namespace brainshift::geometry

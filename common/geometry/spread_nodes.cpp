@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/prepared/control_nodes.hpp"
+#include "common/geometry/spread_nodes.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <limits>
 
-namespace brainshift::inversion {
+namespace brainshift::geometry {
 
 std::vector<NodeIndex> spread_nodes(const Points& nodes, int count) {
   std::vector<NodeIndex> chosen;
@@ -55,4 +55,4 @@ Interpolation interpolate(const Points& sources, const Points& targets) {
   return result;
 }
 
-}  // namespace brainshift::inversion
+}  // namespace brainshift::geometry
