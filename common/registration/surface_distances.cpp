@@ -5,30 +5,19 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <map>
+#include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "common/core/random.hpp"
-#include "common/geometry/closest_point.hpp"
 
 namespace brainshift::registration {
 namespace {
 
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
-// A barycentric coordinate below this lies on the opposite edge.
-constexpr double kOnEdge = 1e-9;
 
-Vec3 barycentric(const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 n = (b - a).cross(c - a);
-  const double area = n.squaredNorm();
-  const double wb = (q - a).cross(c - a).dot(n) / area;
-  const double wc = (b - a).cross(q - a).dot(n) / area;
-  return Vec3(1.0 - wb - wc, wb, wc);
-}
-
-// Errors of all points together when the camera's pose is wrong: three shifts, and three turns
+// Errors of all points together when the instrument's pose is wrong: three shifts, and three turns
 // about the centre.
 Eigen::MatrixXd pose_errors(const Points& places, const SurfaceDistanceOptions& options) {
   const bool shifts = options.pose_sd_mm > 0.0, turns = options.pose_sd_deg > 0.0;
@@ -52,66 +41,40 @@ Eigen::MatrixXd pose_errors(const Points& places, const SurfaceDistanceOptions& 
 
 }  // namespace
 
-SurfacePatch craniotomy_patch(const BrainModel& model) {
-  SurfacePatch patch;
-  patch.nodes = model.craniotomy;
-  std::sort(patch.nodes.begin(), patch.nodes.end());
-  std::map<NodeIndex, int> vertex;
-  for (std::size_t i = 0; i < patch.nodes.size(); ++i) {
-    vertex[patch.nodes[i]] = static_cast<int>(i);
-  }
-  patch.surface.vertices = model.mesh.nodes(Eigen::all, patch.nodes);
-  std::vector<int> corners;
-  for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
-    const auto triangle = model.boundary_triangles.col(t);
-    if (!vertex.count(triangle[0]) || !vertex.count(triangle[1]) || !vertex.count(triangle[2])) {
-      continue;
-    }
-    for (int k = 0; k < 3; ++k) corners.push_back(vertex[triangle[k]]);
-  }
-  patch.surface.triangles = Eigen::Map<const Eigen::Matrix<int, 3, Eigen::Dynamic>>(
-      corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
-  return patch;
+Result<std::shared_ptr<const IndexedPatch>> IndexedPatch::build(SurfacePatch patch) {
+  auto surface = geometry::MovingSurface::build(patch.surface);
+  if (!surface) return tl::unexpected(surface.error());
+  return std::shared_ptr<const IndexedPatch>(
+      new IndexedPatch(std::move(patch), std::move(*surface)));
 }
 
-SurfaceDistances::SurfaceDistances(SurfacePatch patch, const SurfaceDistanceOptions& options)
-    : patch_(std::move(patch)), options_(options) {
-  std::map<std::pair<int, int>, int> uses;
-  const auto& triangles = patch_.surface.triangles;
-  const auto edge = [&](int t, int k) {
-    return std::minmax(triangles(k, t), triangles((k + 1) % 3, t));
-  };
-  for (int t = 0; t < triangles.cols(); ++t) {
-    for (int k = 0; k < 3; ++k) ++uses[edge(t, k)];
-  }
-  for (int t = 0; t < triangles.cols(); ++t) {
-    for (int k = 0; k < 3; ++k) rim_edge_.push_back(uses[edge(t, k)] == 1 ? 1 : 0);
-  }
-}
+SurfaceDistances::SurfaceDistances(std::shared_ptr<const IndexedPatch> patch,
+                                   const SurfaceDistanceOptions& options,
+                                   const RigidTransform& T_undeformed_measured)
+    : patch_(std::move(patch)), options_(options), T_undeformed_measured_(T_undeformed_measured) {}
 
-Result<SurfaceDistances> SurfaceDistances::build(SurfacePatch patch, const Points& measured,
-                                                 const SurfaceDistanceOptions& options) {
-  if (patch.surface.num_triangles() == 0) {
-    return fail(ErrorCode::kEmptySet,
-                "cortical surface: the craniotomy of the model has no triangle to compare it with");
-  }
+Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPatch> patch,
+                                                 const Points& measured,
+                                                 const SurfaceDistanceOptions& options,
+                                                 const RigidTransform& T_undeformed_measured) {
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {
     if (!measured.col(i).allFinite()) {
       return fail(ErrorCode::kNotFinite,
-                  fmt::format("cortical surface: point {} is not finite", i));
+                  fmt::format("{}: point {} is not finite", options.measured, i));
     }
   }
-  SurfaceDistances made(std::move(patch), options);
+  SurfaceDistances made(std::move(patch), options, T_undeformed_measured);
   std::vector<int> over;
-  made.measure(Points::Zero(3, made.patch_.surface.num_vertices()), measured, &over);
-  if (static_cast<int>(over.size()) < kFewestPoints) {
-    const Vec3 centre = made.patch_.surface.vertices.rowwise().mean();
+  const Points vertices = made.first_vertices();
+  made.measure(vertices, measured, &over);
+  if (static_cast<int>(over.size()) < options.fewest) {
+    const Vec3 centre = vertices.rowwise().mean();
     const double away = measured.cols() > 0 ? (measured.rowwise().mean() - centre).norm() : 0.0;
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format("cortical surface: {} of {} points lie over the craniotomy within {} mm, "
-                    "at least {} are needed; their mean lies {:.1f} mm from its centre",
-                    over.size(), measured.cols(), options.farthest_mm, kFewestPoints, away));
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("{}: {} of {} points lie over the {} within {} mm, at least {} are "
+                            "needed; their mean lies {:.1f} mm from its centre",
+                            options.measured, over.size(), measured.cols(), options.surface,
+                            options.farthest_mm, options.fewest, away));
   }
   const int available = static_cast<int>(over.size());
   if (available > options.points) {
@@ -124,34 +87,29 @@ Result<SurfaceDistances> SurfaceDistances::build(SurfacePatch patch, const Point
   return made;
 }
 
-SparseData SurfaceDistances::measure(const Points& u, const Points& measured,
+Points SurfaceDistances::first_vertices() const {
+  const RigidTransform T_measured_undeformed = T_undeformed_measured_.inverse();
+  return (T_measured_undeformed.linear() * patch_->patch().surface.vertices).colwise() +
+         Vec3(T_measured_undeformed.translation());
+}
+
+SparseData SurfaceDistances::measure(Points vertices, const Points& measured,
                                      std::vector<int>* kept) const {
-  const TriangleSurface deformed{patch_.surface.vertices + u, patch_.surface.triangles};
   SparseData data;
-  const auto index = geometry::ClosestPointIndex::build(deformed);
-  if (!index) return data;  // folded to nothing: no datum
+  if (!vertices.allFinite()) return data;  // of an estimate that failed: no datum
+  const geometry::MovedSurface deformed(patch_->surface(), std::move(vertices));
   data.positions.resize(3, measured.cols());
   data.displacements.resize(3, measured.cols());
   data.directions.resize(3, measured.cols());
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {
     const Vec3 p = measured.col(i);
-    const geometry::ClosestPoint closest = index->closest(p);
-    if (!(closest.distance_mm <= options_.farthest_mm)) continue;
-    const auto corners = patch_.surface.triangles.col(closest.triangle);
-    const Vec3 w =
-        barycentric(closest.point, deformed.vertices.col(corners[0]),
-                    deformed.vertices.col(corners[1]), deformed.vertices.col(corners[2]));
-    bool on_rim = false;  // edge k lies opposite to corner k + 2
-    for (int k = 0; k < 3; ++k) {
-      on_rim = on_rim || (rim_edge_[static_cast<std::size_t>(3 * closest.triangle + k)] != 0 &&
-                          w[(k + 2) % 3] < kOnEdge);
-    }
-    if (on_rim) continue;
-    const Vec3 n = index->pseudo_normal(closest);
-    const Vec3 x = w[0] * patch_.surface.vertices.col(corners[0]) +
-                   w[1] * patch_.surface.vertices.col(corners[1]) +
-                   w[2] * patch_.surface.vertices.col(corners[2]);
+    const geometry::SurfacePlace closest = deformed.closest(p);
+    if (!(closest.distance_mm <= options_.farthest_mm) || deformed.on_rim(closest)) continue;
+    const Vec3 n = deformed.normal(closest);
+    if (n.squaredNorm() < 0.5)
+      continue;  // folded to nothing: zero would stand for a whole displacement
+    const Vec3 x = deformed.point_at_rest(closest);
     data.positions.col(count) = x;
     data.directions.col(count) = n;
     data.displacements.col(count) = n.dot(p - x) * n;
@@ -166,12 +124,23 @@ SparseData SurfaceDistances::measure(const Points& u, const Points& measured,
   return data;
 }
 
-SparseData SurfaceDistances::at(const Points& u) const { return measure(u, guiding_, nullptr); }
+SparseData SurfaceDistances::first() const { return measure(first_vertices(), guiding_, nullptr); }
+
+SparseData SurfaceDistances::at(const Points& u) const {
+  const SurfacePatch& patch = patch_->patch();
+  return measure(patch.surface.vertices + u * patch.weights, guiding_, nullptr);
+}
 
 bool SurfaceDistances::moved(const SparseData& before, const SparseData& now) const {
   if (before.size() != now.size()) return true;
-  return now.size() > 0 &&
-         (now.positions - before.positions).colwise().norm().maxCoeff() > options_.settled_mm;
+  for (int i = 0; i < now.size(); ++i) {
+    const Vec3 way = now.positions.col(i) - before.positions.col(i);
+    if (std::abs(before.directions.col(i).dot(way)) > options_.settled_mm ||
+        way.norm() > options_.settled_along_mm) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace brainshift::registration

@@ -1,70 +1,94 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Distances from the model's cortex to a measured surface. As sparse data they let the cortex
-// slide.
+// Distances from a surface of the model to measured points of it. As sparse data they let the
+// surface slide along itself.
 //
-// For a measured point p and a deformation u of the patch:
-//   q  the closest point of the deformed patch
+// For a measured point p and a displacement u of the surface:
+//   q  the closest point of the deformed surface
 //   x  the place of q before deformation
-//   n  the patch's unit normal at q
+//   n  the deformed surface's unit normal at q
 //   n . u(x) = n . (p - x)       is what the point measures, mm
 // That is the part of the displacement along n. A point says nothing about how the surface slides
-// along itself. x and n depend on u, so the data are made anew as the estimate moves. This is the
-// data side of non-rigid ICP (Chui & Rangarajan 2003; paper 2.7 for the rigid kind).
+// along itself: a ball shows no rotation. x and n depend on u, so the data are made anew as the
+// estimate moves. This is the data side of non-rigid ICP (Chui & Rangarajan 2003; paper 2.7 for
+// the rigid kind).
+//
+// The first data are those of a rigid motion of the surface, such as a rigid ICP's: far from the
+// surface, closest points would lie on its wrong side. Of that motion nothing else enters the data.
 #pragma once
 
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/values/brain_model.hpp"
+#include "common/geometry/moving_surface.hpp"
+#include "common/registration/surface_patch.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::registration {
 
-// A part of the mesh's boundary that a camera sees.
-struct SurfacePatch {
-  std::vector<NodeIndex> nodes;  // of the mesh, ascending; vertex i of the surface is nodes[i]
-  TriangleSurface surface;       // undeformed, outward
+// A patch with its index: what observations of one surgery share.
+class IndexedPatch {
+ public:
+  // Errors as ClosestPointIndex::build.
+  static Result<std::shared_ptr<const IndexedPatch>> build(SurfacePatch patch);
+
+  const SurfacePatch& patch() const { return patch_; }
+  const geometry::MovingSurface& surface() const { return surface_; }
+
+ private:
+  IndexedPatch(SurfacePatch patch, geometry::MovingSurface surface)
+      : patch_(std::move(patch)), surface_(std::move(surface)) {}
+  SurfacePatch patch_;
+  geometry::MovingSurface surface_;
 };
 
-// Boundary triangles between three craniotomy nodes; no triangle when there are none.
-SurfacePatch craniotomy_patch(const BrainModel& model);
-
 struct SurfaceDistanceOptions {
-  int points = 300;           // at most; chosen of those over the patch, always the same ones
+  int points = 300;           // at most; chosen of those over the surface, always the same ones
   double sd_mm = 0.5;         // of a point along the normal
-  double pose_sd_mm = 0.0;    // of the camera's place: three common errors (none if 0)
+  double pose_sd_mm = 0.0;    // of the instrument's place: three common errors (none if 0)
   double pose_sd_deg = 0.0;   // of its direction, about the points' centroid: three more
-  double farthest_mm = 30.0;  // from the patch; a point farther away is not on the cortex
-  double settled_mm = 0.5;    // the data are settled when no x has moved by more
+  double farthest_mm = 30.0;  // from the surface; a point farther away is not of it
+  // The data are settled when no x has moved by more: across the surface, and along it, where a
+  // distance hardly notices.
+  double settled_mm = 0.02, settled_along_mm = 0.3;
+  // Fewer points over the surface are an error, in these words.
+  int fewest = 10;
+  std::string measured = "cortical surface", surface = "craniotomy";
 };
 
 class SurfaceDistances {
  public:
-  // measured: 3 x m, mm RAS. kEmptySet: the patch has no triangle. kInvalidArgument: fewer than
-  // kFewestPoints lie over the patch (the sentence says how many, and how far away their mean is).
-  // kNotFinite: names the point.
-  static Result<SurfaceDistances> build(SurfacePatch patch, const Points& measured,
-                                        const SurfaceDistanceOptions& options = {});
+  // measured: 3 x m, mm RAS. T_undeformed_measured: the rigid motion from the measured points to
+  // the undeformed surface. kInvalidArgument: fewer than options.fewest points lie over the
+  // surface, so moved (the sentence says how many, and how far away their mean is). kNotFinite:
+  // names the point.
+  static Result<SurfaceDistances> build(
+      std::shared_ptr<const IndexedPatch> patch, const Points& measured,
+      const SurfaceDistanceOptions& options = {},
+      const RigidTransform& T_undeformed_measured = RigidTransform::Identity());
 
-  const std::vector<NodeIndex>& nodes() const { return patch_.nodes; }
-  // u: 3 x nodes(), mm. A point whose closest point lies on the rim of the patch gives no datum,
+  const std::vector<NodeIndex>& nodes() const { return patch_->patch().nodes; }
+  // The data before any estimate: for the rigid motion given to build().
+  SparseData first() const;
+  // u: 3 x nodes(), mm. A point whose closest point lies on the rim of the surface gives no datum,
   // so the count may differ from call to call.
   SparseData at(const Points& u) const;
-  // True when some x of `now` lies over settled_mm from that of `before`, or the counts differ.
+  // True when some x of `now` lies farther from that of `before` than the options call settled, or
+  // the counts differ.
   bool moved(const SparseData& before, const SparseData& now) const;
 
-  static constexpr int kFewestPoints = 10;
-
  private:
-  SurfaceDistances(SurfacePatch patch, const SurfaceDistanceOptions& options);
-  // Data of the columns of `measured` that lie over the interior of the patch moved by u. `kept`,
-  // if not null, receives their indices.
-  SparseData measure(const Points& u, const Points& measured, std::vector<int>* kept) const;
+  SurfaceDistances(std::shared_ptr<const IndexedPatch> patch, const SurfaceDistanceOptions& options,
+                   const RigidTransform& T_undeformed_measured);
+  // Data of the columns of `measured` that lie over the interior of the surface with these
+  // vertices. `kept`, if not null, receives their indices.
+  SparseData measure(Points vertices, const Points& measured, std::vector<int>* kept) const;
+  Points first_vertices() const;
 
-  SurfacePatch patch_;
+  std::shared_ptr<const IndexedPatch> patch_;
   SurfaceDistanceOptions options_;
-  // 3 per triangle: 1 where edge k, from corner k to k + 1, belongs to one triangle only.
-  std::vector<char> rim_edge_;
+  RigidTransform T_undeformed_measured_;
   Points guiding_;  // the measured points in use
 };
 

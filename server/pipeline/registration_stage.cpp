@@ -74,11 +74,16 @@ double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& opt
   return std::clamp(kScaleOverMedian * median, least, options.welsch_scale_mm);
 }
 
+struct Alignment {
+  registration::IcpResult icp;
+  std::vector<int> guiding;  // indices of the points that guide the model, ascending
+  int outliers = 0;          // points that the alignment leaves aside
+};
+
 // Aligned rigidly from the tracked pose, which is the identity: the points arrive in patient RAS.
-template <typename Surface>
-Result<RegisteredObservation> aligned(const Points& points, double observed_sd_mm,
-                                      const Surface& surface, int guiding, const CaseConfig& config,
-                                      Method method) {
+Result<Alignment> align(const Points& points, double observed_sd_mm,
+                        const registration::TargetSurface& surface, int guiding,
+                        const CaseConfig& config) {
   registration::IcpOptions options;
   options.rotation = config.scene.rotation != Carry::kOff;
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
@@ -90,10 +95,8 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
   options.welsch_scale_mm = fitting_scale_mm(icp->weights, options);
   icp = registration::align(points, surface, icp->T_surface_points, options);
   if (!icp) return tl::unexpected(icp.error());
-  const SparseData all = registration::sparse_data_from_alignment(
-      points, *icp, datum_sd_mm(observed_sd_mm, config.inversion, method));
   std::vector<int> inliers;
-  for (int i = 0; i < all.size(); ++i) {
+  for (int i = 0; i < icp->weights.size(); ++i) {
     if (icp->weights[i] >= kLeastWelschWeight) inliers.push_back(i);
   }
   if (inliers.size() < 3) {
@@ -103,39 +106,83 @@ Result<RegisteredObservation> aligned(const Points& points, double observed_sd_m
                     "needed; residual {:.1f} mm",
                     inliers.size(), points.cols(), icp->rms_mm));
   }
-  std::vector<int> chosen = guiding_points(static_cast<int>(inliers.size()), guiding);
-  for (int& one : chosen) one = inliers[static_cast<std::size_t>(one)];
+  Alignment alignment;
+  alignment.guiding = guiding_points(static_cast<int>(inliers.size()), guiding);
+  for (int& one : alignment.guiding) one = inliers[static_cast<std::size_t>(one)];
+  alignment.outliers = static_cast<int>(points.cols()) - static_cast<int>(inliers.size());
+  alignment.icp = std::move(*icp);
+  return alignment;
+}
+
+// Displacements by a rigid alignment (paper 2.7).
+RegisteredObservation from_alignment(const Points& points, double sd_mm, Alignment alignment) {
   RegisteredObservation registered;
-  registered.data = select(all, chosen);
-  registered.outliers = all.size() - static_cast<int>(inliers.size());
-  registered.icp = std::move(*icp);
+  registered.data = select(registration::sparse_data_from_alignment(points, alignment.icp, sd_mm),
+                           alignment.guiding);
+  registered.outliers = alignment.outliers;
+  registered.icp = std::move(alignment.icp);
+  return registered;
+}
+
+bool follows_deformation(SurfaceGuidance guidance, Method method) {
+  return guidance == SurfaceGuidance::kDistances && method == Method::kCondensed;
+}
+
+Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
+                                            const RegistrationTargets& targets,
+                                            const CaseConfig& config, Method method) {
+  const auto target = targets.tumour_distance
+                          ? registration::TargetSurface(*targets.tumour_distance)
+                          : registration::TargetSurface(targets.tumour->surface().at_rest());
+  auto alignment = align(body.points, body.sd_mm, target, config.inversion.sparse_points, config);
+  if (!alignment) return tl::unexpected(alignment.error());
+  const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
+  if (!follows_deformation(config.sensing.tumour, method)) {
+    return from_alignment(body.points, sd_mm, std::move(*alignment));
+  }
+  registration::SurfaceDistanceOptions options;
+  options.points = config.inversion.sparse_points;
+  options.sd_mm = sd_mm;
+  options.pose_sd_mm = config.sensing.probe_pose_sd_mm;
+  options.pose_sd_deg = config.sensing.probe_pose_sd_deg;
+  options.fewest = 3;
+  options.measured = "tumour boundary";
+  options.surface = "tumour";
+  auto surface = registration::SurfaceDistances::build(targets.tumour,
+                                                       body.points(Eigen::all, alignment->guiding),
+                                                       options, alignment->icp.T_surface_points);
+  if (!surface) return tl::unexpected(surface.error());
+  RegisteredObservation registered;
+  registered.surface = std::move(*surface);
+  registered.outliers = alignment->outliers;
+  registered.icp = std::move(alignment->icp);
   return registered;
 }
 
 Result<RegisteredObservation> from_surface(const CorticalSurface& body,
                                            const RegistrationTargets& targets,
                                            const CaseConfig& config, Method method) {
-  if (!targets.site) {
+  if (!targets.site || targets.craniotomy == nullptr) {
     return fail(ErrorCode::kEmptySet,
                 "cortical surface: the craniotomy of the model has no triangle to compare it with");
   }
   auto checked = geometry::check_cortical_surface(body.surface, *targets.site);
   if (!checked) return tl::unexpected(checked.error());
-  const registration::SurfacePatch& patch = targets.craniotomy;
   const SensingConfig& sensing = config.sensing;
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
-  if (sensing.surface == SurfaceGuidance::kRigid || method != Method::kCondensed) {
-    const auto index = geometry::ClosestPointIndex::build(patch.surface);
-    if (!index) return tl::unexpected(index.error());
-    return aligned(body.surface.vertices, body.sd_mm, *index, sensing.surface_points, config,
-                   method);
+  if (!follows_deformation(sensing.surface, method)) {
+    auto alignment = align(body.surface.vertices, body.sd_mm,
+                           targets.craniotomy->surface().at_rest(), sensing.surface_points, config);
+    if (!alignment) return tl::unexpected(alignment.error());
+    return from_alignment(body.surface.vertices, sd_mm, std::move(*alignment));
   }
   registration::SurfaceDistanceOptions options;
   options.points = sensing.surface_points;
   options.sd_mm = sd_mm;
   options.pose_sd_mm = sensing.surface_pose_sd_mm;
   options.pose_sd_deg = sensing.surface_pose_sd_deg;
-  auto surface = registration::SurfaceDistances::build(patch, body.surface.vertices, options);
+  auto surface =
+      registration::SurfaceDistances::build(targets.craniotomy, body.surface.vertices, options);
   if (!surface) return tl::unexpected(surface.error());
   RegisteredObservation registered;
   registered.surface = std::move(*surface);
@@ -166,11 +213,7 @@ Result<RegisteredObservation> register_body(const Observation& observation,
                                             const RegistrationTargets& targets,
                                             const CaseConfig& config, Method method) {
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    const auto to = [&](const auto& surface) {
-      return aligned(boundary->points, boundary->sd_mm, surface, config.inversion.sparse_points,
-                     config, method);
-    };
-    return targets.tumour_distance ? to(*targets.tumour_distance) : to(targets.tumour);
+    return from_boundary(*boundary, targets, config, method);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
     return from_landmarks(*pairs, config.inversion, method);
@@ -192,12 +235,15 @@ Result<RegisteredObservation> register_body(const Observation& observation,
 }  // namespace
 
 Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) {
-  auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  RegistrationTargets targets;
+  auto tumour = registration::IndexedPatch::build(registration::tumour_patch(model));
   if (!tumour) return tl::unexpected(tumour.error());
-  RegistrationTargets targets{std::move(*tumour), std::nullopt,
-                              registration::craniotomy_patch(model), std::nullopt};
+  targets.tumour = std::move(*tumour);
   if (auto distance = geometry::DistanceVolume::create(model.tumour_distance)) {
     targets.tumour_distance = std::move(*distance);
+  }
+  if (auto patch = registration::IndexedPatch::build(registration::craniotomy_patch(model))) {
+    targets.craniotomy = std::move(*patch);
   }
   if (const auto site = geometry::craniotomy_site(model)) targets.site = *site;
   return targets;

@@ -4,7 +4,12 @@
 //   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then
 //                    a random subset of inversion.sparse_points boundary points (paper 2.6), always
 //                    the same one for the same number of points. scene.rotation = off: translation
-//                    only; on: about every axis, however little the points show of it
+//                    only; on: about every axis, however little the points show of it. By
+//                    sensing.tumour:
+//                    distances  along the normal of the model's tumour, made anew for every
+//                               estimate (registration/surface_distances.hpp; method condensed).
+//                               The pose is where they start; it tells gross outliers too
+//                    rigid      displacements by the pose, with its errors (other methods)
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs
 //   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise,
 //                    and by sensing.surface:
@@ -22,11 +27,11 @@
 // aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "common/core/error.hpp"
-#include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface_check.hpp"
 #include "common/registration/icp.hpp"
@@ -42,7 +47,7 @@ struct RegisteredObservation {
   std::string source;
   std::uint64_t sequence = 0;
   std::int64_t acquired_ns = 0;
-  SparseData data;                                        // one named source; empty with `surface`
+  SparseData data;                                        // empty with `surface`
   int outliers = 0;                                       // points that the alignment left aside
   std::optional<registration::IcpResult> icp;             // when the observation had to be aligned
   std::optional<registration::SurfaceDistances> surface;  // data that follow the deformation
@@ -53,18 +58,20 @@ struct RegistrationTargets {
   // kEmptySet or kNotFinite when the model has no usable tumour surface.
   static Result<RegistrationTargets> build(const BrainModel& model);
 
-  geometry::ClosestPointIndex tumour;
+  std::shared_ptr<const registration::IndexedPatch> tumour;
   // The same by interpolation, some thirty times faster. Models whose tumour is not closed have
   // none.
   std::optional<geometry::DistanceVolume> tumour_distance;
-  registration::SurfacePatch craniotomy;
-  std::optional<geometry::CorticalSite> site;  // none: no cortical surface is taken
+  // Null where the model has no triangle there: no cortical surface is taken.
+  std::shared_ptr<const registration::IndexedPatch> craniotomy;
+  std::optional<geometry::CorticalSite> site;
 };
 
 // kInvalidArgument: a body that is not assimilated, landmark counts that differ, fewer than 3
 // points. The sentence names the observation and the count. Precondition: the observation's numbers
 // are finite, as wire::decode_observation gives them. (Data that are not are rejected further on,
-// by check_data or by registration, with kNotFinite.)
+// by check_data or by registration, with kNotFinite.) The result refers to nothing of the targets
+// but what it shares.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config,

@@ -4,11 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 
 #include "common/core/random.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/registration/alignment_data.hpp"
+#include "common/registration/icp.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::registration {
@@ -37,7 +43,13 @@ SurfacePatch cap() {
   }
   patch.surface.triangles = Eigen::Map<Eigen::Matrix<int, 3, Eigen::Dynamic>>(
       corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
+  patch.weights.resize(kSide * kSide, kSide * kSide);
+  patch.weights.setIdentity();
   return patch;
+}
+
+std::shared_ptr<const IndexedPatch> indexed(SurfacePatch patch) {
+  return IndexedPatch::build(std::move(patch)).value();
 }
 
 Points points_on_cap(int count, double half_width, std::uint64_t seed = 1) {
@@ -56,7 +68,7 @@ Points still(const SurfaceDistances& surface) {
 }
 
 SurfaceDistances built(const Points& measured, const SurfaceDistanceOptions& options = {}) {
-  auto made = SurfaceDistances::build(cap(), measured, options);
+  auto made = SurfaceDistances::build(indexed(cap()), measured, options);
   EXPECT_TRUE(made.has_value());
   return std::move(*made);
 }
@@ -75,6 +87,28 @@ TEST(SurfaceDistances, OfASunkenCortexAreTheDepthAlongItsNormal) {
     EXPECT_NEAR(n.dot(data.displacements.col(i)), n.dot(sink), 0.02);
     EXPECT_LT((data.displacements.col(i) - n * n.dot(data.displacements.col(i))).norm(), 1e-12);
   }
+}
+
+// A distance hardly notices where along the surface it is taken.
+TEST(SurfaceDistances, AreSettledAcrossTheSurfaceSoonerThanAlongIt) {
+  const SurfaceDistances surface = built(points_on_cap(400, 6.0));
+  const SparseData before = surface.at(still(surface));
+  const SurfaceDistanceOptions settled;
+  const auto moved = [&](double across_mm, double along_mm) {
+    SparseData now = before;
+    const Vec3 n = now.directions.col(7);
+    now.positions.col(7) += across_mm * n + along_mm * n.unitOrthogonal();
+    return surface.moved(before, now);
+  };
+  EXPECT_FALSE(moved(0.9 * settled.settled_mm, 0.0));
+  EXPECT_TRUE(moved(-1.1 * settled.settled_mm, 0.0));
+  EXPECT_FALSE(moved(0.0, 0.9 * settled.settled_along_mm));
+  EXPECT_TRUE(moved(0.0, 1.1 * settled.settled_along_mm));
+  SparseData fewer = before;
+  fewer.positions.conservativeResize(3, before.size() - 1);
+  fewer.displacements.conservativeResize(3, before.size() - 1);
+  fewer.sd_mm.conservativeResize(before.size() - 1);
+  EXPECT_TRUE(surface.moved(before, fewer));
 }
 
 TEST(SurfaceDistances, OfTheRightDeformationAreExactWhateverSlid) {
@@ -127,38 +161,253 @@ TEST(SurfaceDistances, TheCamerasPoseIsACommonError) {
 
 TEST(SurfaceDistances, RefuseWhatLiesElsewhereOrIsNotFinite) {
   const auto far =
-      SurfaceDistances::build(cap(), points_on_cap(100, 8.0).colwise() + Vec3(0, 0, 80));
+      SurfaceDistances::build(indexed(cap()), points_on_cap(100, 8.0).colwise() + Vec3(0, 0, 80));
   ASSERT_FALSE(far.has_value());
   EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(far.error().message, HasSubstr("0 of 100 points lie over the craniotomy"));
   Points measured = points_on_cap(100, 8.0);
   measured(1, 17) = std::numeric_limits<double>::quiet_NaN();
-  const auto not_finite = SurfaceDistances::build(cap(), measured);
+  const auto not_finite = SurfaceDistances::build(indexed(cap()), measured);
   ASSERT_FALSE(not_finite.has_value());
   EXPECT_EQ(not_finite.error().code, ErrorCode::kNotFinite);
   EXPECT_THAT(not_finite.error().message, HasSubstr("point 17"));
-  const auto nothing = SurfaceDistances::build(SurfacePatch{}, points_on_cap(100, 8.0));
+  const auto nothing = IndexedPatch::build(SurfacePatch{});
   ASSERT_FALSE(nothing.has_value());
   EXPECT_EQ(nothing.error().code, ErrorCode::kEmptySet);
 }
 
-TEST(CraniotomyPatch, HoldsTheBoundaryTrianglesBetweenCraniotomyNodes) {
-  const BrainModel patient = test_support::toy_patient(8);
-  const SurfacePatch patch = craniotomy_patch(patient);
-  ASSERT_GT(patch.surface.num_triangles(), 4);
-  EXPECT_EQ(patch.nodes.size(), patient.craniotomy.size());
-  for (int t = 0; t < patch.surface.num_triangles(); ++t) {
-    const auto corners = patch.surface.triangles.col(t);
-    const Vec3 a = patch.surface.vertices.col(corners[0]);
-    const Vec3 n = (Vec3(patch.surface.vertices.col(corners[1])) - a)
-                       .cross(Vec3(patch.surface.vertices.col(corners[2])) - a);
-    EXPECT_GT(n.z(), 0.0) << "outwards is up";
-    for (int k = 0; k < 3; ++k) {
-      EXPECT_EQ(patch.surface.vertices.col(corners[k]),
-                patient.mesh.nodes.col(patch.nodes[static_cast<std::size_t>(corners[k])]));
+TEST(SurfaceDistances, OfAnEstimateThatIsNotFiniteAreNone) {
+  const SurfaceDistances surface = built(points_on_cap(100, 8.0));
+  Points u = still(surface);
+  u(0, 5) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(surface.at(u).size(), 0);
+}
+
+// ---- the tumour ----
+
+constexpr double kRadius_mm = 10.0;
+
+// The toy patient with a tumour of these semi-axes, well inside the brain.
+BrainModel patient_with(const Vec3& semi_axes_mm, double edge_mm = 1.5) {
+  BrainModel patient = test_support::toy_patient(8);
+  patient.tumour = geometry::ellipsoid_surface(Vec3(30, 30, 33), semi_axes_mm, edge_mm);
+  return patient;
+}
+
+Points boundary_points(const TriangleSurface& tumour, const Points& vertices, int count = 400) {
+  return geometry::sample_surface({vertices, tumour.triangles}, count, 3);
+}
+
+SurfaceDistances of_tumour(const BrainModel& patient, const Points& measured,
+                           const RigidTransform& T = RigidTransform::Identity(),
+                           SurfaceDistanceOptions options = {}) {
+  options.points = 400;
+  auto made = SurfaceDistances::build(indexed(tumour_patch(patient)), measured, options, T);
+  EXPECT_TRUE(made.has_value());
+  return std::move(*made);
+}
+
+// The amplitude a of the displacement a (x - centre) that data show when nothing else moves but
+// what their common errors allow: its estimate and standard deviation by generalised least squares.
+struct Amplitude {
+  double value = 0.0, sd = 0.0;
+};
+
+Amplitude dilation_shown_by(const SparseData& data) {
+  const Vec3 centre(30, 30, 33);
+  const auto rows_of = [&](const VecX& field) {  // along the directions; 3 rows for whole data
+    VecX rows(data.rows());
+    Eigen::Index row = 0;
+    for (int i = 0; i < data.size(); ++i) {
+      const Vec3 value = field.segment<3>(3 * i);
+      if (data.along_direction(i)) {
+        rows[row++] = data.directions.col(i).dot(value);
+      } else {
+        rows.segment<3>(row) = value;
+        row += 3;
+      }
     }
+    return rows;
+  };
+  const Points growth = data.positions.colwise() - centre;
+  const VecX signal = rows_of(growth.reshaped()), seen = rows_of(data.displacements.reshaped());
+  Eigen::MatrixXd covariance =
+      data.sd_mm[0] * data.sd_mm[0] * Eigen::MatrixXd::Identity(signal.size(), signal.size());
+  for (const auto column : data.common_error.colwise()) {
+    const VecX rows = rows_of(column);
+    covariance += rows * rows.transpose();
   }
-  EXPECT_EQ(craniotomy_patch(BrainModel{}).surface.num_triangles(), 0);
+  const VecX whitened = covariance.ldlt().solve(signal);
+  return {whitened.dot(seen) / whitened.dot(signal), 1.0 / std::sqrt(whitened.dot(signal))};
+}
+
+TEST(TumourDistances, ShowADilationThatARigidAlignmentHides) {
+  const BrainModel patient = patient_with(Vec3::Constant(kRadius_mm));
+  const Vec3 centre(30, 30, 33);
+  const Points grown = (1.05 * (patient.tumour.vertices.colwise() - centre)).colwise() + centre;
+  const Points measured = boundary_points(patient.tumour, grown);
+  SurfaceDistanceOptions options;
+  options.pose_sd_mm = 1.0;
+  options.pose_sd_deg = 1.0;
+  const SurfaceDistances surface =
+      of_tumour(patient, measured, RigidTransform::Identity(), options);
+  const Amplitude shown = dilation_shown_by(surface.first());
+  EXPECT_NEAR(shown.value, 0.05, 0.002);
+  EXPECT_LT(shown.sd, 0.005);
+
+  const auto index = geometry::ClosestPointIndex::build(patient.tumour);
+  ASSERT_TRUE(index);
+  const auto icp = align(measured, *index, RigidTransform::Identity());
+  ASSERT_TRUE(icp);
+  const Amplitude hidden = dilation_shown_by(sparse_data_from_alignment(measured, *icp, 0.5));
+  EXPECT_NEAR(hidden.value, 0.0, 0.005);
+  EXPECT_GT(hidden.sd, 0.05);
+}
+
+TEST(TumourDistances, OfABallSayNothingOfItsRotation) {
+  const BrainModel patient = patient_with(Vec3::Constant(kRadius_mm));
+  const SurfaceDistances surface =
+      of_tumour(patient, boundary_points(patient.tumour, patient.tumour.vertices));
+  const SparseData data = surface.first();
+  ASSERT_EQ(data.size(), 400);
+  const Vec3 w(0.3, -0.5, 0.8);
+  for (int i = 0; i < data.size(); ++i) {
+    const Vec3 turned = w.cross(Vec3(data.positions.col(i)) - Vec3(30, 30, 33));
+    // Rows of facet normals would be up to 0.08 of the motion.
+    EXPECT_NEAR(data.directions.col(i).dot(turned), 0.0, 1e-2 * kRadius_mm * w.norm());
+  }
+}
+
+// A rigid motion far larger than the tumour's curvature allows closest points to find.
+RigidTransform large_motion() {
+  RigidTransform motion = RigidTransform::Identity();
+  motion.linear() = Eigen::AngleAxisd(0.1, Vec3(1, -1, 2).normalized()).toRotationMatrix();
+  motion.translation() = Vec3(9, -14, -6);
+  return motion;
+}
+
+TEST(TumourDistances, StartFromTheRigidMotionWhereTheShiftExceedsTheTumour) {
+  const BrainModel patient = patient_with(Vec3(12, 9, 7));
+  const RigidTransform motion = large_motion();
+  const Points measured =
+      (motion.linear() * boundary_points(patient.tumour, patient.tumour.vertices)).colwise() +
+      Vec3(motion.translation());
+  const SparseData data = of_tumour(patient, measured, motion.inverse()).first();
+  ASSERT_EQ(data.size(), 400);
+  for (int i = 0; i < data.size(); ++i) {
+    const Vec3 x = data.positions.col(i), n = data.directions.col(i);
+    EXPECT_NEAR(n.dot(data.displacements.col(i)), n.dot(motion * x - x), 1e-6) << i;
+  }
+}
+
+// Fields that are linear in space with a small quadratic part, by their 21 amplitudes.
+constexpr int kAmplitudes = 21;
+VecX powers(const Vec3& x) {
+  const Vec3 y = (x - Vec3(30, 30, 33)) / kRadius_mm;
+  VecX values(7);
+  values << 1.0, y, y[0] * y[0], y[1] * y[1], y[2] * y[2];
+  return values;
+}
+Vec3 field_at(const Vec3& x, const VecX& amplitudes) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 7>>(amplitudes.data()) * powers(x);
+}
+Points field_at_all(const Points& x, const VecX& amplitudes) {
+  Points u(3, x.cols());
+  for (Eigen::Index i = 0; i < x.cols(); ++i) u.col(i) = field_at(x.col(i), amplitudes);
+  return u;
+}
+
+// Posterior mean of the amplitudes given the data. Standard deviations, mm at the tumour's surface:
+// shift 20, linear 0.5, quadratic 0.2.
+VecX toy_inversion(const SparseData& data) {
+  VecX information(kAmplitudes);
+  information << VecX::Constant(3, 1.0 / 400.0), VecX::Constant(9, 4.0), VecX::Constant(9, 25.0);
+  Eigen::MatrixXd normal = information.asDiagonal();
+  VecX right = VecX::Zero(kAmplitudes);
+  for (int i = 0; i < data.size(); ++i) {
+    const Vec3 n = data.directions.col(i);
+    VecX row(kAmplitudes);
+    Eigen::Map<Eigen::Matrix<double, 3, 7>>(row.data()) =
+        n * powers(data.positions.col(i)).transpose();
+    const double weight = 1.0 / (data.sd_mm[i] * data.sd_mm[i]);
+    normal += weight * row * row.transpose();
+    right += weight * n.dot(data.displacements.col(i)) * row;
+  }
+  return normal.ldlt().solve(right);
+}
+
+TEST(TumourDistances, AndAnInversionInTurnFindTheDeformedSurfaceAndSettle) {
+  const BrainModel patient = patient_with(Vec3(12, 9, 7));
+  VecX truth(kAmplitudes);
+  truth << 9.0, -14.0, -6.0, 0.5, 0.3, -0.2, -0.4, 0.6, 0.2, 0.1, -0.3, -0.5, 0.2, 0.0, 0.1, 0.0,
+      0.2, 0.0, -0.1, 0.0, 0.2;
+  const TriangleSurface& tumour = patient.tumour;
+  const Points true_vertices = tumour.vertices + field_at_all(tumour.vertices, truth);
+  SurfaceDistanceOptions options;
+  options.sd_mm = 0.05;
+  RigidTransform start = RigidTransform::Identity();  // as an ICP finds the shift
+  start.translation() = -truth.head<3>();
+  const SurfaceDistances surface =
+      of_tumour(patient, boundary_points(tumour, true_vertices), start, options);
+  const Points at_nodes = patient.mesh.nodes(Eigen::all, surface.nodes());
+  SparseData data = surface.first();
+  VecX estimate = toy_inversion(data);
+  int rounds = 1;
+  for (; rounds < 20; ++rounds) {
+    SparseData now = surface.at(field_at_all(at_nodes, estimate));
+    if (!surface.moved(data, now)) break;
+    data = std::move(now);
+    estimate = toy_inversion(data);
+  }
+  EXPECT_LE(rounds, 6);
+  const auto found = geometry::ClosestPointIndex::build(
+      {tumour.vertices + field_at_all(tumour.vertices, estimate), tumour.triangles});
+  ASSERT_TRUE(found);
+  double farthest = 0.0;
+  for (const auto vertex : true_vertices.colwise()) {
+    farthest = std::max(farthest, found->closest(vertex).distance_mm);
+  }
+  EXPECT_LT(farthest, 0.05);
+  // Sliding included, as far as the shape and the prior show it.
+  EXPECT_LT((estimate - truth).head<3>().norm(), 0.2);
+}
+
+TEST(TumourDistances, OfAnOpenSurfaceLeaveOutThePointsBesideIt) {
+  BrainModel patient = patient_with(Vec3::Constant(kRadius_mm));
+  const TriangleSurface whole = patient.tumour;
+  std::vector<int> lower;
+  for (int t = 0; t < whole.num_triangles(); ++t) {
+    if (whole.vertices(2, whole.triangles(0, t)) < 33.0) lower.push_back(t);
+  }
+  patient.tumour.triangles = whole.triangles(Eigen::all, lower);
+  const Points measured = boundary_points(whole, whole.vertices, 200);
+  const SparseData data = of_tumour(patient, measured).first();
+  EXPECT_GT(data.size(), 70);
+  EXPECT_LT(data.size(), 130);
+  for (int i = 0; i < data.size(); ++i) {
+    EXPECT_LT(data.positions(2, i), 36.0);
+    EXPECT_NEAR(data.displacements.col(i).norm(), 0.0, 1e-6);
+  }
+}
+
+TEST(TumourDistances, RefusePointsFarFromTheSurfaceInTheirOwnWords) {
+  const BrainModel patient = patient_with(Vec3::Constant(kRadius_mm));
+  const Points away =
+      boundary_points(patient.tumour, patient.tumour.vertices, 50).colwise() + Vec3(0, 70, 0);
+  SurfaceDistanceOptions options;
+  options.fewest = 3;
+  options.measured = "tumour boundary";
+  options.surface = "tumour";
+  const auto patch = indexed(tumour_patch(patient));
+  const auto far = SurfaceDistances::build(patch, away, options);
+  ASSERT_FALSE(far);
+  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(far.error().message,
+              HasSubstr("tumour boundary: 0 of 50 points lie over the tumour within 30 mm, at "
+                        "least 3 are needed"));
+  RigidTransform back = RigidTransform::Identity();
+  back.translation() = Vec3(0, -70, 0);
+  EXPECT_TRUE(SurfaceDistances::build(patch, away, options, back));
 }
 
 }  // namespace
