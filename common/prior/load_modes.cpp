@@ -1,75 +1,216 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/prior/load_modes.hpp"
 
+#include <Eigen/Geometry>
+#include <cassert>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <vector>
 
+#include "common/contact/tissues.hpp"
+#include "common/core/units.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/fem/swelling.hpp"
+#include "common/geometry/surface.hpp"
 
 namespace brainshift::prior {
 namespace {
 
-void fill_gravity(const BrainModel& model, const CaseConfig& config,
-                  Eigen::Ref<Eigen::MatrixXd> modes) {
-  const Vec3 g = model.gravity_direction;
+// Collects columns part by part.
+class Columns {
+ public:
+  explicit Columns(Eigen::Index rows) : rows_(rows) {}
+  void add(PriorPart part, double sd, const Points& load) {
+    values_.insert(values_.end(), load.data(), load.data() + load.size());
+    Eigen::Map<VecX>(values_.data() + values_.size() - load.size(), load.size()) *= sd;
+    ++of_part_[static_cast<std::size_t>(part)];
+  }
+  LoadModes modes() const {
+    const auto columns = static_cast<Eigen::Index>(values_.size()) / rows_;
+    return {Eigen::Map<const Eigen::MatrixXd>(values_.data(), rows_, columns), of_part_};
+  }
+
+ private:
+  Eigen::Index rows_;
+  std::vector<double> values_;
+  PerPart<int> of_part_{};
+};
+
+// Two unit vectors across `along` and across one another.
+std::pair<Vec3, Vec3> across(const Vec3& along) {
   int least = 0;
-  g.cwiseAbs().minCoeff(&least);
-  const Vec3 across = g.cross(Vec3::Unit(least)).normalized();
-  const Vec3 directions[] = {g, across, g.cross(across)};
-  const double across_sd = config.prior.gravity_mode_sd *
-                           std::tan(config.prior.gravity_direction_sd_deg * std::numbers::pi / 180);
-  for (Eigen::Index column = 0; column < modes.cols(); ++column) {
-    const double level = config.prior.gravity_levels_mm[static_cast<std::size_t>(column / 3)];
-    const double sd = column % 3 == 0 ? config.prior.gravity_mode_sd : across_sd;
-    const Points load = fem::buoyancy_load(
-        model.mesh, config.material, g, model.fluid_plane_depth_mm + level, directions[column % 3]);
-    modes.col(column) = sd * Eigen::Map<const VecX>(load.data(), load.size());
+  along.cwiseAbs().minCoeff(&least);
+  const Vec3 first = along.cross(Vec3::Unit(least)).normalized();
+  return {first, along.cross(first)};
+}
+
+void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out) {
+  const PriorConfig& prior = config.prior;
+  if (prior.gravity_mode_sd == 0.0) return;
+  const Vec3 g = model.gravity_direction;
+  const auto load = [&](double level_mm, const Vec3& direction) {
+    return fem::buoyancy_load(model.mesh, config.material, g, model.fluid_plane_depth_mm + level_mm,
+                              direction);
+  };
+  for (const double level : prior.gravity_levels_mm) {
+    out.add(PriorPart::kAlongGravity, prior.gravity_mode_sd, load(level, g));
+  }
+  const double across_sd =
+      prior.gravity_mode_sd * std::tan(prior.gravity_direction_sd_deg * std::numbers::pi / 180.0);
+  if (across_sd == 0.0) return;
+  const auto [first, second] = across(g);
+  for (const double level : prior.gravity_levels_mm) {
+    out.add(PriorPart::kAcrossGravity, across_sd, load(level, first));
+    out.add(PriorPart::kAcrossGravity, across_sd, load(level, second));
   }
 }
 
-void fill_swelling(const BrainModel& model, const CaseConfig& config,
-                   Eigen::Ref<Eigen::MatrixXd> modes) {
+void add_tumour_volume(const BrainModel& model, const PriorConfig& prior,
+                       const std::vector<fem::Elasticity>& of_tet, Columns& out) {
+  const auto& radii = prior.tumour_volume_radii_mm;
+  if (prior.tumour_volume_strain_sd == 0.0 || radii.empty()) return;
   const Vec3 centre = model.tumour.vertices.rowwise().mean();
-  const auto& radii = config.prior.swelling_radii_mm;
-  const double sd = config.prior.swelling_strain_sd / std::sqrt(static_cast<double>(radii.size()));
-  for (Eigen::Index column = 0; column < modes.cols(); ++column) {
-    const double radius = radii[static_cast<std::size_t>(column / 4)];
-    const Eigen::Index kind = column % 4;
-    const Points load = fem::swelling_load(model.mesh, config.material, [&](const Vec3& x) {
-      const Vec3 arm = (x - centre) / radius;
-      const double gaussian = std::exp(-0.5 * arm.squaredNorm());
-      return kind == 0 ? gaussian : std::exp(0.5) * arm[kind - 1] * gaussian;
-    });
-    modes.col(column) = sd * Eigen::Map<const VecX>(load.data(), load.size());
+  const double sd = prior.tumour_volume_strain_sd / std::sqrt(static_cast<double>(radii.size()));
+  for (const double radius : radii) {
+    for (int kind = 0; kind < 4; ++kind) {
+      const auto strain = [&](const Vec3& x) {
+        const Vec3 arm = (x - centre) / radius;
+        const double gaussian = std::exp(-0.5 * arm.squaredNorm());
+        return kind == 0 ? gaussian : std::exp(0.5) * arm[kind - 1] * gaussian;
+      };
+      out.add(PriorPart::kTumourVolume, sd, fem::swelling_load(model.mesh, of_tet, strain));
+    }
+  }
+}
+
+void add_brain_volume(const BrainModel& model, const PriorConfig& prior,
+                      const std::vector<fem::Elasticity>& of_tet, Columns& out) {
+  if (prior.brain_volume_strain_sd == 0.0) return;
+  const Vec3 low = model.mesh.nodes.rowwise().minCoeff();
+  const Vec3 high = model.mesh.nodes.rowwise().maxCoeff();
+  const Vec3 middle = 0.5 * (low + high), half = 0.5 * (high - low);
+  const auto add = [&](const auto& strain) {
+    out.add(PriorPart::kBrainVolume, prior.brain_volume_strain_sd,
+            fem::swelling_load(model.mesh, of_tet, strain));
+  };
+  add([](const Vec3&) { return 1.0; });
+  add([&](const Vec3& x) { return std::tanh((x.x() - middle.x()) / kMidlineWidth_mm); });
+  add([&](const Vec3& x) { return (x.y() - middle.y()) / half.y(); });
+  add([&](const Vec3& x) { return (x.z() - middle.z()) / half.z(); });
+}
+
+void add_resection(const BrainModel& model, const CaseConfig& config, Columns& out) {
+  const Vec3 centre = model.tumour.vertices.rowwise().mean();
+  const double radius = std::cbrt(std::abs(geometry::enclosed_volume(model.tumour))) /
+                        std::sqrt(2.0 * std::numbers::pi);
+  const auto weight = [&](const Vec3& x) {
+    return std::exp(-0.5 * (x - centre).squaredNorm() / (radius * radius));
+  };
+  if (config.prior.resection_weight_sd > 0.0) {
+    const double density =
+        units::weight_density_from_kg_m3(config.material.tissue_density_kg_m3);  // N/mm^3
+    const VecX volumes = fem::nodal_volumes(model.mesh);
+    for (int axis = 0; axis < 3; ++axis) {
+      Points load = Points::Zero(3, model.mesh.num_nodes());
+      for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+        load(axis, i) = density * volumes[i] * weight(model.mesh.nodes.col(i));
+      }
+      out.add(PriorPart::kResection, config.prior.resection_weight_sd, load);
+    }
+  }
+  if (config.prior.resection_stress_sd_pa > 0.0) {
+    const double sd = units::stress_from_pa(config.prior.resection_stress_sd_pa);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = i; j < 3; ++j) {
+        Mat3 component = Mat3::Zero();
+        component(i, j) = component(j, i) = 1.0;
+        out.add(PriorPart::kResection, sd,
+                fem::initial_stress_load(
+                    model.mesh, [&](const Vec3& x) -> Mat3 { return weight(x) * component; }));
+      }
+    }
+  }
+}
+
+// Forces of the traction that a function of the node gives, on the triangles between three
+// craniotomy nodes: a third of a triangle's area to each corner.
+struct Opening {
+  std::vector<NodeIndex> nodes;
+  VecX areas_mm2;  // per node
+  Vec3 normal = Vec3::Zero();
+  bool empty() const { return nodes.empty(); }
+};
+
+Opening opening_of(const BrainModel& model) {
+  const std::set<NodeIndex> inside(model.craniotomy.begin(), model.craniotomy.end());
+  VecX area = VecX::Zero(model.mesh.num_nodes());
+  Opening opening;
+  for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
+    const Eigen::Vector3i corner = model.boundary_triangles.col(t);
+    if (!inside.count(corner[0]) || !inside.count(corner[1]) || !inside.count(corner[2])) continue;
+    const Vec3 a = model.mesh.nodes.col(corner[0]), b = model.mesh.nodes.col(corner[1]),
+               c = model.mesh.nodes.col(corner[2]);
+    const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
+    opening.normal += vector_area;
+    for (const int node : corner) area[node] += vector_area.norm() / 3.0;
+  }
+  for (const NodeIndex node : inside) {
+    if (area[node] > 0.0) opening.nodes.push_back(node);
+  }
+  if (opening.nodes.empty()) return opening;
+  opening.areas_mm2 = area(opening.nodes);
+  opening.normal.normalize();
+  return opening;
+}
+
+void add_opening(const BrainModel& model, const PriorConfig& prior, Columns& out) {
+  if (prior.opening_pressure_sd_pa == 0.0) return;
+  const Opening opening = opening_of(model);
+  if (opening.empty()) return;
+  const auto add = [&](const auto& traction) {
+    Points load = Points::Zero(3, model.mesh.num_nodes());
+    for (std::size_t i = 0; i < opening.nodes.size(); ++i) {
+      load.col(opening.nodes[i]) = opening.areas_mm2[static_cast<Eigen::Index>(i)] *
+                                   traction(Vec3(model.mesh.nodes.col(opening.nodes[i])));
+    }
+    out.add(PriorPart::kOpening, units::stress_from_pa(prior.opening_pressure_sd_pa), load);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    add([axis](const Vec3&) -> Vec3 { return Vec3::Unit(axis); });
+  }
+  const Points nodes = model.mesh.nodes(Eigen::all, opening.nodes);
+  const Vec3 centre = nodes.rowwise().mean();
+  const auto [first, second] = across(opening.normal);
+  for (const Vec3& direction : {first, second}) {
+    const double reach = (direction.transpose() * (nodes.colwise() - centre)).cwiseAbs().maxCoeff();
+    add([&](const Vec3& x) -> Vec3 { return direction.dot(x - centre) / reach * opening.normal; });
   }
 }
 
 }  // namespace
 
-LoadModeCounts load_mode_counts(const PriorConfig& config) {
-  LoadModeCounts counts;
-  if (config.gravity_mode_sd > 0.0) {
-    counts.gravity = 3 * static_cast<int>(config.gravity_levels_mm.size());
-  }
-  if (config.swelling_strain_sd > 0.0) {
-    counts.swelling = 4 * static_cast<int>(config.swelling_radii_mm.size());
-  }
-  return counts;
+Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) {
+  const auto tissues = contact::tissue_map(model, config.material);
+  if (!tissues) return tl::unexpected(tissues.error());
+  const std::vector<fem::Elasticity> of_tet = tissues->elastic();
+  Columns columns(model.mesh.nodes.size());
+  add_gravity(model, config, columns);
+  add_tumour_volume(model, config.prior, of_tet, columns);
+  add_brain_volume(model, config.prior, of_tet, columns);
+  add_resection(model, config, columns);
+  add_opening(model, config.prior, columns);
+  return columns.modes();
 }
 
-Eigen::MatrixXd load_modes(const BrainModel& model, const CaseConfig& config) {
-  const LoadModeCounts counts = load_mode_counts(config.prior);
-  Eigen::MatrixXd modes(model.mesh.nodes.size(), counts.all());
-  fill_gravity(model, config, modes.leftCols(counts.gravity));
-  fill_swelling(model, config, modes.rightCols(counts.swelling));
-  return modes;
-}
-
-PriorPart prior_part(int column, const LoadModeCounts& counts) {
-  if (column >= counts.all()) return PriorPart::kOther;
-  if (column >= counts.gravity) return PriorPart::kSwelling;
-  return column % 3 == 0 ? PriorPart::kAlongGravity : PriorPart::kAcrossGravity;
+PriorPart part_of_column(int column, const PerPart<int>& of_part) {
+  int last = 0;
+  for (std::size_t part = 0; part < of_part.size(); ++part) {
+    last += of_part[part];
+    if (column < last) return static_cast<PriorPart>(part);
+  }
+  assert(false);
+  return PriorPart::kCoarse;
 }
 
 }  // namespace brainshift::prior

@@ -1,36 +1,55 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Load modes of the prior: a few nodal force fields for what is physically uncertain about the
-// loads, each times the standard deviation that the case gives it.
+// Load modes of the prior: families of nodal force fields for what a surgery does to a brain, each
+// column times the standard deviation that the case gives its family.
 //
-//   gravity   for each fluid level of the case the buoyancy of a fluid plane at that level: along
-//             gravity (drainage is unknown) and along the two directions across it (pose is
-//             unknown); three columns (along, across, across) per level
-//   swelling  tissue that changes its volume by the strain theta around the tumour's centre c
-//             (fem/swelling.hpp); four columns for each radius s of the case, r = |x - c|:
-//               theta = exp(-r^2 / 2 s^2)
-//               theta = (x_i - c_i) / s exp(1/2 - r^2 / 2 s^2), i = 1, 2, 3, for a centre that is
-//                       not c; the largest value is 1 too
-// The standard deviation of swelling is shared by the radii, so that theta(c) as a whole has it.
+//   along, across gravity  for each fluid level of the case the buoyancy of a fluid plane at that
+//                          level: along gravity (drainage is unknown), and along the two directions
+//                          across it (pose is unknown)
+//   tumour volume          tissue that changes its volume by the strain theta around the tumour's
+//                          centre c (fem/swelling.hpp); four columns for each radius s of the case,
+//                          r = |x - c|:
+//                            theta = exp(-r^2 / 2 s^2)
+//                            theta = (x_i - c_i) / s exp(1/2 - r^2 / 2 s^2), i = 1, 2, 3, for a
+//                                    centre that is not c; the largest value is 1 too
+//                          The standard deviation is shared by the radii, so that theta(c) as a
+//                          whole has it
+//   brain volume           the same strain in the whole brain, theta = 1; with opposite sign in the
+//                          hemispheres, theta = tanh(x / kMidlineWidth_mm) of the distance x from
+//                          the brain's middle to the right; and growing from back to front and from
+//                          below, -1 to 1
+//   resection              w = exp(-r^2 / 2 s^2), whose integral over space is the tumour's volume
+//                          (2 pi)^(3/2) s^3. A weight w rho g along each axis, rho g that of tissue
+//                          in air; and an initial stress w sigma0, one of its six components at a
+//                          time
+//   opening                traction on the craniotomy's patch: constant along each axis; along its
+//                          mean normal, growing from -1 to 1 across the patch in two directions
+// Swelling honours the stiffness of tumour and regions (contact/tissues.hpp). All families have
+// zero mean and their columns are independent.
 #pragma once
 
+#include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::prior {
 
-struct LoadModeCounts {
-  int gravity = 0;
-  int swelling = 0;
-  int all() const { return gravity + swelling; }
+// Width of the step between the hemispheres.
+inline constexpr double kMidlineWidth_mm = 10.0;
+
+struct LoadModes {
+  Eigen::MatrixXd columns;    // 3n x k, N, node-major, in the order of the parts
+  PerPart<int> of_part = {};  // how many columns belong to each part; 0 for the remainders
+
+  int size() const { return static_cast<int>(columns.cols()); }
 };
-LoadModeCounts load_mode_counts(const PriorConfig& config);
 
-// 3n x all(), N: gravity, then swelling.
-Eigen::MatrixXd load_modes(const BrainModel& model, const CaseConfig& config);
+// Errors of contact::tissue_map, which name the key. A craniotomy without a triangle between three
+// of its nodes has no opening modes.
+Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config);
 
-// The part of the prior that column `column` of the load modes belongs to. Columns after the load
-// modes belong to kOther.
-PriorPart prior_part(int column, const LoadModeCounts& counts);
+// The part that column `column` belongs to when the parts have so many columns. Precondition: there
+// is such a column.
+PriorPart part_of_column(int column, const PerPart<int>& of_part);
 
 }  // namespace brainshift::prior

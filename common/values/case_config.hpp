@@ -90,30 +90,41 @@ struct ContactConfig {
   double penalty_n_per_mm = 5.0;                    // beta (section 2.3)
 };
 
-// Prior on forces: zero mean, force density with standard deviation and correlation length, plus
-// modes for what pose, drainage and the water in the tissue leave open (prior/load_modes.hpp).
+// Prior on forces, zero mean: families of loads (prior/load_modes.hpp), and a smooth remainder of
+// random force density with three correlation lengths (prior/force_prior.hpp). A standard deviation
+// of 0 leaves a family out. Where the strengths are estimated, a surgery may have up to
+// kLargestStrength times these, or none of a family.
 struct PriorConfig {
+  // Remainder: fine (the paper's), medium and coarse correlation length.
   double correlation_length_mm = 5.0;
+  double medium_length_mm = 20.0;
+  double coarse_length_mm = 60.0;
   double force_density_sd_n_m3 = 1000.0;
-  // In units of the full buoyancy load; 0 switches the modes off.
+  double medium_density_sd_n_m3 = 1000.0;
+  double coarse_density_sd_n_m3 = 1000.0;
+  // Drainage and pose, in units of the full buoyancy load.
   double gravity_mode_sd = 1.0;
   // Standard deviation of the direction of gravity. A mode across it has gravity_mode_sd times the
   // tangent of this angle.
   double gravity_direction_sd_deg = 10.0;
   // Fluid planes below the reference plane.
-  std::vector<double> gravity_levels_mm = {0.0, 20.0, 40.0};
+  std::vector<double> gravity_levels_mm = {-40.0, -20.0, 0.0, 20.0, 40.0, 60.0};
   // Volume strain of swelling or shrinking tissue around the tumour: standard deviation at its
-  // centre. 0 switches the modes off. A single surgery may have four times as much
-  // (kLargestScales). Vasogenic oedema that raises the water
-  // content of white matter from 0.70 to 0.75 adds 0.2.
-  double swelling_strain_sd = 0.05;
-  // Standard deviations of the Gaussians.
-  std::vector<double> swelling_radii_mm = {15.0, 30.0, 50.0};
-  // Method condensed: the strength of the prior's parts is estimated from the data. It starts from
-  // the standard deviations above, which count as known to a factor of 9 (two standard deviations
-  // of ln).
+  // centre. Oedema that raises the water content of white matter from 0.70 to 0.75 adds 0.2.
+  double tumour_volume_strain_sd = 0.06;
+  std::vector<double> tumour_volume_radii_mm = {15.0, 30.0, 50.0};  // sds of the Gaussians
+  // Volume strain of the whole brain and of its halves (mannitol, engorgement).
+  double brain_volume_strain_sd = 0.007;
+  // Tissue that is removed at the tumour: its weight, in units of the tumour's weight in air, and
+  // the stress that it carried.
+  double resection_weight_sd = 1.0;
+  double resection_stress_sd_pa = 300.0;
+  double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
+  // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
 };
+// Greatest strength of a part of the prior, in units of the case's standard deviation.
+inline constexpr double kLargestStrength = 8.0;
 
 struct InversionConfig {
   double sigma_mm = 0.2;    // sd of the data misfit (section 2.2)
@@ -122,12 +133,12 @@ struct InversionConfig {
   double relative_misfit_change = 0.001;  // eq. 17
 };
 
-// How a measured cortical surface guides the model.
+// How measured points of a surface guide the model.
 enum class SurfaceGuidance {
   // Distances along the normal to the deformed model's surface, which may slide along it. Method
   // condensed only.
   kDistances,
-  // Displacements of a rigid alignment, as for the tumour's boundary.
+  // Displacements of a rigid alignment (paper 2.7), as for the other methods.
   kRigid,
 };
 std::string_view to_string(SurfaceGuidance guidance);  // "distances", "rigid"
@@ -144,6 +155,11 @@ struct SensingConfig {
   // How well the camera's pose is known: an error that all points of a surface share.
   double surface_pose_sd_mm = 0.2;
   double surface_pose_sd_deg = 0.2;
+  SurfaceGuidance tumour = SurfaceGuidance::kDistances;
+  // How well the probe's pose is known: an error that all points of a boundary share
+  // (docs/decisions/0020).
+  double probe_pose_sd_mm = 0.0;
+  double probe_pose_sd_deg = 0.0;
 };
 
 // What becomes of data outside the region that was prepared (method condensed).
@@ -157,15 +173,13 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
-  // Largest number of prior modes kept, gravity and swelling modes among them. Against all modes,
-  // 128 move the estimate by less than 2 micrometres in the default scenario
-  // (docs/decisions/0008).
-  int max_rank = 128;
+  // Largest number of prior modes kept, those of the load families among them.
+  int max_rank = 192;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.
-  double deadline_ms = 1000.0;
-  int max_contact_iterations = 30;
+  double deadline_ms = 3000.0;
+  int max_contact_iterations = 100;
   // Nodes at which the standard deviation is evaluated; interpolated between them.
   int uncertainty_nodes = 600;
   OutsideRegion outside_region = OutsideRegion::kExtend;
@@ -191,6 +205,8 @@ struct SceneConfig {
 struct CaseConfig {
   std::string case_id;
   std::filesystem::path file;  // where it was read from; empty for a case made in memory
+  // What the reader of an older case file should know, a sentence each. Not written to files.
+  std::vector<std::string> notes;
 
   std::filesystem::path mri;    // T1 MRI (NIfTI); pictures are drawn on it
   std::filesystem::path brain;  // mask or skull-stripped MRI: voxels > 0 are brain

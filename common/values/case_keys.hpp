@@ -191,12 +191,24 @@ void visit(A& a, V& v) {
 
 template <typename A, Of<PriorConfig> V>
 void visit(A& a, V& v) {
-  a({"correlation_length_mm", "mm", "Correlation length L of (1 + r/L) exp(-r/L)",
-     "paper, section 2.2"},
+  a({"correlation_length_mm", "mm",
+     "Fine correlation length L of the remainder, of (1 + r/L) exp(-r/L)", "paper, section 2.2"},
     v.correlation_length_mm, between(0.1, 200.0));
-  a({"force_density_sd_n_m3", "N/m3", "Standard deviation of force density",
+  a({"medium_length_mm", "mm", "Medium correlation length of the remainder",
+     "between the paper's and the coarse one"},
+    v.medium_length_mm, between(1.0, 300.0));
+  a({"coarse_length_mm", "mm", "Coarse correlation length of the remainder",
+     "about half the width of a brain"},
+    v.coarse_length_mm, between(1.0, 300.0));
+  a({"force_density_sd_n_m3", "N/m3", "Standard deviation of the fine remainder's force density",
      "a tenth of the weight of tissue"},
     v.force_density_sd_n_m3, positive());
+  a({"medium_density_sd_n_m3", "N/m3", "The same of the medium remainder", "decision 0018",
+     "0: no such modes."},
+    v.medium_density_sd_n_m3, not_negative());
+  a({"coarse_density_sd_n_m3", "N/m3", "The same of the coarse remainder", "decision 0018",
+     "0: no such modes."},
+    v.coarse_density_sd_n_m3, not_negative());
   a({"gravity_mode_sd", "in units of the full buoyancy load",
      "Standard deviation of buoyancy modes", "", "0 switches them off."},
     v.gravity_mode_sd, not_negative());
@@ -207,24 +219,37 @@ void visit(A& a, V& v) {
   a({"gravity_levels_mm", "mm below the reference plane along gravity",
      "Fluid planes of these modes", "", "May be empty."},
     v.gravity_levels_mm, between(-300.0, 300.0));
-  a({"swelling_strain_sd", "",
-     "Volume strain of tissue that swells (oedema) or shrinks (mannitol) around the tumour, "
-     "standard "
+  a({"tumour_volume_strain_sd", "",
+     "Volume strain of tissue that swells (oedema) or shrinks around the tumour, standard "
      "deviation at its centre",
-     "docs/decisions/0014",
-     "0: no such modes. A surgery may have up to four times as much (oedema that raises the water "
-     "content of white matter from 0.70 to 0.75 adds 0.2)."},
-    v.swelling_strain_sd, between(0.0, 2.0));
-  a({"swelling_radii_mm", "mm",
+     "decision 0018",
+     "0: no such modes. Oedema that raises the water content of white matter from 0.70 to 0.75 "
+     "adds 0.2.",
+     "swelling_strain_sd"},
+    v.tumour_volume_strain_sd, between(0.0, 2.0));
+  a({"tumour_volume_radii_mm", "mm",
      "Extents of these modes, standard deviations of Gaussians about the tumour's centre", "",
-     "May be empty."},
-    v.swelling_radii_mm, between(1.0, 300.0));
-  a({"scales", "",
-     "Strength of the prior's parts (buoyancy along gravity, across it, swelling, all other "
-     "forces)",
-     "",
-     "estimated: from the data of every update, starting from the standard deviations above, which "
-     "count as known to a factor of 9 (method condensed). fixed: as above."},
+     "May be empty.", "swelling_radii_mm"},
+    v.tumour_volume_radii_mm, between(1.0, 300.0));
+  a({"brain_volume_strain_sd", "",
+     "Volume strain of the whole brain and of its halves (mannitol, engorgement), standard "
+     "deviation",
+     "decision 0018", "0: no such modes."},
+    v.brain_volume_strain_sd, between(0.0, 2.0));
+  a({"resection_weight_sd", "in units of the tumour's weight in air",
+     "Weight that is missing or added at the tumour, standard deviation", "decision 0018",
+     "0: no such modes."},
+    v.resection_weight_sd, not_negative());
+  a({"resection_stress_sd_pa", "Pa",
+     "Stress that removed tissue carried at the tumour, standard deviation", "decision 0018",
+     "0: no such modes."},
+    v.resection_stress_sd_pa, not_negative());
+  a({"opening_pressure_sd_pa", "Pa", "Pull and pressure at the craniotomy, standard deviation",
+     "decision 0018", "0: no such modes."},
+    v.opening_pressure_sd_pa, not_negative());
+  a({"scales", "", "Strength of the prior's parts", "",
+     "estimated: from the data of every update; a part that they do not need vanishes, and none "
+     "is more than eight times as strong as above (method condensed). fixed: as above."},
     v.estimate_scales, kScalesWords);
 }
 
@@ -267,18 +292,29 @@ void visit(A& a, V& v) {
     v.surface_pose_sd_mm, between(0.0, 100.0));
   a({"surface_pose_sd_deg", "degrees", "The same for the camera's direction"},
     v.surface_pose_sd_deg, between(0.0, 45.0));
+  a({"tumour", "", "How measured points of the tumour's boundary guide the model", "",
+     "distances: along the normal to the deformed model's tumour (method condensed). rigid: "
+     "displacements of a rigid alignment, as in the paper."},
+    v.tumour, kGuidanceWords);
+  a({"probe_pose_sd_mm", "mm",
+     "How well the ultrasound probe's place is known: standard deviation of an error that all "
+     "points of a boundary share",
+     "docs/decisions/0020", "Used with tumour: distances."},
+    v.probe_pose_sd_mm, between(0.0, 100.0));
+  a({"probe_pose_sd_deg", "degrees", "The same for the probe's direction", "docs/decisions/0020"},
+    v.probe_pose_sd_deg, between(0.0, 45.0));
 }
 
 template <typename A, Of<CondensedConfig> V>
 void visit(A& a, V& v) {
-  a({"max_rank", "", "Largest number of prior modes kept, gravity and swelling modes among them",
-     "docs/decisions/0008"},
+  a({"max_rank", "", "Largest number of prior modes kept, those of the load families among them",
+     "docs/decisions/0018"},
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));
   a({"deadline_ms", "ms", "An update returns its best iterate when this time has passed"},
     v.deadline_ms, between(0.1, 1e6));
-  a({"max_contact_iterations", "", "Largest number of contact sets tried in one update"},
+  a({"max_contact_iterations", "", "Largest number of steps of one descent"},
     v.max_contact_iterations, between(1, 1000));
   a({"uncertainty_nodes", "",
      "Nodes at which the standard deviation is evaluated; interpolated between them"},

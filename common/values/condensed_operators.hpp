@@ -8,10 +8,11 @@
 //   Phi = N^T K^-1 N     compliance of the slaves, mm/N
 // n nodes, r modes, s slaves. Nodal arrays are node-major (x0 y0 z0 x1 ...), 3n rows.
 //
-// The first `gravity_modes + swelling_modes` columns of U are K^-1 M, exact. The others come from
-// a randomised Nystrom approximation of K^-1 Sigma_kernel K^-1 (Halko, Martinsson, Tropp 2011,
-// SIAM Review 53:217, sec. 5.5). Its test vectors are supported where data come from: near the
-// tumour, at the craniotomy and on the slaves.
+// The columns of U stand in the order of the prior's parts (PriorPart), part_columns[g] of them for
+// part g. Those of the load families are K^-1 M, exact. Those of each remainder come from a
+// randomised Nystrom approximation of K^-1 Sigma_g K^-1 (Halko, Martinsson, Tropp 2011, SIAM Review
+// 53:217, sec. 5.5). Its test vectors are supported where data come from: near the tumour, at the
+// craniotomy and on the slaves.
 // Arrays that are only summed up to a displacement are in single precision (relative rounding
 // 6e-8 of each term).
 #pragma once
@@ -29,9 +30,8 @@ struct CondensedOperators {
   Boundary boundary = Boundary::kContact;
   std::string model_id;  // of the BrainModel they belong to
 
-  double prepare_s = 0.0;  // time it took to factorise and condense
-  int gravity_modes = 0;
-  int swelling_modes = 0;           // after the gravity modes
+  double prepare_s = 0.0;           // time it took to factorise and condense
+  PerPart<int> part_columns{};      // columns of U that belong to each part of the prior
   Eigen::MatrixXf modes;            // U, 3n x r, mm
   Eigen::MatrixXf contact_columns;  // G, 3n x s, mm/N
   Eigen::MatrixXd compliance;       // Phi, s x s, mm/N, symmetric
@@ -44,9 +44,9 @@ struct CondensedOperators {
   // sampling touches little memory.
   std::vector<NodeIndex> region;  // sorted
   // Nodes where the standard deviation is evaluated, and the variance per node that the
-  // truncation to r modes leaves out: tr(C - U U^T) / 3, mm^2, for the free body.
-  std::vector<NodeIndex> control;  // c, sorted
-  VecX truncated_variance_mm2;     // c
+  // truncation of each remainder leaves out: tr(C_g - U_g U_g^T) / 3, mm^2, for the free body.
+  std::vector<NodeIndex> control;          // c, sorted
+  Eigen::MatrixXd truncated_variance_mm2;  // c x kRemainders
   // Interpolation from the control nodes to every node: 4 x n indices into `control` and 4 x n
   // weights whose sum is 1 per node.
   Eigen::Matrix<int, 4, Eigen::Dynamic> control_neighbours;
@@ -54,11 +54,20 @@ struct CondensedOperators {
 
   int num_nodes() const { return static_cast<int>(modes.rows() / 3); }
   int num_modes() const { return static_cast<int>(modes.cols()); }
-  int load_modes() const { return gravity_modes + swelling_modes; }
+  int first_column(PriorPart part) const;
+  int columns(PriorPart part) const { return part_columns[static_cast<std::size_t>(part)]; }
+  // Buoyancy along and across gravity: the first columns.
+  int gravity_modes() const { return first_column(PriorPart::kTumourVolume); }
   int num_slaves() const { return static_cast<int>(contact_columns.cols()); }
   // Memory held by the arrays.
   std::uint64_t bytes() const;
 };
+
+inline int CondensedOperators::first_column(PriorPart part) const {
+  int first = 0;
+  for (std::size_t g = 0; g < static_cast<std::size_t>(part); ++g) first += part_columns[g];
+  return first;
+}
 
 inline std::uint64_t CondensedOperators::bytes() const {
   const auto of = [](const auto& values) -> std::uint64_t {

@@ -23,10 +23,15 @@ std::string_view to_string(PriorPart part) {
   switch (part) {
     case PriorPart::kAlongGravity: return "along_gravity";
     case PriorPart::kAcrossGravity: return "across_gravity";
-    case PriorPart::kSwelling: return "swelling";
-    case PriorPart::kOther: return "other";
+    case PriorPart::kTumourVolume: return "tumour_volume";
+    case PriorPart::kBrainVolume: return "brain_volume";
+    case PriorPart::kResection: return "resection";
+    case PriorPart::kOpening: return "opening";
+    case PriorPart::kFine: return "fine";
+    case PriorPart::kMedium: return "medium";
+    case PriorPart::kCoarse: return "coarse";
   }
-  return "other";
+  return "fine";
 }
 
 std::string_view to_string(EstimateStatus status) {

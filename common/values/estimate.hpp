@@ -59,14 +59,30 @@ struct IterationRecord {
   double elapsed_ms = 0.0;          // since the start of the inversion, monotonic clock
 };
 
-// Parts of the force prior: buoyancy along gravity, buoyancy across it, swelling, all other
-// forces.
-enum class PriorPart { kAlongGravity, kAcrossGravity, kSwelling, kOther };
-inline constexpr int kPriorParts = 4;
-std::string_view to_string(PriorPart part);  // "along_gravity", "across_gravity", ...
+// Parts of the force prior: families of loads, each with a strength of its own (prior/).
+enum class PriorPart {
+  kAlongGravity,   // buoyancy along gravity: drainage
+  kAcrossGravity,  // buoyancy across it: pose
+  kTumourVolume,   // swelling or shrinking of tissue about the tumour
+  kBrainVolume,    // the same of the whole brain and of its halves
+  kResection,      // removed tissue: its weight, and the stress that it carried
+  kOpening,        // pull and pressure at the craniotomy
+  kFine,           // smooth remainder, shortest correlation length
+  kMedium,
+  kCoarse,  // longest
+};
+inline constexpr int kPriorParts = 9;
+// "along_gravity", "across_gravity", "tumour_volume", "brain_volume", "resection", "opening",
+// "fine", "medium", "coarse"
+std::string_view to_string(PriorPart part);
 // One value for each part, in units of the case's standard deviations.
-using PriorScaleValues = std::array<double, kPriorParts>;
-inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1};
+template <typename T>
+using PerPart = std::array<T, kPriorParts>;  // in the order of PriorPart
+using PriorScaleValues = PerPart<double>;
+// Correlation lengths of the smooth remainder: the last parts.
+inline constexpr int kRemainders = 3;
+inline constexpr int kLoadParts = kPriorParts - kRemainders;
+inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1};
 
 // One set of strengths, and how probable the data make it.
 struct Hypothesis {
@@ -131,9 +147,9 @@ struct Estimate {
   PriorScaleValues prior_scales = kAsInTheCase;
   // Probability that a part is absent; 0: not estimated, as by every method so far.
   PriorScaleValues prior_absent{};
-  // Parts with the greatest strength that is allowed, where that is above the case's own.
-  std::array<bool, kPriorParts> prior_at_bound{};
-  // The most probable one first. Empty: no method compares hypotheses so far.
+  // Parts whose most probable strength is the greatest that is allowed.
+  PerPart<bool> prior_at_bound{};
+  // The most probable one first. Method condensed with estimated strengths only.
   std::vector<Hypothesis> hypotheses;
   // Root mean square of the whitened residuals: 1 when the data lie as far off as their standard
   // deviations say. NaN: not computed.

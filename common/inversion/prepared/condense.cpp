@@ -4,16 +4,17 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <mutex>
 #include <vector>
 
 #include "common/core/random.hpp"
+#include "common/geometry/spread_nodes.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
-#include "common/inversion/prepared/control_nodes.hpp"
 #include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/memory_limit.hpp"
 #include "common/linalg/blas.hpp"
-#include "common/prior/load_modes.hpp"
+#include "common/values/quality.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -111,24 +112,75 @@ MatrixXd test_vectors(const CondensedOperators& operators, Eigen::Index rows, in
   return omega;
 }
 
+// How many modes each remainder keeps of those that the load families leave of `max_rank`.
+std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eigen::Index rows) {
+  // A coarse field needs fewer than a fine one.
+  std::array<double, kRemainders> share = {0.4, 0.4, 0.2};
+  if (config.prior.medium_density_sd_n_m3 == 0.0) share[1] = 0.0;
+  if (config.prior.coarse_density_sd_n_m3 == 0.0) share[2] = 0.0;
+  const double all = share[0] + share[1] + share[2];
+  const int left = std::max(kRemainders, config.condensed.max_rank - loads);
+  std::array<int, kRemainders> kept{};
+  for (std::size_t g = 0; g < kept.size(); ++g) {
+    if (share[g] == 0.0) continue;
+    kept[g] = static_cast<int>(std::clamp(share[g] / all * left, 1.0, static_cast<double>(rows)));
+  }
+  return kept;
+}
+
+// The leading modes of F with F = C Omega: F V Lambda^-1/2 with Omega^T F = V Lambda V^T. At most
+// `kept`.
+Result<MatrixXd> leading_modes(const MatrixXd& omega, const MatrixXd& sketch, int kept) {
+  const Eigen::Index tested = omega.cols();
+  MatrixXd core(tested, tested);
+  linalg::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
+  core = (0.5 * (core + core.transpose())).eval();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
+  if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
+    return fail(ErrorCode::kNotFinite, "prior modes: the sketched covariance has no eigenvalues");
+  }
+  // Below the rounding of the largest eigenvalue a mode is noise.
+  const double smallest = 1e-13 * eigen.eigenvalues()[tested - 1];
+  Eigen::Index rank = 0;
+  while (rank < std::min<Eigen::Index>(kept, tested) &&
+         eigen.eigenvalues()[tested - 1 - rank] > smallest) {
+    ++rank;
+  }
+  MatrixXd scaled(tested, rank);
+  for (Eigen::Index j = 0; j < rank; ++j) {
+    scaled.col(j) =
+        eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
+  }
+  MatrixXd modes(sketch.rows(), rank);
+  linalg::blas::multiply(1.0, sketch, scaled, 0.0, modes);
+  return modes;
+}
+
 // Steps 2 and 3: U.
 Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOperators& result) {
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   const prior::ForcePrior& prior = model.prior();
   const int loads = prior.num_modes();
-  const int kept = static_cast<int>(
-      std::min<Eigen::Index>(std::max(1, model.config().condensed.max_rank - loads), rows));
-  const int tested = static_cast<int>(std::min<Eigen::Index>(kept + kOversampling, rows));
+  const auto kept = kept_modes(model.config(), loads, rows);
+  const int tested = static_cast<int>(
+      std::min<Eigen::Index>(*std::max_element(kept.begin(), kept.end()) + kOversampling, rows));
 
   const MatrixXd omega = test_vectors(result, rows, tested);
-  MatrixXd sketch(rows, tested), load_columns(rows, loads);
+  std::array<MatrixXd, kRemainders> sketches;
+  for (std::size_t g = 0; g < kept.size(); ++g) {
+    if (kept[g] > 0) sketches[g].resize(rows, tested);
+  }
+  MatrixXd load_columns(rows, loads);
   auto status =
       runner.run("prior modes", tested, [&](int first, int count, auto& solver) -> Status {
-        MatrixXd u, load;
+        MatrixXd u, load, column;
         if (auto solved = solver.solve(omega.middleCols(first, count), u); !solved) return solved;
-        prior.apply_kernel(u, load);
-        if (auto solved = solver.solve(load, u); !solved) return solved;
-        sketch.middleCols(first, count) = u;
+        for (int g = 0; g < kRemainders; ++g) {
+          if (kept[static_cast<std::size_t>(g)] == 0) continue;
+          prior.kernel(g).apply(u, load);
+          if (auto solved = solver.solve(load, column); !solved) return solved;
+          sketches[static_cast<std::size_t>(g)].middleCols(first, count) = column;
+        }
         return {};
       });
   if (!status) return status;
@@ -142,28 +194,17 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
   });
   if (!status) return status;
 
-  MatrixXd core(tested, tested);
-  linalg::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
-  core = (0.5 * (core + core.transpose())).eval();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
-  if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
-    return fail(ErrorCode::kNotFinite, "prior modes: the sketched covariance has no eigenvalues");
+  result.part_columns = prior.columns_of_part();
+  MatrixXd modes = std::move(load_columns);
+  for (std::size_t g = 0; g < kept.size(); ++g) {
+    if (kept[g] == 0) continue;
+    const auto leading = leading_modes(omega, sketches[g], kept[g]);
+    if (!leading) return tl::unexpected(leading.error());
+    sketches[g].resize(0, 0);
+    result.part_columns[kLoadParts + g] = static_cast<int>(leading->cols());
+    modes.conservativeResize(rows, modes.cols() + leading->cols());
+    modes.rightCols(leading->cols()) = *leading;
   }
-  // Below the rounding of the largest eigenvalue a mode is noise.
-  const double smallest = 1e-13 * eigen.eigenvalues()[tested - 1];
-  int rank = 0;
-  while (rank < kept && eigen.eigenvalues()[tested - 1 - rank] > smallest) ++rank;
-  MatrixXd scaled(tested, rank);
-  for (int j = 0; j < rank; ++j) {
-    scaled.col(j) =
-        eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
-  }
-  MatrixXd modes(rows, loads + rank);
-  modes.leftCols(loads) = load_columns;
-  linalg::blas::multiply(1.0, sketch, scaled, 0.0, modes.rightCols(rank));
-  const prior::LoadModeCounts counts = prior::load_mode_counts(model.config().prior);
-  result.gravity_modes = counts.gravity;
-  result.swelling_modes = counts.swelling;
   result.modes = modes.cast<float>();
   result.slave_modes.resize(static_cast<Eigen::Index>(result.slaves.size()), modes.cols());
   for (std::size_t i = 0; i < result.slaves.size(); ++i) {
@@ -179,9 +220,9 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
                          CondensedOperators& result) {
   const Points& nodes = model.model().mesh.nodes;
   const std::vector<NodeIndex> spread =
-      spread_nodes(nodes, model.config().condensed.uncertainty_nodes);
+      geometry::spread_nodes(nodes, model.config().condensed.uncertainty_nodes);
   const int probed = std::min<int>(kVarianceNodes, static_cast<int>(spread.size()));
-  VecX variance = VecX::Zero(3 * probed);
+  MatrixXd variance = MatrixXd::Zero(3 * probed, kRemainders);
   auto status =
       runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& solver) -> Status {
         MatrixXd unit = MatrixXd::Zero(nodes.size(), count), u, load;
@@ -190,19 +231,24 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
           unit(3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3, j) = 1.0;
         }
         if (auto solved = solver.solve(unit, u); !solved) return solved;
-        model.prior().apply_kernel(u, load);
-        for (int j = 0; j < count; ++j) variance[first + j] = u.col(j).dot(load.col(j));
+        for (int g = 0; g < kRemainders; ++g) {
+          model.prior().kernel(g).apply(u, load);
+          for (int j = 0; j < count; ++j) variance(first + j, g) = u.col(j).dot(load.col(j));
+        }
         return {};
       });
-  const Eigen::Index kernel_modes = result.modes.cols() - result.load_modes();
   Points positions(3, probed);
-  VecX left_out(probed);
+  MatrixXd left_out(probed, kRemainders);
   for (int i = 0; i < probed; ++i) {
     const NodeIndex node = spread[static_cast<std::size_t>(i)];
-    const double carried = result.modes.block(3 * node, result.load_modes(), 3, kernel_modes)
-                               .cast<double>()
-                               .squaredNorm();
-    left_out[i] = std::max(0.0, variance.segment<3>(3 * i).sum() - carried) / 3.0;
+    for (int g = 0; g < kRemainders; ++g) {
+      const auto part = static_cast<PriorPart>(kLoadParts + g);
+      const double carried =
+          result.modes.block(3 * node, result.first_column(part), 3, result.columns(part))
+              .cast<double>()
+              .squaredNorm();
+      left_out(i, g) = std::max(0.0, variance.col(g).segment<3>(3 * i).sum() - carried) / 3.0;
+    }
     positions.col(i) = nodes.col(node);
   }
   result.control = spread;
@@ -211,17 +257,18 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
   for (std::size_t i = 0; i < result.control.size(); ++i) {
     control.col(static_cast<Eigen::Index>(i)) = nodes.col(result.control[i]);
   }
-  const Interpolation to_control = interpolate(positions, control);
+  const geometry::Interpolation to_control = geometry::interpolate(positions, control);
   // The largest of the neighbours, except at a probe itself: an error bar must not be too short.
-  result.truncated_variance_mm2.setZero(control.cols());
+  result.truncated_variance_mm2.setZero(control.cols(), kRemainders);
   for (Eigen::Index i = 0; i < control.cols(); ++i) {
     for (int k = 0; k < 4; ++k) {
       if (to_control.weights(k, i) < kLeastControlWeight) continue;
-      result.truncated_variance_mm2[i] =
-          std::max(result.truncated_variance_mm2[i], left_out[to_control.neighbours(k, i)]);
+      const auto neighbour = left_out.row(to_control.neighbours(k, i));
+      result.truncated_variance_mm2.row(i) =
+          result.truncated_variance_mm2.row(i).cwiseMax(neighbour);
     }
   }
-  Interpolation to_nodes = interpolate(control, nodes);
+  geometry::Interpolation to_nodes = geometry::interpolate(control, nodes);
   result.control_neighbours = std::move(to_nodes.neighbours);
   result.control_weights = std::move(to_nodes.weights);
   return status;
@@ -234,9 +281,35 @@ std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& con
   const auto s = static_cast<std::uint64_t>(slaves);
   const auto q = static_cast<std::uint64_t>(config.condensed.max_rank + kOversampling);
   const std::uint64_t blocks = 8 * n3 * kBlock * 6 * static_cast<std::uint64_t>(threads);
-  // G; Phi; test vectors, sketch, modes (double) and modes (float)
-  return 4 * n3 * s + 8 * s * s + (3 * 8 + 4) * n3 * q + blocks;
+  // G; Phi; test vectors, sketches, modes (double) and modes (float)
+  return 4 * n3 * s + 8 * s * s + ((2 + kRemainders) * 8 + 4) * n3 * q + blocks;
 }
+
+double largest_motion_sd_mm(const CondensedOperators& operators) {
+  const VecX squares = operators.modes.rowwise().squaredNorm().cast<double>();
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i + 2 < squares.size(); i += 3) {
+    largest = std::max(largest, squares.segment<3>(i).sum());
+  }
+  return std::sqrt(largest);
+}
+
+namespace {
+
+// Against a prior in other units, or with every part switched off.
+Status check_motion(const CondensedOperators& operators) {
+  constexpr double kMost_mm = 10.0 * kMostMotion_mm;
+  const double sd_mm = largest_motion_sd_mm(operators);
+  if (sd_mm > 0.0 && sd_mm <= kMost_mm) return {};
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "prior: it allows a node to move by %.3g mm (standard deviation); above 0 and at "
+                "most %g mm, ten times what a skull allows",
+                sd_mm, kMost_mm);
+  return fail(ErrorCode::kInvalidArgument, text);
+}
+
+}  // namespace
 
 Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOptions& options) {
   const int slaves = model.forward().contact().num_slaves();
@@ -261,6 +334,7 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
   if (auto status = prior_modes(model, runner, result); !status) {
     return tl::unexpected(status.error());
   }
+  if (auto status = check_motion(result); !status) return tl::unexpected(status.error());
   if (auto status = left_out_variance(model, runner, result); !status) {
     return tl::unexpected(status.error());
   }

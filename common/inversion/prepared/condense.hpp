@@ -6,10 +6,10 @@
 // partition, one BLAS thread each, so the result is bit-identical from run to run. Only G (float),
 // the sketch (3n x q, double) and two blocks per core are held at a time.
 //   1. G = K^-1 N block by block; Phi from the same blocks
-//   2. sketch F = K^-1 Sigma_k K^-1 Omega; Omega^T F = V Lambda V^T;
-//      U_k = F V Lambda^-1/2, leading columns
+//   2. for each remainder g of the prior, with one set of test vectors: sketch F = K^-1 Sigma_g
+//      K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading columns
 //   3. load modes K^-1 M
-//   4. diag(C) at the control nodes: |Sigma_k^1/2 K^-1 e|^2 by one more solve per control dof
+//   4. diag(C_g) at the control nodes: |Sigma_g^1/2 K^-1 e|^2 by one more solve per control dof
 #pragma once
 
 #include <cstdint>
@@ -40,11 +40,16 @@ struct CondenseOptions {
 };
 
 // kInvalidArgument when condensed.memory_limit_gib is below the factor and condense_memory_bytes
-// (the sentence names both); kUnavailable when stopped; kNotFinite.
+// (the sentence names both), and when the case's prior allows no motion at all or ten times as much
+// as a skull does (the sentence has the figure); kUnavailable when stopped; kNotFinite.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
 
 // Peak memory of the arrays of condense(), bytes.
 std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config, int threads);
+
+// The largest standard deviation of a node's motion under the prior, mm: root of the sum over its
+// components.
+double largest_motion_sd_mm(const CondensedOperators& operators);
 
 }  // namespace brainshift::inversion

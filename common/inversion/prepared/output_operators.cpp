@@ -84,7 +84,7 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   // Lower triangle only: rows from the block's first one on.
   const auto covariance_block = [&](int first, int count, fem::BlockSolver&) -> Status {
     MatrixXd forces;
-    model.prior().apply_kernel(x.middleCols(first, count), forces);
+    model.prior().apply_remainders(x.middleCols(first, count), forces);
     linalg::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
                                       result.covariance.block(first, first, h - first, count));
     return {};

@@ -5,29 +5,38 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/core/units.hpp"
-#include "common/prior/load_modes.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
 prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config,
-                              Eigen::MatrixXd modes) {
+                              prior::LoadModes modes,
+                              const PriorScaleValues& scales = kAsInTheCase) {
+  const VecX volumes = fem::nodal_volumes(model.mesh);
+  const auto sd = [&](PriorPart part, double n_m3) {
+    return scales[static_cast<std::size_t>(part)] * units::force_density_from_n_m3(n_m3);
+  };
+  const Points& nodes = model.mesh.nodes;
+  using prior::ForceKernel;
   return prior::ForcePrior(
-      model.mesh.nodes, fem::nodal_volumes(model.mesh), config.correlation_length_mm,
-      units::force_density_from_n_m3(config.force_density_sd_n_m3), std::move(modes));
+      {ForceKernel::compact(nodes, volumes, config.correlation_length_mm,
+                            sd(PriorPart::kFine, config.force_density_sd_n_m3)),
+       ForceKernel::basis(nodes, volumes, config.medium_length_mm,
+                          sd(PriorPart::kMedium, config.medium_density_sd_n_m3)),
+       ForceKernel::basis(nodes, volumes, config.coarse_length_mm,
+                          sd(PriorPart::kCoarse, config.coarse_density_sd_n_m3))},
+      std::move(modes));
 }
 
 }  // namespace
 
 prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales) {
-  PriorConfig config = model.config().prior;
-  const prior::LoadModeCounts counts = prior::load_mode_counts(config);
-  config.force_density_sd_n_m3 *= scales[static_cast<std::size_t>(PriorPart::kOther)];
-  Eigen::MatrixXd modes = model.prior().modes();
-  for (int j = 0; j < static_cast<int>(modes.cols()); ++j) {
-    modes.col(j) *= scales[static_cast<std::size_t>(prior::prior_part(j, counts))];
+  prior::LoadModes modes{model.prior().modes(), model.prior().columns_of_part()};
+  for (int j = 0; j < modes.size(); ++j) {
+    modes.columns.col(j) *=
+        scales[static_cast<std::size_t>(prior::part_of_column(j, modes.of_part))];
   }
-  return build_prior(model.model(), config, std::move(modes));
+  return build_prior(model.model(), model.config().prior, std::move(modes), scales);
 }
 
 PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
@@ -46,7 +55,9 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   if (!forward) return tl::unexpected(forward.error());
   const Stopwatch prior_watch;
   report(progress, "prior", 0.0);
-  prior::ForcePrior prior = build_prior(*model, config.prior, prior::load_modes(*model, config));
+  auto modes = prior::load_modes(*model, config);
+  if (!modes) return tl::unexpected(modes.error());
+  prior::ForcePrior prior = build_prior(*model, config.prior, std::move(*modes));
   const double prior_s = prior_watch.seconds();
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));

@@ -126,12 +126,17 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   check.nodes("region", operators.region, n, true);
   check.nodes("control", operators.control, n, true);
   check.matrix("modes", operators.modes, 3 * n, r);
-  check.that(operators.gravity_modes >= 0 && operators.gravity_modes <= r, "gravity_modes",
-             "= " + std::to_string(operators.gravity_modes) + ": must be from 0 to the " +
-                 std::to_string(r) + " modes");
-  check.that(operators.swelling_modes >= 0 && operators.load_modes() <= r, "swelling_modes",
-             "= " + std::to_string(operators.swelling_modes) + ": must be from 0 to the " +
-                 std::to_string(r) + " modes less those of gravity");
+  int left = static_cast<int>(r);
+  for (int part = 0; part < kPriorParts; ++part) {
+    const int columns = operators.part_columns[static_cast<std::size_t>(part)];
+    const std::string name = std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
+    check.that(columns >= 0 && columns <= left, name.c_str(),
+               "= " + std::to_string(columns) + ": must be from 0 to the " + std::to_string(left) +
+                   " modes that the parts before it leave");
+    left -= std::max(0, columns);
+  }
+  check.that(left == 0, "modes",
+             "has " + std::to_string(left) + " columns of no part of the prior");
   check.matrix("contact_columns", operators.contact_columns, 3 * n, s);
   check.matrix("compliance", operators.compliance, s, s);
   if (!check.found()) {
@@ -140,7 +145,7 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   check.matrix("slave_modes", operators.slave_modes, s, r);
   check.matrix("slave_normals", operators.slave_normals, 3, s);
   check.matrix("initial_penetration_mm", operators.initial_penetration_mm, s, 1);
-  check.matrix("truncated_variance_mm2", operators.truncated_variance_mm2, c, 1);
+  check.matrix("truncated_variance_mm2", operators.truncated_variance_mm2, c, kRemainders);
   check.matrix("control_neighbours", operators.control_neighbours, 4, c == 0 ? 0 : n);
   check.matrix("control_weights", operators.control_weights, 4, c == 0 ? 0 : n);
   const auto& neighbours = operators.control_neighbours;

@@ -49,13 +49,18 @@ void read_symmetric(const Hdf5Reader& in, const std::string& name, Eigen::Index 
   }
 }
 
+std::string modes_of(int part) {
+  return std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
+}
+
 void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
   const std::string group = group_of(operators.boundary);
   const std::string in_group = group + "/";
   out.group(group);
   out.attribute(group, "model_id", operators.model_id);
-  out.number(group, "gravity_modes", operators.gravity_modes);
-  out.number(group, "swelling_modes", operators.swelling_modes);
+  for (int part = 0; part < kPriorParts; ++part) {
+    out.number(group, modes_of(part), operators.part_columns[static_cast<std::size_t>(part)]);
+  }
   out.number(group, "prepare_s", operators.prepare_s);
   out.matrix(in_group + "modes", operators.modes);
   out.matrix(in_group + "contact_columns", operators.contact_columns);
@@ -66,7 +71,7 @@ void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
   out.list(in_group + "slaves", operators.slaves);
   out.list(in_group + "region", operators.region);
   out.list(in_group + "control", operators.control);
-  out.list(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
+  out.matrix(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
   out.matrix(in_group + "control_neighbours", operators.control_neighbours);
   out.matrix(in_group + "control_weights", operators.control_weights);
 }
@@ -77,8 +82,9 @@ CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
   CondensedOperators operators;
   operators.boundary = boundary;
   operators.model_id = in.attribute_text(group, "model_id");
-  operators.gravity_modes = in.number<int>(group, "gravity_modes");
-  operators.swelling_modes = in.number<int>(group, "swelling_modes");
+  for (int part = 0; part < kPriorParts; ++part) {
+    operators.part_columns[static_cast<std::size_t>(part)] = in.number<int>(group, modes_of(part));
+  }
   operators.prepare_s = in.number<double>(group, "prepare_s");
   in.matrix(in_group + "modes", operators.modes);
   in.matrix(in_group + "contact_columns", operators.contact_columns);

@@ -3,7 +3,7 @@
 // to a temporary name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
-//   brainshift model file\nformat 3\nbytes N\ncrc32 XXXXXXXX\n
+//   brainshift model file\nformat 4\nbytes N\ncrc32 XXXXXXXX\n
 // N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is
 // checked first, because the HDF5 library itself is not safe against damaged files.
 //
@@ -20,8 +20,9 @@
 //   /tumour/{vertices,triangles}, /sets/{craniotomy,brainstem,slaves,fixed}
 //   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); the model may have none
 //     values_mm               dims 1*2*3  float32  signed distance, values/distance_grid.hpp
-//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, gravity_modes
-//                                         (int32), prepare_s (float64, s)
+//   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, prepare_s
+//                                         (float64, s), PART_modes (int32) for each part of the
+//                                         prior (to_string(PriorPart))
 //     modes                   r x 3n      float32  mm     U, one mode per row
 //     contact_columns         s x 3n      float32  mm/N   G, one slave per row
 //     compliance_lower        s(s+1)/2    float64  mm/N   Phi: lower triangle, by columns
@@ -31,7 +32,7 @@
 //     slaves                  s           int32
 //     region                  any         int32    sorted
 //     control                 c           int32    sorted
-//     truncated_variance_mm2  c           float64
+//     truncated_variance_mm2  3 x c       float64           one remainder per row
 //     control_neighbours      n x 4       int32    into control; 0 x 4 without control nodes
 //     control_weights         n x 4       float32
 // model_id is the hash of the model (common/values/model_id.hpp).

@@ -29,7 +29,7 @@ TEST(Swelling, StretchesAFreeBodyByAThirdOfItsStrainInEveryDirection) {
 TEST(Swelling, LoadsBalance) {
   const TetMesh mesh = test_support::box_mesh(Vec3(-5, 0, 2), Vec3(7, 9, 12), 3, 0.15);
   const Points load = swelling_load(
-      mesh, {}, [](const Vec3& x) { return 0.1 * std::exp(-0.02 * x.squaredNorm()); });
+      mesh, Material{}, [](const Vec3& x) { return 0.1 * std::exp(-0.02 * x.squaredNorm()); });
   Vec3 moment = Vec3::Zero();
   double arms = 0.0;
   for (int n = 0; n < mesh.num_nodes(); ++n) {

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "common/fem/elasticity.hpp"
+#include "common/geometry/surface.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::prior {
@@ -13,34 +16,46 @@ Eigen::Map<const Points> mode(const Eigen::MatrixXd& modes, Eigen::Index column)
   return {modes.col(column).data(), 3, modes.rows() / 3};
 }
 
-TEST(LoadModes, AreTriplesOfGravityThenFoursOfSwelling) {
-  const BrainModel patient = test_support::toy_patient();
+CaseConfig only(double gravity, double tumour, double brain, double weight, double stress,
+                double opening) {
   CaseConfig config = test_support::toy_config();
+  config.prior.gravity_mode_sd = gravity;
   config.prior.gravity_levels_mm = {0.0, 20.0};
-  config.prior.swelling_radii_mm = {15.0};
-  config.prior.swelling_strain_sd = 0.05;
-  const LoadModeCounts counts = load_mode_counts(config.prior);
-  EXPECT_EQ(counts.gravity, 6);
-  EXPECT_EQ(counts.swelling, 4);
-  EXPECT_EQ(load_modes(patient, config).cols(), 10);
-  EXPECT_EQ(prior_part(3, counts), PriorPart::kAlongGravity);
-  EXPECT_EQ(prior_part(4, counts), PriorPart::kAcrossGravity);
-  EXPECT_EQ(prior_part(6, counts), PriorPart::kSwelling);
-  EXPECT_EQ(prior_part(9, counts), PriorPart::kSwelling);
-  EXPECT_EQ(prior_part(10, counts), PriorPart::kOther);
-  config.prior.gravity_mode_sd = 0.0;
-  config.prior.swelling_strain_sd = 0.0;
-  EXPECT_EQ(load_modes(patient, config).cols(), 0);
+  config.prior.tumour_volume_strain_sd = tumour;
+  config.prior.tumour_volume_radii_mm = {12.0};
+  config.prior.brain_volume_strain_sd = brain;
+  config.prior.resection_weight_sd = weight;
+  config.prior.resection_stress_sd_pa = stress;
+  config.prior.opening_pressure_sd_pa = opening;
+  return config;
 }
 
-TEST(LoadModes, SwellingBalancesItself) {
+LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
+  auto modes = load_modes(patient, config);
+  EXPECT_TRUE(modes.has_value());
+  return std::move(*modes);
+}
+
+TEST(LoadModes, StandInTheOrderOfTheirParts) {
+  const BrainModel patient = test_support::toy_patient(8);
+  const LoadModes modes = modes_of(patient, only(1.0, 0.05, 0.01, 1.0, 300.0, 600.0));
+  const PerPart<int> expected = {2, 4, 4, 4, 9, 5, 0, 0, 0};
+  EXPECT_EQ(modes.of_part, expected);
+  EXPECT_EQ(modes.size(), 28);
+  EXPECT_EQ(part_of_column(1, modes.of_part), PriorPart::kAlongGravity);
+  EXPECT_EQ(part_of_column(2, modes.of_part), PriorPart::kAcrossGravity);
+  EXPECT_EQ(part_of_column(6, modes.of_part), PriorPart::kTumourVolume);
+  EXPECT_EQ(part_of_column(27, modes.of_part), PriorPart::kOpening);
+  EXPECT_EQ(modes_of(patient, only(0, 0, 0, 0, 0, 0)).size(), 0);
+}
+
+// No net force and no net moment.
+TEST(LoadModes, SwellingAndStressBalanceThemselves) {
   const BrainModel patient = test_support::toy_patient();
-  CaseConfig config = test_support::toy_config();
-  config.prior.swelling_strain_sd = 0.05;
-  const LoadModeCounts counts = load_mode_counts(config.prior);
-  const Eigen::MatrixXd modes = load_modes(patient, config);
-  for (int j = counts.gravity; j < counts.all(); ++j) {
-    const auto force = mode(modes, j);
+  const LoadModes modes = modes_of(patient, only(0.0, 0.05, 0.01, 0.0, 300.0, 0.0));
+  ASSERT_EQ(modes.size(), 4 + 4 + 6);
+  for (int j = 0; j < modes.size(); ++j) {
+    const auto force = mode(modes.columns, j);
     const double size = force.colwise().norm().sum();
     ASSERT_GT(size, 0.0);
     EXPECT_LT(force.rowwise().sum().norm(), 1e-12 * size) << j;
@@ -52,28 +67,106 @@ TEST(LoadModes, SwellingBalancesItself) {
   }
 }
 
-// Work in a uniform dilation u = x e: sum f . x = kappa sum V theta tr(grad x) = 3 kappa int
-// theta.
-TEST(LoadModes, SwellingDoesTheWorkOfItsVolumeStrain) {
-  const BrainModel patient = test_support::toy_patient(8);
-  CaseConfig config = test_support::toy_config();
-  config.prior.swelling_radii_mm = {12.0};
-  config.prior.swelling_strain_sd = 0.3;
-  const LoadModeCounts counts = load_mode_counts(config.prior);
-  const Eigen::MatrixXd modes = load_modes(patient, config);
-  const auto force = mode(modes, counts.gravity);
-  const fem::Elasticity elasticity = fem::elasticity_from(config.material);
-  const double bulk = elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
+double bulk_modulus(const Material& material) {
+  const fem::Elasticity elasticity = fem::elasticity_from(material);
+  return elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
+}
+
+// Work in a uniform dilation u = x e: sum f . x = sum V kappa theta tr(grad x) = 3 int kappa theta.
+template <typename Kappa>
+double expected_work(const BrainModel& patient, double strain, double radius, const Kappa& kappa) {
   const Vec3 centre = patient.tumour.vertices.rowwise().mean();
   double integral = 0.0;
   for (int t = 0; t < patient.mesh.num_tets(); ++t) {
     Vec3 centroid = Vec3::Zero();
     for (int k = 0; k < 4; ++k) centroid += 0.25 * patient.mesh.nodes.col(patient.mesh.tets(k, t));
-    integral += fem::tet_geometry(patient.mesh, t).volume *
-                std::exp(-0.5 * (centroid - centre).squaredNorm() / (12.0 * 12.0));
+    const double r = (centroid - centre).norm();
+    integral += fem::tet_geometry(patient.mesh, t).volume * kappa(r) *
+                std::exp(-0.5 * r * r / (radius * radius));
   }
-  const double work = force.cwiseProduct(patient.mesh.nodes).sum();
-  EXPECT_NEAR(work, 3.0 * bulk * 0.3 * integral, 1e-9 * std::abs(work));
+  return 3.0 * strain * integral;
+}
+
+TEST(LoadModes, SwellingDoesTheWorkOfItsVolumeStrain) {
+  const BrainModel patient = test_support::toy_patient(8);
+  const CaseConfig config = only(0.0, 0.3, 0.0, 0.0, 0.0, 0.0);
+  const LoadModes modes = modes_of(patient, config);
+  const double work = mode(modes.columns, 0).cwiseProduct(patient.mesh.nodes).sum();
+  const double kappa = bulk_modulus(config.material);
+  EXPECT_NEAR(work, expected_work(patient, 0.3, 12.0, [&](double) { return kappa; }),
+              1e-9 * std::abs(work));
+}
+
+// A stiff tumour swells with its own bulk modulus.
+TEST(LoadModes, SwellingHonoursTheStiffnessOfTheTumour) {
+  const BrainModel patient = test_support::toy_patient(8);
+  CaseConfig config = only(0.0, 0.3, 0.0, 0.0, 0.0, 0.0);
+  config.material.tumour = TissueStiffness{6300.0, 0.46};
+  Material stiff = config.material;
+  stiff.shear_modulus_pa = 6300.0;
+  const double work =
+      mode(modes_of(patient, config).columns, 0).cwiseProduct(patient.mesh.nodes).sum();
+  const double inside = bulk_modulus(stiff), outside = bulk_modulus(config.material);
+  // The toy's tumour is a ball of radius 10 mm, as a polyhedron a little smaller.
+  const auto kappa = [&](double r) { return r < 10.0 ? inside : outside; };
+  EXPECT_NEAR(work, expected_work(patient, 0.3, 12.0, kappa), 0.05 * std::abs(work));
+  EXPECT_GT(std::abs(work / expected_work(patient, 0.3, 12.0, [&](double) { return outside; }) - 1),
+            0.1)
+      << "the test shows nothing";
+}
+
+// A net force of the tumour's weight along each axis. The Gaussian reaches beyond the toy's tumour,
+// but not beyond its brain.
+TEST(LoadModes, TheMissingWeightIsThatOfTheTumour) {
+  const BrainModel patient = test_support::toy_patient(12);
+  const LoadModes modes = modes_of(patient, only(0.0, 0.0, 0.0, 2.0, 0.0, 0.0));
+  ASSERT_EQ(modes.size(), 3);
+  const double weight = 1e-9 * 1000.0 * 9.80665 * geometry::enclosed_volume(patient.tumour);  // N
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 total = mode(modes.columns, axis).rowwise().sum();
+    EXPECT_LT((total - 2.0 * weight * Vec3::Unit(axis)).norm(), 0.02 * 2.0 * weight) << axis;
+  }
+}
+
+// Pressure times the area of the triangles between three craniotomy nodes, and nothing elsewhere.
+TEST(LoadModes, ThePullAtTheOpeningActsOnItsNodes) {
+  const BrainModel patient = test_support::toy_patient(12);
+  const LoadModes modes = modes_of(patient, only(0.0, 0.0, 0.0, 0.0, 0.0, 600.0));
+  ASSERT_EQ(modes.size(), 5);
+  const std::set<NodeIndex> inside(patient.craniotomy.begin(), patient.craniotomy.end());
+  double area = 0.0;
+  for (Eigen::Index t = 0; t < patient.boundary_triangles.cols(); ++t) {
+    const Eigen::Vector3i corner = patient.boundary_triangles.col(t);
+    if (inside.count(corner[0]) && inside.count(corner[1]) && inside.count(corner[2])) {
+      area += 0.5 * 5.0 * 5.0;  // cells of 60 / 12 mm, two triangles each
+    }
+  }
+  ASSERT_GT(area, 100.0);
+  for (int j = 0; j < 5; ++j) {
+    const auto force = mode(modes.columns, j);
+    for (Eigen::Index i = 0; i < force.cols(); ++i) {
+      if (inside.count(static_cast<NodeIndex>(i)) == 0) {
+        EXPECT_TRUE(force.col(i).isZero(0.0));
+      }
+    }
+    const Vec3 total = force.rowwise().sum();
+    if (j < 3) {
+      EXPECT_LT((total - 600e-6 * area * Vec3::Unit(j)).norm(), 1e-9 * total.norm()) << j;
+    } else {  // along the normal, z, with either sign
+      EXPECT_LT(force.topRows(2).cwiseAbs().maxCoeff(), 1e-12 * force.cwiseAbs().maxCoeff());
+      EXPECT_LT(std::abs(total.z()), 0.2 * force.cwiseAbs().sum());
+    }
+  }
+}
+
+TEST(LoadModes, ATumourWithoutATetrahedronIsNamed) {
+  BrainModel patient = test_support::toy_patient();
+  CaseConfig config = test_support::toy_config();
+  config.material.tumour = TissueStiffness{6300.0, 0.45};
+  patient.tumour.vertices.colwise() += Vec3(500.0, 0.0, 0.0);
+  const auto modes = load_modes(patient, config);
+  ASSERT_FALSE(modes.has_value());
+  EXPECT_EQ(modes.error().code, ErrorCode::kEmptySet);
 }
 
 }  // namespace

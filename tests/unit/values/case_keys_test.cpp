@@ -98,7 +98,7 @@ TEST(CaseKeys, EveryKeyIsNamedOnceAndSaysWhatItMeans) {
     EXPECT_TRUE(keys.insert(document.key).second) << document.key;
     EXPECT_NE(document.text.substr(0, 1), " ") << document.key << " has no meaning";
   }
-  EXPECT_EQ(keys.count("prior.swelling_strain_sd"), 1u);
+  EXPECT_EQ(keys.count("prior.tumour_volume_strain_sd"), 1u);
   EXPECT_EQ(keys.count("tumour.label_volume.label"), 1u);
   EXPECT_EQ(keys.count("material.tumour.poisson_ratio"), 1u);
 }

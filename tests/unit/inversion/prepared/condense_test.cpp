@@ -53,6 +53,28 @@ TEST_F(Condensed, ModesReproduceThePriorCovarianceWhereDataComeFrom) {
   }
 }
 
+// In other units, or with every part switched off.
+TEST_F(Condensed, APriorWithFarTooMuchMotionOrNoneIsRefusedWithTheFigure) {
+  const double usual_mm = largest_motion_sd_mm(*operators(Boundary::kContact));
+  EXPECT_GT(usual_mm, 0.5);
+  EXPECT_LT(usual_mm, kMostMotion_mm);
+  const auto refused = [](const CaseConfig& with) {
+    const auto model = PreparedModel::prepare(patient(), with, Boundary::kContact);
+    EXPECT_TRUE(model.has_value());
+    const auto made = condense(*model);
+    EXPECT_FALSE(made.has_value());
+    EXPECT_EQ(made.error().code, ErrorCode::kInvalidArgument);
+    return made.error().message;
+  };
+  CaseConfig strong = config();
+  strong.prior.force_density_sd_n_m3 *= 1e4;
+  strong.prior.gravity_mode_sd *= 1e4;
+  EXPECT_THAT(refused(strong), HasSubstr("at most 500 mm"));
+  CaseConfig none = config();
+  none.prior.force_density_sd_n_m3 = none.prior.gravity_mode_sd = 0.0;
+  EXPECT_THAT(refused(none), HasSubstr("above 0"));
+}
+
 TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
   CondenseOptions one;
   one.threads = 1;

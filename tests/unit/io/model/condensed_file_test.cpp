@@ -21,7 +21,7 @@ using testing::HasSubstr;
 void expect_equal(const CondensedOperators& a, const CondensedOperators& b) {
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.model_id, b.model_id);
-  EXPECT_EQ(a.gravity_modes, b.gravity_modes);
+  EXPECT_EQ(a.part_columns, b.part_columns);
   EXPECT_EQ(a.modes, b.modes);
   EXPECT_EQ(a.contact_columns, b.contact_columns);
   EXPECT_EQ(a.compliance, b.compliance);
@@ -71,7 +71,7 @@ TEST(CondensedFile, OperatorsWithoutControlNodesAreReadBack) {
   ModelFile file = condensed_file();
   CondensedOperators& operators = file.condensed[0];
   operators.control.clear();
-  operators.truncated_variance_mm2.resize(0);
+  operators.truncated_variance_mm2.resize(0, kRemainders);
   operators.control_neighbours.resize(4, 0);
   operators.control_weights.resize(4, 0);
   const Status written = write_model(folder / "m.h5", file);
@@ -93,6 +93,7 @@ TEST(CondensedFile, PackedComplianceOfManySlavesIsReadBackBitForBit) {
     CondensedOperators operators;
     operators.model_id = file.model.model_id;
     operators.modes = Eigen::MatrixXf::Random(600, 2);
+    operators.part_columns[0] = 2;
     operators.slaves = file.model.slaves;
     operators.contact_columns = Eigen::MatrixXf::Random(600, slaves);
     operators.compliance = Eigen::MatrixXd::Random(slaves, slaves);
@@ -122,9 +123,12 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
       {"model_id is 'abc': the operators belong to another model than '",
        [](Operators& o) { o.model_id = "abc"; }},
       {"modes is 12 x 3: must be 15 x 3", [](Operators& o) { o.modes.conservativeResize(12, 3); }},
-      {"gravity_modes = 4: must be from 0 to the 3 modes",
-       [](Operators& o) { o.gravity_modes = 4; }},
-      {"gravity_modes = -1: must", [](Operators& o) { o.gravity_modes = -1; }},
+      {"along_gravity_modes = 4: must be from 0 to the 3 modes",
+       [](Operators& o) { o.part_columns[0] = 4; }},
+      {"along_gravity_modes = -1: must", [](Operators& o) { o.part_columns[0] = -1; }},
+      {"fine_modes = 2: must be from 0 to the 1 modes",
+       [](Operators& o) { o.part_columns[6] = 2; }},
+      {"modes has 1 columns of no part", [](Operators& o) { o.part_columns[6] = 0; }},
       {"contact_columns is 15 x 1: must be 15 x 2",
        [](Operators& o) { o.contact_columns.conservativeResize(15, 1); }},
       {"compliance is 2 x 1: must be 2 x 2",
@@ -155,8 +159,8 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
        [](Operators& o) {
          o.control = {1, 1};
        }},
-      {"truncated_variance_mm2 is 3 x 1: must be 2 x 1",
-       [](Operators& o) { o.truncated_variance_mm2.setZero(3); }},
+      {"truncated_variance_mm2 is 3 x 3: must be 2 x 3",
+       [](Operators& o) { o.truncated_variance_mm2.setZero(3, kRemainders); }},
       {"control_neighbours is 4 x 4: must be 4 x 5",
        [](Operators& o) { o.control_neighbours.conservativeResize(4, 4); }},
       {"control_neighbours names a control node that does not exist",
@@ -176,7 +180,7 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
       {"initial_penetration_mm holds a number",
        [](Operators& o) { o.initial_penetration_mm(0) = std::numeric_limits<double>::infinity(); }},
       {"truncated_variance_mm2 holds a number",
-       [&](Operators& o) { o.truncated_variance_mm2(1) = nan; }},
+       [&](Operators& o) { o.truncated_variance_mm2(1, 0) = nan; }},
       {"control_weights holds a number", [&](Operators& o) { o.control_weights(3, 4) = inf; }},
   };
   const TemporaryFolder folder;

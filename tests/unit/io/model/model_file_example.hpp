@@ -74,7 +74,7 @@ inline CondensedOperators operators(Boundary boundary) {
   CondensedOperators result;
   result.boundary = boundary;
   result.model_id = model_file().model.model_id;
-  result.gravity_modes = 2;
+  result.part_columns = {2, 0, 0, 0, 0, 0, 1, 0, 0};
   result.slaves = boundary == Boundary::kContact ? std::vector<int>{3, 2} : std::vector<int>{};
   const auto s = static_cast<Eigen::Index>(result.slaves.size());
   count_up(result.modes, 15, 3, boundary == Boundary::kContact ? 100 : -100);
@@ -86,7 +86,7 @@ inline CondensedOperators operators(Boundary boundary) {
   count_up(result.initial_penetration_mm, s, 1, -600);
   result.region = {0, 2, 4};
   result.control = {1, 3};
-  count_up(result.truncated_variance_mm2, 2, 1, 700);
+  count_up(result.truncated_variance_mm2, 2, kRemainders, 700);
   result.control_neighbours.resize(4, 5);
   for (int i = 0; i < 20; ++i) result.control_neighbours.data()[i] = i % 3 == 0 ? 1 : 0;
   count_up(result.control_weights, 4, 5, 800);
@@ -107,7 +107,7 @@ inline std::string with_header(const std::string& bytes) {
   const auto crc =
       crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
   std::ostringstream header;
-  header << "brainshift model file\nformat 3\nbytes " << bytes.size() << "\ncrc32 " << std::hex
+  header << "brainshift model file\nformat 4\nbytes " << bytes.size() << "\ncrc32 " << std::hex
          << std::setw(8) << std::setfill('0') << crc << "\n";
   std::string block = header.str();
   block.resize(512, '\0');
