@@ -13,11 +13,12 @@
 namespace brainshift::inversion {
 namespace {
 
+// An estimate depends on its data alone: there is no state beside the operators.
 class Condensed final : public Inverter {
  public:
   Condensed(CondensedInverter inverter, std::uint64_t bytes)
       : inverter_(std::move(inverter)), bytes_(bytes) {}
-  void reset() override { inverter_.reset(); }
+  void reset() override {}
   std::optional<OmissionErrors> omission_errors() const override {
     return inverter_.omission_errors();
   }

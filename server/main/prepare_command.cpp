@@ -53,6 +53,9 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto plan = plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
+  for (const std::string& note : config->notes) {
+    bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
+  }
   patient::PrepareOptions options;
   options.progress = bar.progress("");
   options.checkpoint = arguments.out.string() + ".partial";

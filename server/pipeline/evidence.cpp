@@ -3,24 +3,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace brainshift::server {
 namespace {
 
-SparseData measured(const RegisteredObservation& observation, const Points& u) {
-  SparseData data = observation.surface->at(u);
-  data.sources = {{observation.source, 0, data.size()}};
+SparseData named(SparseData data, const std::string& source) {
+  data.sources = {{source, 0, data.size()}};
   return data;
 }
 
 }  // namespace
 
-void Evidence::clear() {
-  newest_.clear();
-  cortex_.resize(3, 0);
-}
+void Evidence::clear() { newest_.clear(); }
 
 void Evidence::put(RegisteredObservation observation) {
   std::string source = observation.source;
@@ -53,37 +50,48 @@ std::vector<Omission> Evidence::stale(std::int64_t now_ns) const {
   return omissions;
 }
 
-Points Evidence::cortex(const std::vector<NodeIndex>& nodes) const {
-  if (cortex_.cols() == 0) return Points::Zero(3, static_cast<Eigen::Index>(nodes.size()));
-  return cortex_;
-}
-
-void Evidence::remember(const Points& displacement, const std::vector<NodeIndex>& nodes) {
-  cortex_ = displacement(Eigen::all, nodes);
-}
-
-CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations,
-                           const Evidence& evidence)
+CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations)
     : observations_(std::move(observations)) {
   for (const RegisteredObservation* observation : observations_) {
     if (!observation->surface) {
       parts_.push_back(observation->data);
       continue;
     }
-    surfaces_.push_back(parts_.size());
-    moving_.nodes = observation->surface->nodes();  // the craniotomy's, for every surface
-    parts_.push_back(measured(*observation, evidence.cortex(moving_.nodes)));
+    followers_.push_back({parts_.size(), {}});
+    parts_.push_back(named(observation->surface->first(), observation->source));
   }
+  gather_nodes();
   data_ = combine(parts_);
   moving_.relocate = [this](const Points& u, SparseData& data) { return relocate(u, data); };
 }
 
+// The union of the followers' nodes, and the place of each follower's nodes in it.
+void CombinedData::gather_nodes() {
+  std::vector<NodeIndex>& all = moving_.nodes;
+  const auto nodes_of = [&](const Follower& follower) -> const std::vector<NodeIndex>& {
+    return observations_[follower.part]->surface->nodes();
+  };
+  for (const Follower& follower : followers_) {
+    all.insert(all.end(), nodes_of(follower).begin(), nodes_of(follower).end());
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  for (Follower& follower : followers_) {
+    for (const NodeIndex node : nodes_of(follower)) {
+      const auto place = std::lower_bound(all.begin(), all.end(), node);
+      follower.columns.push_back(static_cast<int>(place - all.begin()));
+    }
+  }
+}
+
 bool CombinedData::relocate(const Points& u, SparseData& data) {
   bool moved = false;
-  for (const std::size_t part : surfaces_) {
-    SparseData now = measured(*observations_[part], u);
-    if (!observations_[part]->surface->moved(parts_[part], now)) continue;
-    parts_[part] = std::move(now);
+  for (const Follower& follower : followers_) {
+    const RegisteredObservation& observation = *observations_[follower.part];
+    SparseData now =
+        named(observation.surface->at(u(Eigen::all, follower.columns)), observation.source);
+    if (!observation.surface->moved(parts_[follower.part], now)) continue;
+    parts_[follower.part] = std::move(now);
     moved = true;
   }
   if (moved) data = combine(parts_);

@@ -31,29 +31,23 @@ class Evidence {
   // Why the others are not used, for Update::left_out.
   std::vector<Omission> stale(std::int64_t now_ns) const;
 
-  // Displacement of the cortex in the last usable estimate, 3 x nodes; zero before the first one.
-  Points cortex(const std::vector<NodeIndex>& nodes) const;
-  // Keeps the displacement (3 x n) at these nodes of the cortex.
-  void remember(const Points& displacement, const std::vector<NodeIndex>& nodes);
-
  private:
   double age_s(const RegisteredObservation& observation, std::int64_t now_ns) const;
 
   double max_age_s_;
   std::map<std::string, RegisteredObservation> newest_;
-  Points cortex_;  // 3 x nodes of the craniotomy, or no columns
 };
 
-// Data of several observations as one. Data that follow the deformation are measured for the
-// displacement of the cortex in the last estimate, and anew whenever the inversion asks with
-// another one.
+// Data of several observations as one. Data that follow the deformation begin where their
+// observation alone says (SurfaceDistances::first), so that an estimate does not depend on earlier
+// ones. They are measured anew whenever the inversion asks with a displacement.
 class CombinedData {
  public:
-  CombinedData(std::vector<const RegisteredObservation*> observations, const Evidence& evidence);
+  explicit CombinedData(std::vector<const RegisteredObservation*> observations);
 
   const SparseData& data() const { return data_; }
   // Null when nothing moves. Valid as long as this object.
-  const inversion::MovingData* moving() const { return surfaces_.empty() ? nullptr : &moving_; }
+  const inversion::MovingData* moving() const { return followers_.empty() ? nullptr : &moving_; }
   // Fills observation_sequence and age of the estimate's sources, and adds the outliers of their
   // alignment.
   void describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const;
@@ -62,11 +56,17 @@ class CombinedData {
   CombinedData& operator=(const CombinedData&) = delete;
 
  private:
+  // An observation (and part) that follows the deformation.
+  struct Follower {
+    std::size_t part = 0;
+    std::vector<int> columns;  // of its nodes among moving_.nodes
+  };
+  void gather_nodes();
   bool relocate(const Points& u, SparseData& data);
 
   std::vector<const RegisteredObservation*> observations_;
   std::vector<SparseData> parts_;
-  std::vector<std::size_t> surfaces_;  // observations (and parts) that follow the deformation
+  std::vector<Follower> followers_;
   inversion::MovingData moving_;
   SparseData data_;
 };

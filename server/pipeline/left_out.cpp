@@ -26,6 +26,41 @@ std::string at_most_mm(double error_mm) {
 
 }  // namespace
 
+std::vector<Omission> prior_omissions(const PriorConfig& prior) {
+  struct Part {
+    const char* name;
+    const char* keys;
+    bool off;
+    double cortex_mm, tumour_mm;
+  };
+  const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
+  const Part parts[] = {
+      {"gravity modes", "prior.gravity_mode_sd or prior.gravity_levels_mm", no_gravity, 2.1, 2.3},
+      {"swelling of the tumour", "prior.tumour_volume_strain_sd or prior.tumour_volume_radii_mm",
+       prior.tumour_volume_strain_sd == 0.0 || prior.tumour_volume_radii_mm.empty(), 1.7, 1.4},
+      {"volume of the brain", "prior.brain_volume_strain_sd", prior.brain_volume_strain_sd == 0.0,
+       0.4, 0.4},
+      {"resection", "prior.resection_weight_sd and prior.resection_stress_sd_pa",
+       prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6},
+      {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
+       4.8, 1.6},
+      {"fine remainder", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0, 0.1,
+       0.1},
+      {"medium remainder", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0, 0.8,
+       0.8},
+      {"coarse remainder", "prior.coarse_density_sd_n_m3", prior.coarse_density_sd_n_m3 == 0.0, 1.1,
+       1.2}};
+  std::vector<Omission> omissions;
+  for (const Part& part : parts) {
+    if (!part.off) continue;
+    omissions.push_back({part.name, fmt::format("{} is 0 or empty", part.keys),
+                         fmt::format("where it acts, about {:.1f} mm at the cortex and {:.1f} mm "
+                                     "at the tumour (median of the default prior)",
+                                     part.cortex_mm, part.tumour_mm)});
+  }
+  return omissions;
+}
+
 double consolidation_time_s(const TetMesh& mesh, const Material& material) {
   const double volume_mm3 = fem::nodal_volumes(mesh).sum();
   const double radius_mm = std::cbrt(3.0 * volume_mm3 / (4.0 * std::numbers::pi));
@@ -75,6 +110,7 @@ std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig&
          "about 1.8 mm at the craniotomy: in the paper's five cases 3.4 mm of error "
          "remain there on average, 1.6 mm with contact"});
   }
+  for (Omission& part : prior_omissions(config.prior)) omissions.push_back(std::move(part));
   return omissions;
 }
 
@@ -101,13 +137,7 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
   }
   const bool has_modes =
       config.prior.gravity_mode_sd > 0.0 && !config.prior.gravity_levels_mm.empty();
-  if (!has_modes) {
-    omissions.push_back(
-        {"gravity modes",
-         fmt::format("prior.gravity_mode_sd = {:g} with {} gravity_levels_mm",
-                     config.prior.gravity_mode_sd, config.prior.gravity_levels_mm.size()),
-         "none under the prior of the case"});
-  } else if (scene.gravity_modes == Carry::kOff) {
+  if (has_modes && scene.gravity_modes == Carry::kOff) {
     omissions.push_back(
         {"gravity modes", "scene.gravity_modes = off", at_most_mm(errors.gravity_modes_mm)});
   }
@@ -122,12 +152,12 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
 }
 
 std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
-                                             double rotation_prior_sd_deg) {
+                                             double rotation_prior_sd_deg, bool start_only) {
   std::vector<Omission> omissions;
   const std::string size = at_most_mm(icp.left_out_rotation_mm) + " at the tumour's surface";
-  if (rotation == Carry::kOff) {
+  if (!start_only && rotation == Carry::kOff) {
     omissions.push_back({"rotation", "scene.rotation = off: only a translation is aligned", size});
-  } else if (rotation == Carry::kAuto && !icp.rotation_observable) {
+  } else if (!start_only && rotation == Carry::kAuto && !icp.rotation_observable) {
     const std::string held =
         rotation_prior_sd_deg > 0.0
             ? fmt::format("held by a prior of {:.1f} deg", rotation_prior_sd_deg)

@@ -26,7 +26,12 @@ double undrained_fraction(double seconds, double consolidation_time_s);
 // 1 / (1 + (pi^2/4) t/T), above the other for every t.
 double implicit_step_fraction(double seconds, double consolidation_time_s);
 
-// Fixed by case, method and boundary: pressure, uncertainty, and contact under the fixed boundary.
+// Parts of the prior that the case switches off, each with what it moves where it acts: median of
+// the motion under the default prior, at the cortex and at the tumour (docs/decisions/0018).
+std::vector<Omission> prior_omissions(const PriorConfig& prior);
+
+// Fixed by case, method and boundary: pressure, uncertainty, contact under the fixed boundary, and
+// parts of the prior.
 std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
                                       Method method, Boundary boundary);
 
@@ -36,8 +41,9 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
                                           int active_slaves);
 
 // What the alignment of one observation did not estimate: rotation (switched off, or not
-// observable). It is named too when it did not converge.
+// observable). start_only: the alignment is where distances start and says nothing else; the
+// inversion estimates what they show of a rotation. It is named too when it did not converge.
 std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
-                                             double rotation_prior_sd_deg);
+                                             double rotation_prior_sd_deg, bool start_only);
 
 }  // namespace brainshift::server

@@ -69,7 +69,8 @@ Status Pipeline::register_into(const Observation& observation, Update& update) {
   if (registered->icp) {
     update.T_undeformed_deformed = registered->icp->T_surface_points;
     append(registration_omissions(*registered->icp, config_.scene.rotation,
-                                  registration::IcpOptions{}.rotation_sd_deg),
+                                  registration::IcpOptions{}.rotation_sd_deg,
+                                  registered->surface.has_value()),
            update);
   }
   evidence_.put(std::move(*registered));
@@ -82,7 +83,7 @@ Status Pipeline::register_into(const Observation& observation, Update& update) {
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
                                Update& update) {
   const Stopwatch watch;
-  const CombinedData combined(evidence_.fresh(observation.acquired_ns), evidence_);
+  const CombinedData combined(evidence_.fresh(observation.acquired_ns));
   inversion::InversionOptions asked;
   asked.stop = options.stop;
   asked.moving = combined.moving();
@@ -98,11 +99,7 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
   Estimate& estimate = update.estimate;
   if (auto status = inverter_->update(combined.data(), asked, estimate); !status) return status;
   combined.describe(observation.acquired_ns, estimate.sources);
-  if (estimate.quality.usable()) {
-    evidence_.remember(estimate.displacement, targets_.craniotomy.nodes);
-  } else {
-    evidence_.drop(observation.source);
-  }
+  if (!estimate.quality.usable()) evidence_.drop(observation.source);
   if (const auto errors = inverter_->omission_errors()) {
     append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
   }

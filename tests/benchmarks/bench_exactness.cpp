@@ -203,6 +203,8 @@ Status compare_reduced(const PreparedModel& model, const io::ModelFile& head,
   compared.json["reduced_prepare_s"] = watch.seconds();
   CaseConfig config = head.config;
   config.condensed.deadline_ms = 1e6;  // accuracy is asked for here, not speed
+  // The direct posterior is that of one prior, not a mean over hypotheses.
+  config.prior.estimate_scales = false;
   const auto locator = std::make_shared<const geometry::TetLocator>(head.model.mesh);
   for (const int rank : kRanks) {
     inversion::CondensedOptions options;

@@ -6,12 +6,12 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 
 #include "common/contact/forward_model.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
-#include "common/prior/load_modes.hpp"
 
 namespace brainshift {
 namespace {
@@ -80,9 +80,9 @@ void SolveInBlocksOf64(benchmark::State& state) {
 BENCHMARK(SolveInBlocksOf64)->Unit(benchmark::kMillisecond);
 
 void ApplyPrior(benchmark::State& state) {
-  const prior::ForcePrior prior(head().model.mesh.nodes, fem::nodal_volumes(head().model.mesh),
-                                head().config.prior.correlation_length_mm, 1e-6,
-                                prior::load_modes(head().model, head().config));
+  static const auto prepared = inversion::PreparedModel::prepare(
+      std::make_shared<const BrainModel>(head().model), head().config, Boundary::kContact);
+  const prior::ForcePrior& prior = prepared->prior();
   const Points w = Points::Random(3, head().model.mesh.num_nodes());
   Points f;
   for (auto _ : state) {

@@ -90,7 +90,6 @@ void run(const std::string& case_file) {
       Estimate full, estimate;
       for (std::size_t p = 0; p < parts.size(); ++p) {
         Measured measured;
-        inverters[p].reset();
         measured.add(inverters[p], data, estimate);
         if (p == 0) full = estimate;
         const auto& error = parts[p].error;

@@ -86,7 +86,7 @@ Real mean_norm(const VectorR& nodal) {
 
 std::optional<Descent> descend(const ReferencePatient& patient, const SparseData& data,
                                const InversionConfig& config, Steps steps) {
-  constexpr PriorScaleValues kAsTheCaseSays{1.0, 1.0, 1.0, 1.0};
+  constexpr PriorScaleValues kAsTheCaseSays = kAsInTheCase;
   const MatrixR a = sampling_rows(patient.mesh, data.positions);
   const VectorR d =
       Eigen::Map<const VecX>(data.displacements.data(), data.displacements.size()).cast<Real>();

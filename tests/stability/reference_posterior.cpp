@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "common/inversion/condensed/prior_scales.hpp"
+#include "common/inversion/condensed/prior_strengths.hpp"
 
 namespace brainshift::stability {
 namespace {
@@ -64,8 +64,8 @@ MatrixR ReferencePatient::kernel_times(const MatrixR& nodal) const {
 
 MatrixR ReferencePatient::covariance_times(const MatrixR& nodal,
                                            const PriorScaleValues& scales) const {
-  const auto other = static_cast<Real>(scales[index_of(PriorPart::kOther)]);
-  MatrixR out = other * other * kernel_times(nodal);
+  const auto fine = static_cast<Real>(scales[index_of(PriorPart::kFine)]);
+  MatrixR out = fine * fine * kernel_times(nodal);
   MatrixR scaled = modes;
   for (std::size_t j = 0; j < part_of_mode.size(); ++j) {
     scaled.col(static_cast<Eigen::Index>(j)) *=
@@ -126,8 +126,7 @@ ReferencePosterior::ReferencePosterior(ReferencePatient& patient, const SparseDa
   MatrixR x(loads_.rows(), rows_ + sampled_contact_.cols());
   x << patient.system.solve_free(loads_), patient.contact_columns;
   const MatrixR nodal = patient.expand(x);
-  covariance_of_part_[index_of(PriorPart::kOther)] =
-      nodal.transpose() * patient.kernel_times(nodal);
+  covariance_of_part_[index_of(PriorPart::kFine)] = nodal.transpose() * patient.kernel_times(nodal);
   const MatrixR amplitudes = nodal.transpose() * patient.modes;
   for (std::size_t j = 0; j < patient.part_of_mode.size(); ++j) {
     MatrixR& part = covariance_of_part_[index_of(patient.part_of_mode[j])];
@@ -236,18 +235,26 @@ std::optional<contact::ActiveSet> ReferencePosterior::find_set(
 
 std::optional<Posterior> ReferencePosterior::of_set(const contact::ActiveSet& set,
                                                     const PriorScaleValues& scales) {
+  return of_set(set, std::vector<Hypothesis>{{scales, 1.0}});
+}
+
+std::optional<Posterior> ReferencePosterior::of_set(const contact::ActiveSet& set,
+                                                    const std::vector<Hypothesis>& hypotheses) {
   Reference& system = patient_.system;
   if (!system.activate(set)) return std::nullopt;
   const MatrixR adjoints = system.solve(loads_);  // K_p^-1 T^T A^T
-  const MatrixR forces =
-      patient_.restrict_to(patient_.covariance_times(patient_.expand(adjoints), scales));
-  MatrixR innovation = adjoints.transpose() * forces;
-  innovation.diagonal() += variance_;
-  const Eigen::LLT<MatrixR> factor(innovation);
-  if (factor.info() != Eigen::Success) return std::nullopt;
+  const MatrixR nodal = patient_.expand(adjoints);
   const VectorR shift = system.displacement(Points::Zero(3, patient_.mesh.num_nodes()));
   const VectorR misfit = data_ - loads_.transpose() * system.unknowns().restrict_to(shift);
-  const MatrixR load = forces * factor.solve(misfit);
+  MatrixR load = MatrixR::Zero(loads_.rows(), 1);
+  for (const Hypothesis& each : hypotheses) {
+    const MatrixR forces = patient_.restrict_to(patient_.covariance_times(nodal, each.scales));
+    MatrixR innovation = adjoints.transpose() * forces;
+    innovation.diagonal() += variance_;
+    const Eigen::LLT<MatrixR> factor(innovation);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    load += static_cast<Real>(each.weight) * (forces * factor.solve(misfit));
+  }
   Posterior result;
   result.active = set;
   result.displacement = shift + patient_.expand(system.solve(load)).col(0);
@@ -268,11 +275,17 @@ std::optional<Real> ReferencePosterior::log_evidence(const SetModel& model,
   const MatrixR lower = factor.matrixL();
   const VectorR white = factor.matrixL().solve(model.right);
   Real log_p = -white.squaredNorm() / 2 - lower.diagonal().array().log().sum();
-  constexpr Real kSd = inversion::kLogVarianceSd;
+  // Half the weight at 0, the rest log-normal about 1 on the grid of strengths.
+  const Real width = std::log(Real(3));
+  Real sum = 0;
+  for (const double strength : inversion::kStrengths) {
+    if (strength > 0) sum += std::exp(-std::pow(std::log(Real(strength)) / width, 2) / 2);
+  }
   for (std::size_t part = 0; part < scales.size(); ++part) {
     if (covariance_of_part_[part].size() == 0) continue;
-    const Real theta = 2 * std::log(static_cast<Real>(scales[part]));
-    log_p -= theta * theta / (2 * kSd * kSd);
+    const auto strength = static_cast<Real>(scales[part]);
+    log_p += std::log(Real(0.5L));
+    if (strength > 0) log_p -= std::log(sum) + std::pow(std::log(strength) / width, 2) / 2;
   }
   return log_p;
 }
@@ -285,21 +298,18 @@ std::optional<Real> ReferencePosterior::gain_left(const contact::ActiveSet& set,
   if (!start) return std::nullopt;
   PriorScaleValues best = scales;
   Real highest = *start;
-  for (double step = 2.0; step >= 0.25; step /= 2.0) {  // of ln s^2
-    for (bool moved = true; moved;) {
-      moved = false;
-      for (std::size_t part = 0; part < best.size(); ++part) {
-        if (covariance_of_part_[part].size() == 0) continue;
-        for (const double direction : {step, -step}) {
-          PriorScaleValues other = best;
-          other[part] =
-              std::min(inversion::kLargestScales[part], best[part] * std::exp(0.5 * direction));
-          const auto there = log_evidence(*model, other);
-          if (!there || *there <= highest + Real(0.01L)) continue;
-          highest = *there;
-          best = other;
-          moved = true;
-        }
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (std::size_t part = 0; part < best.size(); ++part) {
+      if (covariance_of_part_[part].size() == 0) continue;
+      for (const double strength : inversion::kStrengths) {
+        PriorScaleValues other = best;
+        other[part] = strength;
+        const auto there = log_evidence(*model, other);
+        if (!there || *there <= highest + Real(0.01L)) continue;
+        highest = *there;
+        best = other;
+        moved = true;
       }
     }
   }

@@ -64,9 +64,11 @@ class ReferencePosterior {
   std::optional<contact::ActiveSet> find_set(const PriorScaleValues& scales) const;
   // The posterior of a set by K_p; nothing when a factor fails.
   std::optional<Posterior> of_set(const contact::ActiveSet& set, const PriorScaleValues& scales);
-  // What is left to gain in ln p(d | scales, set) p(scales) over the scales, from `scales` on:
-  // coordinate search with steps of 2 to 0.25 in ln s^2. p(scales) and the largest scales are
-  // those that prior_scales.hpp states.
+  // Loads averaged over hypotheses, the set kept.
+  std::optional<Posterior> of_set(const contact::ActiveSet& set,
+                                  const std::vector<Hypothesis>& hypotheses);
+  // What is left to gain in ln p(d | scales, set) p(scales) over the strengths of
+  // prior_strengths.hpp, from `scales` on: coordinate search.
   std::optional<Real> gain_left(const contact::ActiveSet& set,
                                 const PriorScaleValues& scales) const;
 

@@ -19,7 +19,7 @@ namespace brainshift::stability {
 namespace {
 
 constexpr double kWrongScale = 1.1;
-constexpr PriorScaleValues kAsTheCaseSays{1.0, 1.0, 1.0, 1.0};
+constexpr PriorScaleValues kAsTheCaseSays = kAsInTheCase;
 
 // The model was not built const. No input of the product gives one slave a wrong normal or gap
 // alone.
@@ -111,6 +111,11 @@ CaseConfig stability_config() {
   CaseConfig config = test_support::toy_config();
   config.brain = "toy";  // validate() asks for a mask to mesh; the toy patient needs none
   config.condensed.max_rank = 600;
+  // What the reference assembles: gravity and the paper's remainder.
+  config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;
+  config.prior.tumour_volume_strain_sd = config.prior.brain_volume_strain_sd = 0.0;
+  config.prior.resection_weight_sd = config.prior.resection_stress_sd_pa = 0.0;
+  config.prior.opening_pressure_sd_pa = 0.0;
   config.condensed.uncertainty_nodes = 64;
   config.condensed.deadline_ms = 1e5;  // no answer depends on the machine's speed
   return config;
@@ -178,7 +183,9 @@ void compare_with_posterior(ToyProblem& problem, const SparseData& data, const E
       point.must_warn ||
       fem::measure_deformation(problem.brain->mesh, estimate.displacement).inverted > 0;
   ReferencePosterior reference(*problem.patient, data);
-  const PriorScaleValues& scales = estimate.prior_scales;
+  const std::vector<Hypothesis> hypotheses =
+      estimate.hypotheses.empty() ? std::vector<Hypothesis>{{}} : estimate.hypotheses;
+  const PriorScaleValues& scales = hypotheses.front().scales;
   const contact::ActiveSet product_set = set_of(problem, estimate);
   const auto difference = [&](const Posterior& right) {
     return difference_mm(problem, estimate, right.displacement, right.penetration, right.active);
@@ -186,14 +193,14 @@ void compare_with_posterior(ToyProblem& problem, const SparseData& data, const E
   contact::ActiveSet judged = product_set;
   const auto own_set = reference.find_set(scales);
   if (own_set) {
-    if (const auto right = reference.of_set(*own_set, scales)) {
+    if (const auto right = reference.of_set(*own_set, hypotheses)) {
       point.difference = difference(*right);
       judged = *own_set;
     }
   }
   if (!(point.difference <= point.bound) && own_set != product_set) {
     // Another set may repeat itself too, and some data have none that does.
-    const auto right = reference.of_set(product_set, scales);
+    const auto right = reference.of_set(product_set, hypotheses);
     if (!right) return;
     judged = product_set;
     point.difference = difference(*right);

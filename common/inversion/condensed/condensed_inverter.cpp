@@ -8,16 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "common/contact/set_search.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/contact_reduction.hpp"
 #include "common/inversion/condensed/contradictions.hpp"
 #include "common/inversion/condensed/field_rebuild.hpp"
-#include "common/inversion/condensed/find_contact_set.hpp"
-#include "common/inversion/condensed/mode_posterior.hpp"
+#include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
-#include "common/inversion/condensed/prior_scales.hpp"
+#include "common/inversion/condensed/prior_strengths.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/contract/data_check.hpp"
@@ -28,40 +25,72 @@
 namespace brainshift::inversion {
 namespace {
 
-// Contact, scales, robust weights and places of moving data settle in turn. Two rounds are the rule
-// when a surgery begins, one later.
-constexpr int kMaxRounds = 6;
+// Loads, robust weights and places of moving data settle in turn. Two rounds are the rule when a
+// surgery begins, one later.
+constexpr int kMaxRounds = 10;
+constexpr int kMaxFits = 6;
+constexpr int kMaxFirstRounds = 6;  // of weights
+// Variances that differ by less than this part change nothing that anyone sees.
+constexpr double kSameVariance = 0.1;
 
-// Sets of a cycle from whose mean of loads the search tries to leave it.
-constexpr int kMaxRelaxations = 10;
+// By how much the displacement of a brain differs whose tissue is 30 % stiffer here and softer
+// there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, more where tissue
+// swells (decision 0018). There the strength of the same part grows with the data.
+constexpr double kModelError = 0.1;
+
+// Standard deviation of a displacement component that the modes of `part` stand for, mm; 0 without
+// modes.
+double displacement_sd_mm(const CondensedOperators& operators, PriorPart part) {
+  int first = 0;
+  for (int g = 0; g < static_cast<int>(part); ++g) {
+    first += operators.part_columns[static_cast<std::size_t>(g)];
+  }
+  const int count = operators.part_columns[static_cast<std::size_t>(part)];
+  if (count == 0) return 0.0;
+  const double squares = operators.modes.middleCols(first, count).cast<double>().squaredNorm();
+  return std::sqrt(squares / static_cast<double>(operators.modes.rows()));
+}
 
 // Into memory that `reason` has already.
-void set_reason(EstimateStatus outcome, const contact::SetSearch& search,
-                const CondensedConfig& config, double misfit_ratio, std::string& reason) {
+void set_reason(EstimateStatus outcome, const Estimate& estimate, const CondensedConfig& config,
+                std::string& reason) {
+  const ContactSummary& contact = estimate.contact;
   char text[240];
   switch (outcome) {
     case EstimateStatus::kConverged:
-      std::snprintf(text, sizeof text, "contact holds to %.1g mm at iteration %d",
-                    search.violation_mm(), search.iteration());
+      std::snprintf(text, sizeof text, "loads and contact settled in %d steps", contact.iterations);
       break;
     case EstimateStatus::kDeadline:
-      std::snprintf(text, sizeof text,
-                    "deadline of %g ms reached after %d contact sets; best iterate returned",
-                    config.deadline_ms, search.iteration());
+      std::snprintf(
+          text, sizeof text,
+          "deadline of %g ms reached after %d steps; best iterate returned, %.2g standard "
+          "deviations from its minimum",
+          config.deadline_ms, contact.iterations, contact.decrement);
       break;
     default:
       std::snprintf(text, sizeof text,
-                    "contact did not settle in %d iterations; best iterate returned, "
-                    "which violates it by %.2g mm",
-                    search.iteration(), search.best_violation_mm());
+                    "loads did not settle in %d steps; best iterate returned, %.2g standard "
+                    "deviations from its minimum",
+                    contact.iterations, contact.decrement);
   }
   reason.assign(text);
-  if (misfit_ratio > kUnexplainedMisfit) {
+  if (estimate.misfit_ratio > kUnexplainedMisfit) {
     std::snprintf(text, sizeof text,
                   "; the prior does not explain the data: they lie %.1f standard deviations off",
-                  misfit_ratio);
+                  estimate.misfit_ratio);
     reason.append(text);
   }
+  for (std::size_t part = 0; part < estimate.prior_at_bound.size(); ++part) {
+    if (!estimate.prior_at_bound[part]) continue;
+    const std::string_view name = to_string(static_cast<PriorPart>(part));
+    std::snprintf(text, sizeof text, "; the strength of %.*s is at its bound, %g times the case's",
+                  static_cast<int>(name.size()), name.data(), kLargestStrength);
+    reason.append(text);
+  }
+}
+
+bool same(const RemainderVariances& a, const RemainderVariances& b) {
+  return ((a - b).array().abs() <= kSameVariance * a.array().max(b.array())).all();
 }
 
 // Outliers, and sources that contradict the others.
@@ -107,14 +136,12 @@ struct CondensedInverter::Impl {
         team(options.threads),
         deformation(given_locator->nodes(), given_locator->tets(), team),
         sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
-        reduction(*operators, window, config.contact.penalty_n_per_mm, team),
-        posterior(window),
+        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors,
+                  config.prior.estimate_scales),
+        descent(*operators, window, config.contact.penalty_n_per_mm, options.contact, team),
         rebuild(*operators, window, options.region_of_interest),
-        scales({operators->gravity_modes, operators->swelling_modes}, window,
-               SparseData::kMaxCommonErrors),
-        estimate_scales(config.prior.estimate_scales),
         robust(config.sensing.robust_weights),
-        search(options.contact ? operators->num_slaves() : 0, condensed.max_contact_iterations) {
+        medium_sd_mm(displacement_sd_mm(*operators, PriorPart::kMedium)) {
     for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
       const NodeIndex node = operators->slaves[static_cast<std::size_t>(slave)];
       const auto& region = options.region_of_interest;
@@ -130,7 +157,7 @@ struct CondensedInverter::Impl {
   // Grows what depends on the number of data; nothing happens while they fit.
   void reserve(int data) {
     if (data <= norms.size()) return;
-    posterior.reserve(data);
+    descent.reserve(data);
     sampled.reserve(data);
     weights.reserve(data);
     contradictions.reserve(data);
@@ -140,40 +167,32 @@ struct CondensedInverter::Impl {
   static ModeWindow mode_window(const CondensedOperators& operators,
                                 const CondensedOptions& options) {
     ModeWindow window;
-    window.first = options.gravity_modes ? 0 : operators.gravity_modes;
+    window.first = options.gravity_modes ? 0 : operators.gravity_modes();
     const int last =
         options.rank > 0 ? std::min(options.rank, operators.num_modes()) : operators.num_modes();
     window.count = std::max(0, last - window.first);
     return window;
   }
 
-  void reset() {
-    search.forget();
-    scales.reset();
-  }
   // Checks and places data that are new.
   Status accept(const SparseData& data);
-  // Contact, scales, weights and moving data in turn, until nothing changes. `data` follows
-  // `moving`. Errors of evaluate(), of moving data that are not fit, and stopped().
+  // Loads with contact, weights and moving data in turn, until nothing changes. `data` follows
+  // `moving`. Errors of LoadDescent::run, and of moving data that are not fit.
   Result<EstimateStatus> settle(const SparseData*& data, const InversionOptions& asked);
-  // Contact for the present scales and weights, from the last set on: kConverged, kIterationLimit
-  // or kDeadline.
-  Result<EstimateStatus> settle_contact(const std::stop_token& stop);
-
-  // What find_contact_set() asks of a method.
-  Status evaluate(const contact::ActiveSet& set);
-  const VecX& all_forces() const { return reduction.all_forces(); }
-  const VecX& penetration() const { return reduction.penetration(); }
-  const VecX& compliance_diagonal() const { return reduction.compliance_diagonal(); }
-  void keep();
-  void leave_cycle();
-  bool out_of_time() const { return watch.milliseconds() > condensed.deadline_ms; }
-
+  double model_error_floor(const SparseData& data);
+  // Samples the data and takes their linear model.
+  Status sample(const SparseData& data);
+  Status distrust_outliers(const SparseData& data);
+  // Strengths and rough descents in turn until the strengths stay.
+  Status find_strengths(const DescentLimits& limits, EstimateStatus& outcome);
+  // Weights and places of the data for the present estimate; whether anything changed.
+  Result<bool> follow(const SparseData*& data, const InversionOptions& asked);
+  RemainderVariances remainder_variances() const;
   bool reweigh(const SparseData& data);
   Result<bool> relocate(const SparseData& data, const MovingData& moving);
   void record();
   Status finish(const SparseData& data, Estimate& estimate);
-  void estimate_omissions();
+  Status estimate_omissions();
   void summarise_sources(const SparseData& data, Estimate& estimate);
 
   std::shared_ptr<const CondensedOperators> operators;
@@ -184,22 +203,19 @@ struct CondensedInverter::Impl {
   ThreadTeam team;
   fem::DeformationCheck deformation;
   SampledOperators sampled;
-  ContactReduction reduction;
-  ModePosterior posterior;
+  PriorStrengths strengths;
+  LoadDescent descent;
   FieldRebuild rebuild;
-  PriorScales scales;
-  bool estimate_scales;
   RobustWeights weights;
   Contradictions contradictions;
   bool robust;
-  contact::SetSearch search;
+  double medium_sd_mm;
 
   Stopwatch watch;                  // of the update
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
-  int relaxations = 0;
-  VecX relaxed;      // modes between those of the last sets, once they cycle
-  VecX norms;        // of the residuals, per datum
-  SparseData moved;  // the data where they are now, when they move
+  VecX norms;                       // of the residuals, per datum
+  RemainderVariances left_out;      // what `sampled` knows
+  SparseData moved;                 // the data where they are now, when they move
   Points moving_displacement;
   std::vector<IterationRecord> history;
   OmissionErrors errors;
@@ -211,38 +227,15 @@ Status CondensedInverter::Impl::accept(const SparseData& data) {
   return sampled.locate(data);
 }
 
-// Posterior mean of z and the contact forces for the set; penetration of every slave.
-Status CondensedInverter::Impl::evaluate(const contact::ActiveSet& set) {
-  if (auto status = reduction.activate(set); !status) return status;
-  if (auto status = posterior.solve(sampled, reduction, scales, team); !status) return status;
-  reduction.update_forces(posterior.z());
-  record();
-  return {};
-}
-
-void CondensedInverter::Impl::keep() {
-  relaxed = posterior.z();
-  relaxations = 0;
-}
-
-// The contact set at a point between the last sets' estimates: the mean of their loads.
-void CondensedInverter::Impl::leave_cycle() {
-  for (int k = 0; k < kMaxRelaxations; ++k) {
-    relaxed += (posterior.z() - relaxed) / static_cast<double>(++relaxations + 1);
-    reduction.update_forces(relaxed);
-    if (search.follow(reduction.all_forces(), reduction.penetration())) return;
-  }
-}
-
 bool CondensedInverter::Impl::reweigh(const SparseData& data) {
   if (!robust) return false;
   auto out = norms.head(data.size());
-  for (int i = 0; i < data.size(); ++i) out[i] = posterior.residual_norm(sampled, i);
+  for (int i = 0; i < data.size(); ++i) out[i] = descent.posterior().residual_norm(sampled, i);
   return weights.update(data, out);
 }
 
 Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
-  rebuild.displacement_at(moving.nodes, posterior.z(), reduction, moving_displacement);
+  rebuild.displacement_at(moving.nodes, descent.z(), descent.contact(), moving_displacement);
   if (&data != &moved) moved = data;
   const int before = moved.size();
   if (!moving.relocate(moving_displacement, moved)) return false;
@@ -251,45 +244,130 @@ Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const Mov
   return true;
 }
 
-Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
-                                                       const InversionOptions& asked) {
-  bool sample = true;
-  for (int round = 0;; ++round) {
-    if (sample) sampled.sample(*data, scales.of_other(), weights.values());
-    const auto settled = settle_contact(asked.stop);
-    if (!settled || *settled != EstimateStatus::kConverged || round == kMaxRounds) return settled;
-    const bool rescaled =
-        estimate_scales && scales.fit(posterior.gram(), posterior.right_hand_side());
-    const bool reweighed = reweigh(*data);
-    bool relocated = false;
-    if (asked.moving != nullptr) {
-      const auto changed = relocate(*data, *asked.moving);
-      if (!changed) return tl::unexpected(changed.error());
-      relocated = *changed;
-      if (relocated) data = &moved;
-    }
-    if (!rescaled && !reweighed && !relocated) return settled;
-    sample = reweighed || relocated || sampled.data_outside_region() > 0;
+RemainderVariances CondensedInverter::Impl::remainder_variances() const {
+  const PriorScaleValues squares = strengths.mean_square();
+  RemainderVariances variances;
+  for (int g = 0; g < kRemainders; ++g) {
+    variances[g] = squares[static_cast<std::size_t>(kLoadParts + g)];
   }
+  return variances;
 }
 
-Result<EstimateStatus> CondensedInverter::Impl::settle_contact(const std::stop_token& stop) {
-  const auto end = find_contact_set(search, *this, stop);
-  if (!end) return tl::unexpected(end.error());
-  switch (*end) {
-    case SearchEnd::kSolved: return EstimateStatus::kConverged;
-    case SearchEnd::kDeadline: return EstimateStatus::kDeadline;
-    case SearchEnd::kExhausted: break;
+// Before strengths are fitted, which would grow until gross errors are no residuals any more:
+// weights under the case's own strengths, without contact.
+Status CondensedInverter::Impl::distrust_outliers(const SparseData& data) {
+  for (int round = 0; round < kMaxFirstRounds; ++round) {
+    if (auto status = descent.posterior().minimise(strengths); !status) return status;
+    if (!reweigh(data)) return {};
+    if (auto status = sample(data); !status) return status;
   }
-  return search.best_violation_mm() <= contact::kHolds_mm ? EstimateStatus::kConverged
-                                                          : EstimateStatus::kIterationLimit;
+  return {};
+}
+
+Status CondensedInverter::Impl::find_strengths(const DescentLimits& limits,
+                                               EstimateStatus& outcome) {
+  if (auto status =
+          strengths.fit(descent.posterior().gram(), descent.posterior().right_hand_side());
+      !status) {
+    return status;
+  }
+  bool changed = true;
+  for (int fit = 1; changed && fit <= kMaxFits && outcome == EstimateStatus::kConverged; ++fit) {
+    if (auto status = descent.jump(sampled, strengths); !status) return status;
+    const auto descended = descent.descend(sampled, strengths, false, limits);
+    if (!descended) return tl::unexpected(descended.error());
+    outcome = *descended;
+    if (auto status = strengths.refit(descent.posterior().gram(),
+                                      descent.posterior().right_hand_side(), changed);
+        !status) {
+      return status;
+    }
+  }
+  return {};
+}
+
+Result<bool> CondensedInverter::Impl::follow(const SparseData*& data,
+                                             const InversionOptions& asked) {
+  const bool reweighed = reweigh(*data);
+  bool relocated = false;
+  if (asked.moving != nullptr) {
+    const auto changed = relocate(*data, *asked.moving);
+    if (!changed) return tl::unexpected(changed.error());
+    relocated = *changed;
+    if (relocated) data = &moved;
+  }
+  const RemainderVariances now = remainder_variances();
+  const bool resampled = sampled.data_outside_region() > 0 && !same(now, left_out);
+  return reweighed || relocated || resampled;
+}
+
+// Of the part that stands for the model's own error, in units of its standard deviation.
+double CondensedInverter::Impl::model_error_floor(const SparseData& data) {
+  if (!(medium_sd_mm > 0.0)) return 0.0;
+  auto measured = norms.head(data.size());
+  measured = data.displacements.colwise().norm().transpose();
+  const auto upper = measured.data() + 3 * data.size() / 4;
+  std::nth_element(measured.data(), upper, measured.data() + data.size());
+  return kModelError * *upper / (std::sqrt(3.0) * medium_sd_mm);
+}
+
+Status CondensedInverter::Impl::sample(const SparseData& data) {
+  left_out = remainder_variances();
+  sampled.sample(data, left_out, weights.values());
+  return descent.take(sampled);
+}
+
+Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
+                                                       const InversionOptions& asked) {
+  DescentLimits limits;
+  limits.max_steps = condensed.max_contact_iterations;
+  limits.stop = asked.stop;
+  limits.out_of_time = [this] { return watch.milliseconds() > condensed.deadline_ms; };
+  limits.on_step = [this] { record(); };
+  strengths.reset();
+  strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
+  auto outcome = EstimateStatus::kConverged;
+  const auto& posterior = descent.posterior();
+  if (auto status = sample(*data); !status) return tl::unexpected(status.error());
+  if (auto status = distrust_outliers(*data); !status) return tl::unexpected(status.error());
+  if (auto status = find_strengths(limits, outcome); !status) {
+    return tl::unexpected(status.error());
+  }
+  bool fine = false;
+  for (int round = 0;; ++round) {
+    if (auto status = descent.average(strengths); !status) return tl::unexpected(status.error());
+    if (outcome != EstimateStatus::kConverged || round == kMaxRounds) break;
+    const auto followed = follow(data, asked);
+    if (!followed) return tl::unexpected(followed.error());
+    if (!*followed && fine) break;
+    fine = !*followed;
+    if (*followed) {
+      if (auto status = sample(*data); !status) return tl::unexpected(status.error());
+    }
+    const auto descended = descent.descend(sampled, strengths, fine, limits);
+    if (!descended) return tl::unexpected(descended.error());
+    outcome = *descended;
+    bool changed = false;
+    if (auto status = strengths.refit(posterior.gram(), posterior.right_hand_side(), changed);
+        !status) {
+      return tl::unexpected(status.error());
+    }
+    if (changed && outcome == EstimateStatus::kConverged && round < kMaxRounds / 2) {
+      if (auto status = find_strengths(limits, outcome); !status) {
+        return tl::unexpected(status.error());
+      }
+      fine = false;
+    }
+  }
+  if (auto status = descent.spread(strengths); !status) return tl::unexpected(status.error());
+  return outcome;
 }
 
 void CondensedInverter::Impl::record() {
   const int m = sampled.size();
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < m; ++i) {
-    const double norm = posterior.misfit(sampled, i) * sampled.sd(i);
+    const double norm = descent.posterior().misfit(sampled, i) * sampled.sd(i);
     sum += norm;
     squares += norm * norm;
   }
@@ -297,7 +375,7 @@ void CondensedInverter::Impl::record() {
   entry.iteration = static_cast<int>(history.size()) + 1;
   entry.misfit_mm.mean = sum / m;
   entry.misfit_mm.std = m > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / m) / (m - 1))) : 0.0;
-  const PenetrationSummary summary = summarise_penetration(reduction.penetration());
+  const PenetrationSummary summary = summarise_penetration(descent.contact().penetration());
   entry.penetrating = summary.penetrating;
   entry.max_penetration_mm = summary.max_mm;
   entry.elapsed_ms = watch.milliseconds();
@@ -305,18 +383,20 @@ void CondensedInverter::Impl::record() {
 }
 
 Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
+  record();  // of the mean over the hypotheses
   const Stopwatch rebuilding;
+  const double misfit_ratio = descent.posterior().misfit_ratio();
   if (options.uncertainty) {
-    rebuild.standard_deviation(team, reduction,
-                               posterior.factor().bottomRightCorner(window.count, window.count),
-                               scales.of_other() * scales.of_other(), estimate.sd_mm);
+    rebuild.standard_deviation(team, descent.reduction(), descent.covariance_factor(),
+                               remainder_variances(), estimate.sd_mm);
     // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
-    if (posterior.misfit_ratio() > 1.0) estimate.sd_mm *= posterior.misfit_ratio();
+    if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
   } else {
     estimate.sd_mm.resize(0);
   }
-  rebuild.displacement(team, posterior.z(), reduction, estimate.displacement);
-  if (auto status = check_equilibrium(*operators, rebuilt_slaves, reduction.penetration(),
+  const ContactAtLoads& contact = descent.contact();
+  rebuild.displacement(team, descent.z(), contact, estimate.displacement);
+  if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
                                       estimate.displacement);
       !status) {
     return status;
@@ -324,27 +404,28 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   const auto measured = deformation.measure(estimate.displacement);
   if (auto status = check_deformation(measured, estimate); !status) return status;
   estimate.rebuild_ms = rebuilding.milliseconds();
-  estimate_omissions();
+  if (auto status = estimate_omissions(); !status) return status;
 
   const IterationRecord& last = history.back();
   estimate.misfit_mm = last.misfit_mm;
   estimate.initial_misfit_mm = mean_std_of_norms(data.displacements);
-  estimate.contact = {reduction.size(), last.penetrating, last.max_penetration_mm,
+  estimate.contact = {contact.size(), last.penetrating, last.max_penetration_mm,
                       static_cast<int>(history.size())};
-  if (options.contact) estimate.contact.max_violation_mm = search.violation_mm();
+  estimate.contact.decrement = descent.decrement();
+  estimate.contact.max_violation_mm = contact.violation_mm();
   estimate.active_slaves.clear();
-  estimate.contact_force_n = reduction.forces();
-  for (const int slave : reduction.active()) {
+  estimate.contact_force_n = contact.forces();
+  for (const int slave : contact.active()) {
     estimate.active_slaves.push_back(operators->slaves[static_cast<std::size_t>(slave)]);
   }
   estimate.history = history;
-  estimate.prior_scales = scales.scales();
-  // A bound of 1 is the case's own strength, where the search begins: it tells nothing.
-  for (std::size_t part = 0; part < kLargestScales.size(); ++part) {
-    estimate.prior_at_bound[part] = estimate_scales && kLargestScales[part] > 1.0 &&
-                                    estimate.prior_scales[part] >= kLargestScales[part];
-  }
-  estimate.misfit_ratio = posterior.misfit_ratio();
+  estimate.prior_scales = strengths.mean();
+  estimate.prior_absent = strengths.absent();
+  estimate.prior_at_bound = strengths.at_bound();
+  estimate.hypotheses = strengths.hypotheses();
+  std::sort(estimate.hypotheses.begin(), estimate.hypotheses.end(),
+            [](const Hypothesis& a, const Hypothesis& b) { return a.weight > b.weight; });
+  estimate.misfit_ratio = misfit_ratio;
   estimate.data_outside_region = sampled.data_outside_region();
   summarise_sources(data, estimate);
   return {};
@@ -360,7 +441,8 @@ void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate
     summary.data = source.count;
     summary.outliers = weights.outliers(source.first, source.count);
     Consistency consistency;
-    if (data.sources.size() < 2 || !posterior.check_source(sampled, scales, source, consistency)) {
+    if (data.sources.size() < 2 ||
+        !descent.posterior().check_source(sampled, strengths, source, consistency)) {
       continue;
     }
     summary.chi_square = consistency.chi_square;
@@ -370,18 +452,19 @@ void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate
   }
 }
 
-void CondensedInverter::Impl::estimate_omissions() {
-  const VecX& penetration = reduction.penetration();
+Status CondensedInverter::Impl::estimate_omissions() {
+  const VecX& penetration = descent.contact().penetration();
   errors.nearest_slave_mm =
       penetration.size() > 0 ? -penetration.maxCoeff() : std::numeric_limits<double>::infinity();
-  errors.contact_mm = reduction.size() == 0 ? contact_error_mm(penetration) : 0.0;
+  errors.contact_mm = descent.contact().size() == 0 ? contact_error_mm(penetration) : 0.0;
   errors.far_field_mm = rebuild.far_field_error_mm();
   errors.gravity_modes_mm = 0.0;
-  if (!options.gravity_modes) {
-    errors.gravity_modes_mm =
-        gravity_modes_error_mm(sampled, reduction, rebuild, posterior.jacobian(),
-                               posterior.residual(), posterior.factor());
-  }
+  if (options.gravity_modes) return {};
+  const auto error =
+      gravity_modes_error_mm(sampled, descent.reduction(), rebuild, descent.posterior());
+  if (!error) return tl::unexpected(error.error());
+  errors.gravity_modes_mm = *error;
+  return {};
 }
 
 CondensedInverter::CondensedInverter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -403,34 +486,28 @@ Result<CondensedInverter> CondensedInverter::build(
   return CondensedInverter(std::move(impl));
 }
 
-void CondensedInverter::reset() { impl_->reset(); }
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
 
 Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
                                  const InversionOptions& asked) {
   Impl& impl = *impl_;
   impl.watch = Stopwatch();
-  if (!impl.options.warm_start) impl.reset();
+  impl.descent.forget();
   impl.history.clear();
   if (auto status = impl.accept(given); !status) return status;
   impl.weights.reset(given.size());
   const SparseData* data = &given;
   const auto outcome = impl.settle(data, asked);
-  if (!outcome) {
-    impl.reset();
-    return tl::unexpected(outcome.error());
-  }
-  if (!impl.posterior.z().allFinite() || !impl.reduction.forces().allFinite()) {
-    impl.reset();
+  if (!outcome) return tl::unexpected(outcome.error());
+  if (!impl.descent.z().allFinite() || !impl.descent.contact().forces().allFinite()) {
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
   if (auto status = impl.finish(*data, estimate); !status) {
     estimate.status = EstimateStatus::kNotRun;
-    impl.reset();
     return status;
   }
   estimate.status = *outcome;
-  set_reason(*outcome, impl.search, impl.condensed, impl.posterior.misfit_ratio(), estimate.reason);
+  set_reason(*outcome, estimate, impl.condensed, estimate.reason);
   append_sources(estimate);
   if (data->sources.empty()) append_outliers(impl.weights, data->size(), estimate.reason);
   append_contradiction(impl.contradictions.find(*data), *data, estimate.reason);

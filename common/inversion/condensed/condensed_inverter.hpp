@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CondensedInverter: SparseData -> Estimate in milliseconds; holds what an update can reuse.
+// CondensedInverter: SparseData -> Estimate in some tens of milliseconds.
 //
-// For a set A of active slaves, with D = Phi_AA + I / beta (penalty contact, paper eq. 16):
-//   contact forces   D f = p_A - N_A^T U z    =>  f = f0 - T z,   [T f0] = D^-1 [N_A^T U  p_A]
-//   data             d = A u + e              =>  A u = J z + A G_A f0,   J = A U - A G_A T
-//   posterior of z   (I + J^T R^-1 J) z = J^T R^-1 (d - A G_A f0)
-// This is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. With a
-// common error of the data (SparseData) its amplitudes c ~ N(0, I) are estimated beside z, J =
-// [common J].
+// The data d = A u(z) + e, with u(z) the displacement under loads z ~ N(0, S^2) and contact, and S
+// the strengths of the prior's parts. Four things settle in turn:
 //
-// Next set: active slaves that press (f > 0) and open ones that penetrate, until contact holds
-// (contact/set_search.hpp). A set that comes back means a cycle: z is estimated anew for every set,
-// and the sets call for one another. From there on the next set is the one that a mean z of the
-// sets of the cycle calls for. The set of least violation is kept; the limits on iterations and
-// time end with it.
+//   loads       the most probable z with contact (load_descent.hpp)
+//   strengths   hypotheses about S, from the data (prior_strengths.hpp)
+//   weights     of single data that chance does not explain (robust_weights.hpp)
+//   places      of data that follow the deformation (InversionOptions::moving)
 //
-// Contact, prior scales, robust weights (robust_weights.hpp) and the places of moving data settle
-// in turn.
+// roughly at first, the loads to the end when the others are settled. Where no slave changes, the
+// estimate is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. With a
+// common error of the data (SparseData) its amplitudes c ~ N(0, I) are estimated beside z.
+//
+// The model's own error: the patient's tissue is stiffer here and softer there than the case says,
+// so that its displacement differs from the model's by a part of itself (kModelError; decision
+// 0018). The medium remainder has that much variance besides its strength.
+//
+// An estimate depends on its data alone, not on earlier updates.
 //
 // The standard deviation is that of the model above, times the ratio of the misfit to the one
 // expected where that is above 1. The reason names a ratio above 1.5.
 //
-// Reproducible: the same updates from reset() on give the same bits for one build, type of machine
-// and BLAS kernel. Another region of interest moves a node that is rebuilt either way by less than
-// 1e-9 mm. Another BLAS kernel rounds z otherwise, and the field is a sum in single precision: some
-// 1e-7 of its largest terms, and up to the tolerance of the contact search where a slave at its
-// edge flips.
+// Reproducible: the same data give the same bits for one build, type of machine and BLAS kernel.
+// Another region of interest moves a node that is rebuilt either way by less than 1e-9 mm. Another
+// BLAS kernel rounds z otherwise, and the field is a sum in single precision: some 1e-7 of its
+// largest terms, and up to kDecrement where a slave at its edge flips.
 //
 // Not thread-safe. update() allocates nothing as long as the data fit the capacity, but for members
 // of the estimate whose size changes.
@@ -53,8 +53,7 @@ struct CondensedOptions {
   bool gravity_modes = true;
   // Nodes that are rebuilt, sorted; the others are interpolated (far_field.hpp). Empty: every node.
   std::vector<NodeIndex> region_of_interest;
-  int rank = 0;  // use only so many modes; 0: all
-  bool warm_start = true;
+  int rank = 0;         // use only so many modes; 0: all
   int capacity = 1000;  // data per update reserved up front
   int threads = 0;      // 0: as many as cores
 };
@@ -72,15 +71,13 @@ class CondensedInverter {
   ~CondensedInverter();
 
   // Writes every member of `estimate` in place, reusing its memory. An error leaves it as it was,
-  // but for status kNotRun when the rebuilt field is what is wrong; the next update then starts
-  // cold, unless the data themselves were rejected. asked.moving: data that follow the deformation.
-  // asked.stop: looked at before every contact set; the deadline of the case is something else: it
-  // ends with the best iterate and status kDeadline. Errors: as check_data; kInvalidArgument for
-  // data outside the brain (the sentence names the datum); stopped(); kNotFinite when the result is
-  // not finite; kNotConverged when the field contradicts its contact forces (estimate_check.hpp).
+  // but for status kNotRun when the rebuilt field is what is wrong. asked.moving: data that follow
+  // the deformation. asked.stop: looked at before every step; the deadline of the case is something
+  // else: it ends with the best iterate and status kDeadline. Errors: as check_data;
+  // kInvalidArgument for data outside the brain (the sentence names the datum); stopped();
+  // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact
+  // forces (estimate_check.hpp).
   Status update(const SparseData& data, Estimate& estimate, const InversionOptions& asked = {});
-  // Forgets the last active set and the prior scales.
-  void reset();
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;
 

@@ -14,7 +14,7 @@
 
 #include <vector>
 
-#include "common/inversion/condensed/mode_window.hpp"
+#include "common/inversion/skull/mode_window.hpp"
 #include "common/values/condensed_operators.hpp"
 
 namespace brainshift::inversion {

@@ -50,6 +50,7 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       response_(operators.num_slaves(), window.count),
       factor_(window.count, window.count),
       conditioned_(control_modes_.rows(), window.count),
+      spread_(control_modes_.rows(), window.count),
       contact_storage_(new float[static_cast<std::size_t>(control_contact_.size())]),
       control_variance_(static_cast<Eigen::Index>(operators.control.size())) {
   const auto most =
@@ -61,7 +62,7 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
   near_contact_ = gather_rows(operators.contact_columns, far_.rebuilt);
 }
 
-void FieldRebuild::sum_columns(ThreadTeam& team, const VecX& z, const ContactReduction& contact) {
+void FieldRebuild::sum_columns(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact) {
   const Eigen::MatrixXf& modes = far_.empty() ? operators_.modes : near_modes_;
   const Eigen::MatrixXf& contacts = far_.empty() ? operators_.contact_columns : near_contact_;
   columns_.clear();
@@ -85,7 +86,7 @@ void FieldRebuild::sum_columns(ThreadTeam& team, const VecX& z, const ContactRed
 }
 
 void FieldRebuild::displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
-                                   const ContactReduction& contact, Points& u) const {
+                                   const ContactAtLoads& contact, Points& u) const {
   u.setZero(3, static_cast<Eigen::Index>(nodes.size()));
   const auto add = [&](const auto& column, double factor) {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -100,7 +101,7 @@ void FieldRebuild::displacement_at(const std::vector<NodeIndex>& nodes, const Ve
   }
 }
 
-void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactReduction& contact,
+void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact,
                                 Points& u) {
   u.resize(3, operators_.num_nodes());
   sum_columns(team, z, contact);
@@ -122,7 +123,7 @@ Vec3 FieldRebuild::interpolated(NodeIndex node) const {
   return u;
 }
 
-void FieldRebuild::interpolate_far(ThreadTeam& team, const ContactReduction& contact, Points& u) {
+void FieldRebuild::interpolate_far(ThreadTeam& team, const ContactAtLoads& contact, Points& u) {
   team.split(u.cols(), [&](long begin, long end) {
     for (long i = begin; i < end; ++i) {
       const int row = far_.row[static_cast<std::size_t>(i)];
@@ -162,12 +163,13 @@ double FieldRebuild::greatest_control_move(const VecX& dg, const VecX& dz,
 }
 
 void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                                      const linalg::blas::In<double>& normal_factor,
-                                      double left_out_scale, VecX& sd) {
+                                      const linalg::blas::In<double>& covariance_factor,
+                                      const RemainderVariances& left_out, VecX& sd) {
   const int r = window_.count, k = contact.size();
   sd.resize(operators_.num_nodes());
-  // The diagonal blocks of a float factor are exact enough for a standard deviation.
-  factor_ = normal_factor.cast<float>();
+  // Single precision is exact enough for a standard deviation.
+  factor_.setZero(r, r);
+  factor_.triangularView<Eigen::Lower>() = covariance_factor.cast<float>();
   Eigen::Map<Eigen::MatrixXf> response(response_.data(), k, r);
   if (k > 0) response = contact.response().leftCols(r).cast<float>();
   Eigen::Map<Eigen::MatrixXf> columns(contact_storage_.get(), control_contact_.rows(), k);
@@ -183,11 +185,10 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
       }
       linalg::blas::multiply(-1.0F, own, response, 1.0F, v);
     }
-    linalg::blas::solve_lower_transposed_right(factor_, v);
+    linalg::blas::multiply(1.0F, v, factor_, 0.0F, spread_.middleRows(first, rows));
     for (long i = begin; i < end; ++i) {
-      control_variance_[i] =
-          static_cast<double>(conditioned_.middleRows<3>(3 * i).squaredNorm()) / 3.0 +
-          left_out_scale * operators_.truncated_variance_mm2[i];
+      control_variance_[i] = static_cast<double>(spread_.middleRows<3>(3 * i).squaredNorm()) / 3.0 +
+                             operators_.truncated_variance_mm2.row(i).dot(left_out);
     }
   });
   team.split(sd.size(), [&](long begin, long end) {

@@ -3,7 +3,7 @@
 // forces.
 //
 //   u = U z + G_A f                                            every node, single precision
-//   Cov(u) = V (I + J^T J)^-1 V^T + left out,   V = U - G_A T   at the control nodes, interpolated
+//   Cov(u) = V Cov(z) V^T + left out,   V = U - G_A T           at the control nodes, interpolated
 //                                                               to the others
 // sd of a node: root mean square of its three components' standard deviations. Given the active
 // set: which slaves touch is taken as known.
@@ -19,9 +19,11 @@
 #include <vector>
 
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/contact_reduction.hpp"
 #include "common/inversion/condensed/far_field.hpp"
-#include "common/inversion/condensed/mode_window.hpp"
+#include "common/inversion/condensed/sampled_operators.hpp"
+#include "common/inversion/skull/contact_at_loads.hpp"
+#include "common/inversion/skull/contact_reduction.hpp"
+#include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/values/condensed_operators.hpp"
 
@@ -34,28 +36,28 @@ class FieldRebuild {
                const std::vector<NodeIndex>& region = {});
 
   // u: 3 x n, mm.
-  void displacement(ThreadTeam& team, const VecX& z, const ContactReduction& contact, Points& u);
+  void displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact, Points& u);
   // u: 3 x nodes, mm, at these nodes only.
   void displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
-                       const ContactReduction& contact, Points& u) const;
+                       const ContactAtLoads& contact, Points& u) const;
   // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was
   // rebuilt.
   double far_field_error_mm() const { return far_field_error_mm_; }
   // Greatest |U_g dg + U dz + G_A df| at a control node, mm; U_g: the modes before the window.
   double greatest_control_move(const VecX& dg, const VecX& dz, const ContactReduction& contact,
                                const VecX& df) const;
-  // normal_factor: lower Cholesky factor of S^-2 + J^T J, r x r. left_out_scale: of the variance
-  // that the modes leave out. sd: n, mm.
+  // covariance_factor: F, r x r, lower, Cov(z) = F F^T. left_out: mean squared strength of each
+  // remainder, for the variance that its modes leave out. sd: n, mm.
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
-                          const linalg::blas::In<double>& normal_factor, double left_out_scale,
-                          VecX& sd);
+                          const linalg::blas::In<double>& covariance_factor,
+                          const RemainderVariances& left_out, VecX& sd);
 
  private:
   const CondensedOperators& operators_;
   ModeWindow window_;
   // field_ = sum of columns, for all nodes or those of far_.rebuilt
-  void sum_columns(ThreadTeam& team, const VecX& z, const ContactReduction& contact);
-  void interpolate_far(ThreadTeam& team, const ContactReduction& contact, Points& u);
+  void sum_columns(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact);
+  void interpolate_far(ThreadTeam& team, const ContactAtLoads& contact, Points& u);
   Vec3 interpolated(NodeIndex node) const;
 
   FarField far_;
@@ -66,7 +68,7 @@ class FieldRebuild {
   std::vector<float> factors_;
   Eigen::VectorXf field_;
   // Control nodes: rows of U and G, V, and what a set needs of them.
-  Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_;
+  Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
   std::unique_ptr<float[]> contact_storage_;
   VecX control_variance_;
 };

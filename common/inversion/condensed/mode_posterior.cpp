@@ -15,7 +15,9 @@ ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
   factor_storage_.resize(most * most);
   right_.setZero(most);
   solution_.setZero(most);
-  prior_.setOnes(most);
+  scales_.setOnes(most);
+  full_.setZero(most);
+  precision_.setZero(most);
   z_.setZero(window.count);
 }
 
@@ -25,16 +27,8 @@ void ModePosterior::reserve(int data) {
   residual_.resize(3 * data);
 }
 
-void ModePosterior::fill_prior(const PriorScales& scales) {
-  prior_.head(common_).setOnes();
-  for (int i = 0; i < window_.count; ++i) {
-    const double scale = scales.of_mode(i);
-    prior_[common_ + i] = 1.0 / (scale * scale);
-  }
-}
-
-Status ModePosterior::solve(SampledOperators& sampled, const ContactReduction& reduction,
-                            const PriorScales& scales, ThreadTeam& team) {
+void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction& reduction,
+                              ThreadTeam& team) {
   common_ = sampled.common();
   rows_ = sampled.rows();
   const Eigen::Index r = window_.count, size = unknowns();
@@ -49,24 +43,81 @@ Status ModePosterior::solve(SampledOperators& sampled, const ContactReduction& r
     });
   }
   Eigen::Map<Eigen::MatrixXd> gram(gram_storage_.data(), size, size);
-  Eigen::Map<Eigen::MatrixXd> factor(factor_storage_.data(), size, size);
   blas::gram(j.leftCols(size), 0.0, gram);
-  fill_prior(scales);
-  factor = gram;
-  factor.diagonal() += prior_.head(size);
+  right_.head(size).noalias() = j.leftCols(size).transpose() * j.col(size);
+}
+
+void ModePosterior::fill_scales(const PriorStrengths& strengths) {
+  scales_.head(common_).setOnes();
+  for (int i = 0; i < window_.count; ++i) scales_[common_ + i] = strengths.scale_of(i);
+}
+
+Status ModePosterior::minimise(const PriorStrengths& strengths) {
+  const Eigen::Index size = unknowns();
+  fill_scales(strengths);
+  const auto scales = scales_.head(size);
+  Eigen::Map<Eigen::MatrixXd> factor(factor_storage_.data(), size, size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    factor.col(j).tail(size - j) =
+        scales[j] * scales.tail(size - j).cwiseProduct(gram().col(j).tail(size - j));
+    factor(j, j) += 1.0;
+  }
   if (!blas::cholesky(factor)) {
     return fail(ErrorCode::kNotFinite, "inversion: the normal equations are not positive definite");
   }
-  right_.head(size).noalias() = j.leftCols(size).transpose() * j.col(size);
-  auto cz = solution_.head(size);
-  cz = right_.head(size);
-  blas::solve_lower(factor, cz);
-  blas::solve_lower_transposed(factor, cz);
-  z_ = cz.tail(r);
-  residual_.head(rows_) = j.col(size);
-  residual_.head(rows_).noalias() -= j.leftCols(size) * cz;
-  misfit_ratio_ = std::sqrt(residual_.head(rows_).squaredNorm() / static_cast<double>(rows_));
+  auto x = solution_.head(size);
+  x = scales.cwiseProduct(right_.head(size));
+  blas::solve_lower(factor, x);
+  blas::solve_lower_transposed(factor, x);
+  x.array() *= scales.array();
+  z_ = x.tail(window_.count);
+  update_residual();
   return {};
+}
+
+void ModePosterior::whiten(const VecX& step, VecX& out) const {
+  const Eigen::Index r = window_.count;
+  out.resize(r);
+  for (Eigen::Index i = 0; i < r; ++i) {
+    const double s = scales_[common_ + i];
+    full_[i] = s > 0.0 ? step[i] / s : 0.0;
+  }
+  // The common errors come first, so that the last block is the factor of the Schur complement.
+  const auto factor_of_z = factor().bottomRightCorner(r, r);
+  out.noalias() = factor_of_z.transpose().triangularView<Eigen::Upper>() * full_.head(r);
+}
+
+void ModePosterior::unwhiten(const VecX& image, VecX& step) const {
+  const Eigen::Index r = window_.count;
+  step = image;
+  blas::solve_lower_transposed(factor().bottomRightCorner(r, r), step);
+  step.array() *= scales_.segment(common_, r).array();
+}
+
+void ModePosterior::whitened_newton_step(const VecX& gradient, VecX& out) const {
+  const Eigen::Index r = window_.count;
+  out = -scales_.segment(common_, r).cwiseProduct(gradient);
+  blas::solve_lower(factor().bottomRightCorner(r, r), out);
+}
+
+void ModePosterior::set_answer(const Eigen::Ref<const VecX>& change_of_common, const VecX& z) {
+  solution_.head(common_) += change_of_common;
+  solution_.segment(common_, window_.count) = z;
+  update_residual();
+}
+
+void ModePosterior::update_residual() {
+  residual_.head(rows_) = jacobian_.col(unknowns()).head(rows_);
+  residual_.head(rows_).noalias() -= jacobian() * solution_.head(unknowns());
+  misfit_ratio_ = std::sqrt(residual_.head(rows_).squaredNorm() / static_cast<double>(rows_));
+}
+
+void ModePosterior::solve_normal(Eigen::MatrixXd& x) const {
+  const auto scales = scales_.head(unknowns());
+  x.array().colwise() *= scales.array();
+  blas::solve_lower(factor(), x);
+  blas::solve_lower_transposed(factor(), x);
+  x.array().colwise() *= scales.array();
 }
 
 double ModePosterior::residual_norm(const SampledOperators& sampled, int datum) const {
@@ -77,13 +128,14 @@ double ModePosterior::residual_norm(const SampledOperators& sampled, int datum) 
 double ModePosterior::misfit(const SampledOperators& sampled, int datum) const {
   double squares = 0.0;
   for (int row = sampled.first_row(datum); row < sampled.first_row(datum + 1); ++row) {
-    const double value = residual_[row] + jacobian_.row(row).head(common_).dot(common_amplitudes());
+    const double value =
+        residual_[row] + jacobian_.row(row).head(common_).dot(solution_.head(common_));
     squares += value * value;
   }
   return std::sqrt(squares);
 }
 
-bool ModePosterior::check_source(const SampledOperators& sampled, const PriorScales& scales,
+bool ModePosterior::check_source(const SampledOperators& sampled, const PriorStrengths& strengths,
                                  const DataSource& source, Consistency& out) {
   const int first = sampled.first_row(source.first);
   const int count = sampled.first_row(source.first + source.count) - first;
@@ -92,8 +144,11 @@ bool ModePosterior::check_source(const SampledOperators& sampled, const PriorSca
   own_gram_.resize(size, size);
   blas::gram(own, 0.0, own_gram_);
   own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
-  fill_prior(scales);
-  return check_.run(gram(), right_hand_side(), own_gram_, own_right_, prior_.head(size), out);
+  fill_scales(strengths);
+  // The check wants the prior's information; that of an absent part is as good as infinite.
+  constexpr double kAbsentScale = 1e-4;
+  precision_.head(size) = scales_.head(size).cwiseMax(kAbsentScale).array().pow(-2);
+  return check_.run(gram(), right_hand_side(), own_gram_, own_right_, precision_.head(size), out);
 }
 
 }  // namespace brainshift::inversion

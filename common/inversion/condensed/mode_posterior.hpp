@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ModePosterior: prior modes z and amplitudes c of the common errors, given the data and a set of
-// active slaves.
+// active slaves, by the linear model of that set.
 //
 //   whitened data   [common | J | d - A G f0]                               rows x (q + r + 1)
 //                   = R^-1/2 [common error | A U - A G_A T | d - A G_A f0]
-//   posterior mean  (S^-2 + J^T J) (c, z) = J^T d,    S = diag(1 for c, prior scale for z)
-// with T and f0 of ContactReduction and everything whitened by SampledOperators. Contact does not
-// touch the common error. Nothing is allocated as long as the data fit what was reserved.
+//   objective       J(z) = 1/2 |d - J z - common c|^2 + 1/2 |c|^2 + 1/2 |x|^2,   z = S x
+// with T and f0 of ContactReduction, S the strengths of the prior's parts (0: the part is absent),
+// everything whitened by SampledOperators. Contact does not touch the common error. Nothing is
+// allocated as long as the data fit what was reserved.
 #pragma once
 
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/contact_reduction.hpp"
-#include "common/inversion/condensed/prior_scales.hpp"
+#include "common/inversion/condensed/prior_strengths.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/source_check.hpp"
+#include "common/inversion/skull/contact_reduction.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
@@ -24,23 +25,36 @@ class ModePosterior {
   explicit ModePosterior(ModeWindow window);
   void reserve(int data);
 
+  // The linear model of the reduction's set: J, G = J^T J and b = J^T d.
+  void linearise(SampledOperators& sampled, const ContactReduction& reduction, ThreadTeam& team);
+  // Minimises the objective for the held strengths and takes the minimum for the answer.
   // kNotFinite when the normal equations are not positive definite.
-  Status solve(SampledOperators& sampled, const ContactReduction& reduction,
-               const PriorScales& scales, ThreadTeam& team);
-
+  Status minimise(const PriorStrengths& strengths);
+  // Of the last minimise().
   const VecX& z() const { return z_; }
-  auto common_amplitudes() const { return solution_.head(common_); }
+  // Q x with step = S x and Q^T Q = H, the objective's second derivative for x with c eliminated:
+  // |Q x| is the length of a step of z in posterior standard deviations. Modes of absent parts do
+  // not count.
+  void whiten(const VecX& step, VecX& out) const;
+  // The step of z for its image Q x; 0 for modes of absent parts.
+  void unwhiten(const VecX& image, VecX& step) const;
+  // Q x of the Newton step -H^-1 gradient.
+  void whitened_newton_step(const VecX& gradient, VecX& out) const;
+
+  // Takes for the answer: z, and the amplitudes of the last minimise() and a change of them. The
+  // residuals and the misfit below are those of the answer in the linear model.
+  void set_answer(const Eigen::Ref<const VecX>& change_of_common, const VecX& z);
+
+  int unknowns() const { return common_ + window_.count; }
   // J^T J of (c, z), lower triangle, without the prior; and J^T d.
   Eigen::Map<const Eigen::MatrixXd> gram() const {
     return {gram_storage_.data(), unknowns(), unknowns()};
   }
   auto right_hand_side() const { return right_.head(unknowns()); }
-  // Lower Cholesky factor of the normal equations. The common error comes first, so that the last r
-  // x r block is the factor of the Schur complement of z.
-  Eigen::Map<const Eigen::MatrixXd> factor() const {
-    return {factor_storage_.data(), unknowns(), unknowns()};
-  }
   auto jacobian() const { return jacobian_.topLeftCorner(rows_, unknowns()); }
+  // X = (S^-2 + G)^-1 X, q + r rows; rows of absent parts become 0.
+  void solve_normal(Eigen::MatrixXd& x) const;
+
   // d - A u - common error, whitened, rows.
   auto residual() const { return residual_.head(rows_); }
   // Its root mean square: 1 when the data lie as far off as their standard deviations say.
@@ -50,24 +64,29 @@ class ModePosterior {
   // |d - A u - common error| of one datum, whitened.
   double residual_norm(const SampledOperators& sampled, int datum) const;
 
-  // Consistency of the rows of one source with the others (source_check.hpp); false when it cannot
-  // be computed.
-  [[nodiscard]] bool check_source(const SampledOperators& sampled, const PriorScales& scales,
+  // Consistency of the rows of one source with the others under the held strengths
+  // (source_check.hpp); false when it cannot be computed.
+  [[nodiscard]] bool check_source(const SampledOperators& sampled, const PriorStrengths& strengths,
                                   const DataSource& source, Consistency& out);
 
  private:
-  int unknowns() const { return common_ + window_.count; }
-  void fill_prior(const PriorScales& scales);
+  Eigen::Map<const Eigen::MatrixXd> factor() const {
+    return {factor_storage_.data(), unknowns(), unknowns()};
+  }
+  void fill_scales(const PriorStrengths& strengths);
+  void update_residual();
 
   ModeWindow window_;
   int common_ = 0;
   Eigen::Index rows_ = 0;
   Eigen::MatrixXd jacobian_;
-  VecX residual_, gram_storage_, factor_storage_, right_, solution_, z_, prior_;
+  VecX residual_, gram_storage_, factor_storage_, right_, solution_, z_;
+  VecX scales_;  // 1 for c, s for z
+  mutable VecX full_;
   double misfit_ratio_ = 0.0;
   SourceCheck check_;
   Eigen::MatrixXd own_gram_;
-  VecX own_right_;
+  VecX own_right_, precision_;
 };
 
 }  // namespace brainshift::inversion

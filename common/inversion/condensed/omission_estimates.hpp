@@ -7,18 +7,20 @@
 //                  it, so the true difference is about that much at least; the data then pull the
 //                  modes after it.
 //   gravity modes  one Newton step of the whole problem from the estimate without them, for the
-//                  same active set:
+//                  same active set and strengths of the prior:
 //                    S dg = J_g^T r,  S = I + J_g^T J_g - C^T X,   dz = -X dg
-//                    C = J^T J_g,     X = (I + J^T J)^-1 C
+//                    C = J^T J_g,     X = (S^-2 + J^T J)^-1 C
 //                    du = (U_g - G_A T_g) dg + (U - G_A T) dz
 //                  exact where the set stays; kGravitySafety times its greatest size at the control
 //                  nodes.
 //   far field      far_field.hpp
 #pragma once
 
-#include "common/inversion/condensed/contact_reduction.hpp"
+#include "common/core/error.hpp"
 #include "common/inversion/condensed/field_rebuild.hpp"
+#include "common/inversion/condensed/mode_posterior.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
+#include "common/inversion/skull/contact_reduction.hpp"
 
 namespace brainshift::inversion {
 
@@ -30,13 +32,9 @@ inline constexpr double kGravitySafety = 2.0;
 // penetration: one per slave, mm.
 double contact_error_mm(const VecX& penetration);
 
-// jacobian: whitened [common J], rows x (q + r) with SampledOperators::rows() rows, three per whole
-// datum and one per datum along a direction. residual: whitened d - A u - common error, rows.
-// normal_factor: lower factor of I + [common J]^T [common J]. Allocates.
-double gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction& contact,
-                              const FieldRebuild& rebuild,
-                              const Eigen::Ref<const Eigen::MatrixXd>& jacobian,
-                              const Eigen::Ref<const VecX>& residual,
-                              const Eigen::Ref<const Eigen::MatrixXd>& normal_factor);
+// posterior: of the reduction's set, with the answer of the update. Allocates. Errors of
+// ContactReduction::response_before.
+Result<double> gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction& contact,
+                                      const FieldRebuild& rebuild, const ModePosterior& posterior);
 
 }  // namespace brainshift::inversion

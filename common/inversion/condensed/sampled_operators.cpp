@@ -36,7 +36,7 @@ void SampledOperators::reserve(int data) {
   weights_.resize(4, data);
   directions_.resize(3, data);
   first_row_.resize(static_cast<std::size_t>(data) + 1);
-  left_out_.resize(data);
+  left_out_.resize(kRemainders, data);
   sd_.resize(data);
   free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
   before_.resize(3 * data, window_.first);
@@ -68,8 +68,10 @@ Status SampledOperators::locate(const SparseData& data) {
     first_row_[static_cast<std::size_t>(i) + 1] = first_row(i) + (along ? 1 : 3);
     rows_.col(i) = location.nodes;
     barycentric_.col(i) = location.weights;
-    left_out_[i] = truncated_variance(location);
-    if (left_out_[i] < 0.0) continue;
+    RemainderVariances left_out;
+    const bool outside = truncated_variance(location, left_out);
+    left_out_.col(i) = left_out;
+    if (!outside) continue;
     ++outside_region_;
     if (outside_ == OutsideRegion::kRefuse) {
       return refuse(data, i,
@@ -86,26 +88,29 @@ Status SampledOperators::locate(const SparseData& data) {
   return {};
 }
 
-double SampledOperators::truncated_variance(const geometry::TetLocation& location) const {
-  bool in_region = true;
-  double variance = 0.0;
+bool SampledOperators::truncated_variance(const geometry::TetLocation& location,
+                                          RemainderVariances& out) const {
+  bool outside = false;
+  out.setZero();
   for (int k = 0; k < 4; ++k) {
     const int node = location.nodes[k];
     if (region_row_[static_cast<std::size_t>(node)] >= 0 || location.weights[k] == 0.0) continue;
-    in_region = false;
+    outside = true;
     for (int c = 0; c < 4; ++c) {
-      variance += location.weights[k] * operators_->control_weights(c, node) *
-                  operators_->truncated_variance_mm2[operators_->control_neighbours(c, node)];
+      const int control = operators_->control_neighbours(c, node);
+      out += location.weights[k] * static_cast<double>(operators_->control_weights(c, node)) *
+             operators_->truncated_variance_mm2.row(control).transpose();
     }
   }
-  return in_region ? -1.0 : std::max(0.0, variance);
+  out = out.cwiseMax(0.0);
+  return outside;
 }
 
-void SampledOperators::sample(const SparseData& data, double scale,
+void SampledOperators::sample(const SparseData& data, const RemainderVariances& strengths_squared,
                               const Eigen::Ref<const VecX>& weights) {
   for (int i = 0; i < size_; ++i) {
-    const double left_out = std::max(0.0, left_out_[i]);
-    sd_[i] = std::sqrt((data.sd_mm[i] * data.sd_mm[i] + scale * scale * left_out) / weights[i]);
+    const double left_out = left_out_.col(i).dot(strengths_squared);
+    sd_[i] = std::sqrt((data.sd_mm[i] * data.sd_mm[i] + left_out) / weights[i]);
     weights_.col(i) = barycentric_.col(i) / sd_[i];
   }
   const Eigen::MatrixXf& modes = outside_region_ == 0 ? region_modes_ : operators_->modes;

@@ -18,13 +18,16 @@
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/geometry/tet_locator.hpp"
-#include "common/inversion/condensed/mode_window.hpp"
+#include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/values/case_config.hpp"
 #include "common/values/condensed_operators.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
+
+// One number for each remainder of the prior.
+using RemainderVariances = Eigen::Matrix<double, kRemainders, 1>;
 
 class SampledOperators {
  public:
@@ -37,13 +40,14 @@ class SampledOperators {
   // brain, or outside the region where the case refuses that (named). Preconditions: check_data;
   // reserve(data.size()).
   Status locate(const SparseData& data);
-  // Fills free_body for the data that locate() was given. scale: of the prior's standard deviation,
-  // for what the modes leave out. weights: robust weight per datum, > 0.
-  void sample(const SparseData& data, double scale, const Eigen::Ref<const VecX>& weights);
+  // Fills free_body for the data that locate() was given. strengths_squared: of the prior's
+  // remainders, for what their modes leave out. weights: robust weight per datum, > 0.
+  void sample(const SparseData& data, const RemainderVariances& strengths_squared,
+              const Eigen::Ref<const VecX>& weights);
   int size() const { return size_; }
   int rows() const { return first_row_[static_cast<std::size_t>(size_)]; }
   int first_row(int datum) const { return first_row_[static_cast<std::size_t>(datum)]; }
-  // Data whose variance depends on `scale`.
+  // Data whose variance depends on the strengths.
   int data_outside_region() const { return outside_region_; }
   int common() const { return common_; }  // q
   // mm, with what the modes leave out and the robust weight.
@@ -56,8 +60,9 @@ class SampledOperators {
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
 
  private:
-  // Of the prior at unit scale, mm^2; -1 when every node that counts was prepared.
-  double truncated_variance(const geometry::TetLocation& location) const;
+  // What the modes of each remainder leave out at unit strength, mm^2; false when every node that
+  // counts was prepared.
+  bool truncated_variance(const geometry::TetLocation& location, RemainderVariances& out) const;
   Status refuse(const SparseData& data, int datum, const std::string& where);
   // The rows of one datum in a column of rows().
   void put(const Vec3& value, int datum, double* column) const;
@@ -77,7 +82,7 @@ class SampledOperators {
   Eigen::Matrix<double, 4, Eigen::Dynamic> barycentric_, weights_;  // 4 x m; weights_: / sd
   Points directions_;                                               // 3 x m, zero: whole
   std::vector<int> first_row_;                                      // m + 1
-  VecX left_out_;  // of the prior's variance at unit scale, mm^2
+  Eigen::Matrix<double, kRemainders, Eigen::Dynamic> left_out_;     // at unit strength, mm^2
   VecX sd_;
   Eigen::MatrixXd free_body_, before_;
   std::unique_ptr<double[]> contact_storage_;

@@ -80,7 +80,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
 
   static DirectPosterior direct_posterior(Boundary boundary, const SparseData& data,
                                           const std::vector<NodeIndex>& active_nodes,
-                                          const PriorScaleValues& scales = {1, 1, 1, 1}) {
+                                          const PriorScaleValues& scales = kAsInTheCase) {
     const PreparedModel& model = prepared(boundary);
     const prior::ForcePrior forces = scaled_prior(model, scales);
     const contact::ForwardModel& forward = model.forward();

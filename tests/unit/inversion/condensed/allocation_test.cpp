@@ -25,13 +25,23 @@ void* malloc(std::size_t size) {
 namespace brainshift::inversion {
 namespace {
 
-TEST_F(Condensed, UpdatesDoNotAllocate) {
+class AllocationFree : public Condensed {
+ protected:
+  void updates(bool estimate_strengths);
+};
+
+TEST_F(AllocationFree, UpdatesWithStrengthsOfTheCase) { updates(false); }
+TEST_F(AllocationFree, UpdatesWithEstimatedStrengths) { updates(true); }
+
+void AllocationFree::updates(bool estimate_strengths) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer has its own malloc";
 #endif
   CondensedOptions options;
   options.threads = 2;
-  auto inverter = Condensed::inverter(Boundary::kContact, options);
+  CaseConfig with = config();
+  with.prior.estimate_scales = estimate_strengths;
+  auto inverter = Condensed::inverter(Boundary::kContact, options, with);
   std::vector<SparseData> data;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     data.push_back(sagging_data(Boundary::kContact, 0.3, seed));
@@ -42,6 +52,7 @@ TEST_F(Condensed, UpdatesDoNotAllocate) {
   const int active = estimate.contact.active;
   ASSERT_GT(active, 0);
 
+  allocations = 0;
   counting = true;
   std::free(std::malloc(1));
   const long own = allocations;

@@ -23,6 +23,7 @@ CaseConfig with_pressure(double step_s) {
   config.condensed.uncertainty_nodes = 40;
   config.scene.pressure = Carry::kOn;
   config.scene.pressure_step_s = step_s;
+  config.prior.estimate_scales = false;  // as the reference has them
   return config;
 }
 
@@ -175,10 +176,7 @@ TEST(Pressure, LongAfterTheLoadTheEstimateIsTheDrainedOne) {
 }
 
 TEST(Pressure, EveryMethodWithAFactorCarriesIt) {
-  // The prior's own scales, which condensed-exact keeps too.
-  CaseConfig config = with_pressure(0.2);
-  config.prior.estimate_scales = false;
-  const PreparedModel model = prepare(Boundary::kContact, config);
+  const PreparedModel model = prepare(Boundary::kContact, with_pressure(0.2));
   // At nodes: method condensed-exact takes data inside its region only.
   const Estimate coarse = condensed_estimate(model, sagging_data(model, 0.1));
   const auto region = data_region(model.model());

@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/core/random.hpp"
+#include "common/geometry/surface.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/fake_inverter.hpp"
@@ -55,16 +58,28 @@ Observation cortex(std::uint64_t sequence, double time_s) {
   return made;
 }
 
+// Points of the tumour's surface, moved.
+Observation boundary(std::uint64_t sequence, double time_s, const Vec3& shift = Vec3::Zero()) {
+  Observation made = observation(sequence, "ius", time_s);
+  TumourBoundary body;
+  body.points = geometry::sample_surface(patient()->tumour, 400, 5).colwise() + shift;
+  body.sd_mm = 0.3;
+  made.body = body;
+  return made;
+}
+
 // Remembers what it was given, asks moving data once for a displacement of (0, 0, -motion_mm), and
 // answers with it.
 struct FakeInversion {
-  SparseData seen;
+  SparseData first, seen;        // before and after the question
+  std::vector<NodeIndex> nodes;  // that the data asked for
   bool fails = false;
   double motion_mm = 1.0;
   Status operator()(int, const SparseData& data, const inversion::InversionOptions& options,
                     Estimate& estimate) {
     if (fails) return fail(ErrorCode::kNotConverged, "no");
-    seen = data;
+    first = seen = data;
+    if (options.moving != nullptr) nodes = options.moving->nodes;
     estimate.displacement =
         Points(Vec3(0, 0, -motion_mm).replicate(1, patient()->mesh.num_nodes()));
     if (options.moving != nullptr) {
@@ -185,16 +200,87 @@ TEST_F(Sources, ASurfaceIsMeasuredAnewForTheEstimate) {
   EXPECT_EQ(data.common_error.cols(), 6);  // the camera's pose
 }
 
-TEST(EvidenceMemory, KeepsTheCortexOfTheLastEstimateOnly) {
-  Evidence evidence(10.0);
-  const std::vector<NodeIndex> nodes = {1, 3};
-  EXPECT_EQ(evidence.cortex(nodes), Points::Zero(3, 2));
-  Points u(3, 4);
-  u << 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12;
-  evidence.remember(u, nodes);
-  EXPECT_EQ(evidence.cortex(nodes).col(1), Vec3(4, 8, 12));
-  evidence.clear();
-  EXPECT_EQ(evidence.cortex(nodes), Points::Zero(3, 2));
+// The estimate of the first update is (0, 0, -1) everywhere; nothing of it enters the second.
+TEST_F(Sources, DataThatFollowTheDeformationBeginWhereTheirObservationSays) {
+  ASSERT_TRUE(run(cortex(1, 0)));
+  ASSERT_TRUE(run(boundary(2, 1)));
+  const SparseData second = inversion_.first;
+  pipeline_.reset();
+  ASSERT_TRUE(run(cortex(1, 0)));
+  const SparseData cortex_alone = inversion_.first;
+  ASSERT_TRUE(run(boundary(2, 1)));
+  EXPECT_EQ(inversion_.first.positions, second.positions);
+  EXPECT_EQ(inversion_.first.displacements, second.displacements);
+  EXPECT_EQ(Points(second.positions.rightCols(cortex_alone.size())), cortex_alone.positions);
+}
+
+TEST_F(Sources, ATumourBoundaryIsMeasuredAnewForTheEstimate) {
+  config_.sensing.probe_pose_sd_mm = config_.sensing.probe_pose_sd_deg = 0.5;
+  pipeline_ = pipeline(Method::kCondensed);
+  ASSERT_TRUE(run(boundary(1, 0, Vec3(0, 0, -1))));
+  const SparseData& data = inversion_.seen;
+  ASSERT_EQ(data.size(), config_.inversion.sparse_points);
+  for (int i = 0; i < data.size(); ++i) {
+    ASSERT_TRUE(data.along_direction(i));
+    // Exact where the fake estimate is the truth.
+    EXPECT_NEAR(data.directions.col(i).dot(data.displacements.col(i)), -data.directions(2, i),
+                1e-9);
+  }
+  EXPECT_EQ(data.common_error.cols(), 6);  // the probe's pose
+}
+
+TEST_F(Sources, TheNodesOfSeveralSurfacesAreAskedForTogether) {
+  ASSERT_TRUE(run(boundary(1, 0, Vec3(0, 0, -1))));
+  const std::vector<NodeIndex> of_tumour = inversion_.nodes;
+  ASSERT_TRUE(run(cortex(2, 1)));
+  const std::vector<NodeIndex>& all = inversion_.nodes;
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end()));
+  EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
+  EXPECT_TRUE(std::includes(all.begin(), all.end(), of_tumour.begin(), of_tumour.end()));
+  std::vector<NodeIndex> craniotomy = patient()->craniotomy;
+  std::sort(craniotomy.begin(), craniotomy.end());
+  EXPECT_TRUE(std::includes(all.begin(), all.end(), craniotomy.begin(), craniotomy.end()));
+  // Each surface moved by its own nodes: both are exact for the fake estimate.
+  const SparseData& data = inversion_.seen;
+  ASSERT_EQ(data.sources.size(), 2u);
+  for (int i = 0; i < data.size(); ++i) {
+    const double expected = i < data.sources[0].count ? -data.directions(2, i) : -2.0;
+    EXPECT_NEAR(data.directions.col(i).dot(data.displacements.col(i)), expected, 1e-9);
+  }
+}
+
+TEST_F(Sources, ATumourBoundaryGuidesByARigidAlignmentWhereTheCaseOrTheMethodSaysSo) {
+  const auto is_rigid = [&] {
+    EXPECT_EQ(inversion_.seen.size(), config_.inversion.sparse_points);
+    EXPECT_EQ(inversion_.seen.directions.cols(), 0);
+    EXPECT_EQ(inversion_.seen.common_error.cols(), 12);
+    for (int i = 0; i < inversion_.seen.size(); ++i) {
+      EXPECT_NEAR(inversion_.seen.displacements(2, i), -1.0, 0.01);
+    }
+  };
+  for (const Method method : kAllMethods) {
+    if (method == Method::kCondensed) continue;
+    ASSERT_TRUE(pipeline(method).run(boundary(1, 0, Vec3(0, 0, -1))));
+    is_rigid();
+  }
+  config_.sensing.tumour = SurfaceGuidance::kRigid;
+  ASSERT_TRUE(pipeline(Method::kCondensed).run(boundary(1, 0, Vec3(0, 0, -1))));
+  is_rigid();
+}
+
+// A ball's rotation is left out of its alignment. Distances do not depend on it.
+TEST_F(Sources, DistancesLeaveNoRotationOut) {
+  const auto names_rotation = [&](Pipeline pipeline) {
+    const auto update = pipeline.run(boundary(1, 0));
+    EXPECT_TRUE(update);
+    return std::any_of(update->left_out.begin(), update->left_out.end(),
+                       [](const Omission& one) { return one.part == "rotation"; });
+  };
+  EXPECT_FALSE(names_rotation(pipeline(Method::kCondensed)));
+  config_.scene.rotation = Carry::kOff;
+  EXPECT_FALSE(names_rotation(pipeline(Method::kCondensed)));
+  config_.sensing.tumour = SurfaceGuidance::kRigid;
+  EXPECT_TRUE(names_rotation(pipeline(Method::kCondensed)));
 }
 
 TEST_F(Sources, ASurfaceGuidesOtherMethodsByARigidAlignment) {
@@ -217,13 +303,13 @@ TEST_F(Sources, ASurfaceInMetresIsRefusedAndTheOthersGoOn) {
 }
 
 TEST_F(Sources, PointsThatTheAlignmentLeavesAsideGuideNothing) {
-  Observation boundary = observation(1, "ius", 0);
+  Observation made = observation(1, "ius", 0);
   TumourBoundary body;
   body.points = patient()->tumour.vertices;
   body.sd_mm = 0.3;
   for (Eigen::Index i = 0; i < body.points.cols(); i += 10) body.points.col(i) += Vec3(0, 30, 25);
-  boundary.body = body;
-  const auto update = run(boundary);
+  made.body = body;
+  const auto update = run(made);
   ASSERT_TRUE(update) << update.error().message;
   EXPECT_LT(inversion_.seen.displacements.colwise().norm().maxCoeff(), 0.6);
   EXPECT_LT((inversion_.seen.positions.row(2).array() - 40.0).maxCoeff(), 11.0);

@@ -298,6 +298,22 @@ TEST(Pipeline, SaysWhatItLeavesOut) {
   }
 }
 
+TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
+  PriorConfig prior;
+  EXPECT_TRUE(prior_omissions(prior).empty());
+  prior.tumour_volume_strain_sd = 0.0;
+  prior.gravity_levels_mm.clear();
+  prior.resection_weight_sd = 0.0;  // its stress stays
+  const auto left_out = prior_omissions(prior);
+  ASSERT_EQ(left_out.size(), 2u);
+  EXPECT_EQ(left_out[0].part, "gravity modes");
+  EXPECT_EQ(left_out[1].part, "swelling of the tumour");
+  EXPECT_THAT(left_out[1].reason, HasSubstr("prior.tumour_volume_strain_sd"));
+  EXPECT_THAT(left_out[1].estimated_error, HasSubstr("1.7 mm at the cortex"));
+  prior.resection_stress_sd_pa = 0.0;
+  EXPECT_EQ(prior_omissions(prior).size(), 3u);
+}
+
 TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
   auto sphere = std::make_shared<BrainModel>(*model());
   sphere->tumour = ellipsoid({10, 10, 10});

@@ -100,8 +100,14 @@ TEST_F(SceneSession, PartsForcedOffAreListedWithReasonAndNumber) {
 
 TEST_F(SceneSession, ByDefaultOnlyPressureIsLeftOutWhenTheBrainTouches) {
   const Update update = run(config(), {3, 0, 3});
-  ASSERT_EQ(update.left_out.size(), 1u);
-  EXPECT_EQ(update.left_out[0].part, "pressure");
+  // And the parts of the prior that the toy's case switches off.
+  std::vector<std::string> parts;
+  for (const Omission& one : update.left_out) parts.push_back(one.part);
+  const std::vector<Omission> off = prior_omissions(config().prior);
+  ASSERT_EQ(off.size(), 6u);
+  EXPECT_THAT(parts, testing::Contains("pressure"));
+  EXPECT_EQ(parts.size(), 1 + off.size());
+  for (const Omission& one : off) EXPECT_THAT(parts, testing::Contains(one.part));
 }
 
 // What the drained limit moves a displacement by, against what the update says that it does.

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/load_descent.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "common/inversion/contract/inversion_options.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+// Armijo's fraction of the fall that the gradient promises; on an edge, of what the bundle
+// promises.
+constexpr double kSufficient = 1e-4;
+constexpr double kSufficientOfBundle = 0.1;
+// Trials in a row without a fall that change the direction; later ones shorten the step.
+constexpr int kMaxTurns = 4;
+constexpr int kMaxTurnsOfBundle = 16;
+constexpr double kShortestStep = 1e-6;
+// Farther from the minimum than this, a new linear model is worth its price.
+constexpr double kFar = 1.0;
+
+}  // namespace
+
+LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta,
+                         bool contact, ThreadTeam& team)
+    : window_(window),
+      team_(team),
+      factor_(operators, beta),
+      reduction_(operators, window, factor_, team),
+      contact_(operators, window, beta, contact, factor_, team),
+      posterior_(window),
+      z_(VecX::Zero(window.count)),
+      trial_(window.count),
+      step_(window.count),
+      gradient_(window.count),
+      shift_(SparseData::kMaxCommonErrors + window.count),
+      mean_z_(VecX::Zero(window.count)),
+      newton_(window.count),
+      next_(window.count),
+      direction_(window.count),
+      change_(window.count),
+      curvature_(window.count),
+      bundle_(window.count),
+      covariance_factor_(window.count, window.count) {}
+
+void LoadDescent::forget() {
+  z_.setZero();
+  contact_.forget();
+  reduction_.forget();
+  factor_.forget();
+}
+
+double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& strengths,
+                              const VecX& z) {
+  double sum = 0.0;
+  for (int i = 0; i < window_.count; ++i) {
+    const double s = strengths.scale_of(i);
+    if (s > 0.0) sum += z[i] * z[i] / (s * s);
+  }
+  const auto free_body = sampled.free_body();
+  const int q = sampled.common();
+  whitened_ = free_body.col(q + window_.count);
+  whitened_.noalias() -= free_body.middleCols(q, window_.count) * z;
+  if (contact_.size() > 0) {
+    whitened_.noalias() -= sampled.contact(contact_.active()) * contact_.forces();
+  }
+  sum += whitened_.squaredNorm();
+  if (q > 0) {
+    const auto common = free_body.leftCols(q);
+    normal_.noalias() = common.transpose() * common;
+    normal_.diagonal().array() += 1.0;
+    right_.noalias() = common.transpose() * whitened_;
+    common_amplitudes_ = right_;
+    Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(normal_);
+    factor.solveInPlace(common_amplitudes_);
+    sum -= right_.dot(common_amplitudes_);
+  }
+  return 0.5 * sum;
+}
+
+Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths& strengths) {
+  const auto free_body = sampled.free_body();
+  const int q = sampled.common();
+  adjoint_ = whitened_;  // R^-1/2 (d - A u - common error)
+  if (q > 0) adjoint_.noalias() -= free_body.leftCols(q) * common_amplitudes_;
+  gradient_.noalias() = -free_body.middleCols(q, window_.count).transpose() * adjoint_;
+  if (contact_.size() > 0) {
+    felt_.resize(contact_.size());
+    felt_.noalias() = sampled.contact(contact_.active()).transpose() * adjoint_;
+    if (auto status = contact_.add_adjoint(felt_, gradient_); !status) return status;
+  }
+  for (int i = 0; i < window_.count; ++i) {
+    const double s = strengths.scale_of(i);
+    gradient_[i] = s > 0.0 ? gradient_[i] + trial_[i] / (s * s) : 0.0;
+  }
+  posterior_.whitened_newton_step(gradient_, next_);
+  return {};
+}
+
+Status LoadDescent::linearise(SampledOperators& sampled) {
+  if (auto status = reduction_.activate(contact_.set()); !status) return status;
+  posterior_.linearise(sampled, reduction_, team_);
+  return {};
+}
+
+// More slaves than an edge brings into play have changed.
+bool LoadDescent::far_from_model() const {
+  int changes = 0;
+  for (std::size_t i = 0; i < contact_.set().size(); ++i) {
+    changes += contact_.set()[i] != reduction_.set()[i] ? 1 : 0;
+  }
+  return changes > std::max(6, reduction_.size() / 20);
+}
+
+Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
+  if (auto status = posterior_.minimise(strengths); !status) return status;
+  z_ = posterior_.z();
+  if (auto status = contact_.solve(z_); !status) return status;
+  return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
+}
+
+Status LoadDescent::take(SampledOperators& sampled) {
+  if (auto status = contact_.solve(z_); !status) return status;
+  return linearise(sampled);
+}
+
+Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {
+  value_ = objective(sampled, strengths, z_);
+  if (auto status = posterior_.minimise(strengths); !status) return status;
+  step_ = posterior_.z() - z_;
+  posterior_.whiten(step_, newton_);
+  return {};
+}
+
+Status LoadDescent::attempt(SampledOperators& sampled, const PriorStrengths& strengths,
+                            const VecX& whitened) {
+  posterior_.unwhiten(whitened, step_);
+  trial_ = z_ + step_;
+  if (auto status = contact_.solve(trial_); !status) return status;
+  after_ = objective(sampled, strengths, trial_);
+  return newton_step(sampled, strengths);
+}
+
+Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
+                                            const PriorStrengths& strengths, bool fine,
+                                            const DescentLimits& limits) {
+  auto outcome = descend_smoothly(sampled, strengths, kRoughDecrement, limits);
+  if (outcome && fine && *outcome == EstimateStatus::kConverged) {
+    outcome = descend_to_edge(sampled, strengths, limits);
+    if (outcome && *outcome == EstimateStatus::kIterationLimit) {
+      outcome = descend_smoothly(sampled, strengths, kDecrement, limits);
+    }
+  }
+  if (!outcome) return outcome;
+  if (auto status = contact_.solve(z_); !status) return tl::unexpected(status.error());
+  if (contact_.set() != reduction_.set()) {
+    if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
+    if (auto status = posterior_.minimise(strengths); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
+  return outcome;
+}
+
+Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
+                                                     const PriorStrengths& strengths,
+                                                     double tolerance,
+                                                     const DescentLimits& limits) {
+  if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
+  curvature_.reset();
+  int turns = 0;
+  double length = 1.0, fall = 0.0;
+  for (int step = 0; step < limits.max_steps && length > kShortestStep; ++step) {
+    if (limits.stop.stop_requested()) return stopped(step + 1);
+    if (length == 1.0) {
+      curvature_.apply(newton_, direction_);
+      fall = std::max(0.0, direction_.dot(newton_));
+      decrement_ = std::sqrt(fall);
+      if (decrement_ <= tolerance) return EstimateStatus::kConverged;
+    }
+    change_ = length * direction_;
+    if (auto status = attempt(sampled, strengths, change_); !status) {
+      return tl::unexpected(status.error());
+    }
+    const bool fell = after_ <= value_ - kSufficient * length * fall;
+    if (fell && decrement_ > kFar && far_from_model()) {
+      z_ = trial_;
+      length = 1.0;
+      turns = 0;
+      if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
+      if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
+      curvature_.reset();
+    } else {
+      bool learned = false;
+      if (decrement_ <= kFar) {
+        newton_ -= next_;  // change of the gradient
+        learned = curvature_.learn(change_, newton_);
+        newton_ += next_;
+      }
+      if (fell) {
+        z_ = trial_;
+        value_ = after_;
+        newton_ = next_;
+        length = 1.0;
+        turns = 0;
+      } else if (learned && length == 1.0 && turns < kMaxTurns) {
+        ++turns;
+      } else {
+        const double fitted = 0.5 * length * length * fall / (after_ - value_ + length * fall);
+        length = std::clamp(fitted, 0.1 * length, 0.5 * length);
+      }
+    }
+    limits.on_step();
+    if (limits.out_of_time()) return EstimateStatus::kDeadline;
+  }
+  return EstimateStatus::kIterationLimit;
+}
+
+Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
+                                                    const PriorStrengths& strengths,
+                                                    const DescentLimits& limits) {
+  if (auto status = contact_.solve(z_); !status) return tl::unexpected(status.error());
+  if (contact_.set() != reduction_.set()) {
+    if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
+  }
+  if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
+  bundle_.clear();
+  bundle_.add_here(newton_);
+  int turns = 0;
+  double length = 1.0;
+  for (int step = 0; step < limits.max_steps && length > kShortestStep; ++step) {
+    if (limits.stop.stop_requested()) return stopped(step + 1);
+    bundle_.solve();
+    decrement_ = std::sqrt(2.0 * std::max(0.0, bundle_.fall()));
+    if (decrement_ <= kDecrement) return EstimateStatus::kConverged;
+    change_ = length * bundle_.step();
+    if (auto status = attempt(sampled, strengths, change_); !status) {
+      return tl::unexpected(status.error());
+    }
+    if (after_ <= value_ - kSufficientOfBundle * length * bundle_.fall()) {
+      z_ = trial_;
+      bundle_.move(change_, value_ - after_);
+      bundle_.add_here(next_);
+      value_ = after_;
+      length = 1.0;
+      turns = 0;
+    } else {
+      bundle_.add_at(change_, after_ - value_, next_);
+      if (++turns > kMaxTurnsOfBundle) length *= 0.5;
+    }
+    limits.on_step();
+    if (limits.out_of_time()) return EstimateStatus::kDeadline;
+  }
+  return EstimateStatus::kIterationLimit;
+}
+
+Status LoadDescent::average(PriorStrengths& strengths) {
+  auto shift = shift_.head(posterior_.unknowns());
+  if (!strengths.mean_shift(shift)) {
+    return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
+  }
+  mean_z_ = z_ + shift.tail(window_.count);
+  posterior_.set_answer(shift.head(posterior_.unknowns() - window_.count), mean_z_);
+  return contact_.solve(mean_z_);
+}
+
+Status LoadDescent::spread(PriorStrengths& strengths) {
+  if (strengths.covariance(covariance_factor_)) return {};
+  return fail(ErrorCode::kNotFinite, "inversion: the covariance is not positive definite");
+}
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// LoadDescent: the most probable loads of an update, with contact.
+//
+// For fixed loads z contact has one solution u(z) (contact_at_loads.hpp). The most probable z
+// minimises
+//
+//   J(z) = min over c of 1/2 |R^-1/2 (d - A u(z) - common c)|^2 + 1/2 |c|^2 + 1/2 |x|^2,   z = S x
+//
+// with S the strengths of the prior's parts. J is continuous and piecewise quadratic, one piece for
+// each active set. The linear model of one set gives the second derivative H and the Newton step to
+// its piece's minimum. The gradient of any other piece is cheap: by the adjoint, one solve with the
+// compliance of its slaves. J is searched in two ways:
+//
+//   rough  From afar J looks smooth, with more or less curvature than its pieces have. Gradients
+//          correct H as the search goes on (quasi_newton.hpp), also those of trials that J did not
+//          fall to. While the set changes much, the linear model is made anew instead.
+//   fine   A minimum often lies on an edge between pieces, where no Newton step of any of them
+//          falls. The pieces that the trials meet are gathered, and the next step is to the minimum
+//          of their maximum (newton_bundle.hpp).
+//
+//   certificate   decrement: the length of the step that is left, in posterior standard deviations;
+//                 J falls by half its square. violation: ContactAtLoads::violation_mm()
+//
+// The answer is z and what the mean over the hypotheses adds to the most probable one, with contact
+// solved for it.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+
+#include "common/core/error.hpp"
+#include "common/core/thread_team.hpp"
+#include "common/inversion/condensed/mode_posterior.hpp"
+#include "common/inversion/condensed/newton_bundle.hpp"
+#include "common/inversion/condensed/prior_strengths.hpp"
+#include "common/inversion/condensed/quasi_newton.hpp"
+#include "common/inversion/condensed/sampled_operators.hpp"
+#include "common/inversion/skull/contact_at_loads.hpp"
+#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/contact_reduction.hpp"
+#include "common/linalg/growing_matrix.hpp"
+#include "common/values/estimate.hpp"
+
+namespace brainshift::inversion {
+
+// A decrement at which the search has converged.
+inline constexpr double kDecrement = 1e-3;
+
+// While strengths, weights or places of data may still change, a descent this close will do.
+inline constexpr double kRoughDecrement = 0.2;
+
+struct DescentLimits {
+  int max_steps = 100;                // of one descent
+  std::stop_token stop;               // looked at before every step
+  std::function<bool()> out_of_time;  // looked at after every step
+  std::function<void()> on_step;      // after every step, for the history
+};
+
+class LoadDescent {
+ public:
+  // Keeps references to operators and team. contact: false keeps every slave open.
+  LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
+              ThreadTeam& team);
+  void reserve(int data) { posterior_.reserve(data); }
+  // The next search begins without loads and contact.
+  void forget();
+
+  // New data: the linear model at the last z.
+  Status take(SampledOperators& sampled);
+  // To the minimum of the present linear model for strengths that are new, and the linear model
+  // there.
+  Status jump(SampledOperators& sampled, const PriorStrengths& strengths);
+  // Descends from z until decrement() is at most kDecrement (fine) or kRoughDecrement. Ends with
+  // the linear model of the set at z: kConverged, kIterationLimit or kDeadline. Errors of the
+  // members and stopped().
+  Result<EstimateStatus> descend(SampledOperators& sampled, const PriorStrengths& strengths,
+                                 bool fine, const DescentLimits& limits);
+  // The mean over the hypotheses, which were weighed for the present linear model, and contact for
+  // it.
+  Status average(PriorStrengths& strengths);
+  // Its covariance.
+  Status spread(PriorStrengths& strengths);
+
+  // Of the last average().
+  const VecX& z() const { return mean_z_; }
+  // Lower factor of the covariance of z.
+  const Eigen::MatrixXd& covariance_factor() const { return covariance_factor_; }
+  double decrement() const { return decrement_; }
+  const ContactAtLoads& contact() const { return contact_; }
+  const ContactReduction& reduction() const { return reduction_; }
+  ModePosterior& posterior() { return posterior_; }
+  const ModePosterior& posterior() const { return posterior_; }
+
+ private:
+  // The linear model of the set that contact has at z_.
+  Status linearise(SampledOperators& sampled);
+  Result<EstimateStatus> descend_smoothly(SampledOperators& sampled,
+                                          const PriorStrengths& strengths, double tolerance,
+                                          const DescentLimits& limits);
+  Result<EstimateStatus> descend_to_edge(SampledOperators& sampled, const PriorStrengths& strengths,
+                                         const DescentLimits& limits);
+  // value_ and newton_ at z_, from the linear model there.
+  Status begin(SampledOperators& sampled, const PriorStrengths& strengths);
+  // Contact, after_ and next_ at trial_ = z_ + the step whose whitened image is given.
+  Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
+  bool far_from_model() const;
+  // J at z, whose contact is solved. Precondition: z has no modes of absent parts.
+  double objective(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& z);
+  // next_: the whitened Newton step at trial_ of the piece that its contact is on. Precondition:
+  // objective(trial_) was the last one.
+  Status newton_step(SampledOperators& sampled, const PriorStrengths& strengths);
+
+  ModeWindow window_;
+  ThreadTeam& team_;
+  ContactFactor factor_;
+  ContactReduction reduction_;
+  ContactAtLoads contact_;
+  ModePosterior posterior_;
+  VecX z_, trial_, step_, gradient_, shift_, mean_z_;
+  VecX newton_, next_, direction_, change_;              // whitened
+  double value_ = 0.0, after_ = 0.0;                     // J at z_ and at trial_
+  VecX whitened_, adjoint_, common_amplitudes_, right_;  // of the last objective()
+  linalg::GrowingVector felt_;                           // by the active slaves
+  Eigen::MatrixXd normal_;
+  QuasiNewton curvature_;
+  NewtonBundle bundle_;
+  Eigen::MatrixXd covariance_factor_;
+  double decrement_ = 0.0;
+};
+
+}  // namespace brainshift::inversion

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/skull/contact_factor.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace brainshift::inversion {
+namespace {
+
+namespace blas = linalg::blas;
+
+// With more changes than this part of the set (and this many), a new base costs less.
+constexpr int kPart = 6;
+constexpr Eigen::Index kFewChanges = 16;
+
+}  // namespace
+
+void list_active(const contact::ActiveSet& set, std::vector<int>& active) {
+  active.clear();
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (set[i]) active.push_back(static_cast<int>(i));
+  }
+}
+
+ContactFactor::ContactFactor(const CondensedOperators& operators, double beta)
+    : operators_(operators),
+      beta_(beta),
+      row_in_base_(static_cast<std::size_t>(operators.num_slaves()), -1),
+      row_in_set_(static_cast<std::size_t>(operators.num_slaves()), -1),
+      factor_(new double[static_cast<std::size_t>(operators.compliance.size())]),
+      cache_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMostChanges]),
+      columns_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMostChanges]),
+      schur_(kMostChanges, kMostChanges) {
+  const auto slaves = static_cast<std::size_t>(operators.num_slaves());
+  for (std::vector<int>* each : {&active_, &base_, &changed_}) each->reserve(slaves);
+  cached_.reserve(kMostChanges);
+  set_.reserve(slaves);
+}
+
+ContactFactor::Column ContactFactor::factor() const {
+  return {factor_.get(), base_size(), base_size(), Eigen::OuterStride<>(base_size())};
+}
+
+ContactFactor::Column ContactFactor::columns(Eigen::Index first, Eigen::Index count) const {
+  const Eigen::Index slaves = operators_.num_slaves();
+  return {columns_.get() + first * slaves, base_size(), count, Eigen::OuterStride<>(slaves)};
+}
+
+double ContactFactor::entry(int row, int column) const {
+  return operators_.compliance(row, column) + (row == column ? 1.0 / beta_ : 0.0);
+}
+
+Status ContactFactor::take(const contact::ActiveSet& set) {
+  if (set == set_) return {};
+  set_ = set;
+  list_active(set, active_);
+  std::fill(row_in_set_.begin(), row_in_set_.end(), -1);
+  for (int j = 0; j < size(); ++j)
+    row_in_set_[static_cast<std::size_t>(active_[static_cast<std::size_t>(j)])] = j;
+  changed_.clear();
+  for (const int slave : active_) {
+    if (row_in_base_[static_cast<std::size_t>(slave)] < 0) changed_.push_back(slave);
+  }
+  joining_ = changed_.size();
+  for (const int slave : base_) {
+    if (row_in_set_[static_cast<std::size_t>(slave)] < 0) changed_.push_back(slave);
+  }
+  leaving_ = changed_.size() - joining_;
+  if (changes() <= std::max(kFewChanges, base_size() / kPart) && gather_columns() &&
+      factorise_changes()) {
+    return {};
+  }
+  return make_base();
+}
+
+void ContactFactor::forget() {
+  set_.clear();
+  active_.clear();
+  base_.clear();
+  changed_.clear();
+  cached_.clear();
+  joining_ = leaving_ = 0;
+  std::fill(row_in_base_.begin(), row_in_base_.end(), -1);
+  std::fill(row_in_set_.begin(), row_in_set_.end(), -1);
+}
+
+Status ContactFactor::make_base() {
+  base_ = active_;
+  row_in_base_ = row_in_set_;
+  changed_.clear();
+  cached_.clear();
+  joining_ = leaving_ = 0;
+  if (base_.empty()) return {};
+  auto d = factor();
+  for (Eigen::Index j = 0; j < base_size(); ++j) {
+    const double* column = operators_.compliance.col(base_[static_cast<std::size_t>(j)]).data();
+    for (Eigen::Index i = j; i < base_size(); ++i) {
+      d(i, j) = column[base_[static_cast<std::size_t>(i)]];
+    }
+    d(j, j) += 1.0 / beta_;
+  }
+  if (blas::cholesky(d)) return {};
+  const std::string slaves = std::to_string(base_.size());
+  forget();
+  return fail(ErrorCode::kSingularMatrix,
+              "contact: the compliance of " + slaves + " active slaves is not positive definite");
+}
+
+bool ContactFactor::gather_columns() {
+  const Eigen::Index slaves = operators_.num_slaves(), rows = base_size();
+  const std::size_t before = cached_.size();
+  for (const int slave : changed_) {
+    if (std::find(cached_.begin(), cached_.end(), slave) != cached_.end()) continue;
+    if (cached_.size() == kMostChanges) return false;
+    double* column = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * slaves;
+    const int own_row = row_in_base_[static_cast<std::size_t>(slave)];
+    if (own_row < 0) {
+      const double* compliance = operators_.compliance.col(slave).data();
+      for (Eigen::Index i = 0; i < rows; ++i) {
+        column[i] = compliance[base_[static_cast<std::size_t>(i)]];
+      }
+    } else {
+      std::fill(column, column + rows, 0.0);
+      column[own_row] = 1.0;
+    }
+    cached_.push_back(slave);
+  }
+  if (rows > 0 && cached_.size() > before) {
+    Column fresh(cache_.get() + static_cast<Eigen::Index>(before) * slaves, rows,
+                 static_cast<Eigen::Index>(cached_.size() - before), Eigen::OuterStride<>(slaves));
+    blas::solve_lower(factor(), fresh);
+  }
+  for (std::size_t j = 0; j < changed_.size(); ++j) {
+    const auto place = std::find(cached_.begin(), cached_.end(), changed_[j]) - cached_.begin();
+    std::copy_n(cache_.get() + place * slaves, rows,
+                columns_.get() + static_cast<Eigen::Index>(j) * slaves);
+  }
+  return true;
+}
+
+// C = D_aa - V_a^T V_a = G G^T, Z = -G^-1 V_a^T V_q, N N^T = V_q^T V_q + Z^T Z.
+bool ContactFactor::factorise_changes() {
+  const auto a = static_cast<Eigen::Index>(joining_), q = static_cast<Eigen::Index>(leaving_);
+  if (a + q == 0) return true;
+  auto all = schur_.topLeftCorner(a + q, a + q);
+  all.setZero();
+  if (base_size() > 0) blas::gram(columns(0, a + q), 0.0, all);
+  auto joining = all.topLeftCorner(a, a);
+  for (Eigen::Index j = 0; j < a; ++j) {
+    for (Eigen::Index i = j; i < a; ++i) {
+      joining(i, j) =
+          entry(changed_[static_cast<std::size_t>(i)], changed_[static_cast<std::size_t>(j)]) -
+          joining(i, j);
+    }
+  }
+  if (a > 0 && !blas::cholesky(joining)) return false;
+  if (q == 0) return true;
+  // Z in the upper right corner, which nothing else uses.
+  auto z = all.topRightCorner(a, q);
+  auto leaving = all.bottomRightCorner(q, q);
+  if (a > 0) {
+    z = -all.bottomLeftCorner(q, a).transpose();
+    blas::solve_lower(joining, z);
+    blas::gram(z, 1.0, leaving);
+  }
+  return blas::cholesky(leaving);
+}
+
+void ContactFactor::solve(blas::Out<double> b, blas::Out<double> work) const {
+  const Eigen::Index rows = base_size(), columns_of_b = b.cols();
+  const auto a = static_cast<Eigen::Index>(joining_), q = static_cast<Eigen::Index>(leaving_);
+  if (b.rows() == 0) return;
+  if (a + q == 0) {
+    blas::solve_lower(factor(), b);
+    blas::solve_lower_transposed(factor(), b);
+    return;
+  }
+  auto x = work.topRows(rows);
+  auto t = work.middleRows(rows, a + q);
+  const auto row_of = [&](int slave) { return row_in_set_[static_cast<std::size_t>(slave)]; };
+  for (Eigen::Index c = 0; c < columns_of_b; ++c) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const int row = row_of(base_[static_cast<std::size_t>(i)]);
+      x(i, c) = row >= 0 ? b(row, c) : 0.0;
+    }
+    for (Eigen::Index i = 0; i < a; ++i) {
+      t(i, c) = b(row_of(changed_[static_cast<std::size_t>(i)]), c);
+    }
+    for (Eigen::Index i = a; i < a + q; ++i) t(i, c) = 0.0;
+  }
+  if (rows > 0) {
+    blas::solve_lower(factor(), x);
+    blas::multiply_transposed(-1.0, columns(0, a + q), x, 1.0, t);
+  }
+  // [C Y; Y^T -V_q^T V_q], Y = -V_a^T V_q
+  auto joining = t.topRows(a), leaving = t.bottomRows(q);
+  const auto g = schur_.topLeftCorner(a, a);
+  const auto z = schur_.block(0, a, a, q);
+  const auto n = schur_.block(a, a, q, q);
+  if (a > 0) blas::solve_lower(g, joining);
+  if (q > 0) {
+    if (a > 0) blas::multiply_transposed(-1.0, z, joining, 1.0, leaving);
+    blas::solve_lower(n, leaving);
+    blas::solve_lower_transposed(n, leaving);
+    leaving *= -1.0;
+    if (a > 0) blas::multiply(-1.0, z, leaving, 1.0, joining);
+  }
+  if (a > 0) blas::solve_lower_transposed(g, joining);
+  if (rows > 0) {
+    blas::multiply(-1.0, columns(0, a + q), t, 1.0, x);
+    blas::solve_lower_transposed(factor(), x);
+  }
+  for (Eigen::Index c = 0; c < columns_of_b; ++c) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const int row = row_of(base_[static_cast<std::size_t>(i)]);
+      if (row >= 0) b(row, c) = x(i, c);
+    }
+    for (Eigen::Index i = 0; i < a; ++i) {
+      b(row_of(changed_[static_cast<std::size_t>(i)]), c) = t(i, c);
+    }
+  }
+}
+
+}  // namespace brainshift::inversion

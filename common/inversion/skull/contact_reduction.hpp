@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// ContactReduction: contact forces of a set A of active slaves as an affine function of the prior
+// modes z.
+//
+//   D f = p_A - L_A z,   D = Phi_AA + I / beta        =>   f = f0 - T z,   [T f0] = D^-1 [L_A p_A]
+// L = N^T U: s x r; p: initial penetration. Everything is kept while the set stays the same.
+// Memory for all slaves is reserved by the constructor; nothing is allocated afterwards.
+#pragma once
+
+#include <vector>
+
+#include "common/contact/penalty.hpp"
+#include "common/core/error.hpp"
+#include "common/core/thread_team.hpp"
+#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/mode_window.hpp"
+#include "common/values/condensed_operators.hpp"
+
+namespace brainshift::inversion {
+
+class ContactReduction {
+ public:
+  // Keeps references to the operators, to the factor that it shares with ContactAtLoads, and to the
+  // team that shares the work.
+  ContactReduction(const CondensedOperators& operators, ModeWindow window, ContactFactor& factor,
+                   ThreadTeam& team);
+
+  // Errors of ContactFactor::take. set: one flag per slave, or empty for none.
+  Status activate(const contact::ActiveSet& set);
+  void forget() {
+    set_.clear();
+    active_.clear();
+  }
+  int size() const { return static_cast<int>(active_.size()); }
+  const std::vector<int>& active() const { return active_; }  // slaves, ascending
+  const contact::ActiveSet& set() const { return set_; }
+  // [T | f0], k x (r + 1)
+  Eigen::Map<const Eigen::MatrixXd> response() const {
+    return {response_.data(), size(), window_.count + 1};
+  }
+
+  // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
+  // Allocates. Errors of ContactFactor::take.
+  Result<Eigen::MatrixXd> response_before() const;
+
+ private:
+  const CondensedOperators& operators_;
+  ModeWindow window_;
+  ContactFactor& factor_;
+  ThreadTeam& team_;
+  contact::ActiveSet set_;
+  std::vector<int> active_;
+  Eigen::MatrixXd response_;  // storage; the first k x (r + 1) entries are used, column-major
+  Eigen::MatrixXd work_;      // of ContactFactor::solve
+};
+
+}  // namespace brainshift::inversion

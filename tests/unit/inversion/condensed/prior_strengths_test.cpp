@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/prior_strengths.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+
+#include "common/core/random.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using Eigen::MatrixXd;
+
+constexpr int kModes = 48, kCommon = 2, kData = 300;
+constexpr ModeWindow kWindow{0, kModes};
+// Along gravity, across it, tumour volume, fine; the model lacks the other parts.
+constexpr PerPart<int> kColumns = {2, 4, 8, 0, 0, 0, 34, 0, 0};
+constexpr std::size_t kPresent[] = {0, 1, 2, 6};
+
+PriorScaleValues strengths(double along, double across, double volume, double fine) {
+  return {along, across, volume, 0, 0, 0, fine, 0, 0};
+}
+
+struct Problem {
+  MatrixXd jacobian;  // whitened [common | modes]
+  VecX data;          // whitened
+  MatrixXd gram() const { return jacobian.transpose() * jacobian; }
+  VecX right() const { return jacobian.transpose() * data; }
+};
+
+std::size_t part(int mode) {
+  if (mode >= 14) return 6;
+  if (mode >= 6) return 2;
+  return mode >= 2 ? 1 : 0;
+}
+
+VecX prior_sd(const PriorScaleValues& scales) {
+  VecX sd = VecX::Ones(kCommon + kModes);
+  for (int i = 0; i < kModes; ++i) sd[kCommon + i] = scales[part(i)];
+  return sd;
+}
+
+// A floor of `part` beside its strength.
+VecX prior_sd_with(const PriorScaleValues& scales, std::size_t floored, double floor) {
+  PriorScaleValues with = scales;
+  with[floored] = std::hypot(scales[floored], floor);
+  return prior_sd(with);
+}
+
+// Data drawn from the model whose parts have the given strengths.
+Problem drawn(const PriorScaleValues& scales, std::uint64_t seed) {
+  Random random(seed);
+  Problem problem{MatrixXd(kData, kCommon + kModes), VecX(kData)};
+  for (Eigen::Index i = 0; i < problem.jacobian.size(); ++i) {
+    problem.jacobian.data()[i] = 0.3 * random.normal();
+  }
+  VecX truth = prior_sd(scales);
+  for (double& value : truth) value *= random.normal();
+  for (int i = 0; i < kData; ++i) problem.data[i] = random.normal();
+  problem.data += problem.jacobian * truth;
+  return problem;
+}
+
+// ln p(d | s) p(s) by the covariance of the data, up to a constant.
+double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
+  double sum = 0.0, log_prior = 0.0;
+  for (std::size_t i = 1; i < kStrengths.size(); ++i) {
+    sum += std::exp(-0.5 * std::pow(std::log(kStrengths[i]) / std::log(3.0), 2));
+  }
+  for (const std::size_t g : kPresent) {
+    log_prior += scales[g] == 0.0
+                     ? std::log(0.5)
+                     : std::log(0.5 / sum) - 0.5 * std::pow(std::log(scales[g]) / std::log(3.0), 2);
+  }
+  const VecX sd = prior_sd(scales);
+  MatrixXd covariance =
+      problem.jacobian * sd.cwiseAbs2().asDiagonal() * problem.jacobian.transpose();
+  covariance.diagonal().array() += 1.0;
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  const MatrixXd lower = factor.matrixL();
+  return log_prior - 0.5 * problem.data.dot(factor.solve(problem.data)) -
+         lower.diagonal().array().log().sum();
+}
+
+PriorStrengths fitted(const Problem& problem, bool estimate = true) {
+  PriorStrengths result(kColumns, kWindow, kCommon, estimate);
+  EXPECT_TRUE(result.fit(problem.gram(), problem.right()));
+  return result;
+}
+
+TEST(PriorStrengths, NoOtherStrengthOfOnePartIsMoreProbable) {
+  const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.25), 3);
+  const PriorScaleValues best = fitted(problem).held();
+  const double at_best = log_posterior(problem, best);
+  EXPECT_GT(at_best, log_posterior(problem, strengths(1, 1, 1, 1)) + 5.0)
+      << "the test shows nothing";
+  for (const std::size_t g : kPresent) {
+    for (const double strength : kStrengths) {
+      auto other = best;
+      other[g] = strength;
+      EXPECT_LE(log_posterior(problem, other), at_best + 1e-3) << g << " at " << strength;
+    }
+  }
+}
+
+TEST(PriorStrengths, HypothesesAreWeighedByTheirProbability) {
+  const Problem problem = drawn(strengths(0.5, 0.125, 2.0, 0.25), 3);
+  const PriorStrengths result = fitted(problem);
+  const auto& hypotheses = result.hypotheses();
+  ASSERT_GE(hypotheses.size(), 3u);
+  double sum = 0.0;
+  const double at_best = log_posterior(problem, hypotheses[0].scales);
+  for (const Hypothesis& each : hypotheses) {
+    sum += each.weight;
+    EXPECT_LE(each.weight, hypotheses[0].weight);
+    const double expected = std::exp(log_posterior(problem, each.scales) - at_best);
+    EXPECT_NEAR(each.weight / hypotheses[0].weight, expected, 2e-3);
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-12);
+}
+
+TEST(PriorStrengths, FindTheStrengthThatTheDataWereDrawnWith) {
+  // 34 amplitudes are known to 1 / sqrt(2 * 34) of their standard deviation; steps are of 2.
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const double found = fitted(drawn(strengths(0.5, 0.5, 0.5, 2.0), seed)).held()[6];
+    EXPECT_TRUE(found == 1.0 || found == 2.0 || found == 4.0) << found;
+  }
+}
+
+TEST(PriorStrengths, APartThatTheDataDoNotNeedVanishes) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const PriorStrengths result = fitted(drawn(strengths(1.0, 1.0, 0.0, 1.0), seed));
+    EXPECT_EQ(result.held()[2], 0.0) << seed;
+    EXPECT_GT(result.absent()[2], 0.5) << seed;
+    EXPECT_EQ(result.mean()[3], 0.0) << "the model lacks it";
+  }
+}
+
+TEST(PriorStrengths, AStrengthAtItsBoundIsSaid) {
+  const PriorStrengths result = fitted(drawn(strengths(1.0, 1.0, 1.0, 60.0), 4));
+  EXPECT_EQ(result.held()[6], kLargestStrength);
+  EXPECT_TRUE(result.at_bound()[6]);
+  EXPECT_FALSE(result.at_bound()[0]);
+}
+
+TEST(PriorStrengths, DoNotDependOnEarlierData) {
+  const Problem one = drawn(strengths(0.5, 0.0, 2.0, 0.25), 3);
+  const Problem two = drawn(strengths(4.0, 0.5, 0.0, 1.0), 7);
+  PriorStrengths used = fitted(two);
+  ASSERT_TRUE(used.fit(one.gram(), one.right()));
+  const PriorStrengths fresh = fitted(one);
+  ASSERT_EQ(used.hypotheses().size(), fresh.hypotheses().size());
+  for (std::size_t h = 0; h < fresh.hypotheses().size(); ++h) {
+    EXPECT_EQ(used.hypotheses()[h].scales, fresh.hypotheses()[h].scales);
+    EXPECT_EQ(used.hypotheses()[h].weight, fresh.hypotheses()[h].weight);
+  }
+}
+
+// By the formulas of each hypothesis, with dense inverses.
+void expect_moments_of_the_mixture(const Problem& problem, PriorStrengths result,
+                                   std::size_t floored = 0, double floor = 0.0) {
+  const int size = kCommon + kModes;
+  VecX mean = VecX::Zero(size), most_probable;
+  MatrixXd second = MatrixXd::Zero(size, size);
+  for (const Hypothesis& each : result.hypotheses()) {
+    const VecX sd = prior_sd_with(each.scales, floored, floor);
+    MatrixXd inner = sd.asDiagonal() * problem.gram() * sd.asDiagonal();
+    inner.diagonal().array() += 1.0;
+    const MatrixXd covariance = sd.asDiagonal() * inner.inverse() * sd.asDiagonal();
+    const VecX m = covariance * problem.right();
+    if (most_probable.size() == 0) most_probable = m;
+    mean += each.weight * m;
+    second += each.weight * (covariance + m * m.transpose());
+  }
+  const MatrixXd covariance = second - mean * mean.transpose();
+  VecX found(size);
+  MatrixXd factor(kModes, kModes);
+  ASSERT_TRUE(result.mean_shift(found));
+  ASSERT_TRUE(result.covariance(factor));
+  EXPECT_LT((found - (mean - most_probable)).norm(), 1e-4 * mean.norm());
+  const MatrixXd lower = factor.triangularView<Eigen::Lower>();
+  EXPECT_LT((lower * lower.transpose() - covariance.bottomRightCorner(kModes, kModes)).norm(),
+            1e-4 * covariance.norm());
+}
+
+// A hypothesis that was found for one linear model stays for another that hardly prefers a
+// different one, and gives way to one that is more probable by kWorthwhile.
+TEST(PriorStrengths, AnotherLinearModelChangesThemOnlyWhereItIsWorthwhile) {
+  int stayed = 0, gave_way = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Problem one = drawn(strengths(0.5, 0.125, 2.0, 0.25), seed);
+    const Problem two = drawn(strengths(0.5, 0.5, 0.0, 0.25), seed + 100);
+    PriorStrengths result = fitted(one);
+    const PriorScaleValues held = result.held();
+    bool changed = true;
+    ASSERT_TRUE(result.refit(one.gram(), one.right(), changed));
+    EXPECT_FALSE(changed);
+    EXPECT_EQ(result.held(), held);
+    ASSERT_TRUE(result.refit(two.gram(), two.right(), changed));
+    double gain = 0.0;  // of another strength of one part
+    for (const std::size_t g : kPresent) {
+      for (const double strength : kStrengths) {
+        PriorScaleValues other = held;
+        other[g] = strength;
+        gain = std::max(gain, log_posterior(two, other) - log_posterior(two, held));
+      }
+    }
+    EXPECT_EQ(changed, gain > kWorthwhile) << gain;
+    EXPECT_EQ(result.held(), changed ? fitted(two).held() : held);
+    (changed ? gave_way : stayed) += 1;
+  }
+  EXPECT_GT(gave_way, 0) << "the test shows nothing";
+  const Problem one = drawn(strengths(0.5, 0.125, 2.0, 0.25), 3);
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {  // the same surgery, measured a little worse
+    Problem again = one;
+    Random random(seed);
+    for (double& value : again.data) value += 0.7 * random.normal();
+    PriorStrengths result = fitted(one);
+    bool changed = false;
+    ASSERT_TRUE(result.refit(again.gram(), again.right(), changed));
+    stayed += !changed && fitted(again).held() != result.held() ? 1 : 0;
+  }
+  EXPECT_GT(stayed, 0) << "the test shows nothing";
+}
+
+TEST(PriorStrengths, MomentsAreThoseOfTheMixture) {
+  const Problem problem = drawn(strengths(0.5, 0.125, 2.0, 0.25), 3);
+  const PriorStrengths result = fitted(problem);
+  ASSERT_GE(result.hypotheses().size(), 3u) << "the test shows nothing";
+  expect_moments_of_the_mixture(problem, result);
+}
+
+TEST(PriorStrengths, AFloorIsVarianceThatNoHypothesisTakesAway) {
+  const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.0), 5);
+  PriorStrengths result(kColumns, kWindow, kCommon, true);
+  result.set_floor(static_cast<PriorPart>(6), 0.4);
+  ASSERT_TRUE(result.fit(problem.gram(), problem.right()));
+  EXPECT_EQ(result.held()[6], 0.0) << "the test shows nothing";
+  EXPECT_EQ(result.scale_of(kModes - 1), 0.4);
+  EXPECT_GE(result.mean_square()[6], 0.16);
+  expect_moments_of_the_mixture(problem, result, 6, 0.4);
+  PriorStrengths fixed(kColumns, kWindow, kCommon, false);
+  fixed.set_floor(static_cast<PriorPart>(6), 0.4);
+  EXPECT_EQ(fixed.scale_of(kModes - 1), 1.0) << "without effect where strengths are given";
+}
+
+TEST(PriorStrengths, StrengthsThatAreNotEstimatedStayAsInTheCase) {
+  const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.25), 3);
+  const PriorStrengths result = fitted(problem, false);
+  ASSERT_EQ(result.hypotheses().size(), 1u);
+  EXPECT_EQ(result.held(), strengths(1, 1, 1, 1));
+  expect_moments_of_the_mixture(problem, result);
+}
+
+TEST(PriorStrengths, NumbersThatAreNotFiniteAreRejected) {
+  Problem problem = drawn(strengths(1, 1, 1, 1), 3);
+  PriorStrengths result(kColumns, kWindow, kCommon, true);
+  MatrixXd gram = problem.gram();
+  gram(5, 5) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(result.fit(gram, problem.right()).error().code, ErrorCode::kNotFinite);
+  VecX right = problem.right();
+  right[7] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(result.fit(problem.gram(), right).error().code, ErrorCode::kNotFinite);
+}
+
+TEST(PriorStrengths, AWindowLeavesTheFirstModesOut) {
+  const Problem problem = drawn(strengths(0.5, 0.5, 2.0, 0.25), 3);
+  const int left = 6;  // both gravity parts
+  const int size = kCommon + kModes - left;
+  MatrixXd jacobian(kData, size);
+  jacobian << problem.jacobian.leftCols(kCommon), problem.jacobian.rightCols(size - kCommon);
+  PriorStrengths result(kColumns, {left, kModes - left}, kCommon, true);
+  ASSERT_TRUE(result.fit(jacobian.transpose() * jacobian, jacobian.transpose() * problem.data));
+  EXPECT_EQ(result.held()[0], 0.0);
+  EXPECT_EQ(result.held()[1], 0.0);
+  EXPECT_EQ(result.scale_of(0), result.held()[2]);
+  EXPECT_GT(result.held()[2], 0.0);
+}
+
+}  // namespace
+}  // namespace brainshift::inversion
