@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries format format-check tidy image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -52,6 +52,10 @@ sensing: setup ## registration, ultrasound, stereopsis, joint data: accuracy and
 surgeries: configure ## many different simulated surgeries on two heads, scored, into out/surgeries; an hour; RESUME=1 goes on
 	cmake --build --preset $(PRESET) -j $(JOBS) --target surgery_programs
 	cmake/scripts/surgeries.sh $(BUILD)
+
+prior: configure ## brains drawn from the prior against published brain shift, into out/prior; QUICK=1 for a short run
+	cmake --build --preset $(PRESET) -j $(JOBS) --target prior_programs
+	cmake/scripts/prior.sh $(BUILD)
 
 format: ## rewrite the C++ sources in the house format
 	@cmake/scripts/clang-format.sh write
