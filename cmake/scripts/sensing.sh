@@ -26,8 +26,7 @@ done
 through_the_daemon() {
   local surgery=$out/joint-mixed.surgery
   rm -f "$surgery"
-  local case_file=$out/colin27-oedema.yaml
-  sed 's/swelling_strain_sd: 0.0$/swelling_strain_sd: 0.05/' config/cases/colin27.yaml >"$case_file"
+  local case_file=config/cases/colin27.yaml
   "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" >"$out/prepare.txt"
   "$bin/brainshift" simulate --case "$case_file" --scenario joint-mixed --seed 1 --out "$surgery"
   start_daemon "$out/colin27.h5"

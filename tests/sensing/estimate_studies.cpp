@@ -19,8 +19,10 @@ struct Study {
 };
 
 Status run(double thousand_nodes, const std::vector<std::string>& wanted) {
-  const Study studies[] = {
-      {"joint", joint_study}, {"landmarks", landmark_study}, {"outliers", outlier_study}};
+  const Study studies[] = {{"joint", joint_study},
+                           {"landmarks", landmark_study},
+                           {"outliers", outlier_study},
+                           {"boundary", boundary_study}};
   const auto head = make_default_head(thousand_nodes);
   if (!head) return tl::unexpected(head.error());
   for (const Study& study : studies) {

@@ -9,6 +9,8 @@ namespace brainshift::sensing {
 
 // Tumour boundary and exposed cortex together, against the tumour alone.
 Status joint_study(const bench::Head& head);
+// The tumour's boundary as distances, against its rigid alignment: figures without a bound.
+Status boundary_study(const bench::Head& head);
 // Fifteen landmark pairs, one of them left out, against the best rigid fit.
 Status landmark_study(const bench::Head& head);
 // Gross outliers among boundary points and among landmark pairs.

@@ -70,17 +70,11 @@ Status outlier_study(const bench::Head& head) {
           {"outliers", what, "gross outliers %", "tumour error mm", 100.0 * fraction, *error});
       if (fraction != 0.2) continue;
       char text[60];
-      const bool held = std::string(name) == "paper-icp";
-      std::snprintf(text, sizeof text, "%s (%.4f to %.4f mm)", held ? "<= 1.2" : "shown", clean,
-                    *error);
+      std::snprintf(text, sizeof text, "<= 1.2 (%.4f to %.4f mm)", clean, *error);
       const std::string figure =
           std::string("tumour error with 20 % among ") + what + " over that without";
-      const std::string source = "twin; mean of 6 measurements";
-      if (held)
-        test_support::record_check("outliers", figure, *error / clean, text, *error <= 1.2 * clean,
-                                   source);
-      else
-        test_support::record_figure("outliers", figure, *error / clean, text, source);
+      test_support::record_check("outliers", figure, *error / clean, text, *error <= 1.2 * clean,
+                                 "twin; mean of 6 measurements");
     }
   }
   return {};
