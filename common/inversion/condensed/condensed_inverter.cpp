@@ -68,6 +68,13 @@ void set_reason(EstimateStatus outcome, const Estimate& estimate, const Condense
           config.deadline_ms, contact.iterations, contact.decrement);
       break;
     default:
+      if (contact.decrement <= kDecrement) {
+        std::snprintf(text, sizeof text,
+                      "weights or places of the data did not settle; loads and contact did, in %d "
+                      "steps",
+                      contact.iterations);
+        break;
+      }
       std::snprintf(text, sizeof text,
                     "loads did not settle in %d steps; best iterate returned, %.2g standard "
                     "deviations from its minimum",
@@ -333,14 +340,19 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   if (auto status = find_strengths(limits, outcome); !status) {
     return tl::unexpected(status.error());
   }
-  bool fine = false;
+  bool fine = false, unsettled = false;
   for (int round = 0;; ++round) {
     if (auto status = descent.average(strengths); !status) return tl::unexpected(status.error());
-    if (outcome != EstimateStatus::kConverged || round == kMaxRounds) break;
+    if (outcome != EstimateStatus::kConverged) break;
+    if (unsettled) {
+      outcome = EstimateStatus::kIterationLimit;
+      break;
+    }
     const auto followed = follow(data, asked);
     if (!followed) return tl::unexpected(followed.error());
     if (!*followed && fine) break;
-    fine = !*followed;
+    unsettled = *followed && round >= kMaxRounds;  // the data stay where they are now
+    fine = !*followed || unsettled;
     if (*followed) {
       if (auto status = sample(*data); !status) return tl::unexpected(status.error());
     }

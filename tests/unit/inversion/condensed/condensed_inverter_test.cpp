@@ -296,6 +296,28 @@ TEST_F(Condensed, TheModelsOwnErrorGrowsWithTheMotion) {
   EXPECT_GT(much.sd_mm.maxCoeff(), 2.0 * little.sd_mm.maxCoeff());
 }
 
+// Contact is certified for where the data are at last.
+TEST_P(Condensed, DataThatNeverSettleEndTheRoundsAndAreSaid) {
+  auto inverter = Condensed::inverter(GetParam());
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  int asked = 0;
+  MovingData moving;
+  moving.nodes = {0};
+  moving.relocate = [&](const Points&, SparseData& now) {
+    now.displacements = data.displacements * (++asked % 2 == 0 ? 1.0 : 1.02);
+    return true;
+  };
+  InversionOptions options;
+  options.moving = &moving;
+  Estimate estimate;
+  ASSERT_TRUE(inverter.update(data, estimate, options));
+  EXPECT_EQ(estimate.status, EstimateStatus::kIterationLimit);
+  EXPECT_THAT(estimate.reason, HasSubstr("places of the data did not settle"));
+  EXPECT_LE(estimate.contact.decrement, kDecrement);
+  EXPECT_GT(asked, 3);
+  EXPECT_LT(asked, 20);
+}
+
 TEST_P(Condensed, TheCertificateIsMet) {
   auto inverter = Condensed::inverter(GetParam());
   Estimate estimate;
