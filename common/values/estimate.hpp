@@ -98,12 +98,14 @@ struct ContactSummary {
   // What was counted depends on the method.
   //   descent methods (paper, paper-woodbury, cg, pcg): how often the active set changed to
   //     another set that is not empty (PenalisedSystem::changes)
-  //   condensed, condensed-exact: active sets evaluated, i.e. the length of Estimate::history. At
-  //     least 1, also without contact; the best set counts again when it is evaluated once more.
+  //   condensed: trial loads for which contact was solved, and the answer, i.e. the length of
+  //     Estimate::history. At least 1, also without contact.
+  //   condensed-exact: active sets evaluated, likewise; the best set counts again when it is
+  //     evaluated once more.
   int iterations = 0;
   // Certificate of contact; NaN: not computed. decrement: how far the loads are from the most
-  // probable ones, in posterior standard deviations (no method computes it yet). max_violation_mm:
-  // bound on an open slave's depth and an active one's pull times its compliance (condensed).
+  // probable ones, in posterior standard deviations. max_violation_mm: the greatest depth of an
+  // open slave. Both of method condensed.
   double decrement = std::numeric_limits<double>::quiet_NaN();
   double max_violation_mm = std::numeric_limits<double>::quiet_NaN();
 };
@@ -145,7 +147,7 @@ struct Estimate {
   // Estimated strength of the prior's parts, in units of the case's standard deviations.
   // Estimated by method condensed only; 1 otherwise.
   PriorScaleValues prior_scales = kAsInTheCase;
-  // Probability that a part is absent; 0: not estimated, as by every method so far.
+  // Probability that a part is absent. Estimated by method condensed only; 0 otherwise.
   PriorScaleValues prior_absent{};
   // Parts whose most probable strength is the greatest that is allowed.
   PerPart<bool> prior_at_bound{};

@@ -145,7 +145,6 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   Estimate estimate;
   // Memory is claimed and caches are filled by an update that does not count.
   if (Status ok = inverter->update(trial.data.back(), estimate); !ok) return ok;
-  // Both are the same by now: an estimate depends on its data alone.
   for (const char* start : {"cold", "warm"}) {
     row.start = start;
     row.repetition = 0;

@@ -35,9 +35,9 @@ inline constexpr const char* kErrorTimeHeading =
     "mesh,nodes,scenario,method,rank,start,repetition,time_ms,time_over_tsolve,cross_mm,"
     "field_mean_mm,field_max_mm,recovery_pct,active,iterations,status,coverage_90,t_solve_ms";
 
-// Times each repetition of one method and writes a row for it. The first rows are cold: nothing is
-// kept from one update to the next. The condensed method adds warm rows, which start from the
-// active set and the memory of the update before; the other methods have no state to keep.
+// Times each repetition of one method and writes a row for it. No method keeps anything from one
+// update to the next but memory. The condensed method has rows "cold" and, in a second round, rows
+// "warm" for those who read the tables by that name; both are the same estimate.
 Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& out);
 // Ends early when budget_s is used up; a repetition that goes beyond is stopped.
 Status run_method(const Head& head, const Trial& trial, Method method, int repetitions,

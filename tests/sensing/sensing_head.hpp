@@ -12,7 +12,7 @@ namespace brainshift::sensing {
 // Contact boundary. `thousand_nodes`: wanted size of the mesh. Prints how long it took.
 Result<bench::Head> make_default_head(double thousand_nodes);
 
-// The pipeline of the daemon's default session on this head: method condensed, warm, with the
+// The pipeline of the daemon's default session on this head: method condensed, with the
 // evidence of the other sources.
 Result<server::Pipeline> begin_surgery(const bench::Head& head, const CaseConfig& config);
 

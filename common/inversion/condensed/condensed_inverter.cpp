@@ -25,8 +25,8 @@
 namespace brainshift::inversion {
 namespace {
 
-// Loads, robust weights and places of moving data settle in turn. Two rounds are the rule when a
-// surgery begins, one later.
+// Rounds of weights and places of data, each with a descent; then the data stay where they are.
+// Until half of them the strengths may change again.
 constexpr int kMaxRounds = 10;
 constexpr int kMaxFits = 6;
 constexpr int kMaxFirstRounds = 6;  // of weights
@@ -183,9 +183,10 @@ struct CondensedInverter::Impl {
 
   // Checks and places data that are new.
   Status accept(const SparseData& data);
-  // Loads with contact, weights and moving data in turn, until nothing changes. `data` follows
-  // `moving`. Errors of LoadDescent::run, and of moving data that are not fit.
+  // Loads with contact, strengths, weights and moving data in turn, until nothing changes. `data`
+  // follows `moved`. Errors of LoadDescent and PriorStrengths, and of moving data that are not fit.
   Result<EstimateStatus> settle(const SparseData*& data, const InversionOptions& asked);
+  // Of the part that stands for the model's own error, in units of its standard deviation.
   double model_error_floor(const SparseData& data);
   // Samples the data and takes their linear model.
   Status sample(const SparseData& data);
@@ -278,19 +279,18 @@ Status CondensedInverter::Impl::find_strengths(const DescentLimits& limits,
       !status) {
     return status;
   }
-  bool changed = true;
-  for (int fit = 1; changed && fit <= kMaxFits && outcome == EstimateStatus::kConverged; ++fit) {
+  for (int fit = 1;; ++fit) {
     if (auto status = descent.jump(sampled, strengths); !status) return status;
     const auto descended = descent.descend(sampled, strengths, false, limits);
     if (!descended) return tl::unexpected(descended.error());
     outcome = *descended;
-    if (auto status = strengths.refit(descent.posterior().gram(),
-                                      descent.posterior().right_hand_side(), changed);
-        !status) {
-      return status;
-    }
+    // Strengths that change need loads of their own.
+    const bool may_change = outcome == EstimateStatus::kConverged && fit < kMaxFits;
+    const auto changed = strengths.refit(descent.posterior().gram(),
+                                         descent.posterior().right_hand_side(), may_change);
+    if (!changed) return tl::unexpected(changed.error());
+    if (!*changed) return {};
   }
-  return {};
 }
 
 Result<bool> CondensedInverter::Impl::follow(const SparseData*& data,
@@ -308,7 +308,8 @@ Result<bool> CondensedInverter::Impl::follow(const SparseData*& data,
   return reweighed || relocated || resampled;
 }
 
-// Of the part that stands for the model's own error, in units of its standard deviation.
+// The upper quartile of the measured motion: a few gross errors do not raise it, and of a surface
+// that is measured along its normals it is near the motion itself.
 double CondensedInverter::Impl::model_error_floor(const SparseData& data) {
   if (!(medium_sd_mm > 0.0)) return 0.0;
   auto measured = norms.head(data.size());
@@ -359,12 +360,10 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
     const auto descended = descent.descend(sampled, strengths, fine, limits);
     if (!descended) return tl::unexpected(descended.error());
     outcome = *descended;
-    bool changed = false;
-    if (auto status = strengths.refit(posterior.gram(), posterior.right_hand_side(), changed);
-        !status) {
-      return tl::unexpected(status.error());
-    }
-    if (changed && outcome == EstimateStatus::kConverged && round < kMaxRounds / 2) {
+    const bool may_change = outcome == EstimateStatus::kConverged && round < kMaxRounds / 2;
+    const auto changed = strengths.refit(posterior.gram(), posterior.right_hand_side(), may_change);
+    if (!changed) return tl::unexpected(changed.error());
+    if (*changed) {
       if (auto status = find_strengths(limits, outcome); !status) {
         return tl::unexpected(status.error());
       }

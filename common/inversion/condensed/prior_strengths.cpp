@@ -277,11 +277,10 @@ Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const 
   return {};
 }
 
-Status PriorStrengths::refit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-                             bool& changed) {
-  changed = false;
+Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
+                                   const Eigen::Ref<const VecX>& right, bool may_change) {
   if (!compress(gram, right)) return not_finite();
-  if (!estimate_) return {};
+  if (!estimate_) return false;
   const PriorScaleValues before = held();
   if (!profiles(before, profiles_)) return not_finite();
   double gain = 0.0;
@@ -291,14 +290,13 @@ Status PriorStrengths::refit(const blas::In<double>& gram, const Eigen::Ref<cons
     gain = std::max(gain,
                     *std::max_element(log_p.begin(), log_p.end()) - log_p[index_of(before[part])]);
   }
-  changed = gain > kWorthwhile;
-  if (!changed) {
+  if (!may_change || gain <= kWorthwhile) {
     take_neighbours(before);
-    return {};
+    return false;
   }
   PriorScaleValues best;
   if (!search(best) || !weigh(best)) return not_finite();
-  return {};
+  return true;
 }
 
 bool PriorStrengths::mean_shift(Eigen::Ref<VecX> out) {

@@ -65,9 +65,10 @@ class PriorStrengths {
   Status fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
   // The same for another linear model of the same data. The held hypothesis stays while none that
   // differs in one part is more probable by kWorthwhile: the data hardly tell such two apart, and a
-  // search would wander between them. changed: whether it did not stay.
-  Status refit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-               bool& changed);
+  // search would wander between them. It stays in any case without may_change, for loads that are
+  // its own and that nobody will descend from again. Whether it did not stay.
+  Result<bool> refit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
+                     bool may_change);
   // Every strength as in the case, before the first fit(), and no floor.
   void reset();
   // In units of the case's standard deviation. Without effect where strengths are not estimated.

@@ -58,7 +58,7 @@ class PreparedModel {
   PrepareTimings timings_;
 };
 
-// The case's prior with the standard deviations of its parts multiplied by `scales` (PriorScales).
+// The case's prior with the standard deviations of its parts multiplied by `scales`.
 prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales);
 
 }  // namespace brainshift::inversion
