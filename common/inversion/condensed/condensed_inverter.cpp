@@ -308,14 +308,17 @@ Result<bool> CondensedInverter::Impl::follow(const SparseData*& data,
   return reweighed || relocated || resampled;
 }
 
-// The upper quartile of the measured motion: a few gross errors do not raise it, and of a surface
-// that is measured along its normals it is near the motion itself.
+// The upper quartile of the measured motion without outliers: of a surface that is measured along
+// its normals it is near the motion itself.
 double CondensedInverter::Impl::model_error_floor(const SparseData& data) {
   if (!(medium_sd_mm > 0.0)) return 0.0;
-  auto measured = norms.head(data.size());
-  measured = data.displacements.colwise().norm().transpose();
-  const auto upper = measured.data() + 3 * data.size() / 4;
-  std::nth_element(measured.data(), upper, measured.data() + data.size());
+  int count = 0;
+  for (int i = 0; i < data.size(); ++i) {
+    if (weights.values()[i] >= kOutlierWeight) norms[count++] = data.displacements.col(i).norm();
+  }
+  if (count == 0) return 0.0;
+  double* const upper = norms.data() + 3 * count / 4;
+  std::nth_element(norms.data(), upper, norms.data() + count);
   return kModelError * *upper / (std::sqrt(3.0) * medium_sd_mm);
 }
 
@@ -338,6 +341,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   const auto& posterior = descent.posterior();
   if (auto status = sample(*data); !status) return tl::unexpected(status.error());
   if (auto status = distrust_outliers(*data); !status) return tl::unexpected(status.error());
+  strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
   if (auto status = find_strengths(limits, outcome); !status) {
     return tl::unexpected(status.error());
   }

@@ -9,6 +9,7 @@ namespace brainshift::inversion {
 void RobustWeights::reserve(int data) {
   sorted_.reserve(static_cast<std::size_t>(data));
   weights_.resize(data);
+  next_.resize(data);
   residuals_.resize(data);
 }
 
@@ -39,11 +40,12 @@ bool RobustWeights::update(const SparseData& data, const Eigen::Ref<const VecX>&
       const double limit = scale * (data.along_direction(i) ? kOutlierAlong : kOutlierWhole);
       const double weight = residuals_[i] <= limit ? 1.0 : std::pow(limit / residuals_[i], 4);
       changed = changed || std::abs(weight - weights_[i]) > kWeightTolerance;
-      weights_[i] = weight;
+      next_[i] = weight;
     }
   };
   if (data.sources.empty()) reweigh(0, m);
   for (const DataSource& source : data.sources) reweigh(source.first, source.count);
+  if (changed) weights_.head(m) = next_.head(m);
   return changed;
 }
 

@@ -35,14 +35,15 @@ class RobustWeights {
   auto values() const { return weights_.head(size_); }
 
   // norms: |r_i| with the present weight inside (sqrt(w) |r|), m. Returns true when a weight
-  // changed by more than kWeightTolerance.
+  // changed by more than kWeightTolerance; otherwise all weights stay as they are, since the
+  // caller's next norms will have them inside.
   bool update(const SparseData& data, const Eigen::Ref<const VecX>& norms);
   // Outliers among data [first, first + count).
   int outliers(int first, int count) const;
 
  private:
   double source_scale(const SparseData& data, int first, int count);
-  VecX weights_, residuals_;  // of the capacity
+  VecX weights_, next_, residuals_;  // of the capacity
   int size_ = 0;
   std::vector<double> sorted_;
 };

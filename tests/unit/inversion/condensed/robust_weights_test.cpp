@@ -75,6 +75,24 @@ TEST(RobustWeights, StayWhenTheResidualsDo) {
 }
 
 // A whole source that the model cannot explain is not a crowd of outliers.
+// The caller takes them anew only when it is told to. Of a gross error a small change of the weight
+// is a large part of it.
+TEST(RobustWeights, StayWhereTheCallerIsToldThatTheyDo) {
+  const VecX norms = gaussian_norms(100, 3, 3);
+  RobustWeights weights;
+  weights.reset(100);
+  VecX residuals = norms;
+  residuals[7] = 30.0;
+  ASSERT_TRUE(weights.update(whole(100), residuals));
+  for (int round = 0; round < 6; ++round) {
+    residuals[7] = round % 2 == 0 ? 20.0 : 30.0;
+    const VecX before = weights.values();
+    ASSERT_FALSE(weights.update(whole(100), residuals.cwiseProduct(before.cwiseSqrt())));
+    EXPECT_EQ(before, VecX(weights.values())) << round;
+  }
+  EXPECT_LT(weights.values()[7], 0.01);
+}
+
 TEST(RobustWeights, ASourceThatIsOffAsAWholeKeepsItsWeight) {
   SparseData data = whole(200);
   data.sources = {{"a", 0, 100}, {"b", 100, 100}};
