@@ -66,18 +66,40 @@ void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out
   }
 }
 
+// Bumps of one radius, at the places i, j, k of a lattice about the tumour.
+struct Bumps {
+  std::vector<Vec3> centres;
+  double height = 1.0;  // of each, so that the strain of all together has variance 1 at the tumour
+};
+
+Bumps bumps_around(const Vec3& tumour, double radius) {
+  Bumps bumps;
+  double variance = 0.0;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      for (int k = -1; k <= 1; ++k) {
+        const Vec3 away = std::sqrt(2.0) * radius * Vec3(i, j, k);
+        if (away != Vec3::Zero() && away.norm() > kTumourVolumeReach_mm) continue;
+        bumps.centres.push_back(tumour + away);
+        variance += std::exp(-away.squaredNorm() / (radius * radius));
+      }
+    }
+  }
+  bumps.height = 1.0 / std::sqrt(variance);
+  return bumps;
+}
+
 void add_tumour_volume(const BrainModel& model, const PriorConfig& prior,
                        const std::vector<fem::Elasticity>& of_tet, Columns& out) {
   const auto& radii = prior.tumour_volume_radii_mm;
   if (prior.tumour_volume_strain_sd == 0.0 || radii.empty()) return;
-  const Vec3 centre = model.tumour.vertices.rowwise().mean();
+  const Vec3 tumour = model.tumour.vertices.rowwise().mean();
   const double sd = prior.tumour_volume_strain_sd / std::sqrt(static_cast<double>(radii.size()));
   for (const double radius : radii) {
-    for (int kind = 0; kind < 4; ++kind) {
+    const Bumps bumps = bumps_around(tumour, radius);
+    for (const Vec3& centre : bumps.centres) {
       const auto strain = [&](const Vec3& x) {
-        const Vec3 arm = (x - centre) / radius;
-        const double gaussian = std::exp(-0.5 * arm.squaredNorm());
-        return kind == 0 ? gaussian : std::exp(0.5) * arm[kind - 1] * gaussian;
+        return bumps.height * std::exp(-0.5 * ((x - centre) / radius).squaredNorm());
       };
       out.add(PriorPart::kTumourVolume, sd, fem::swelling_load(model.mesh, of_tet, strain));
     }

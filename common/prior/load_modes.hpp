@@ -5,14 +5,13 @@
 //   along, across gravity  for each fluid level of the case the buoyancy of a fluid plane at that
 //                          level: along gravity (drainage is unknown), and along the two directions
 //                          across it (pose is unknown)
-//   tumour volume          tissue that changes its volume by the strain theta around the tumour's
-//                          centre c (fem/swelling.hpp); four columns for each radius s of the case,
-//                          r = |x - c|:
-//                            theta = exp(-r^2 / 2 s^2)
-//                            theta = (x_i - c_i) / s exp(1/2 - r^2 / 2 s^2), i = 1, 2, 3, for a
-//                                    centre that is not c; the largest value is 1 too
-//                          The standard deviation is shared by the radii, so that theta(c) as a
-//                          whole has it
+//   tumour volume          tissue that changes its volume by the strain theta near the tumour with
+//                          centre c (fem/swelling.hpp): oedema lies beside a tumour and differs
+//                          from place to place. For each radius s of the case bumps
+//                            theta = h exp(-|x - c_n|^2 / 2 s^2),  c_n = c + sqrt(2) s (i, j, k)
+//                          with i, j, k in {-1, 0, 1} and c_n at most kTumourVolumeReach_mm from c.
+//                          h is such that theta(c) of one radius has variance 1; the radii share
+//                          the standard deviation of theta(c) equally
 //   brain volume           the same strain in the whole brain, theta = 1; with opposite sign in the
 //                          hemispheres, theta = tanh(x / kMidlineWidth_mm) of the distance x from
 //                          the brain's middle to the right; and growing from back to front and from
@@ -36,6 +35,8 @@ namespace brainshift::prior {
 
 // Width of the step between the hemispheres.
 inline constexpr double kMidlineWidth_mm = 10.0;
+// Half of a brain's width: what swells with a tumour lies in its hemisphere.
+inline constexpr double kTumourVolumeReach_mm = 75.0;
 
 struct LoadModes {
   Eigen::MatrixXd columns;    // 3n x k, N, node-major, in the order of the parts

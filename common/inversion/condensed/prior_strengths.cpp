@@ -18,7 +18,7 @@ constexpr double kLeastGain = 1e-9;
 // A hypothesis of less weight than this changes nothing that anyone sees; of the others, so many
 // are kept.
 constexpr double kLeastWeight = 0.01;
-constexpr std::size_t kMostHypotheses = 10;
+constexpr std::size_t kMostHypotheses = 20;
 // Makes the covariance of absent parts, which is zero, positive definite.
 constexpr double kJitter = 1e-12;
 
@@ -61,7 +61,8 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
     }
     count_[part] = static_cast<int>(part_of_mode_.size()) - first_[part];
   }
-  hypotheses_.reserve(1 + kPriorParts * kStrengths.size());
+  hypotheses_.reserve(kMostHypotheses);
+  candidates_.reserve((1 + kPriorParts) * kPriorParts * kStrengths.size());
   reset();
 }
 
@@ -225,40 +226,63 @@ double PriorStrengths::log_posterior(const PriorScaleValues& scales) {
 }
 
 bool PriorStrengths::weigh(const PriorScaleValues& best) {
-  if (!profiles(best, profiles_)) return false;
-  take_neighbours(best);
-  return true;
+  return profiles(best, profiles_) && take_neighbours(best);
+}
+
+void PriorStrengths::gather_neighbours(const PerPart<Profile>& log_p, const PriorScaleValues& from,
+                                       double log_weight) {
+  for (std::size_t part = 0; part < count_.size(); ++part) {
+    if (count_[part] == 0) continue;
+    const std::size_t own = index_of(from[part]);
+    for (std::size_t i = 0; i < kStrengths.size(); ++i) {
+      if (i == own) continue;
+      candidates_.push_back({from, log_weight + log_p[part][i] - log_p[part][own]});
+      candidates_.back().scales[part] = kStrengths[i];
+    }
+  }
 }
 
 // Of the hypothesis whose profiles_ are given.
-void PriorStrengths::take_neighbours(const PriorScaleValues& best) {
-  hypotheses_.assign(1, {best, 1.0});
+bool PriorStrengths::take_neighbours(const PriorScaleValues& best) {
+  candidates_.clear();
+  gather_neighbours(profiles_, best, 0.0);
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (count_[part] == 0) continue;
+    const Profile& log_p = profiles_[part];
     const std::size_t own = index_of(best[part]);
-    for (std::size_t i = 0; i < kStrengths.size(); ++i) {
-      if (i == own) continue;
-      Hypothesis other{best, std::exp(profiles_[part][i] - profiles_[part][own])};
-      other.scales[part] = kStrengths[i];
-      hypotheses_.push_back(other);
-    }
+    const auto other = own > 0
+                           ? 0
+                           : static_cast<std::size_t>(
+                                 std::max_element(log_p.begin() + 1, log_p.end()) - log_p.begin());
+    PriorScaleValues changed = best;
+    changed[part] = kStrengths[other];
+    if (!profiles(changed, changed_profiles_)) return false;
+    gather_neighbours(changed_profiles_, changed, log_p[other] - log_p[own]);
   }
-  std::sort(hypotheses_.begin() + 1, hypotheses_.end(),
-            [](const Hypothesis& a, const Hypothesis& b) {
-              return a.weight != b.weight ? a.weight > b.weight : a.scales < b.scales;
-            });
+  std::sort(candidates_.begin(), candidates_.end(), [](const Hypothesis& a, const Hypothesis& b) {
+    return a.weight != b.weight ? a.weight > b.weight : a.scales < b.scales;
+  });
+  hypotheses_.assign(1, {best, 1.0});
+  for (const Hypothesis& each : candidates_) {
+    if (hypotheses_.size() >= kMostHypotheses) break;
+    // The same pair of changes may come in either order.
+    const bool known =
+        std::any_of(hypotheses_.begin(), hypotheses_.end(),
+                    [&](const Hypothesis& other) { return other.scales == each.scales; });
+    if (!known) hypotheses_.push_back({each.scales, std::exp(each.weight)});
+  }
   const auto sum = [&] {
     double total = 0.0;
     for (const Hypothesis& each : hypotheses_) total += each.weight;
     return total;
   };
   const double all = sum();
-  while (hypotheses_.size() > 1 &&
-         (hypotheses_.size() > kMostHypotheses || hypotheses_.back().weight < kLeastWeight * all)) {
+  while (hypotheses_.size() > 1 && hypotheses_.back().weight < kLeastWeight * all) {
     hypotheses_.pop_back();
   }
   const double kept = sum();
   for (Hypothesis& each : hypotheses_) each.weight /= kept;
+  return true;
 }
 
 bool PriorStrengths::search(PriorScaleValues& best) {
@@ -269,11 +293,21 @@ bool PriorStrengths::search(PriorScaleValues& best) {
   return true;
 }
 
+bool PriorStrengths::climb(PriorScaleValues best) {
+  if (!weigh(best)) return false;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    if (candidates_.empty() || candidates_.front().weight <= kLeastGain) return true;
+    best = candidates_.front().scales;
+    if (!ascend(best) || !weigh(best)) return false;
+  }
+  return true;
+}
+
 Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
   if (!compress(gram, right)) return not_finite();
   if (!estimate_) return {};
   PriorScaleValues best;
-  if (!search(best) || !weigh(best)) return not_finite();
+  if (!search(best) || !climb(best)) return not_finite();
   return {};
 }
 
@@ -282,20 +316,9 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
   if (!compress(gram, right)) return not_finite();
   if (!estimate_) return false;
   const PriorScaleValues before = held();
-  if (!profiles(before, profiles_)) return not_finite();
-  double gain = 0.0;
-  for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (count_[part] == 0) continue;
-    const Profile& log_p = profiles_[part];
-    gain = std::max(gain,
-                    *std::max_element(log_p.begin(), log_p.end()) - log_p[index_of(before[part])]);
-  }
-  if (!may_change || gain <= kWorthwhile) {
-    take_neighbours(before);
-    return false;
-  }
-  PriorScaleValues best;
-  if (!search(best) || !weigh(best)) return not_finite();
+  if (!weigh(before)) return not_finite();
+  if (!may_change || candidates_.empty() || candidates_.front().weight <= kWorthwhile) return false;
+  if (!climb(before)) return not_finite();
   return true;
 }
 

@@ -16,11 +16,12 @@
 // else acts through it that is never absent (the model's own error, condensed_inverter.hpp). s_g^2
 // then stands for s_g^2 + floor_g^2 everywhere below.
 //
-// fit() finds a most probable hypothesis by coordinate ascent, best part first, once from s = 0 and
-// once from s = 1, and takes in the hypotheses that differ from the better one in one part. Their
-// weights are p(d | s) p(s), normalised (spike and slab: Mitchell & Beauchamp 1988, JASA 83:1023;
-// averaging: Hoeting et al. 1999, Stat. Sci. 14:382). Estimate and covariance are those of the
-// mixture:
+// The *neighbours* of a hypothesis differ from it in one part, or in two of which one vanishes or
+// enters: two families may explain the same data. fit() finds a hypothesis that is more probable
+// than its neighbours by coordinate ascent, best part first, from s = 0 and from s = 1, and takes
+// in the neighbours that have weight. Their weights are p(d | s) p(s), normalised (spike and slab:
+// Mitchell & Beauchamp 1988, JASA 83:1023; averaging: Hoeting et al. 1999, Stat. Sci. 14:382).
+// Estimate and covariance are those of the mixture:
 //
 //   z = sum w_h m_h        Cov = sum w_h (C_h + (m_h - z)(m_h - z)^T)
 //
@@ -63,9 +64,9 @@ class PriorStrengths {
   // gram: G, lower triangle; right: b; the common errors come first. kNotFinite when G is not
   // positive semidefinite or not finite.
   Status fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
-  // The same for another linear model of the same data. The held hypothesis stays while none that
-  // differs in one part is more probable by kWorthwhile: the data hardly tell such two apart, and a
-  // search would wander between them. It stays in any case without may_change, for loads that are
+  // The same for another linear model of the same data. The held hypothesis stays while no
+  // neighbour is more probable by kWorthwhile: the data hardly tell such two apart, and a search
+  // would wander between them. It stays in any case without may_change, for loads that are
   // its own and that nobody will descend from again. Whether it did not stay.
   Result<bool> refit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
                      bool may_change);
@@ -113,17 +114,23 @@ class PriorStrengths {
   double log_posterior(const PriorScaleValues& scales);
   bool search(PriorScaleValues& best);
   bool weigh(const PriorScaleValues& best);
-  void take_neighbours(const PriorScaleValues& best);
+  // candidates_: those that differ from `from`, whose profiles are given, in one part. Their
+  // weights are ln p, `log_weight` that of `from`.
+  void gather_neighbours(const PerPart<Profile>& log_p, const PriorScaleValues& from,
+                         double log_weight);
+  bool take_neighbours(const PriorScaleValues& best);
+  // From `from` to a hypothesis that is more probable than its neighbours, and weighs them.
+  bool climb(PriorScaleValues from);
 
   ModeWindow window_;
   bool estimate_;
   int max_common_;
   std::vector<std::size_t> part_of_mode_;  // of the window
   PerPart<int> first_ = {}, count_ = {};   // columns of the window, by part
-  std::vector<Hypothesis> hypotheses_;
+  std::vector<Hypothesis> hypotheses_, candidates_;
   PriorScaleValues floor_{};
   Profile log_prior_{};
-  PerPart<Profile> profiles_{};
+  PerPart<Profile> profiles_{}, changed_profiles_{};
 
   Eigen::Index common_ = 0, size_ = 0, rank_ = 0;  // q, q + r, columns of L
   Eigen::MatrixXd left_;                           // L, (q + r) x rank

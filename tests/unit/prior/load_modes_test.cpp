@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
+#include <vector>
 
 #include "common/fem/elasticity.hpp"
 #include "common/geometry/surface.hpp"
@@ -39,13 +41,13 @@ LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
 TEST(LoadModes, StandInTheOrderOfTheirParts) {
   const BrainModel patient = test_support::toy_patient(8);
   const LoadModes modes = modes_of(patient, only(1.0, 0.05, 0.01, 1.0, 300.0, 600.0));
-  const PerPart<int> expected = {2, 4, 4, 4, 9, 5, 0, 0, 0};
+  const PerPart<int> expected = {2, 4, 27, 4, 9, 5, 0, 0, 0};
   EXPECT_EQ(modes.of_part, expected);
-  EXPECT_EQ(modes.size(), 28);
+  EXPECT_EQ(modes.size(), 51);
   EXPECT_EQ(part_of_column(1, modes.of_part), PriorPart::kAlongGravity);
   EXPECT_EQ(part_of_column(2, modes.of_part), PriorPart::kAcrossGravity);
   EXPECT_EQ(part_of_column(6, modes.of_part), PriorPart::kTumourVolume);
-  EXPECT_EQ(part_of_column(27, modes.of_part), PriorPart::kOpening);
+  EXPECT_EQ(part_of_column(50, modes.of_part), PriorPart::kOpening);
   EXPECT_EQ(modes_of(patient, only(0, 0, 0, 0, 0, 0)).size(), 0);
 }
 
@@ -53,7 +55,7 @@ TEST(LoadModes, StandInTheOrderOfTheirParts) {
 TEST(LoadModes, SwellingAndStressBalanceThemselves) {
   const BrainModel patient = test_support::toy_patient();
   const LoadModes modes = modes_of(patient, only(0.0, 0.05, 0.01, 0.0, 300.0, 0.0));
-  ASSERT_EQ(modes.size(), 4 + 4 + 6);
+  ASSERT_EQ(modes.size(), 27 + 4 + 6);
   for (int j = 0; j < modes.size(); ++j) {
     const auto force = mode(modes.columns, j);
     const double size = force.colwise().norm().sum();
@@ -72,29 +74,65 @@ double bulk_modulus(const Material& material) {
   return elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
 }
 
-// Work in a uniform dilation u = x e: sum f . x = sum V kappa theta tr(grad x) = 3 int kappa theta.
+// Work in a uniform dilation u = x e: sum f . x = sum V kappa theta tr(grad x) = 3 int kappa theta,
+// of a bump of height 1 at `away` of the tumour's centre. kappa: by the distance from that centre.
 template <typename Kappa>
-double expected_work(const BrainModel& patient, double strain, double radius, const Kappa& kappa) {
+double expected_work(const BrainModel& patient, const Vec3& away, double radius,
+                     const Kappa& kappa) {
   const Vec3 centre = patient.tumour.vertices.rowwise().mean();
   double integral = 0.0;
   for (int t = 0; t < patient.mesh.num_tets(); ++t) {
     Vec3 centroid = Vec3::Zero();
     for (int k = 0; k < 4; ++k) centroid += 0.25 * patient.mesh.nodes.col(patient.mesh.tets(k, t));
-    const double r = (centroid - centre).norm();
-    integral += fem::tet_geometry(patient.mesh, t).volume * kappa(r) *
-                std::exp(-0.5 * r * r / (radius * radius));
+    const Vec3 arm = (centroid - centre - away) / radius;
+    integral += fem::tet_geometry(patient.mesh, t).volume * kappa((centroid - centre).norm()) *
+                std::exp(-0.5 * arm.squaredNorm());
   }
-  return 3.0 * strain * integral;
+  return 3.0 * integral;
+}
+
+// Places in the order of the columns: the last index first.
+std::vector<Vec3> lattice(double radius) {
+  std::vector<Vec3> places;
+  for (int n = 0; n < 27; ++n) {
+    places.push_back(std::sqrt(2.0) * radius * Vec3(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1));
+  }
+  return places;
+}
+
+// exp(-r^2 / s^2) at the tumour of all 27 bumps: 1, 6, 12 and 8 of them at r^2 / s^2 = 0, 2, 4, 6.
+double height() {
+  return 1.0 / std::sqrt(1.0 + 6.0 * std::exp(-2.0) + 12.0 * std::exp(-4.0) + 8.0 * std::exp(-6.0));
 }
 
 TEST(LoadModes, SwellingDoesTheWorkOfItsVolumeStrain) {
   const BrainModel patient = test_support::toy_patient(8);
   const CaseConfig config = only(0.0, 0.3, 0.0, 0.0, 0.0, 0.0);
   const LoadModes modes = modes_of(patient, config);
-  const double work = mode(modes.columns, 0).cwiseProduct(patient.mesh.nodes).sum();
   const double kappa = bulk_modulus(config.material);
-  EXPECT_NEAR(work, expected_work(patient, 0.3, 12.0, [&](double) { return kappa; }),
-              1e-9 * std::abs(work));
+  const std::vector<Vec3> places = lattice(12.0);
+  ASSERT_EQ(modes.size(), static_cast<int>(places.size()));
+  const double largest = expected_work(patient, Vec3::Zero(), 12.0, [&](double) { return kappa; });
+  for (int j = 0; j < modes.size(); ++j) {
+    const double work = mode(modes.columns, j).cwiseProduct(patient.mesh.nodes).sum();
+    const double expected = expected_work(patient, places[static_cast<std::size_t>(j)], 12.0,
+                                          [&](double) { return kappa; });
+    EXPECT_NEAR(work, 0.3 * height() * expected, 1e-9 * std::abs(largest)) << j;
+  }
+}
+
+// Beyond kTumourVolumeReach_mm swelling is no longer the tumour's: sqrt(2) 50 mm is within, its
+// diagonals are not. The radii share the variance.
+TEST(LoadModes, SwellingReachesNoFurtherThanItsHemisphere) {
+  const BrainModel patient = test_support::toy_patient(8);
+  CaseConfig config = only(0.0, 0.3, 0.0, 0.0, 0.0, 0.0);
+  config.prior.tumour_volume_radii_mm = {50.0, 60.0};
+  const LoadModes modes = modes_of(patient, config);
+  ASSERT_EQ(modes.size(), 7 + 1);
+  const double kappa = bulk_modulus(config.material);
+  const double work = mode(modes.columns, 7).cwiseProduct(patient.mesh.nodes).sum();
+  const double expected = expected_work(patient, Vec3::Zero(), 60.0, [&](double) { return kappa; });
+  EXPECT_NEAR(work, 0.3 / std::sqrt(2.0) * expected, 1e-9 * std::abs(work));
 }
 
 // A stiff tumour swells with its own bulk modulus.
@@ -104,13 +142,18 @@ TEST(LoadModes, SwellingHonoursTheStiffnessOfTheTumour) {
   config.material.tumour = TissueStiffness{6300.0, 0.46};
   Material stiff = config.material;
   stiff.shear_modulus_pa = 6300.0;
+  constexpr int kMiddle = 13;
   const double work =
-      mode(modes_of(patient, config).columns, 0).cwiseProduct(patient.mesh.nodes).sum();
+      mode(modes_of(patient, config).columns, kMiddle).cwiseProduct(patient.mesh.nodes).sum();
   const double inside = bulk_modulus(stiff), outside = bulk_modulus(config.material);
   // The toy's tumour is a ball of radius 10 mm, as a polyhedron a little smaller.
   const auto kappa = [&](double r) { return r < 10.0 ? inside : outside; };
-  EXPECT_NEAR(work, expected_work(patient, 0.3, 12.0, kappa), 0.05 * std::abs(work));
-  EXPECT_GT(std::abs(work / expected_work(patient, 0.3, 12.0, [&](double) { return outside; }) - 1),
+  const double strain = 0.3 * height();
+  EXPECT_NEAR(work, strain * expected_work(patient, Vec3::Zero(), 12.0, kappa),
+              0.05 * std::abs(work));
+  EXPECT_GT(std::abs(work / (strain * expected_work(patient, Vec3::Zero(), 12.0,
+                                                    [&](double) { return outside; })) -
+                     1),
             0.1)
       << "the test shows nothing";
 }

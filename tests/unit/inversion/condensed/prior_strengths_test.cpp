@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -98,6 +99,15 @@ TEST(PriorStrengths, NoOtherStrengthOfOnePartIsMoreProbable) {
   EXPECT_GT(at_best, log_posterior(problem, strengths(1, 1, 1, 1)) + 5.0)
       << "the test shows nothing";
   for (const std::size_t g : kPresent) {
+    for (const std::size_t h : kPresent) {
+      auto other = best;
+      std::swap(other[g], other[h]);
+      if (best[g] == 0.0 || best[h] == 0.0) {
+        EXPECT_LE(log_posterior(problem, other), at_best + 1e-3) << g << " for " << h;
+      }
+    }
+  }
+  for (const std::size_t g : kPresent) {
     for (const double strength : kStrengths) {
       auto other = best;
       other[g] = strength;
@@ -120,6 +130,26 @@ TEST(PriorStrengths, HypothesesAreWeighedByTheirProbability) {
     EXPECT_NEAR(each.weight / hypotheses[0].weight, expected, 2e-3);
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
+}
+
+// A part may be another one's likeness in what the data feel of it; with a single data set nobody
+// can tell which of the two acts.
+TEST(PriorStrengths, PartsThatExplainTheSameDataAreEquallyProbable) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Problem problem = drawn(strengths(4.0, 0.0, 0.0, 0.25), seed);
+    problem.jacobian.middleCols(kCommon + 2, 2) = problem.jacobian.middleCols(kCommon, 2);
+    problem.jacobian.middleCols(kCommon + 4, 2).setZero();
+    const PriorStrengths result = fitted(problem);
+    PriorScaleValues likeness = result.held();
+    ASSERT_NE(likeness[0] > 0.0, likeness[1] > 0.0);
+    std::swap(likeness[0], likeness[1]);
+    double weight = 0.0;
+    for (const Hypothesis& each : result.hypotheses()) {
+      if (each.scales == likeness) weight = each.weight;
+    }
+    EXPECT_NEAR(weight, result.hypotheses()[0].weight, 1e-6) << seed;
+    EXPECT_LT(std::max(result.absent()[0], result.absent()[1]), 0.6) << "one of them is needed";
+  }
 }
 
 TEST(PriorStrengths, FindTheStrengthThatTheDataWereDrawnWith) {

@@ -21,8 +21,8 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(model->boundary(), Boundary::kFixed);
   EXPECT_EQ(&model->model(), patient().get());
-  // Two fluid levels in three directions, three radii, the brain's halves, resection, opening.
-  EXPECT_EQ(model->prior().num_modes(), 6 + 12 + 4 + 9 + 5);
+  // Fluid levels in three directions, bumps of three radii, the brain's halves, resection, opening.
+  EXPECT_EQ(model->prior().num_modes(), 6 + (27 + 27 + 7) + 4 + 9 + 5);
   EXPECT_GT(model->timings().factor_nonzeros, 0u);
   EXPECT_GT(model->timings().bytes, 0u);
   EXPECT_GE(model->timings().total_s, model->timings().factor_s);
