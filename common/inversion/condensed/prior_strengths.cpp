@@ -69,6 +69,16 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
 void PriorStrengths::reset() {
   hypotheses_.assign(1, {as_in_the_case(), 1.0});
   floor_ = {};
+  size_ = 0;
+}
+
+bool PriorStrengths::weighed_for(const blas::In<double>& gram,
+                                 const Eigen::Ref<const VecX>& right) const {
+  if (gram.rows() != size_ || right != right_) return false;
+  for (Eigen::Index j = 0; j < size_; ++j) {
+    if (gram.col(j).tail(size_ - j) != gram_.col(j).tail(size_ - j)) return false;
+  }
+  return true;
 }
 
 // 0 for parts that the window does not have.
@@ -85,6 +95,8 @@ bool PriorStrengths::compress(const blas::In<double>& gram, const Eigen::Ref<con
   size_ = gram.rows();
   common_ = size_ - window_.count;
   if (!gram.diagonal().allFinite() || !right.allFinite()) return false;
+  gram_ = gram;
+  right_ = right;
   const auto greatest = [&](Eigen::Index i) { return i < common_ ? 1.0 : kLargestStrength; };
   residual_diagonal_ = gram.diagonal();
   for (Eigen::Index i = 0; i < size_; ++i) residual_diagonal_[i] *= greatest(i) * greatest(i);
@@ -313,10 +325,12 @@ Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const 
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
                                    const Eigen::Ref<const VecX>& right, bool may_change) {
-  if (!compress(gram, right)) return not_finite();
-  if (!estimate_) return false;
   const PriorScaleValues before = held();
-  if (!weigh(before)) return not_finite();
+  if (!weighed_for(gram, right)) {
+    if (!compress(gram, right)) return not_finite();
+    if (estimate_ && !weigh(before)) return not_finite();
+  }
+  if (!estimate_) return false;
   if (!may_change || candidates_.empty() || candidates_.front().weight <= kWorthwhile) return false;
   if (!climb(before)) return not_finite();
   return true;

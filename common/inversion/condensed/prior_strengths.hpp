@@ -107,6 +107,8 @@ class PriorStrengths {
     return scales[part] * scales[part] + floor_[part] * floor_[part];
   }
   bool compress(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
+  // Whether candidates_ are those of the held hypothesis for this linear model.
+  bool weighed_for(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right) const;
   // Omega = I + sum s_g^2 L_g^T L_g, common errors included.
   void fill_omega(const PriorScaleValues& scales);
   PriorScaleValues as_in_the_case() const;
@@ -133,7 +135,9 @@ class PriorStrengths {
   PerPart<Profile> profiles_{}, changed_profiles_{};
 
   Eigen::Index common_ = 0, size_ = 0, rank_ = 0;  // q, q + r, columns of L
-  Eigen::MatrixXd left_;                           // L, (q + r) x rank
+  linalg::GrowingMatrix gram_;                     // G and b of the last compress()
+  linalg::GrowingVector right_;
+  Eigen::MatrixXd left_;  // L, (q + r) x rank
   VecX residual_diagonal_, row_;
   linalg::GrowingVector y_;
   PerPart<linalg::GrowingMatrix> of_part_;  // L_g^T L_g
