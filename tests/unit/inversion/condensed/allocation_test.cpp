@@ -48,7 +48,7 @@ void AllocationFree::updates(bool estimate_strengths) {
   }
   Estimate estimate;
   for (const SparseData& d : data) ASSERT_TRUE(inverter.update(d, estimate));
-  constexpr int kUpdates = 50;
+  constexpr int kUpdates = 12;
   const int active = estimate.contact.active;
   ASSERT_GT(active, 0);
 
