@@ -228,7 +228,7 @@ void visit(A& a, V& v) {
      "swelling_strain_sd"},
     v.tumour_volume_strain_sd, between(0.0, 2.0));
   a({"tumour_volume_radii_mm", "mm",
-     "Extents of these modes, standard deviations of Gaussians about the tumour's centre", "",
+     "Extents of these modes, standard deviations of Gaussian bumps about the tumour", "",
      "May be empty.", "swelling_radii_mm"},
     v.tumour_volume_radii_mm, between(1.0, 300.0));
   a({"brain_volume_strain_sd", "",

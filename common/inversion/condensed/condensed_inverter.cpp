@@ -341,6 +341,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   const auto& posterior = descent.posterior();
   if (auto status = sample(*data); !status) return tl::unexpected(status.error());
   if (auto status = distrust_outliers(*data); !status) return tl::unexpected(status.error());
+  // Once more, without them.
   strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
   if (auto status = find_strengths(limits, outcome); !status) {
     return tl::unexpected(status.error());

@@ -305,12 +305,10 @@ bool PriorStrengths::search(PriorScaleValues& best) {
   return true;
 }
 
-bool PriorStrengths::climb(PriorScaleValues best) {
-  if (!weigh(best)) return false;
-  for (int step = 0; step < kMaxSteps; ++step) {
-    if (candidates_.empty() || candidates_.front().weight <= kLeastGain) return true;
-    best = candidates_.front().scales;
-    if (!ascend(best) || !weigh(best)) return false;
+bool PriorStrengths::climb() {
+  for (int step = 0; step < kMaxSteps && gain() > kLeastGain; ++step) {
+    PriorScaleValues next = candidates_.front().scales;
+    if (!ascend(next) || !weigh(next)) return false;
   }
   return true;
 }
@@ -319,20 +317,19 @@ Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const 
   if (!compress(gram, right)) return not_finite();
   if (!estimate_) return {};
   PriorScaleValues best;
-  if (!search(best) || !climb(best)) return not_finite();
+  if (!search(best) || !weigh(best) || !climb()) return not_finite();
   return {};
 }
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
                                    const Eigen::Ref<const VecX>& right, bool may_change) {
-  const PriorScaleValues before = held();
   if (!weighed_for(gram, right)) {
+    const PriorScaleValues same = held();
     if (!compress(gram, right)) return not_finite();
-    if (estimate_ && !weigh(before)) return not_finite();
+    if (estimate_ && !weigh(same)) return not_finite();
   }
-  if (!estimate_) return false;
-  if (!may_change || candidates_.empty() || candidates_.front().weight <= kWorthwhile) return false;
-  if (!climb(before)) return not_finite();
+  if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
+  if (!climb()) return not_finite();
   return true;
 }
 

@@ -121,8 +121,10 @@ class PriorStrengths {
   void gather_neighbours(const PerPart<Profile>& log_p, const PriorScaleValues& from,
                          double log_weight);
   bool take_neighbours(const PriorScaleValues& best);
-  // From `from` to a hypothesis that is more probable than its neighbours, and weighs them.
-  bool climb(PriorScaleValues from);
+  // Of ln p, from the held hypothesis to the most probable neighbour; they have been weighed.
+  double gain() const { return candidates_.empty() ? 0.0 : candidates_.front().weight; }
+  // From the held hypothesis to one that is more probable than its neighbours.
+  bool climb();
 
   ModeWindow window_;
   bool estimate_;
