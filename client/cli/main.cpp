@@ -6,8 +6,10 @@
 
 #include "client/cli/command.hpp"
 #include "common/core/exit_status.hpp"
+#include "common/linalg/blas_kernel.hpp"
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   using namespace brainshift;
   CLI::App app{
       "brainshift: simulate surgeries with known truth, replay recorded ones to brainshiftd, and "

@@ -46,6 +46,19 @@ void multiply_transposed(double alpha, const In<double>& a, const In<double>& b,
               a.data(), leading(a), b.data(), leading(b), beta, c.data(), leading(c));
 }
 
+void multiply_by_transposed(double alpha, const In<double>& a, const In<double>& b, double beta,
+                            Out<double> c) {
+  assert(a.cols() == b.cols() && c.rows() == a.rows() && c.cols() == b.rows());
+  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, rows(c), columns(c), columns(a), alpha,
+              a.data(), leading(a), b.data(), leading(b), beta, c.data(), leading(c));
+}
+
+void subtract_outer(const In<double>& a, Out<double> c) {
+  assert(c.rows() == a.rows() && c.cols() == a.rows());
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, rows(c), columns(a), -1.0, a.data(),
+              leading(a), 1.0, c.data(), leading(c));
+}
+
 void gram(const In<double>& a, double beta, Out<double> c) {
   assert(c.rows() == a.cols() && c.cols() == a.cols());
   cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, rows(c), rows(a), 1.0, a.data(), leading(a),
@@ -70,6 +83,12 @@ void solve_lower(const In<double>& l, Out<double> b) {
 void solve_lower_transposed(const In<double>& l, Out<double> b) {
   assert(l.rows() == b.rows());
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),
+              1.0, l.data(), leading(l), b.data(), leading(b));
+}
+
+void solve_lower_transposed_right(const In<double>& l, Out<double> b) {
+  assert(l.rows() == b.cols());
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),
               1.0, l.data(), leading(l), b.data(), leading(b));
 }
 

@@ -21,6 +21,11 @@ void multiply(float alpha, const In<float>& a, const In<float>& b, float beta, O
 // C = alpha A^T B + beta C
 void multiply_transposed(double alpha, const In<double>& a, const In<double>& b, double beta,
                          Out<double> c);
+// C = alpha A B^T + beta C
+void multiply_by_transposed(double alpha, const In<double>& a, const In<double>& b, double beta,
+                            Out<double> c);
+// Lower triangle of C = C - A A^T.
+void subtract_outer(const In<double>& a, Out<double> c);
 // Lower triangle of C = A^T A + beta C.
 void gram(const In<double>& a, double beta, Out<double> c);
 // Lower triangle of A -> L with L L^T = A, in place; false when A is not positive definite.
@@ -29,6 +34,7 @@ void gram(const In<double>& a, double beta, Out<double> c);
 void solve_lower(const In<double>& l, Out<double> b);
 void solve_lower_transposed(const In<double>& l, Out<double> b);
 // B = B L^-T
+void solve_lower_transposed_right(const In<double>& l, Out<double> b);
 void solve_lower_transposed_right(const In<float>& l, Out<float> b);
 // y += alpha x, n entries
 void add_scaled(long n, double alpha, const double* x, double* y);

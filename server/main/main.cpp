@@ -5,6 +5,7 @@
 #include <exception>
 #include <string>
 
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/prepare_command.hpp"
@@ -74,6 +75,7 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   try {
     return parse_and_run(argc, argv);

@@ -10,6 +10,7 @@
 
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/model/model_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/stop_signals.hpp"
@@ -81,6 +82,9 @@ Status serve(const ServeArguments& arguments) {
                  options->model->model_id, options->model->mesh.num_nodes());
   } else {
     spdlog::warn("no model is loaded: clients get model_not_ready");
+  }
+  if (const std::string kernel = linalg::blas_kernel(); !kernel.empty()) {
+    spdlog::info("OpenBLAS kernel {}", kernel);
   }
   Outbox outbox;
   Service service(std::move(*options), outbox);

@@ -13,6 +13,7 @@
 #include "common/core/stopwatch.hpp"
 #include "common/fem/biot_matrix.hpp"
 #include "common/geometry/surface.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
 #include "common/patient/read_patient.hpp"
@@ -152,6 +153,7 @@ void measure(const BrainModel& model, const CaseConfig& config, double dt_s) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   using namespace brainshift;
   linalg::use_single_threaded_blas();
   const char* name = std::getenv("BRAINSHIFT_CASE");

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "tests/benchmarks/error_time.hpp"
 
@@ -194,6 +195,7 @@ void describe(CLI::App& app, Arguments& arguments) {
 }  // namespace brainshift::bench
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   using namespace brainshift;
   CLI::App app{"Error against run time of all inversion methods on simulated surgeries.",
                "bench_error_time"};

@@ -28,6 +28,7 @@
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
@@ -322,6 +323,7 @@ int run(const Arguments& arguments) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   CLI::App app("Compares the condensed methods with the direct posterior at every node.",
                "bench_exactness");

@@ -10,6 +10,7 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
 
@@ -96,6 +97,7 @@ BENCHMARK(ApplyPrior)->Unit(benchmark::kMillisecond);
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;

@@ -11,6 +11,7 @@
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/median_time.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
@@ -77,6 +78,7 @@ void run(const std::string& out, const std::string& case_file) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::run(argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : BRAINSHIFT_DEFAULT_CASE);
   return 0;
 }

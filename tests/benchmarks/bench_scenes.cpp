@@ -15,6 +15,7 @@
 #include "common/core/statistics.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
 #include "server/pipeline/scene_plan.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
@@ -107,6 +108,7 @@ void run(const std::string& case_file) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::run(argc > 1 ? argv[1] : BRAINSHIFT_DEFAULT_CASE);
   return 0;
 }

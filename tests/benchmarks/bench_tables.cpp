@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "common/core/statistics.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 
 namespace brainshift::bench {
@@ -36,8 +37,9 @@ void machine(std::ostringstream& out, const std::string& commit) {
   double kib = 0.0;
   memory >> kib;
   out << "Processor: " << first_field("/proc/cpuinfo", "model name") << ", "
-      << std::thread::hardware_concurrency() << " logical cores; memory " << cell(kib / kMib, 3)
-      << " GiB; commit " << commit << ".\n";
+      << std::thread::hardware_concurrency() << " logical cores, OpenBLAS kernel "
+      << linalg::blas_kernel() << "; memory " << cell(kib / kMib, 3) << " GiB; commit " << commit
+      << ".\n";
 }
 
 void check_table(std::ostringstream& out, const std::vector<Check>& checks) {

@@ -45,7 +45,7 @@ class Brains {
   explicit Brains(const bench::Head& head)
       : operators_(*head.operators),
         window_{0, operators_.num_modes()},
-        factor_(operators_, head.config.contact.penalty_n_per_mm),
+        factor_(operators_, head.config.contact.penalty_n_per_mm, team_),
         contact_(operators_, window_, head.config.contact.penalty_n_per_mm, true, factor_, team_),
         rebuild_(operators_, window_),
         check_(head.model->mesh.nodes, head.model->mesh.tets, team_),

@@ -12,6 +12,7 @@
 
 #include "common/core/statistics.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "tests/prior_study/prior_draws.hpp"
 #include "tests/prior_study/prior_pictures.hpp"
@@ -76,6 +77,7 @@ Status run(const Arguments& arguments) {
 }  // namespace brainshift::prior_study
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::prior_study::Arguments arguments;
   CLI::App app{"Motion of brains drawn from the prior, against published ranges of brain shift.",
                "prior_predictive"};

@@ -27,6 +27,7 @@
 #include "common/fem/gravity.hpp"
 #include "common/fem/swelling.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/bench_head.hpp"
@@ -241,6 +242,7 @@ Status run(const Arguments& arguments) {
 }  // namespace brainshift::prior_study
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::prior_study::Arguments arguments;
   CLI::App app{"How far an unknown stiffness moves a brain from the model.", "stiffness_study"};
   app.add_option("--head", arguments.head, "case file of the head")->capture_default_str();

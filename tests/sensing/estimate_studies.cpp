@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/linalg/blas_kernel.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
 
@@ -40,6 +41,7 @@ Status run(double thousand_nodes, const std::vector<std::string>& wanted) {
 }  // namespace brainshift::sensing
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   const std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
   const auto ok = brainshift::sensing::run(argc > 1 ? std::atof(argv[1]) : 18.0, wanted);
   if (ok) return 0;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/io/files/file_access.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"
@@ -254,6 +255,7 @@ Result<bool> run(const Arguments& arguments) {
 }  // namespace brainshift::stability
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   using namespace brainshift;
   CLI::App app{
       "Sweeps to the edges of what may be asked; exit status 1 where an answer is wrong "

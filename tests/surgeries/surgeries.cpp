@@ -19,6 +19,7 @@
 #include "client/twin/varied_patient.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/surgeries/surgery_place.hpp"
@@ -140,6 +141,7 @@ Status run(const Arguments& arguments) {
 }  // namespace brainshift::surgeries
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::surgeries::Arguments arguments;
   CLI::App app{"Different simulated surgeries on one head, scored: a row per update.", "surgeries"};
   app.add_option("--head", arguments.head, "case file of the head")->capture_default_str();

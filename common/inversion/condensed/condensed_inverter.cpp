@@ -348,7 +348,8 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   }
   bool fine = false, unsettled = false;
   for (int round = 0;; ++round) {
-    if (auto status = descent.average(strengths); !status) return tl::unexpected(status.error());
+    if (auto status = descent.average(sampled, strengths); !status)
+      return tl::unexpected(status.error());
     if (outcome != EstimateStatus::kConverged) break;
     if (unsettled) {
       outcome = EstimateStatus::kIterationLimit;

@@ -18,6 +18,11 @@ constexpr double kSufficientOfBundle = 0.1;
 constexpr int kMaxTurns = 4;
 constexpr int kMaxTurnsOfBundle = 16;
 constexpr double kShortestStep = 1e-6;
+// Slaves that may change on the first step of a descent: so many, or this part of those that are
+// active. On the way to a mean half of them, and after steps that did not fall at least kFewest.
+constexpr int kFewSlaves = 64;
+constexpr int kPartOfSlaves = 5;
+constexpr int kFewestSlaves = 16;
 // Farther from the minimum than this, a new linear model is worth its price.
 constexpr double kFar = 1.0;
 
@@ -27,9 +32,10 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
                          bool contact, ThreadTeam& team)
     : window_(window),
       team_(team),
-      factor_(operators, beta),
+      factor_(operators, beta, team),
       reduction_(operators, window, factor_, team),
       contact_(operators, window, beta, contact, factor_, team),
+      reach_(operators, window, beta, reduction_, team),
       posterior_(window),
       z_(VecX::Zero(window.count)),
       trial_(window.count),
@@ -37,6 +43,8 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
       gradient_(window.count),
       shift_(SparseData::kMaxCommonErrors + window.count),
       mean_z_(VecX::Zero(window.count)),
+      foretold_(operators.num_slaves()),
+      penetration_(operators.num_slaves()),
       newton_(window.count),
       next_(window.count),
       direction_(window.count),
@@ -47,6 +55,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
 
 void LoadDescent::forget() {
   z_.setZero();
+  contact_at_z_ = false;
   contact_.forget();
   reduction_.forget();
   factor_.forget();
@@ -59,6 +68,10 @@ double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& s
     const double s = strengths.scale_of(i);
     if (s > 0.0) sum += z[i] * z[i] / (s * s);
   }
+  return misfit(sampled, z) + 0.5 * sum;
+}
+
+double LoadDescent::misfit(SampledOperators& sampled, const VecX& z) {
   const auto free_body = sampled.free_body();
   const int q = sampled.common();
   whitened_ = free_body.col(q + window_.count);
@@ -66,7 +79,7 @@ double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& s
   if (contact_.size() > 0) {
     whitened_.noalias() -= sampled.contact(contact_.active()) * contact_.forces();
   }
-  sum += whitened_.squaredNorm();
+  double sum = whitened_.squaredNorm();
   if (q > 0) {
     const auto common = free_body.leftCols(q);
     normal_.noalias() = common.transpose() * common;
@@ -99,10 +112,29 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
   return {};
 }
 
+Status LoadDescent::solve_contact(const VecX& z) {
+  auto forces = foretold_.head(reduction_.size());
+  reduction_.forces_at(z, forces);
+  contact_.begin_from(reduction_.active(), forces);
+  contact_at_z_ = &z == &z_;
+  return contact_.solve(z);
+}
+
+Status LoadDescent::at_present() { return contact_at_z_ ? Status{} : solve_contact(z_); }
+
+void LoadDescent::accept_trial() {
+  z_ = trial_;
+  contact_at_z_ = true;
+}
+
 Status LoadDescent::linearise(SampledOperators& sampled) {
   if (auto status = reduction_.activate(contact_.set()); !status) return status;
   posterior_.linearise(sampled, reduction_, team_);
   return {};
+}
+
+int LoadDescent::most_changes() const {
+  return std::max(kFewSlaves, reduction_.size() / kPartOfSlaves);
 }
 
 // More slaves than an edge brings into play have changed.
@@ -117,16 +149,17 @@ bool LoadDescent::far_from_model() const {
 Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
   if (auto status = posterior_.minimise(strengths); !status) return status;
   z_ = posterior_.z();
-  if (auto status = contact_.solve(z_); !status) return status;
+  if (auto status = solve_contact(z_); !status) return status;
   return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
 }
 
 Status LoadDescent::take(SampledOperators& sampled) {
-  if (auto status = contact_.solve(z_); !status) return status;
+  if (auto status = at_present(); !status) return status;
   return linearise(sampled);
 }
 
 Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {
+  if (auto status = at_present(); !status) return status;
   value_ = objective(sampled, strengths, z_);
   if (auto status = posterior_.minimise(strengths); !status) return status;
   step_ = posterior_.z() - z_;
@@ -138,7 +171,7 @@ Status LoadDescent::attempt(SampledOperators& sampled, const PriorStrengths& str
                             const VecX& whitened) {
   posterior_.unwhiten(whitened, step_);
   trial_ = z_ + step_;
-  if (auto status = contact_.solve(trial_); !status) return status;
+  if (auto status = solve_contact(trial_); !status) return status;
   after_ = objective(sampled, strengths, trial_);
   return newton_step(sampled, strengths);
 }
@@ -154,7 +187,7 @@ Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
     }
   }
   if (!outcome) return outcome;
-  if (auto status = contact_.solve(z_); !status) return tl::unexpected(status.error());
+  if (auto status = at_present(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
     if (auto status = posterior_.minimise(strengths); !status) {
@@ -170,24 +203,33 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
                                                      const DescentLimits& limits) {
   if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
   curvature_.reset();
-  int turns = 0;
-  double length = 1.0, fall = 0.0;
+  penetration_ = contact_.penetration();
+  int turns = 0, most = most_changes();
+  double fall = 0.0, longest = 1.0, length = longest;  // longest: of this direction
   for (int step = 0; step < limits.max_steps && length > kShortestStep; ++step) {
     if (limits.stop.stop_requested()) return stopped(step + 1);
-    if (length == 1.0) {
+    if (length == longest) {
       curvature_.apply(newton_, direction_);
       fall = std::max(0.0, direction_.dot(newton_));
       decrement_ = std::sqrt(fall);
       if (decrement_ <= tolerance) return EstimateStatus::kConverged;
+      posterior_.unwhiten(direction_, step_);
+      length = longest = reach_.along(step_, penetration_, most);
     }
     change_ = length * direction_;
     if (auto status = attempt(sampled, strengths, change_); !status) {
       return tl::unexpected(status.error());
     }
     const bool fell = after_ <= value_ - kSufficient * length * fall;
+    if (fell) {
+      penetration_ = contact_.penetration();
+      if (length == longest && longest < 1.0) most *= 2;
+    } else {
+      most = std::max(most / 2, kFewestSlaves);
+    }
     if (fell && decrement_ > kFar && far_from_model()) {
-      z_ = trial_;
-      length = 1.0;
+      accept_trial();
+      length = longest = 1.0;
       turns = 0;
       if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
       if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
@@ -200,13 +242,14 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
         newton_ += next_;
       }
       if (fell) {
-        z_ = trial_;
+        accept_trial();
         value_ = after_;
         newton_ = next_;
-        length = 1.0;
+        length = longest = 1.0;
         turns = 0;
-      } else if (learned && length == 1.0 && turns < kMaxTurns) {
+      } else if (learned && length == longest && turns < kMaxTurns) {
         ++turns;
+        length = longest = 1.0;
       } else {
         const double fitted = 0.5 * length * length * fall / (after_ - value_ + length * fall);
         length = std::clamp(fitted, 0.1 * length, 0.5 * length);
@@ -221,7 +264,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
 Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
                                                     const PriorStrengths& strengths,
                                                     const DescentLimits& limits) {
-  if (auto status = contact_.solve(z_); !status) return tl::unexpected(status.error());
+  if (auto status = at_present(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
   }
@@ -240,7 +283,7 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
       return tl::unexpected(status.error());
     }
     if (after_ <= value_ - kSufficientOfBundle * length * bundle_.fall()) {
-      z_ = trial_;
+      accept_trial();
       bundle_.move(change_, value_ - after_);
       bundle_.add_here(next_);
       value_ = after_;
@@ -256,14 +299,23 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
   return EstimateStatus::kIterationLimit;
 }
 
-Status LoadDescent::average(PriorStrengths& strengths) {
+Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths) {
   auto shift = shift_.head(posterior_.unknowns());
   if (!strengths.mean_shift(shift)) {
     return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
   }
-  mean_z_ = z_ + shift.tail(window_.count);
-  posterior_.set_answer(shift.head(posterior_.unknowns() - window_.count), mean_z_);
-  return contact_.solve(mean_z_);
+  if (auto status = at_present(); !status) return status;
+  const double most_probable = misfit(sampled, z_);
+  step_ = shift.tail(window_.count);
+  double length = reach_.along(step_, contact_.penetration(), most_changes() / 2);
+  for (;; length *= 0.5) {
+    if (length < kShortestStep) length = 0.0;
+    mean_z_ = z_ + length * step_;
+    if (auto status = solve_contact(mean_z_); !status) return status;
+    if (length == 0.0 || misfit(sampled, mean_z_) <= most_probable + kLostByMean) break;
+  }
+  posterior_.set_answer(length * shift.head(posterior_.unknowns() - window_.count), mean_z_);
+  return {};
 }
 
 Status LoadDescent::spread(PriorStrengths& strengths) {

@@ -18,11 +18,17 @@
 //          falls. The pieces that the trials meet are gathered, and the next step is to the minimum
 //          of their maximum (newton_bundle.hpp).
 //
+// A rough step is shortened where contact would change in many slaves (contact_reach.hpp); how many
+// are allowed grows with steps that fall and shrinks with others. A search for contact begins with
+// the forces that the linear model foretells.
+//
 //   certificate   decrement: the length of the step that is left, in posterior standard deviations;
 //                 J falls by half its square. violation: ContactAtLoads::violation_mm()
 //
 // The answer is z and what the mean over the hypotheses adds to the most probable one, with contact
-// solved for it.
+// solved for it. That mean is one of linear models. Where hypotheses are so far apart that contact
+// differs, it may lie where no hypothesis does and miss the data; then it is taken only as far as
+// the linear model holds and the data allow.
 #pragma once
 
 #include <functional>
@@ -37,6 +43,7 @@
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
 #include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/contact_reach.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/values/estimate.hpp"
@@ -45,6 +52,9 @@ namespace brainshift::inversion {
 
 // A decrement at which the search has converged.
 inline constexpr double kDecrement = 1e-3;
+
+// -log probability of the data that the mean over the hypotheses may cost.
+inline constexpr double kLostByMean = 1.0;
 
 // While strengths, weights or places of data may still change, a descent this close will do.
 inline constexpr double kRoughDecrement = 0.2;
@@ -76,11 +86,14 @@ class LoadDescent {
   Result<EstimateStatus> descend(SampledOperators& sampled, const PriorStrengths& strengths,
                                  bool fine, const DescentLimits& limits);
   // The mean over the hypotheses, which were weighed for the present linear model, and contact for
-  // it.
-  Status average(PriorStrengths& strengths);
+  // it. Nearer to the most probable loads where contact changes in many slaves on the way, or where
+  // the mean would be less probable than those by more than kLostByMean for its misfit alone.
+  Status average(SampledOperators& sampled, PriorStrengths& strengths);
   // Its covariance.
   Status spread(PriorStrengths& strengths);
 
+  // Where the last descend() ended.
+  const VecX& most_probable() const { return z_; }
   // Of the last average().
   const VecX& z() const { return mean_z_; }
   // Lower factor of the covariance of z.
@@ -104,6 +117,14 @@ class LoadDescent {
   // Contact, after_ and next_ at trial_ = z_ + the step whose whitened image is given.
   Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
   bool far_from_model() const;
+  int most_changes() const;
+  // Contact at z, from the forces that the linear model foretells.
+  Status solve_contact(const VecX& z);
+  // Contact at z_, where it is not there already.
+  Status at_present();
+  void accept_trial();
+  // The first sum of J at z, whose contact is solved, without the loads' own.
+  double misfit(SampledOperators& sampled, const VecX& z);
   // J at z, whose contact is solved. Precondition: z has no modes of absent parts.
   double objective(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& z);
   // next_: the whitened Newton step at trial_ of the piece that its contact is on. Precondition:
@@ -115,8 +136,11 @@ class LoadDescent {
   ContactFactor factor_;
   ContactReduction reduction_;
   ContactAtLoads contact_;
+  ContactReach reach_;
   ModePosterior posterior_;
   VecX z_, trial_, step_, gradient_, shift_, mean_z_;
+  VecX foretold_;                                        // forces, N
+  VecX penetration_;                                     // of every slave at z_, mm
   VecX newton_, next_, direction_, change_;              // whitened
   double value_ = 0.0, after_ = 0.0;                     // J at z_ and at trial_
   VecX whitened_, adjoint_, common_amplitudes_, right_;  // of the last objective()
@@ -126,6 +150,7 @@ class LoadDescent {
   NewtonBundle bundle_;
   Eigen::MatrixXd covariance_factor_;
   double decrement_ = 0.0;
+  bool contact_at_z_ = false;
 };
 
 }  // namespace brainshift::inversion

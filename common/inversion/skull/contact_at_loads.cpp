@@ -40,6 +40,14 @@ void ContactAtLoads::forget() {
   all_forces_.setZero();
 }
 
+void ContactAtLoads::begin_from(const std::vector<int>& slaves,
+                                const Eigen::Ref<const VecX>& forces) {
+  all_forces_.setZero();
+  for (std::size_t j = 0; j < slaves.size(); ++j) {
+    all_forces_[slaves[j]] = std::max(0.0, forces[static_cast<Eigen::Index>(j)]);
+  }
+}
+
 Status ContactAtLoads::solve(const VecX& z) {
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
   free_penetration_.noalias() = operators_.initial_penetration_mm - modes * z;

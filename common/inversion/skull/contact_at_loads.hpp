@@ -33,8 +33,10 @@ class ContactAtLoads {
   ContactAtLoads(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
                  ContactFactor& factor, ThreadTeam& team);
 
-  // Solves for z from the last set on. kNotConverged after kMaxSets sets; errors of
-  // ContactFactor::take.
+  // The next search begins from these forces of these slaves, N; where they pull, from 0.
+  void begin_from(const std::vector<int>& slaves, const Eigen::Ref<const VecX>& forces);
+  // Solves for z from the last forces on, or from those of begin_from(). kNotConverged after
+  // kMaxSets sets; errors of ContactFactor::take.
   Status solve(const VecX& z);
   // out += T^T felt with T = D^-1 L_A of the present set (contact_reduction.hpp): what forces felt
   // by data mean for the modes. felt: one per active slave; out: r.

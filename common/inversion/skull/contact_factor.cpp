@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string>
 
+#include "common/linalg/team_cholesky.hpp"
+
 namespace brainshift::inversion {
 namespace {
 
@@ -22,9 +24,10 @@ void list_active(const contact::ActiveSet& set, std::vector<int>& active) {
   }
 }
 
-ContactFactor::ContactFactor(const CondensedOperators& operators, double beta)
+ContactFactor::ContactFactor(const CondensedOperators& operators, double beta, ThreadTeam& team)
     : operators_(operators),
       beta_(beta),
+      team_(team),
       row_in_base_(static_cast<std::size_t>(operators.num_slaves()), -1),
       row_in_set_(static_cast<std::size_t>(operators.num_slaves()), -1),
       factor_(new double[static_cast<std::size_t>(operators.compliance.size())]),
@@ -92,14 +95,16 @@ Status ContactFactor::make_base() {
   joining_ = leaving_ = 0;
   if (base_.empty()) return {};
   auto d = factor();
-  for (Eigen::Index j = 0; j < base_size(); ++j) {
-    const double* column = operators_.compliance.col(base_[static_cast<std::size_t>(j)]).data();
-    for (Eigen::Index i = j; i < base_size(); ++i) {
-      d(i, j) = column[base_[static_cast<std::size_t>(i)]];
+  team_.split(base_size(), [&](long begin, long end) {
+    for (Eigen::Index j = begin; j < end; ++j) {
+      const double* column = operators_.compliance.col(base_[static_cast<std::size_t>(j)]).data();
+      for (Eigen::Index i = j; i < base_size(); ++i) {
+        d(i, j) = column[base_[static_cast<std::size_t>(i)]];
+      }
+      d(j, j) += 1.0 / beta_;
     }
-    d(j, j) += 1.0 / beta_;
-  }
-  if (blas::cholesky(d)) return {};
+  });
+  if (linalg::cholesky(d, team_)) return {};
   const std::string slaves = std::to_string(base_.size());
   forget();
   return fail(ErrorCode::kSingularMatrix,
@@ -128,7 +133,9 @@ bool ContactFactor::gather_columns() {
   if (rows > 0 && cached_.size() > before) {
     Column fresh(cache_.get() + static_cast<Eigen::Index>(before) * slaves, rows,
                  static_cast<Eigen::Index>(cached_.size() - before), Eigen::OuterStride<>(slaves));
-    blas::solve_lower(factor(), fresh);
+    team_.split(fresh.cols(), [&](long begin, long end) {
+      blas::solve_lower(factor(), fresh.middleCols(begin, end - begin));
+    });
   }
   for (std::size_t j = 0; j < changed_.size(); ++j) {
     const auto place = std::find(cached_.begin(), cached_.end(), changed_[j]) - cached_.begin();

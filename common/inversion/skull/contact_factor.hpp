@@ -23,6 +23,7 @@
 
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/values/condensed_operators.hpp"
 
@@ -35,8 +36,8 @@ class ContactFactor {
  public:
   static constexpr int kMostChanges = 128;  // columns of V
 
-  // Keeps a reference to the operators. beta: penalty, N/mm.
-  ContactFactor(const CondensedOperators& operators, double beta);
+  // Keeps references to the operators and to the team that shares the work. beta: penalty, N/mm.
+  ContactFactor(const CondensedOperators& operators, double beta, ThreadTeam& team);
 
   // solve() is for this set from now on. set: one flag per slave, or empty for none.
   // kSingularMatrix when D cannot be factorised; no set is held then.
@@ -70,6 +71,7 @@ class ContactFactor {
 
   const CondensedOperators& operators_;
   double beta_;
+  ThreadTeam& team_;
   contact::ActiveSet set_;
   std::vector<int> active_;
   std::vector<int> base_, row_in_base_;  // slaves, ascending; by slave, -1: not of the base

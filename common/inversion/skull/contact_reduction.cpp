@@ -40,6 +40,11 @@ Status ContactReduction::activate(const contact::ActiveSet& set) {
   return {};
 }
 
+void ContactReduction::forces_at(const VecX& z, Eigen::Ref<VecX> out) const {
+  out = response().col(window_.count);
+  out.noalias() -= response().leftCols(window_.count) * z;
+}
+
 Result<Eigen::MatrixXd> ContactReduction::response_before() const {
   const int k = size();
   Eigen::MatrixXd response(k, window_.first);

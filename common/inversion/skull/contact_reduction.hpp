@@ -39,6 +39,9 @@ class ContactReduction {
     return {response_.data(), size(), window_.count + 1};
   }
 
+  // f0 - T z, of the active slaves, N; those that pull are no solution. out: k.
+  void forces_at(const VecX& z, Eigen::Ref<VecX> out) const;
+
   // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
   // Allocates. Errors of ContactFactor::take.
   Result<Eigen::MatrixXd> response_before() const;

@@ -1,42 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/skull/contact_at_loads.hpp"
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-
-#include "common/core/random.hpp"
+#include "tests/unit/inversion/skull_fixture.hpp"
 
 namespace brainshift::inversion {
 namespace {
-
-using Eigen::MatrixXd;
-
-constexpr int kSlaves = 120, kModes = 12;
-constexpr double kBeta = 5.0;
-constexpr ModeWindow kWindow{0, kModes};
-
-// Slaves on a line with a smooth compliance, pressed by random loads: badly conditioned, as a skull
-// is.
-CondensedOperators operators(double gap_mm) {
-  Random random(5);
-  CondensedOperators result;
-  result.compliance.resize(kSlaves, kSlaves);
-  for (int i = 0; i < kSlaves; ++i) {
-    for (int j = 0; j < kSlaves; ++j) {
-      result.compliance(i, j) = 2.0 * std::exp(-std::abs(i - j) / 3.0);
-    }
-    result.slaves.push_back(i);
-  }
-  result.slave_modes.resize(kSlaves, kModes);
-  for (Eigen::Index i = 0; i < result.slave_modes.size(); ++i) {
-    result.slave_modes.data()[i] = random.normal() - 0.5;
-  }
-  result.initial_penetration_mm = VecX::Constant(kSlaves, -gap_mm);
-  result.contact_columns.resize(3, kSlaves);
-  result.modes.resize(3, kModes);
-  return result;
-}
 
 // f_i = max(0, beta P_i), by projected Gauss-Seidel: another method, of no use for large sets.
 VecX reference_forces(const CondensedOperators& brain, const VecX& z) {
@@ -58,18 +28,13 @@ VecX reference_forces(const CondensedOperators& brain, const VecX& z) {
 
 struct Search {
   explicit Search(const CondensedOperators& brain, bool contact = true)
-      : team(1), factor(brain, kBeta), at_loads(brain, kWindow, kBeta, contact, factor, team) {}
+      : team(1),
+        factor(brain, kBeta, team),
+        at_loads(brain, kWindow, kBeta, contact, factor, team) {}
   ThreadTeam team;
   ContactFactor factor;
   ContactAtLoads at_loads;
 };
-
-VecX loads(std::uint64_t seed, double size) {
-  Random random(seed);
-  VecX z(kModes);
-  for (double& value : z) value = size * random.normal();
-  return z;
-}
 
 void expect_solution(const CondensedOperators& brain, const VecX& z, const ContactAtLoads& found) {
   const VecX f = reference_forces(brain, z);
@@ -84,11 +49,11 @@ void expect_solution(const CondensedOperators& brain, const VecX& z, const Conta
 }
 
 TEST(ContactAtLoads, SolvesContactFromAnyStart) {
-  const CondensedOperators brain = operators(0.5);
+  const CondensedOperators brain = skull_operators(0.5);
   Search search(brain);
   int largest = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const VecX z = loads(seed, 0.5 * static_cast<double>(seed));
+    const VecX z = skull_loads(seed, 0.5 * static_cast<double>(seed));
     ASSERT_TRUE(search.at_loads.solve(z));
     expect_solution(brain, z, search.at_loads);
     largest = std::max(largest, search.at_loads.size());
@@ -97,10 +62,10 @@ TEST(ContactAtLoads, SolvesContactFromAnyStart) {
 }
 
 TEST(ContactAtLoads, FindsTheSameWhateverTheSearchBeganWith) {
-  const CondensedOperators brain = operators(0.5);
+  const CondensedOperators brain = skull_operators(0.5);
   Search cold(brain), warm(brain);
-  const VecX z = loads(6, 1.0);
-  ASSERT_TRUE(warm.at_loads.solve(loads(7, 3.0)));
+  const VecX z = skull_loads(6, 1.0);
+  ASSERT_TRUE(warm.at_loads.solve(skull_loads(7, 3.0)));
   ASSERT_TRUE(warm.at_loads.solve(z));
   ASSERT_TRUE(cold.at_loads.solve(z));
   EXPECT_EQ(warm.at_loads.active(), cold.at_loads.active());
@@ -109,10 +74,29 @@ TEST(ContactAtLoads, FindsTheSameWhateverTheSearchBeganWith) {
   EXPECT_EQ(warm.at_loads.size(), 0);
 }
 
+TEST(ContactAtLoads, FindsTheSameFromForcesThatAreGiven) {
+  const CondensedOperators brain = skull_operators(0.5);
+  Search search(brain);
+  const VecX z = skull_loads(6, 1.0);
+  std::vector<int> slaves;
+  for (int i = 0; i < kSlaves; i += 2) slaves.push_back(i);
+  Random random(8);
+  VecX forces(static_cast<Eigen::Index>(slaves.size()));
+  for (double& force : forces) force = 3.0 * random.normal();  // some of them pull
+  search.at_loads.begin_from(slaves, forces);
+  ASSERT_TRUE(search.at_loads.solve(z));
+  expect_solution(brain, z, search.at_loads);
+  // From the solution itself one set is enough.
+  const VecX solution = search.at_loads.forces();
+  search.at_loads.begin_from(std::vector<int>(search.at_loads.active()), solution);
+  ASSERT_TRUE(search.at_loads.solve(z));
+  EXPECT_EQ(search.at_loads.sets(), 1);
+}
+
 TEST(ContactAtLoads, WithoutContactNothingTouches) {
-  const CondensedOperators brain = operators(0.5);
+  const CondensedOperators brain = skull_operators(0.5);
   Search search(brain, false);
-  const VecX z = loads(3, 2.0);
+  const VecX z = skull_loads(3, 2.0);
   ASSERT_TRUE(search.at_loads.solve(z));
   EXPECT_EQ(search.at_loads.size(), 0);
   const VecX depth = brain.initial_penetration_mm - brain.slave_modes * z;
@@ -121,10 +105,10 @@ TEST(ContactAtLoads, WithoutContactNothingTouches) {
 }
 
 TEST(ContactAtLoads, ACompliantSkullThatCannotBeFactorisedIsRejected) {
-  CondensedOperators brain = operators(0.0);
+  CondensedOperators brain = skull_operators(0.0);
   brain.compliance *= -1.0;
   Search search(brain);
-  const Status status = search.at_loads.solve(loads(3, 1.0));
+  const Status status = search.at_loads.solve(skull_loads(3, 1.0));
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kSingularMatrix);
 }

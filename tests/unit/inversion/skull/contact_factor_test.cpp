@@ -60,7 +60,8 @@ contact::ActiveSet random_set(Random& random, double share) {
 
 TEST(ContactFactor, SolvesForSetsThatFollowEachOther) {
   const CondensedOperators brain = operators();
-  ContactFactor factor(brain, kBeta);
+  ThreadTeam team(2);
+  ContactFactor factor(brain, kBeta, team);
   Random random(3);
   contact::ActiveSet set = random_set(random, 0.6);
   int updates = 0;
@@ -81,7 +82,8 @@ TEST(ContactFactor, SolvesForSetsThatFollowEachOther) {
 TEST(ContactFactor, SolvesWhereSlavesOnlyJoinOrOnlyLeave) {
   const CondensedOperators brain = operators();
   for (const bool join : {true, false}) {
-    ContactFactor factor(brain, kBeta);
+    ThreadTeam team(2);
+    ContactFactor factor(brain, kBeta, team);
     contact::ActiveSet set(kSlaves);
     for (int i = 0; i < kSlaves; ++i) set[static_cast<std::size_t>(i)] = i % 3 == 0 ? 1 : 0;
     ASSERT_TRUE(factor.take(set));
@@ -94,7 +96,8 @@ TEST(ContactFactor, SolvesWhereSlavesOnlyJoinOrOnlyLeave) {
 
 TEST(ContactFactor, ServesTheEmptySetAndComesBackFromIt) {
   const CondensedOperators brain = operators();
-  ContactFactor factor(brain, kBeta);
+  ThreadTeam team(2);
+  ContactFactor factor(brain, kBeta, team);
   Random random(4);
   const contact::ActiveSet none(kSlaves), some = random_set(random, 0.05), all(kSlaves, 1);
   for (const contact::ActiveSet& set : {none, some, none, all, none, some}) {
@@ -106,7 +109,8 @@ TEST(ContactFactor, ServesTheEmptySetAndComesBackFromIt) {
 TEST(ContactFactor, AnIndefiniteComplianceIsRejectedAndLeavesNoSet) {
   CondensedOperators brain = operators();
   brain.compliance(7, 7) = -1.0;
-  ContactFactor factor(brain, kBeta);
+  ThreadTeam team(2);
+  ContactFactor factor(brain, kBeta, team);
   contact::ActiveSet set(kSlaves);
   for (int i = 20; i < 60; ++i) set[static_cast<std::size_t>(i)] = 1;
   ASSERT_TRUE(factor.take(set));
