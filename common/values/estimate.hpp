@@ -120,8 +120,9 @@ struct SourceSummary {
   int outliers = 0;
   // Consistency with the other sources. chi_square: squared Mahalanobis distance between the data
   // of this source and what the other sources and the prior predict for them. degrees_of_freedom:
-  // its expectation. p_value: probability of a larger chi_square by chance. All three are NaN for
-  // a single source and for methods that do not compute them.
+  // its expectation. p_value: probability of a larger chi_square by chance; where that is below
+  // kInconsistent under the most probable hypothesis, the mean over the hypotheses. All three are
+  // NaN for a single source and for methods that do not compute them.
   double chi_square = std::numeric_limits<double>::quiet_NaN();
   double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
   double p_value = std::numeric_limits<double>::quiet_NaN();

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/condensed/mode_posterior.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/linalg/blas.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {
 
@@ -144,11 +146,30 @@ bool ModePosterior::check_source(const SampledOperators& sampled, const PriorStr
   own_gram_.resize(size, size);
   blas::gram(own, 0.0, own_gram_);
   own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
-  fill_scales(strengths);
-  // The check wants the prior's information; that of an absent part is as good as infinite.
-  constexpr double kAbsentScale = 1e-4;
-  precision_.head(size) = scales_.head(size).cwiseMax(kAbsentScale).array().pow(-2);
-  return check_.run(gram(), right_hand_side(), own_gram_, own_right_, precision_.head(size), out);
+  const auto run = [&](const PriorScaleValues& scales, Consistency& result) {
+    // The check wants the prior's information; that of an absent part is as good as infinite.
+    constexpr double kAbsentScale = 1e-4;
+    precision_.head(common_).setOnes();
+    for (int i = 0; i < window_.count; ++i) {
+      precision_[common_ + i] = std::pow(std::max(kAbsentScale, strengths.scale_of(i, scales)), -2);
+    }
+    return check_.run(gram(), right_hand_side(), own_gram_, own_right_, precision_.head(size),
+                      result);
+  };
+  const auto& hypotheses = strengths.hypotheses();
+  if (!run(strengths.held(), out)) return false;
+  if (out.p_value >= kInconsistent) return true;
+  double mean = hypotheses.front().weight * out.p_value;
+  double left = 1.0 - hypotheses.front().weight;
+  for (std::size_t h = 1; h < hypotheses.size(); ++h) {
+    if (mean >= kInconsistent || mean + left < kInconsistent) break;
+    Consistency other;
+    if (!run(hypotheses[h].scales, other)) return false;
+    mean += hypotheses[h].weight * other.p_value;
+    left -= hypotheses[h].weight;
+  }
+  out.p_value = mean;
+  return true;
 }
 
 }  // namespace brainshift::inversion

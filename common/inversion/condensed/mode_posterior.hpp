@@ -64,8 +64,10 @@ class ModePosterior {
   // |d - A u - common error| of one datum, whitened.
   double residual_norm(const SampledOperators& sampled, int datum) const;
 
-  // Consistency of the rows of one source with the others under the held strengths
-  // (source_check.hpp); false when it cannot be computed.
+  // Consistency of the rows of one source with the others (source_check.hpp) under the held
+  // strengths. Where its p_value is below kInconsistent, p_value is the mean over the hypotheses
+  // instead, or the part of that mean that reaches kInconsistent: what contradicts under one
+  // hypothesis may well agree under the next. false when it cannot be computed.
   [[nodiscard]] bool check_source(const SampledOperators& sampled, const PriorStrengths& strengths,
                                   const DataSource& source, Consistency& out);
 

@@ -82,8 +82,10 @@ class PriorStrengths {
   // Of the hypothesis that a descent is for: a most probable one.
   const PriorScaleValues& held() const { return hypotheses_.front().scales; }
   // Of mode `mode` of the window under the held hypothesis, with its part's floor.
-  double scale_of(int mode) const {
-    return std::sqrt(variance(part_of_mode_[static_cast<std::size_t>(mode)], held()));
+  double scale_of(int mode) const { return scale_of(mode, held()); }
+  // The same under other strengths.
+  double scale_of(int mode, const PriorScaleValues& scales) const {
+    return std::sqrt(variance(part_of_mode_[static_cast<std::size_t>(mode)], scales));
   }
   // Mean of s_g, and of s_g^2 with the floor, over the hypotheses; probability of s_g = 0.
   PriorScaleValues mean() const;
