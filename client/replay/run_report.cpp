@@ -222,7 +222,9 @@ struct Reader {
   void decode(const Json& json, const std::string& here, std::map<std::string, T>& values) const {
     if (!json.is_object()) return complain(here + " must be an object");
     values.clear();
-    for (const auto& [key, value] : json.items()) decode(value, here + "." + key, values[key]);
+    for (const auto& [key, value] : json.items()) {
+      decode(value, std::string(here).append(".").append(key), values[key]);
+    }
   }
   template <typename T>
   requires(std::is_class_v<T>) void decode(const Json& json, const std::string& here,

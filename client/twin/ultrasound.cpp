@@ -184,7 +184,8 @@ std::string scan_converted(const Eigen::MatrixXf& envelope, const UltrasoundProb
                          s * ((1 - t) * cell(1, 0) + t * cell(1, 1));
       const double db = 20.0 * std::log10(std::max(1e-12, echo / probe.brightest));
       const double grey = 1.0 + 254.0 * (1.0 + db / probe.dynamic_range_db);
-      pixels[static_cast<std::size_t>(v * grid.width + u)] =
+      pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) +
+             static_cast<std::size_t>(u)] =
           static_cast<char>(static_cast<unsigned char>(std::clamp(grey, 1.0, 255.0)));
     }
   return pixels;

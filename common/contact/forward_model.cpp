@@ -46,11 +46,12 @@ Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig
 
 }  // namespace
 
-ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs, linalg::SymmetricMatrix stiffness,
-                           fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s)
+ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs,
+                           const linalg::SymmetricMatrix& stiffness, fem::StiffnessFactor factor,
+                           PenaltyContact contact, double assemble_s)
     : boundary_(boundary),
       dofs_(std::move(dofs)),
-      stiffness_(std::move(stiffness)),
+      stiffness_(stiffness),
       stiffness_norm_(linalg::max_norm(stiffness_)),
       factor_(std::move(factor)),
       contact_(std::move(contact)),
@@ -78,7 +79,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   auto factor = factorise(model, config, *materials, dofs, stiffness);
   if (!factor) return tl::unexpected(factor.error());
   report(progress, "factorise", 1.0);
-  return ForwardModel(boundary, std::move(dofs), std::move(stiffness), std::move(*factor),
+  return ForwardModel(boundary, std::move(dofs), stiffness, std::move(*factor),
                       PenaltyContact(std::move(pairs), config.contact.penalty_n_per_mm),
                       assemble_s);
 }

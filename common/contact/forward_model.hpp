@@ -57,7 +57,7 @@ class ForwardModel {
   Result<ContactSolution> solve_with_contact(const Points& load) const;
 
  private:
-  ForwardModel(Boundary boundary, fem::DofMap dofs, linalg::SymmetricMatrix stiffness,
+  ForwardModel(Boundary boundary, fem::DofMap dofs, const linalg::SymmetricMatrix& stiffness,
                fem::StiffnessFactor factor, PenaltyContact contact, double assemble_s);
   Boundary boundary_;
   fem::DofMap dofs_;

@@ -48,7 +48,7 @@ DistanceSample DistanceVolume::inside(const Vec3& cells) const {
 
 DistanceSample DistanceVolume::outside(const Vec3& x, const Vec3& cells) const {
   const Vec3 nearest = cells.cwiseMax(0.0).cwiseMin(last_cell_);
-  const DistanceSample rim = inside(nearest);
+  DistanceSample rim = inside(nearest);
   const double slope = rim.gradient.norm();
   if (!(slope > kTouching)) return rim;
   const Vec3 c = grid_.origin_mm + grid_.spacing_mm * nearest;

@@ -116,7 +116,8 @@ Vec3 MovedSurface::normal(const SurfacePlace& place) const {
 
 bool MovedSurface::on_rim(const SurfacePlace& place) const {
   for (int k = 0; k < 3; ++k) {
-    const auto edge = static_cast<std::size_t>(3 * place.triangle + k);
+    const std::size_t edge =
+        3 * static_cast<std::size_t>(place.triangle) + static_cast<std::size_t>(k);
     const auto corner = static_cast<std::size_t>(moved_.triangles(k, place.triangle));
     // Edge k lies opposite to corner k + 2.
     if (surface_.rim_edge_[edge] != 0 && place.weights[(k + 2) % 3] < kOnEdge) return true;

@@ -45,7 +45,8 @@ struct TetLocator::Impl {
     return c.cwiseMax(0.0).cwiseMin((dims - 1).cast<double>()).cast<int>();
   }
   std::size_t index_of(const Cell& c) const {
-    return static_cast<std::size_t>(c[0] + dims[0] * (c[1] + dims[1] * c[2]));
+    const auto at = [](int i) { return static_cast<std::size_t>(i); };
+    return at(c[0]) + at(dims[0]) * (at(c[1]) + at(dims[1]) * at(c[2]));
   }
   template <typename Visit>
   void for_each_cell_of(int tet, const Visit& visit) const;
@@ -142,7 +143,7 @@ TetLocator::TetLocator(const TetMesh& mesh) : impl_(std::make_unique<Impl>()) {
     Mat3 edges;
     for (int k = 0; k < 3; ++k)
       edges.col(k) = mesh.nodes.col(mesh.tets(k + 1, t)) - mesh.nodes.col(mesh.tets(0, t));
-    impl_->inverse.push_back(edges.inverse());
+    impl_->inverse.emplace_back(edges.inverse());
   }
   impl_->fill_grid();
   impl_->find_boundary(mesh);
@@ -160,7 +161,7 @@ TetLocation TetLocator::locate(const Vec3& query) const {
   nowhere.distance_mm = std::numeric_limits<double>::infinity();
   if (!impl_->boundary || !query.allFinite()) return nowhere;
   if (impl_->box.contains(query)) {
-    const TetLocation inside = impl_->locate_inside(query);
+    TetLocation inside = impl_->locate_inside(query);
     if (inside.tet >= 0) return inside;
   }
   return impl_->locate_outside(query);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cassert>
 
+// LAPACK's name, as Fortran spells it.
+// NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 
 namespace brainshift::linalg::blas {

@@ -80,7 +80,7 @@ Bumps bumps_around(const Vec3& tumour, double radius) {
       for (int k = -1; k <= 1; ++k) {
         const Vec3 away = std::sqrt(2.0) * radius * Vec3(i, j, k);
         if (away != Vec3::Zero() && away.norm() > kTumourVolumeReach_mm) continue;
-        bumps.centres.push_back(tumour + away);
+        bumps.centres.emplace_back(tumour + away);
         variance += std::exp(-away.squaredNorm() / (radius * radius));
       }
     }

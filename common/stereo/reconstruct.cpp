@@ -131,7 +131,8 @@ void add_triangle(const Grid& grid, const Triangle& t, double min_cosine,
 std::vector<Triangle> triangles_of(const Grid& grid, double min_cosine) {
   std::vector<Triangle> triangles;
   const auto vertex = [&](int column, int row) {
-    return grid.vertex[static_cast<std::size_t>(row * grid.columns + column)];
+    return grid.vertex[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns) +
+                       static_cast<std::size_t>(column)];
   };
   const auto length = [&](int i, int j) {
     return (grid.points[static_cast<std::size_t>(i)] - grid.points[static_cast<std::size_t>(j)])

@@ -24,7 +24,7 @@ Session::Session(std::string case_id, SessionHooks hooks)
 
 Session::~Session() { stop(); }
 
-void Session::start(const wire::SessionRequest& request, StartDone done) {
+void Session::start(const wire::SessionRequest& request, const StartDone& done) {
   if (request.case_id != case_id_) {
     done(fail(ErrorCode::kInvalidArgument,
               fmt::format("start_session.case_id = {}: the loaded model is for {}",
@@ -129,7 +129,7 @@ void Session::work(const std::stop_token& stop) {
         boxes_.erase(oldest);
       }
     }
-    if (start) make_ready(std::move(*start));
+    if (start) make_ready(*start);
     if (observation) process(*observation);
   }
 }
@@ -143,7 +143,7 @@ Result<SessionModel*> Session::model_for(const wire::SessionRequest& request) {
   return models_.emplace(key, std::move(*made)).first->second.get();
 }
 
-void Session::make_ready(PendingStart start) {
+void Session::make_ready(const PendingStart& start) {
   const auto model = model_for(start.request);
   if (!model) {
     start.done(tl::unexpected(model.error()));

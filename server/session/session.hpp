@@ -70,7 +70,7 @@ class Session {
   // `done` is called exactly once: on the calling thread for another case (kInvalidArgument, the
   // running session goes on), else on the worker; kUnavailable when a later start or stop() came
   // first.
-  void start(const wire::SessionRequest& request, StartDone done);
+  void start(const wire::SessionRequest& request, const StartDone& done);
 
   // kModelNotReady without a running session; the errors of check_observation; kUnavailable when
   // kMaxSources other sources wait. `on_accepted` is called once before the worker can see an
@@ -100,7 +100,7 @@ class Session {
   };
 
   void work(const std::stop_token& stop);
-  void make_ready(PendingStart start);
+  void make_ready(const PendingStart& start);
   Result<SessionModel*> model_for(const wire::SessionRequest& request);
   void process(const Observation& observation);
 

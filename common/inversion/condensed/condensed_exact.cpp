@@ -178,7 +178,7 @@ Status CondensedExact::Impl::solve_for_set(const contact::ActiveSet& set) {
     return fail(ErrorCode::kSingularMatrix, "contact: the compliance of " + std::to_string(k) +
                                                 " active slaves is not positive definite");
   }
-  const auto solve_d = [&](Eigen::Ref<MatrixXd, 0, Eigen::OuterStride<>> b) {
+  const auto solve_d = [&](auto& b) {
     if (k == 0) return;
     blas::solve_lower(factor, b);
     blas::solve_lower_transposed(factor, b);

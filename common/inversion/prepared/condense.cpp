@@ -65,8 +65,8 @@ Status contact_columns(const PreparedModel& model, const CondenseOptions& option
     if (!kept) {
       MatrixXd loads = MatrixXd::Zero(rows, count), u;
       for (int j = 0; j < count; ++j) {
-        loads.col(j).segment<3>(3 * result.slaves[static_cast<std::size_t>(first + j)]) =
-            result.slave_normals.col(first + j);
+        const auto slave = static_cast<std::size_t>(first) + static_cast<std::size_t>(j);
+        loads.col(j).segment<3>(3 * result.slaves[slave]) = result.slave_normals.col(first + j);
       }
       if (auto solved = solver.solve(loads, u); !solved) return solved;
       for (int j = 0; j < count; ++j) {
@@ -279,7 +279,7 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
 std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config, int threads) {
   const auto n3 = static_cast<std::uint64_t>(3) * static_cast<std::uint64_t>(nodes);
   const auto s = static_cast<std::uint64_t>(slaves);
-  const auto q = static_cast<std::uint64_t>(config.condensed.max_rank + kOversampling);
+  const auto q = static_cast<std::uint64_t>(config.condensed.max_rank) + kOversampling;
   const std::uint64_t blocks = 8 * n3 * kBlock * 6 * static_cast<std::uint64_t>(threads);
   // G; Phi; test vectors, sketches, modes (double) and modes (float)
   return 4 * n3 * s + 8 * s * s + ((2 + kRemainders) * 8 + 4) * n3 * q + blocks;

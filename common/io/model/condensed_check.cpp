@@ -130,7 +130,7 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   for (int part = 0; part < kPriorParts; ++part) {
     const int columns = operators.part_columns[static_cast<std::size_t>(part)];
     const std::string name = std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
-    check.that(columns >= 0 && columns <= left, name.c_str(),
+    check.that(columns >= 0 && columns <= left, name,
                "= " + std::to_string(columns) + ": must be from 0 to the " + std::to_string(left) +
                    " modes that the parts before it leave");
     left -= std::max(0, columns);
