@@ -235,12 +235,9 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
       curvature_.reset();
     } else {
-      bool learned = false;
-      if (decrement_ <= kFar) {
-        newton_ -= next_;  // change of the gradient
-        learned = curvature_.learn(change_, newton_);
-        newton_ += next_;
-      }
+      newton_ -= next_;  // change of the gradient
+      const bool learned = curvature_.learn(change_, newton_);
+      newton_ += next_;
       if (fell) {
         accept_trial();
         value_ = after_;
