@@ -42,7 +42,7 @@ struct Observation {
   std::string case_id;
   std::string frame = "ras";          // only "ras" enters the inversion
   std::string source;                 // e.g. "ius", "stereopsis", "pointer"
-  std::uint64_t sequence = 0;         // counts up per surgery, from 1
+  std::uint64_t sequence = 0;         // counts up per source, from 1, below 2^63
   std::int64_t acquired_ns = 0;       // monotonic clock of the recording
   std::int64_t acquired_wall_ns = 0;  // metadata only, UTC since the epoch
   std::variant<TumourBoundary, CorticalSurface, LandmarkPairs, PatientPose> body;

@@ -10,6 +10,7 @@
 #include "server/main/exit_status.hpp"
 #include "server/main/prepare_command.hpp"
 #include "server/main/serve_command.hpp"
+#include "server/main/stop_signals.hpp"
 
 namespace {
 
@@ -77,6 +78,7 @@ int parse_and_run(int argc, char** argv) {
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
+  survive_failing_writes();
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {

@@ -35,6 +35,15 @@ bool set_action(void (*action)(int)) {
 
 }  // namespace
 
+void survive_failing_writes() {
+  for (const int signal : {SIGPIPE, SIGXFSZ}) {
+    struct sigaction description {};
+    description.sa_handler = SIG_IGN;
+    sigemptyset(&description.sa_mask);
+    sigaction(signal, &description, nullptr);
+  }
+}
+
 Result<StopSignals> StopSignals::catch_all() {
   const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (fd < 0) return fail(ErrorCode::kInternal, std::string("eventfd: ") + std::strerror(errno));

@@ -10,6 +10,10 @@
 
 namespace brainshift::server {
 
+// A write to a pipe that nobody reads any more, or beyond the limit on a file's size, fails with
+// EPIPE or EFBIG from here on; by default the signal that comes with it ends the process.
+void survive_failing_writes();
+
 class StopSignals {
  public:
   // From here on both signals only make fd() readable. One at a time in a process.

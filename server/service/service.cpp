@@ -59,7 +59,8 @@ std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame&
       return Reply{MessageType::kStatusReply, wire::encode(status()), false};
     case MessageType::kSubscribeRequest: {
       const std::uint64_t session = session_ ? session_->state().session_id : 0;
-      return Reply{MessageType::kSubscribeReply, wire::encode_subscribe_reply(session), true};
+      return Reply{MessageType::kSubscribeReply, wire::encode_subscribe_reply(session), true,
+                   session};
     }
     case MessageType::kStartSessionRequest: return start_session(peer, frame);
     case MessageType::kModelRequest:
@@ -171,7 +172,7 @@ void Service::publish(wire::UpdateMessage message) {
     spdlog::warn("unusable update sequence={} reason=\"{}\"", update.sequence,
                  update.estimate.quality.reason);
   }
-  outbox_.post({delivery, {}, std::move(frame)});
+  outbox_.post({delivery, {}, std::move(frame), message.session_id});
 }
 
 }  // namespace brainshift::server

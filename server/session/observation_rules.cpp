@@ -27,10 +27,16 @@ Status check_observation(const Observation& observation, std::string_view case_i
                 fmt::format("observation.source = {}: must have 1 to {} characters",
                             in_quotes(observation.source), kMaxSourceLength));
   }
+  if (observation.sequence > kMaxSequence) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.sequence = {}: must be at most {}", observation.sequence,
+                            kMaxSequence));
+  }
   if (observation.sequence <= last_sequence) {
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.sequence = {}: must be above {}, the last one accepted",
-                            observation.sequence, last_sequence));
+                fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
+                            "from {}",
+                            observation.sequence, last_sequence, in_quotes(observation.source)));
   }
   return {};
 }

@@ -63,19 +63,22 @@ Result<wire::ObservationReceipt> Session::submit(Observation observation,
                                                  ? "the session is still being prepared"
                                                  : "no session is running: start one first");
     }
-    auto status = check_observation(observation, case_id_, running_->last_sequence);
+    auto& last_sequence = running_->last_sequence;
+    const auto last = last_sequence.find(observation.source);
+    auto status =
+        check_observation(observation, case_id_, last != last_sequence.end() ? last->second : 0);
     if (!status) return tl::unexpected(status.error());
-    const auto box = boxes_.find(observation.source);
-    if (box == boxes_.end() && boxes_.size() >= kMaxSources) {
+    if (last == last_sequence.end() && last_sequence.size() >= kMaxSources) {
       return fail(ErrorCode::kUnavailable,
-                  fmt::format("observation.source = {}: {} other sources are waiting already",
-                              in_quotes(observation.source), boxes_.size()));
+                  fmt::format("observation.source = {}: {} other sources have observed already",
+                              in_quotes(observation.source), last_sequence.size()));
     }
     receipt.observation_sequence = observation.sequence;
-    receipt.replaced_pending = box != boxes_.end();
-    running_->last_sequence = observation.sequence;
+    receipt.replaced_pending = boxes_.count(observation.source) > 0;
+    last_sequence[observation.source] = observation.sequence;
     if (on_accepted) on_accepted();
-    boxes_.insert_or_assign(observation.source, std::move(observation));
+    const std::string source = observation.source;
+    boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_});
   }
   wake_.notify_all();
   return receipt;
@@ -124,8 +127,8 @@ void Session::work(const std::stop_token& stop) {
       } else {
         const auto oldest = std::min_element(
             boxes_.begin(), boxes_.end(),
-            [](const auto& a, const auto& b) { return a.second.sequence < b.second.sequence; });
-        observation = std::move(oldest->second);
+            [](const auto& a, const auto& b) { return a.second.arrival < b.second.arrival; });
+        observation = std::move(oldest->second.observation);
         boxes_.erase(oldest);
       }
     }
@@ -160,7 +163,7 @@ void Session::make_ready(const PendingStart& start) {
   {
     const std::lock_guard lock(mutex_);
     superseded = stopped_ || pending_start_.has_value();
-    if (!superseded) running_ = Running{info.session_id, start.request, *model, 0, 0};
+    if (!superseded) running_ = Running{info.session_id, start.request, *model, {}, 0};
   }
   if (superseded) {
     start.done(fail(ErrorCode::kUnavailable, "another session was started before this one"));

@@ -4,7 +4,7 @@
 //   start()   ends the running session and makes the next one ready on the worker (seconds, once
 //             per boundary and method)
 //   submit()  checks an observation and leaves it in the box of its source; never waits
-//   worker    takes the oldest waiting observation, runs the pipeline, hands the message to
+//   worker    takes the observation that arrived first, runs the pipeline, hands the message to
 //             `publish`
 //
 // Every source has a box for one observation: a newer one replaces an older one that has not
@@ -73,9 +73,9 @@ class Session {
   void start(const wire::SessionRequest& request, const StartDone& done);
 
   // kModelNotReady without a running session; the errors of check_observation; kUnavailable when
-  // kMaxSources other sources wait. `on_accepted` is called once before the worker can see an
-  // accepted observation; it must be quick and must not call back. Precondition: the observation's
-  // numbers are finite (wire::decode_observation).
+  // kMaxSources other sources have observed. `on_accepted` is called once before the worker can see
+  // an accepted observation; it must be quick and must not call back. Precondition: the
+  // observation's numbers are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
                                           const std::function<void()>& on_accepted = {});
 
@@ -94,9 +94,9 @@ class Session {
   struct Running {
     std::uint64_t session_id = 0;
     wire::SessionRequest request;
-    SessionModel* model = nullptr;  // in models_
-    std::uint64_t last_sequence = 0;
-    std::uint64_t published = 0;  // number of the last message's update
+    SessionModel* model = nullptr;                       // in models_
+    std::map<std::string, std::uint64_t> last_sequence;  // by source
+    std::uint64_t published = 0;                         // number of the last message's update
   };
 
   void work(const std::stop_token& stop);
@@ -113,8 +113,13 @@ class Session {
   std::condition_variable_any wake_;
   std::optional<PendingStart> pending_start_;
   std::optional<Running> running_;
-  std::map<std::string, Observation> boxes_;  // by source
-  std::stop_source run_stop_;                 // of the inversion in progress
+  struct Box {
+    Observation observation;
+    std::uint64_t arrival = 0;
+  };
+  std::map<std::string, Box> boxes_;  // by source
+  std::uint64_t arrivals_ = 0;
+  std::stop_source run_stop_;  // of the inversion in progress
   std::uint64_t last_session_id_ = 0;
   std::uint64_t updates_ = 0;
   bool busy_ = false;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -26,6 +27,7 @@ struct Outgoing {
   Delivery delivery = Delivery::kReply;
   std::string peer;  // routing id; kReply only
   Bytes bytes;
+  std::uint64_t session = 0;  // that it belongs to; not of replies
 };
 
 // Thread-safe. Only the newest kMaxIterates iterates wait; nothing else is ever dropped here.

@@ -117,6 +117,7 @@ struct Router::Impl {
   void answer(RequestHandler& handler, const Incoming& incoming);
   void reply(const std::string& peer, const Bytes& bytes);
   void deliver(const Outgoing& message);
+  void forget_session();
   void push(const std::string& routing_id, Peer& peer, const Bytes& bytes, Delivery delivery);
   void pay_owed();
   void pay(const std::string& routing_id, Peer& peer);
@@ -128,7 +129,8 @@ struct Router::Impl {
   ConnectionMonitor monitor;
   Peers peers;
   std::string endpoint;
-  // What a late subscriber gets: the last usable field, and the newest failure since.
+  // What a late subscriber of `session` gets: the last usable field, and the newest failure since.
+  std::uint64_t session = 0;
   Bytes last_final;
   Bytes failure_since;
 };
@@ -220,6 +222,7 @@ void Router::Impl::answer(RequestHandler& handler, const Incoming& incoming) {
   peer = peers.find(incoming.peer);  // gone when the reply found no route
   if (!answer->subscribe || peer == nullptr) return;
   peer->subscribed = true;
+  if (answer->session != session) return;  // nothing of the running session yet
   if (last_final) push(incoming.peer, *peer, last_final, Delivery::kFinal);
   peer = peers.find(incoming.peer);
   if (failure_since && peer != nullptr) {
@@ -237,6 +240,10 @@ void Router::Impl::reply(const std::string& peer, const Bytes& bytes) {
 
 void Router::Impl::deliver(const Outgoing& message) {
   if (message.delivery == Delivery::kReply) return reply(message.peer, message.bytes);
+  if (message.session != session) {
+    forget_session();
+    session = message.session;
+  }
   if (message.delivery == Delivery::kFinal) {
     last_final = message.bytes;
     failure_since.reset();
@@ -246,6 +253,12 @@ void Router::Impl::deliver(const Outgoing& message) {
     const auto peer = next++;  // push may remove it
     if (peer->second.subscribed) push(peer->first, peer->second, message.bytes, message.delivery);
   }
+}
+
+void Router::Impl::forget_session() {
+  last_final.reset();
+  failure_since.reset();
+  for (auto& [routing_id, peer] : peers.all()) peer.owed.clear();
 }
 
 void Router::Impl::push(const std::string& routing_id, Peer& peer, const Bytes& bytes,

@@ -7,8 +7,9 @@
 // frame that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and
 // unfinished handshakes to a short limit. A subscriber that does not read loses iterates; it is
 // owed the newest few final updates and failures, the newest usable field among them. A late one
-// receives that field, and the newest failure since. ZeroMQ bounds the size of each part, not their
-// number within one message: expose the daemon to trusted networks only.
+// receives that field, and the newest failure since. Nothing of a session is kept once the next one
+// has published, and nobody gets a field of a session that has ended. ZeroMQ bounds the size of
+// each part, not their number within one message: expose the daemon to trusted networks only.
 #pragma once
 
 #include <chrono>
@@ -36,7 +37,9 @@ struct RouterOptions {
 struct Reply {
   wire::MessageType type = wire::MessageType::kErrorReply;
   std::string payload;
-  bool subscribe = false;  // the peer receives updates from now on, the last usable one first
+  bool subscribe = false;  // the peer receives updates from now on
+  // With subscribe: the running session, whose last usable update the peer gets first.
+  std::uint64_t session = 0;
 };
 
 // Answers requests; called on the router's thread and must not block.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/files/yaml_section.hpp"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <sstream>
 
 namespace brainshift::io {
 
@@ -32,10 +34,50 @@ struct YamlSection::Node {
 
 namespace {
 
+// Finds an alias inside the node that it stands for. yaml-cpp makes a cycle of it, which no reader
+// would ever leave.
+class CycleFinder : public YAML::EventHandler {
+ public:
+  int line() const { return line_; }  // 1-based, of the first such alias; 0: none
+
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const bool open = std::find(open_.begin(), open_.end(), anchor) != open_.end();
+    if (open && line_ == 0) line_ = mark.line + 1;
+  }
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    open_.push_back(anchor);
+  }
+  void OnSequenceEnd() override { open_.pop_back(); }
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    open_.push_back(anchor);
+  }
+  void OnMapEnd() override { open_.pop_back(); }
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+
+ private:
+  std::vector<YAML::anchor_t> open_;  // of the nodes around; 0: without an anchor
+  int line_ = 0;
+};
+
+int line_of_cycle(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  CycleFinder finder;
+  while (finder.line() == 0 && parser.HandleNextDocument(finder)) {
+  }
+  return finder.line();
+}
+
 int line_of(const YAML::Node& node) { return node.Mark().is_null() ? 0 : node.Mark().line + 1; }
 
 // The value as one short line for a message.
-std::string shown(const YAML::Node& node) {
+std::string shown(const YAML::Node& node, int depth = 0) {
   if (node.IsNull()) return "(empty)";
   if (node.IsMap()) return "(a section)";
   if (node.IsScalar()) {
@@ -45,9 +87,10 @@ std::string shown(const YAML::Node& node) {
     }
     return value.size() > 60 ? value.substr(0, 57) + "..." : value;
   }
+  if (depth > 1) return "[...]";
   std::string list = "[";
   for (std::size_t i = 0; i < node.size() && i < 6; ++i) {
-    list.append(i > 0 ? ", " : "").append(shown(node[i]));
+    list.append(i > 0 ? ", " : "").append(shown(node[i], depth + 1));
   }
   return list + (node.size() > 6 ? ", ...]" : "]");
 }
@@ -90,6 +133,10 @@ YamlDocument YamlDocument::parse(const std::string& text, const fs::path& file) 
   auto state = std::make_unique<State>();
   state->file = file;
   try {
+    if (const int line = line_of_cycle(text); line > 0) {
+      state->fail_at(line, "an alias stands inside the node that it names");
+      return YamlDocument(std::move(state));
+    }
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.size() > 1) {
       state->fail_at(0,

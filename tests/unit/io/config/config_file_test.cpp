@@ -283,6 +283,8 @@ INSTANTIATE_TEST_SUITE_P(
                 ":10: mesh.generate.edge_mm: key is given twice"},
         BadCase{"SectionTwice", "gravity: {direction: [0, 0, -2]}",
                 "brainstem: {centre_mm: [0, 0, 0]}", ":19: brainstem: key is given twice"},
+        BadCase{"AliasInsideItself", "edge_mm: 6", "edge_mm: &a [1, *a]",
+                ":5: an alias stands inside the node that it names"},
         BadCase{"NumberWithUnit", "edge_mm: 6", "edge_mm: 6 mm",
                 ":5: mesh.generate.edge_mm = 6 mm: must be a finite number"},
         BadCase{"CommaNumber", "0.45", "0,45", ":22: material.poisson_ratio = 0,45: must be"},

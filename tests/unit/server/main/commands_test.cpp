@@ -26,6 +26,13 @@ TEST(ExitStatus, IsTwoForWhatTheUserCanMendAndOneOtherwise) {
   EXPECT_EQ(exit_status(ErrorCode::kInternal), 1);
 }
 
+// Each ends the process by default: a dead reader of the log, a limit on the journal's size.
+TEST(FailingWrites, DoNotEndTheProcess) {
+  survive_failing_writes();
+  EXPECT_EQ(std::raise(SIGPIPE), 0);
+  EXPECT_EQ(std::raise(SIGXFSZ), 0);
+}
+
 TEST(PrintError, IsOneLine) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(print_error({ErrorCode::kNotFound, "a\nb"}), 2);

@@ -50,6 +50,29 @@ TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
   EXPECT_EQ(next_update(late).update.observation_sequence, 42u);
 }
 
+// The first field that it sees is one of the running session.
+TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
+  serve(with_model());
+  RawPeer sender(endpoint_);
+  start_session(sender);
+  subscribe(sender);
+  sender.request(MessageType::kObservation, wire::encode(landmarks(42)));
+  ASSERT_EQ(next_update(sender).update.observation_sequence, 42u);
+  start_session(sender);
+  RawPeer late(endpoint_);
+  subscribe(late);
+  sender.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  for (RawPeer* peer : {&late, &sender}) {
+    const auto message = next_update(*peer);
+    EXPECT_EQ(message.session_id, 2u);
+    EXPECT_EQ(message.update.observation_sequence, 1u);
+  }
+  // Now there is one to keep.
+  RawPeer later(endpoint_);
+  subscribe(later);
+  EXPECT_EQ(next_update(later).session_id, 2u);
+}
+
 TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   ServiceOptions options = with_model();
   options.make_model = [](const wire::SessionRequest& request) {

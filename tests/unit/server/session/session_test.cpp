@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/session/observation_rules.hpp"
 #include "tests/unit/server/fake_session.hpp"
 
 namespace brainshift::server {
@@ -132,11 +133,34 @@ TEST_F(SessionTest, SequenceNumbersMustGrow) {
   ASSERT_TRUE(start(session).has_value());
   EXPECT_FALSE(session.submit(landmarks(0)).has_value());
   EXPECT_TRUE(session.submit(landmarks(4)).has_value());
-  const auto again = session.submit(landmarks(4, "another"));
+  const auto again = session.submit(landmarks(4));
   ASSERT_FALSE(again.has_value());
   EXPECT_THAT(again.error().message, HasSubstr("observation.sequence = 4: must be above 4"));
   EXPECT_FALSE(session.submit(landmarks(3)).has_value());
   EXPECT_TRUE(session.submit(landmarks(9)).has_value());
+}
+
+// A camera that counts fast does not shut out the ultrasound.
+TEST_F(SessionTest, EverySourceCountsForItself) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  EXPECT_TRUE(session.submit(landmarks(50, "camera")).has_value());
+  EXPECT_TRUE(session.submit(landmarks(6, "ius")).has_value());
+  EXPECT_FALSE(session.submit(landmarks(50, "camera")).has_value());
+  EXPECT_TRUE(session.submit(landmarks(7, "ius")).has_value());
+}
+
+TEST_F(SessionTest, ASequenceThatTheJournalCannotHoldIsRefusedAndLocksNothing) {
+  Session session(kCase, hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  for (const std::uint64_t sequence : {kMaxSequence + 1, ~std::uint64_t{0}}) {
+    const auto refused = session.submit(landmarks(sequence));
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(refused.error().message, HasSubstr("must be at most 9223372036854775807"));
+  }
+  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+  EXPECT_TRUE(session.submit(landmarks(kMaxSequence)).has_value());
 }
 
 TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
@@ -206,7 +230,7 @@ TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
   EXPECT_THAT(answered, ElementsAre(1, 4, 5));  // oldest first
 }
 
-TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
+TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
   Gate gate;
   Session session(kCase, hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
                     if (call == 1) {
@@ -218,7 +242,7 @@ TEST_F(SessionTest, TheNumberOfWaitingSourcesIsBounded) {
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   gate.entered.get_future().wait();
-  for (std::uint64_t i = 0; i < Session::kMaxSources; ++i) {
+  for (std::uint64_t i = 1; i < Session::kMaxSources; ++i) {
     EXPECT_TRUE(session.submit(landmarks(2 + i, "source " + std::to_string(i))).has_value());
   }
   const auto refused = session.submit(landmarks(100, "one too many"));
