@@ -22,7 +22,7 @@ void walk_segments(const Points& segments, double spacing, std::vector<Vec3>& po
     const double length = along.norm();
     double position = until_next;
     for (; position < length; position += spacing) {
-      points.push_back(from + along * (position / length));
+      points.emplace_back(from + along * (position / length));
     }
     until_next = position - length;
   }

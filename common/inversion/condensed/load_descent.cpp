@@ -25,6 +25,8 @@ constexpr int kPartOfSlaves = 5;
 constexpr int kFewestSlaves = 16;
 // Farther from the minimum than this, a new linear model is worth its price.
 constexpr double kFar = 1.0;
+// Steps from afar that are shorter than this zigzag across an edge.
+constexpr double kShort = 0.1;
 
 }  // namespace
 
@@ -235,9 +237,12 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       if (auto status = begin(sampled, strengths); !status) return tl::unexpected(status.error());
       curvature_.reset();
     } else {
-      newton_ -= next_;  // change of the gradient
-      const bool learned = curvature_.learn(change_, newton_);
-      newton_ += next_;
+      bool learned = false;
+      if (decrement_ <= kFar || length < kShort) {
+        newton_ -= next_;  // change of the gradient
+        learned = curvature_.learn(change_, newton_);
+        newton_ += next_;
+      }
       if (fell) {
         accept_trial();
         value_ = after_;

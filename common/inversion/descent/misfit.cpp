@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/descent/misfit.hpp"
 
-#include <utility>
-
 #include "common/inversion/contract/data_check.hpp"
 
 namespace brainshift::inversion {
 
-Misfit::Misfit(const SparseData& data, fem::SamplingMatrix sampling)
-    : data_(data),
-      sampling_(std::move(sampling)),
-      weights_(data.sd_mm.array().square().inverse()) {}
+Misfit::Misfit(const SparseData& data, const fem::SamplingMatrix& sampling)
+    : data_(data), sampling_(sampling), weights_(data.sd_mm.array().square().inverse()) {}
 
 Result<Misfit> Misfit::build(const PreparedModel& model, const SparseData& data) {
   auto sampling = fem::sampling_matrix(model.locator(), model.model().mesh.num_nodes(),
                                        data.positions, kOutsideTolerance_mm);
   if (!sampling) return tl::unexpected(sampling.error());
-  return Misfit(data, std::move(*sampling));
+  return Misfit(data, *sampling);
 }
 
 Points Misfit::sample(const Points& u) const { return (sampling_ * u.transpose()).transpose(); }

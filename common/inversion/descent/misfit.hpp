@@ -29,7 +29,7 @@ class Misfit {
   double inner(const Points& r, const Points& s) const;
 
  private:
-  Misfit(const SparseData& data, fem::SamplingMatrix sampling);
+  Misfit(const SparseData& data, const fem::SamplingMatrix& sampling);
   const SparseData& data_;
   fem::SamplingMatrix sampling_;
   VecX weights_;
