@@ -153,7 +153,8 @@ cv::Scalar magnitude_colour(double t) {
     return colours;
   }();
   const double clamped = std::isfinite(t) ? std::clamp(t, 0.0, 1.0) : 0.0;
-  const cv::Vec3b c = table.at<cv::Vec3b>(0, static_cast<int>(std::lround(64.0 + 191.0 * clamped)));
+  const cv::Vec3b& c =
+      table.at<cv::Vec3b>(0, static_cast<int>(std::lround(64.0 + 191.0 * clamped)));
   return {static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
 }
 
