@@ -10,10 +10,11 @@ namespace brainshift::linalg {
 std::string blas_kernel();
 
 // OpenBLAS chooses its kernel by the model of the processor. One that is younger than the library
-// gets the oldest kernel, Prescott (SSE3), whatever it can do: dense products then take four times
-// as long. This starts the program again, with OPENBLAS_CORETYPE set to the kernel for AVX2 or
-// AVX-512, where that is so; otherwise it returns. OPENBLAS_CORETYPE is the user's choice where it
-// is set. Call it first in main(): nothing may be open, running or written yet.
+// gets the oldest kernel, Prescott (SSE3), whatever it can do (a product of 1,000 x 1,000 on a Xeon
+// of model 207: 15 GFlop/s, with Haswell 40, with SkylakeX 67). This starts the program again, with
+// OPENBLAS_CORETYPE set to the kernel for AVX2 or AVX-512, where that is so; otherwise it returns.
+// OPENBLAS_CORETYPE is the user's choice where it is set. Call it first in main(): nothing may be
+// open, running or written yet.
 void choose_blas_kernel();
 
 }  // namespace brainshift::linalg

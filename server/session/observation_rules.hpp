@@ -16,9 +16,9 @@ inline constexpr std::uint64_t kMaxSequence = (std::uint64_t{1} << 63) - 1;
 
 // Ok, or kInvalidArgument for another case, a frame other than "ras", an empty or overlong source,
 // or a sequence number that is not above `last_sequence`, the last one of this source, or above
-// kMaxSequence. The sentence names the field and its
-// value. The numbers of the body are not looked at: wire::decode_observation has tested that they
-// are finite and that standard deviations are not negative.
+// kMaxSequence. The sentence names the field and its value. The numbers of the body are not looked
+// at: wire::decode_observation has tested that they are finite and that standard deviations are not
+// negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          std::uint64_t last_sequence);
 

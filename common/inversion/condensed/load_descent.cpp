@@ -37,7 +37,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
       factor_(operators, beta, team),
       reduction_(operators, window, factor_, team),
       contact_(operators, window, beta, contact, factor_, team),
-      reach_(operators, window, beta, reduction_, team),
+      reach_(operators, window, beta, contact, reduction_, team),
       posterior_(window),
       z_(VecX::Zero(window.count)),
       trial_(window.count),
@@ -118,11 +118,16 @@ Status LoadDescent::solve_contact(const VecX& z) {
   auto forces = foretold_.head(reduction_.size());
   reduction_.forces_at(z, forces);
   contact_.begin_from(reduction_.active(), forces);
-  contact_at_z_ = &z == &z_;
+  contact_at_z_ = false;
   return contact_.solve(z);
 }
 
-Status LoadDescent::at_present() { return contact_at_z_ ? Status{} : solve_contact(z_); }
+Status LoadDescent::return_contact() {
+  if (contact_at_z_) return {};
+  if (auto status = solve_contact(z_); !status) return status;
+  contact_at_z_ = true;
+  return {};
+}
 
 void LoadDescent::accept_trial() {
   z_ = trial_;
@@ -151,17 +156,18 @@ bool LoadDescent::far_from_model() const {
 Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
   if (auto status = posterior_.minimise(strengths); !status) return status;
   z_ = posterior_.z();
-  if (auto status = solve_contact(z_); !status) return status;
+  contact_at_z_ = false;
+  if (auto status = return_contact(); !status) return status;
   return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
 }
 
 Status LoadDescent::take(SampledOperators& sampled) {
-  if (auto status = at_present(); !status) return status;
+  if (auto status = return_contact(); !status) return status;
   return linearise(sampled);
 }
 
 Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {
-  if (auto status = at_present(); !status) return status;
+  if (auto status = return_contact(); !status) return status;
   value_ = objective(sampled, strengths, z_);
   if (auto status = posterior_.minimise(strengths); !status) return status;
   step_ = posterior_.z() - z_;
@@ -189,7 +195,7 @@ Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
     }
   }
   if (!outcome) return outcome;
-  if (auto status = at_present(); !status) return tl::unexpected(status.error());
+  if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
     if (auto status = posterior_.minimise(strengths); !status) {
@@ -266,7 +272,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
 Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
                                                     const PriorStrengths& strengths,
                                                     const DescentLimits& limits) {
-  if (auto status = at_present(); !status) return tl::unexpected(status.error());
+  if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
   }
@@ -306,7 +312,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
   if (!strengths.mean_shift(shift)) {
     return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
   }
-  if (auto status = at_present(); !status) return status;
+  if (auto status = return_contact(); !status) return status;
   const double most_probable = misfit(sampled, z_);
   step_ = shift.tail(window_.count);
   double length = reach_.along(step_, contact_.penetration(), most_changes() / 2);

@@ -120,8 +120,9 @@ class LoadDescent {
   int most_changes() const;
   // Contact at z, from the forces that the linear model foretells.
   Status solve_contact(const VecX& z);
-  // Contact at z_, where it is not there already.
-  Status at_present();
+  // The same at z_, unless contact_ is there already.
+  Status return_contact();
+  // trial_ becomes z_; contact_ is there already.
   void accept_trial();
   // The first sum of J at z, whose contact is solved, without the loads' own.
   double misfit(SampledOperators& sampled, const VecX& z);
@@ -150,7 +151,7 @@ class LoadDescent {
   NewtonBundle bundle_;
   Eigen::MatrixXd covariance_factor_;
   double decrement_ = 0.0;
-  bool contact_at_z_ = false;
+  bool contact_at_z_ = false;  // else at a trial or at the mean
 };
 
 }  // namespace brainshift::inversion

@@ -8,10 +8,11 @@
 namespace brainshift::inversion {
 
 ContactReach::ContactReach(const CondensedOperators& operators, ModeWindow window, double beta,
-                           const ContactReduction& reduction, ThreadTeam& team)
+                           bool contact, const ContactReduction& reduction, ThreadTeam& team)
     : operators_(operators),
       window_(window),
       beta_(beta),
+      contact_(contact),
       reduction_(reduction),
       team_(team),
       opening_(operators.num_slaves()),
@@ -19,6 +20,7 @@ ContactReach::ContactReach(const CondensedOperators& operators, ModeWindow windo
       crossings_(operators.num_slaves()) {}
 
 double ContactReach::along(const VecX& step, const VecX& penetration, int most) {
+  if (!contact_) return 1.0;
   const auto& active = reduction_.active();
   const int k = reduction_.size();
   auto opening = opening_.head(k);

@@ -19,8 +19,9 @@ namespace brainshift::inversion {
 
 class ContactReach {
  public:
-  // Keeps references to all but the numbers. beta: penalty, N/mm.
-  ContactReach(const CondensedOperators& operators, ModeWindow window, double beta,
+  // Keeps references to all but the numbers. beta: penalty, N/mm. contact: false keeps every slave
+  // open, so that every step reaches its end.
+  ContactReach(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
                const ContactReduction& reduction, ThreadTeam& team);
 
   // The largest t <= 1 at which at most `most` slaves have changed on the way z + t step; at least
@@ -34,6 +35,7 @@ class ContactReach {
   const CondensedOperators& operators_;
   ModeWindow window_;
   double beta_;
+  bool contact_;
   const ContactReduction& reduction_;
   ThreadTeam& team_;
   VecX opening_, closing_;  // changes of force, N, and of penetration, mm

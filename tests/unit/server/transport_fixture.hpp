@@ -139,6 +139,14 @@ class TransportTest : public testing::Test {
     ASSERT_EQ(peer.ask(MessageType::kSubscribeRequest).type, MessageType::kSubscribeReply);
   }
 
+  // A session of which `peer` has received the update of one observation.
+  static void begin_with_update(RawPeer& peer, std::uint64_t sequence) {
+    start_session(peer);
+    subscribe(peer);
+    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    ASSERT_EQ(next_update(peer).update.observation_sequence, sequence);
+  }
+
   static wire::UpdateMessage next_update(RawPeer& peer) {
     Received received = peer.receive();
     while (received.type != MessageType::kUpdate) received = peer.receive();

@@ -6,27 +6,14 @@
 #include <Eigen/Cholesky>
 
 #include "common/core/random.hpp"
+#include "tests/unit/inversion/skull_fixture.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
 using Eigen::MatrixXd;
 
-constexpr int kSlaves = 150, kColumns = 3;
-constexpr double kBeta = 5.0;
-
-CondensedOperators operators() {
-  CondensedOperators result;
-  result.compliance.resize(kSlaves, kSlaves);
-  for (int i = 0; i < kSlaves; ++i) {
-    for (int j = 0; j < kSlaves; ++j) {
-      result.compliance(i, j) = 2.0 * std::exp(-std::abs(i - j) / 5.0);
-    }
-    result.slaves.push_back(i);
-  }
-  result.contact_columns.resize(3, kSlaves);  // as many columns as slaves
-  return result;
-}
+constexpr int kColumns = 3;
 
 MatrixXd right_hand_sides(int rows) {
   Random random(9);
@@ -59,7 +46,7 @@ contact::ActiveSet random_set(Random& random, double share) {
 }
 
 TEST(ContactFactor, SolvesForSetsThatFollowEachOther) {
-  const CondensedOperators brain = operators();
+  const CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team(2);
   ContactFactor factor(brain, kBeta, team);
   Random random(3);
@@ -80,7 +67,7 @@ TEST(ContactFactor, SolvesForSetsThatFollowEachOther) {
 }
 
 TEST(ContactFactor, SolvesWhereSlavesOnlyJoinOrOnlyLeave) {
-  const CondensedOperators brain = operators();
+  const CondensedOperators brain = skull_operators(0.5);
   for (const bool join : {true, false}) {
     ThreadTeam team(2);
     ContactFactor factor(brain, kBeta, team);
@@ -89,13 +76,13 @@ TEST(ContactFactor, SolvesWhereSlavesOnlyJoinOrOnlyLeave) {
     ASSERT_TRUE(factor.take(set));
     for (int i = 0; i < 8; ++i) set[static_cast<std::size_t>(join ? 3 * i + 1 : 3 * i)] = join;
     ASSERT_TRUE(factor.take(set));
-    EXPECT_EQ(factor.work_rows(), 50 + 8);
+    EXPECT_EQ(factor.work_rows(), kSlaves / 3 + 8);
     expect_solves(brain, factor, set);
   }
 }
 
 TEST(ContactFactor, ServesTheEmptySetAndComesBackFromIt) {
-  const CondensedOperators brain = operators();
+  const CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team(2);
   ContactFactor factor(brain, kBeta, team);
   Random random(4);
@@ -107,7 +94,7 @@ TEST(ContactFactor, ServesTheEmptySetAndComesBackFromIt) {
 }
 
 TEST(ContactFactor, AnIndefiniteComplianceIsRejectedAndLeavesNoSet) {
-  CondensedOperators brain = operators();
+  CondensedOperators brain = skull_operators(0.5);
   brain.compliance(7, 7) = -1.0;
   ThreadTeam team(2);
   ContactFactor factor(brain, kBeta, team);

@@ -24,13 +24,21 @@ int changes(const CondensedOperators& brain, const ContactReduction& model, cons
   return count;
 }
 
+struct Skull {
+  explicit Skull(bool with_contact = true)
+      : contact(brain, kWindow, kBeta, with_contact, factor, team),
+        reach(brain, kWindow, kBeta, with_contact, model, team) {}
+  CondensedOperators brain = skull_operators(0.5);
+  ThreadTeam team{2};
+  ContactFactor factor{brain, kBeta, team};
+  ContactReduction model{brain, kWindow, factor, team};
+  ContactAtLoads contact;
+  ContactReach reach;
+};
+
 TEST(ContactReach, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
-  const CondensedOperators brain = skull_operators(0.5);
-  ThreadTeam team(2);
-  ContactFactor factor(brain, kBeta, team);
-  ContactReduction model(brain, kWindow, factor, team);
-  ContactAtLoads contact(brain, kWindow, kBeta, true, factor, team);
-  ContactReach reach(brain, kWindow, kBeta, model, team);
+  Skull skull;
+  auto& [brain, team, factor, model, contact, reach] = skull;
   int shortened = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const VecX z = skull_loads(seed, 0.5), step = skull_loads(seed + 20, 2.0);
@@ -51,12 +59,8 @@ TEST(ContactReach, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
 }
 
 TEST(ContactReach, SlavesThatTheLinearModelHasWrongAlreadyDoNotCount) {
-  const CondensedOperators brain = skull_operators(0.5);
-  ThreadTeam team(1);
-  ContactFactor factor(brain, kBeta, team);
-  ContactReduction model(brain, kWindow, factor, team);
-  ContactAtLoads contact(brain, kWindow, kBeta, true, factor, team);
-  ContactReach reach(brain, kWindow, kBeta, model, team);
+  Skull skull;
+  auto& [brain, team, factor, model, contact, reach] = skull;
   ASSERT_TRUE(model.activate(contact::ActiveSet(kSlaves)));
   const VecX z = skull_loads(3, 1.0);
   ASSERT_TRUE(contact.solve(z));
@@ -65,6 +69,13 @@ TEST(ContactReach, SlavesThatTheLinearModelHasWrongAlreadyDoNotCount) {
   EXPECT_EQ(reach.along(VecX::Zero(kModes), contact.penetration(), 0), 1.0);
   EXPECT_GT(reach.along(1e-6 * skull_loads(4, 1.0), contact.penetration(), 0),
             ContactReach::kShortest);
+}
+
+TEST(ContactReach, WithoutContactEveryStepReachesItsEnd) {
+  Skull with, without(false);
+  const VecX step = skull_loads(3, 3.0);
+  ASSERT_LT(with.reach.along(step, with.contact.penetration(), 0), 1.0);
+  EXPECT_EQ(without.reach.along(step, without.contact.penetration(), 0), 1.0);
 }
 
 }  // namespace

@@ -41,10 +41,7 @@ TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {
 TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
   serve(with_model());
   RawPeer sender(endpoint_);
-  start_session(sender);
-  subscribe(sender);
-  sender.request(MessageType::kObservation, wire::encode(landmarks(42)));
-  ASSERT_EQ(next_update(sender).update.observation_sequence, 42u);
+  begin_with_update(sender, 42);
   RawPeer late(endpoint_);
   subscribe(late);
   EXPECT_EQ(next_update(late).update.observation_sequence, 42u);
@@ -54,10 +51,7 @@ TEST_F(TransportTest, ALateSubscriberReceivesTheLastUpdateAtOnce) {
 TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
   serve(with_model());
   RawPeer sender(endpoint_);
-  start_session(sender);
-  subscribe(sender);
-  sender.request(MessageType::kObservation, wire::encode(landmarks(42)));
-  ASSERT_EQ(next_update(sender).update.observation_sequence, 42u);
+  begin_with_update(sender, 42);
   start_session(sender);
   RawPeer late(endpoint_);
   subscribe(late);
