@@ -79,6 +79,8 @@ void add_replay(CLI::App& app, Status& status) {
                    "--speed max")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
+  command->add_flag("--takeover", options.takeover,
+                    "end the session of another client that is still connected");
   command->add_option("--latency-csv", options.latency_csv,
                       "also write latency, stage times and contact of every update, a row each; "
                       "with --boundary both a file per boundary, \"-contact\" and \"-fixed\" added "

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/lib/client.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "client/lib/dealer.hpp"
 #include "client/lib/latest_usable.hpp"
+#include "client/lib/session_watch.hpp"
 #include "client/lib/update_queue.hpp"
 #include "common/wire/frame.hpp"
 
@@ -33,6 +35,7 @@ Status validate(const ClientOptions& options) {
   Status status = check_range("request_timeout", options.request_timeout);
   if (status) status = check_range("session_timeout", options.session_timeout);
   if (status) status = check_range("heartbeat_interval", options.heartbeat_interval);
+  if (status) status = check_range("renewal_interval", options.renewal_interval);
   return status;
 }
 
@@ -44,6 +47,11 @@ struct Client::Impl {
   std::uint64_t last_request_id = 0;
   UpdateQueue updates{kMaxQueuedUpdates};
   LatestUsable latest_usable;
+  SessionWatch watch;
+  std::optional<Subscription> subscription;
+  std::uint64_t acknowledged = 0;  // of subscription->received
+  Deadline renewed;                // when it was last renewed
+  std::uint64_t losses = 0;        // of the dealer, as far as they have been dealt with
 
   // Sends a request and waits for its reply's payload. Updates met on the way are queued.
   Result<std::string> request(MessageType type, const std::string& payload, MessageType reply_type,
@@ -51,6 +59,18 @@ struct Client::Impl {
   // The payload if `message` answers request `id`; nullopt if it is an update or a late reply.
   std::optional<Result<std::string>> answer(const std::string& message, std::uint64_t id,
                                             MessageType reply_type);
+  void take_state(std::uint64_t request_id, std::string_view payload);
+  void take_update(std::string_view payload);
+  // Subscribes again where the connection was lost since the last time.
+  void notice_losses();
+  // Tells the daemon what was received, and asks what is current. Never waits for the answer.
+  void renew(Deadline deadline);
+  Deadline next_renewal() const;
+  // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
+  // said what is newest.
+  Status confirm(Deadline deadline);
+  // Receives one message for nobody in particular.
+  Status receive_push(Deadline deadline);
   // The oldest queued update, on its way to the caller.
   std::optional<Result<wire::UpdateMessage>> hand_out();
 
@@ -83,8 +103,12 @@ std::optional<Result<std::string>> Client::Impl::answer(const std::string& messa
   const auto frame = wire::decode_frame(message);
   if (!frame) return protocol_error(frame.error().message);
   if (frame->type == MessageType::kUpdate) {
-    updates.push(wire::decode_update(frame->payload));
+    take_update(frame->payload);
     return std::nullopt;
+  }
+  if (frame->type == MessageType::kSessionState) {
+    take_state(frame->request_id, frame->payload);
+    if (frame->request_id != id) return std::nullopt;
   }
   if (frame->request_id != 0 && frame->request_id < id) return std::nullopt;  // timed out before
   // A daemon that could not read a request's id complains with id 0.
@@ -101,6 +125,74 @@ std::optional<Result<std::string>> Client::Impl::answer(const std::string& messa
                           ", must be " + std::to_string(static_cast<int>(reply_type)));
   }
   return std::string(frame->payload);
+}
+
+void Client::Impl::take_state(std::uint64_t request_id, std::string_view payload) {
+  const auto state = wire::decode_session_state(payload);
+  if (!state) return;  // subscribe() reports it; a renewal without an answer proves nothing
+  if (request_id == 0) {
+    watch.told(*state);
+  } else {
+    watch.answered(request_id, *state);
+  }
+  latest_usable.follow(state->session);
+}
+
+void Client::Impl::take_update(std::string_view payload) {
+  if (subscription) ++subscription->received;
+  auto update = wire::decode_update(payload);
+  if (update &&
+      (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id))) {
+    return;
+  }
+  updates.push(std::move(update));
+}
+
+void Client::Impl::notice_losses() {
+  if (dealer->losses() == losses) return;
+  losses = dealer->losses();
+  watch.lost();
+  if (!subscription) return;
+  ++subscription->id;
+  subscription->received = acknowledged = 0;
+  renewed = {};
+}
+
+void Client::Impl::renew(Deadline deadline) {
+  notice_losses();
+  const Deadline now = std::chrono::steady_clock::now();
+  const std::uint64_t id = ++last_request_id;
+  watch.asked(id, now);
+  renewed = now;
+  acknowledged = subscription->received;
+  // Without a connection there is nothing to renew: field_status() tells in time.
+  static_cast<void>(dealer->send(
+      encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), deadline));
+}
+
+Deadline Client::Impl::next_renewal() const {
+  const std::uint64_t batch = std::max<std::uint64_t>(1, subscription->window / 2);
+  if (subscription->received - acknowledged >= batch) return renewed;
+  return renewed + options.renewal_interval;
+}
+
+Status Client::Impl::receive_push(Deadline deadline) {
+  const auto message = dealer->receive(deadline);
+  if (!message) return tl::unexpected(message.error());
+  // No request is open: a reply with an old id is late, one with the next id is unasked for.
+  const auto unexpected = answer(*message, last_request_id + 1, MessageType::kUpdate);
+  if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
+  return {};
+}
+
+Status Client::Impl::confirm(Deadline deadline) {
+  const Deadline asked = std::chrono::steady_clock::now();
+  renew(deadline);
+  while (!watch.as_of() || *watch.as_of() < asked) {
+    if (auto status = receive_push(deadline); !status) return status;
+  }
+  updates.drop_older_than(*watch.state());
+  return {};
 }
 
 std::optional<Result<wire::UpdateMessage>> Client::Impl::hand_out() {
@@ -137,7 +229,8 @@ Result<wire::SessionInfo> Client::start_session(const wire::SessionRequest& requ
                 MessageType::kStartSessionReply, impl_->options.session_timeout)
       .and_then([](const std::string& payload) { return wire::decode_session_info(payload); })
       .map([this](wire::SessionInfo info) {
-        impl_->latest_usable.begin(info.session_id);
+        impl_->latest_usable.begin(info.key());
+        impl_->watch.expect_model(info.model_id);
         return info;
       });
 }
@@ -146,40 +239,87 @@ Result<BrainModel> Client::model() {
   return impl_
       ->request(MessageType::kModelRequest, "", MessageType::kModelReply,
                 impl_->options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_model(payload); });
+      .and_then([](const std::string& payload) { return wire::decode_model(payload); })
+      .map([this](BrainModel model) {
+        impl_->watch.expect_model(model.model_id);
+        return model;
+      });
 }
 
-Status Client::subscribe() {
-  return impl_
-      ->request(MessageType::kSubscribeRequest, "", MessageType::kSubscribeReply,
-                impl_->options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_subscribe_reply(payload); })
-      .map([this](std::uint64_t session_id) { impl_->latest_usable.follow(session_id); });
+Status Client::subscribe(std::uint32_t window) {
+  if (window < 1 || window > Subscription::kMaxWindow) {
+    return fail(ErrorCode::kInvalidArgument, "window = " + std::to_string(window) +
+                                                 ": must be in [1, " +
+                                                 std::to_string(Subscription::kMaxWindow) + "]");
+  }
+  Impl& self = *impl_;
+  self.notice_losses();
+  const std::uint64_t id = self.subscription ? self.subscription->id + 1 : 1;
+  self.subscription = Subscription{id, window, 0};
+  self.acknowledged = 0;
+  self.renewed = std::chrono::steady_clock::now();
+  self.watch.asked(self.last_request_id + 1, self.renewed);
+  return self
+      .request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
+               MessageType::kSessionState, self.options.request_timeout)
+      .and_then([](const std::string& payload) { return wire::decode_session_state(payload); })
+      .map([](const SessionState&) {});
 }
 
 Result<wire::ObservationReceipt> Client::submit(const Observation& observation) {
+  std::string payload;
+  if (observation.session == SessionKey{}) {
+    Observation named = observation;
+    named.session = impl_->latest_usable.session();
+    payload = wire::encode(named);
+  } else {
+    payload = wire::encode(observation);
+  }
   return impl_
-      ->request(MessageType::kObservation, wire::encode(observation),
-                MessageType::kObservationReply, impl_->options.request_timeout)
-      .and_then(
-          [](const std::string& payload) { return wire::decode_observation_receipt(payload); });
+      ->request(MessageType::kObservation, payload, MessageType::kObservationReply,
+                impl_->options.request_timeout)
+      .and_then([](const std::string& reply) { return wire::decode_observation_receipt(reply); });
 }
 
 Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
-  if (auto update = impl_->hand_out()) return *std::move(update);
+  Impl& self = *impl_;
   const Deadline deadline = deadline_after(timeout);
+  self.notice_losses();
+  if (self.subscription && self.subscription->window == 1) {
+    while (self.dealer->readable()) {
+      if (auto status = self.receive_push(deadline); !status) return tl::unexpected(status.error());
+    }
+    if (self.updates.size() > 0) {
+      if (auto status = self.confirm(deadline); !status) return tl::unexpected(status.error());
+    }
+  }
   while (true) {
-    const auto message = impl_->dealer->receive(deadline);
-    if (!message) return tl::unexpected(message.error());
-    // No request is open: a reply with an old id is late, one with the next id is unasked for.
-    auto unexpected = impl_->answer(*message, impl_->last_request_id + 1, MessageType::kUpdate);
-    if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
-    if (auto update = impl_->hand_out()) return *std::move(update);
+    if (auto update = self.hand_out()) return *std::move(update);
+    Deadline until = deadline;
+    if (self.subscription) {
+      if (self.next_renewal() <= std::chrono::steady_clock::now()) self.renew(deadline);
+      until = std::min(deadline, self.next_renewal());
+    }
+    const auto status = self.receive_push(until);
+    if (status) continue;
+    const bool lost = self.dealer->losses() != self.losses;
+    self.notice_losses();
+    const bool waiting = status.error().code == ErrorCode::kUnavailable && !lost &&
+                         std::chrono::steady_clock::now() < deadline;
+    if (!waiting) return tl::unexpected(status.error());
   }
 }
 
 const std::optional<wire::UpdateMessage>& Client::latest_usable() const {
   return impl_->latest_usable.get();
 }
+
+FieldStatus Client::field_status() const {
+  std::optional<std::pair<SessionKey, std::uint64_t>> shown;
+  if (const auto& field = latest_usable()) shown.emplace(field->key(), field->update.sequence);
+  return impl_->watch.judge(shown, impl_->dealer->endpoint(), std::chrono::steady_clock::now());
+}
+
+const std::optional<SessionState>& Client::session_state() const { return impl_->watch.state(); }
 
 }  // namespace brainshift::client

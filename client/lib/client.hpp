@@ -23,6 +23,18 @@
 //     draw(model->mesh.nodes + u);
 //   }
 //
+// Currency. The top hazard is an old picture that looks current. field_status() says whether the
+// field of latest_usable() is current, and if not, why, in a sentence to show. It is stale as soon
+// as the daemon has not confirmed it for a second: by this computer's clock from the moment at
+// which the question was sent, so that no queue on the way makes it look younger. next_update()
+// asks every 250 ms while it waits, subscribes again after a restart, and drops the updates of
+// other sessions. A viewer that calls it rarely gets the newest update then, not the oldest, and
+// shows stale in between. Draw, at least once a second:
+//
+//   (void)client->next_update(std::chrono::milliseconds(100));
+//   const FieldStatus status = client->field_status();
+//   banner(status.currency == Currency::kCurrent ? "" : status.reason);
+//
 // Quality. Every final update carries a verdict on its field (common/values/quality.hpp): good,
 // caution, unusable. An unusable field is no deformation of a brain. It arrives like any other, so
 // that the user can be told why; latest_usable() keeps the field before it. Draw that one. When it
@@ -43,13 +55,16 @@
 // talk to one daemon, which has one session at a time for all of them.
 //
 // Waiting. Every call returns within its timeout. Updates that arrive while a call waits for its
-// reply are queued for next_update(). The queue holds 256 of them; when it is full, the oldest
-// iterate gives way. Final updates and errors are never dropped.
+// reply are queued for next_update(); the daemon sends no more than the subscription's window.
 //
 // Lost connections. connect() does not wait for the daemon; the first request does. When the
 // daemon goes away while a call waits, the call returns kUnavailable at once instead of at its
-// timeout. The connection comes back by itself, but the daemon may have forgotten this client:
-// subscribe again, and start the session again if the daemon was restarted.
+// timeout. The connection comes back by itself, and next_update() subscribes again. A daemon that
+// was restarted runs no session, or one that somebody else started: its key differs.
+//
+// Sessions. A session belongs to the client that started it until that client disconnects. Another
+// one ends it only with SessionRequest::takeover. submit() names the session for the caller: the
+// one that this client started or, when it only subscribed, the one that runs.
 #pragma once
 
 #include <chrono>
@@ -58,9 +73,11 @@
 #include <optional>
 #include <string>
 
+#include "client/lib/field_status.hpp"
 #include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/observation.hpp"
+#include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
@@ -73,6 +90,8 @@ struct ClientOptions {
   std::chrono::milliseconds session_timeout{600000};
   // A daemon that misses three heartbeats counts as gone.
   std::chrono::milliseconds heartbeat_interval{1000};
+  // How often next_update() asks what is current while it waits.
+  std::chrono::milliseconds renewal_interval{250};
 };
 
 class Client {
@@ -98,22 +117,33 @@ class Client {
 
   // From now on the daemon pushes updates to this client. If there is a usable update already, the
   // newest one comes at once, and after it the newest error or unusable update since.
-  Status subscribe();
+  // window: updates that may be under way at once, 1 to Subscription::kMaxWindow. 1 is for a
+  // viewer: it gets the newest update whenever it asks, and never one that the daemon knows to be
+  // outdated. More is for one that wants every update, and reads at once.
+  Status subscribe(std::uint32_t window = 1);
 
   // Hands an observation over. Returns when the daemon has accepted it, not when it has been
   // inverted. The receipt tells whether it replaced an older one of the same source that still
   // waited. kInvalidArgument and others: the daemon rejects the observation and names the field.
+  // Without a session in it, it is for this client's (see Sessions).
   Result<wire::ObservationReceipt> submit(const Observation& observation);
 
   // The next pushed update in order of arrival: an iterate, a final update (Update::final) of any
   // quality, or the error that an observation ended in. Only Update::usable() ones may be shown.
-  // kUnavailable when none arrives within the timeout.
+  // With a window of 1, one that had to wait here is first confirmed to be the newest.
+  // kUnavailable when none arrives within the timeout, and at once when the connection is lost.
   Result<wire::UpdateMessage> next_update(std::chrono::milliseconds timeout);
 
   // The newest usable update of the running session among those that next_update() has returned.
   // Neither errors, iterates and unusable updates nor a lost connection replace it; the start of
   // another session does. Empty before the first one.
   const std::optional<wire::UpdateMessage>& latest_usable() const;
+
+  // Whether that field may be shown as current, now.
+  FieldStatus field_status() const;
+
+  // What the daemon last said of its session; empty before subscribe().
+  const std::optional<SessionState>& session_state() const;
 
  private:
   struct Impl;

@@ -133,7 +133,9 @@ bool Dealer::read_monitor() {
     std::uint16_t number = 0;
     if (bytes.size() >= sizeof number) std::memcpy(&number, bytes.data(), sizeof number);
     connected_ = number == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
-    lost = lost || number == ZMQ_EVENT_DISCONNECTED;
+    if (number != ZMQ_EVENT_DISCONNECTED) continue;
+    lost = true;
+    ++losses_;
   }
   return lost;
 }
@@ -154,6 +156,11 @@ Status Dealer::send(std::string_view message, Deadline deadline) {
     }
   } while (remaining_ms(deadline) > 0);
   return fail(ErrorCode::kUnavailable, "no daemon at " + endpoint_);
+}
+
+bool Dealer::readable() const {
+  zmq_pollitem_t item{socket_, 0, ZMQ_POLLIN, 0};
+  return zmq_poll(&item, 1, 0) == 1;
 }
 
 Result<std::string> Dealer::receive(Deadline deadline) {

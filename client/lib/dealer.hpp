@@ -9,6 +9,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -34,6 +35,12 @@ class Dealer {
   // message.
   Result<std::string> receive(Deadline deadline);
 
+  // Something has arrived; receive() would not wait.
+  bool readable() const;
+  // Connections lost so far, whichever call noticed: what the peer knew of this client is gone
+  // with each.
+  std::uint64_t losses() const { return losses_; }
+
   const std::string& endpoint() const { return endpoint_; }
 
  private:
@@ -48,6 +55,7 @@ class Dealer {
   void* context_ = nullptr;
   void* socket_ = nullptr;
   void* monitor_ = nullptr;
+  std::uint64_t losses_ = 0;
   bool connected_ = false;  // a handshake, and no loss since, in the order of the monitor's reports
 };
 

@@ -3,18 +3,23 @@
 
 namespace brainshift::client {
 
-void LatestUsable::begin(std::uint64_t session_id) {
-  session_id_ = session_id;
+void LatestUsable::begin(const SessionKey& session) {
+  session_ = session;
   latest_.reset();
 }
 
-void LatestUsable::follow(std::uint64_t session_id) {
-  if (session_id != session_id_) begin(session_id);
+void LatestUsable::follow(const SessionKey& session) {
+  if (session != session_) begin(session);
+}
+
+bool LatestUsable::belongs(const SessionKey& session) const {
+  if (session_ == SessionKey{} || session == session_) return true;
+  return session.boot_id == session_.boot_id && session.session_id > session_.session_id;
 }
 
 void LatestUsable::take(const wire::UpdateMessage& message) {
-  if (message.session_id < session_id_) return;
-  follow(message.session_id);
+  if (!belongs(message.key())) return;
+  follow(message.key());
   if (message.error || !message.update.usable()) return;
   latest_ = message;
 }

@@ -2,27 +2,31 @@
 // The newest update whose field may be shown. Private to client/lib. Not thread-safe.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 
+#include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 
 // Iterates, failures and unusable fields pass it by: they never replace a usable field. A field of
-// another session is somebody else's picture: a new session forgets it, and an older one, such as a
-// snapshot that was still on its way, does not bring it back.
+// another session is somebody else's picture: a new session forgets it, and an older one, or one of
+// another daemon, such as a snapshot that was still on its way, does not bring it back.
 class LatestUsable {
  public:
   // This client's session is now this one; forgets the field of any earlier one.
-  void begin(std::uint64_t session_id);
-  // The daemon runs this session: begins it unless it has begun already.
-  void follow(std::uint64_t session_id);
+  void begin(const SessionKey& session);
+  // The daemon says that it runs this session: begins it unless it has begun already.
+  void follow(const SessionKey& session);
+  // Whether an update of this session is one of the running session, or of the next that its daemon
+  // began. Before the first session: any.
+  bool belongs(const SessionKey& session) const;
   void take(const wire::UpdateMessage& message);
   const std::optional<wire::UpdateMessage>& get() const { return latest_; }
+  const SessionKey& session() const { return session_; }
 
  private:
-  std::uint64_t session_id_ = 0;
+  SessionKey session_;
   std::optional<wire::UpdateMessage> latest_;
 };
 

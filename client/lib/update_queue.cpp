@@ -15,6 +15,15 @@ void UpdateQueue::push(Result<wire::UpdateMessage> update) {
   if (iterate != updates_.end()) updates_.erase(iterate);
 }
 
+void UpdateQueue::drop_older_than(const SessionState& state) {
+  std::erase_if(updates_, [&](const Result<wire::UpdateMessage>& entry) {
+    if (!entry) return false;
+    if (entry->key() != state.session) return true;
+    const bool usable = !entry->error && entry->update.usable();
+    return entry->update.sequence < (usable ? state.newest_usable : state.newest_update);
+  });
+}
+
 std::optional<Result<wire::UpdateMessage>> UpdateQueue::pop() {
   if (updates_.empty()) return std::nullopt;
   std::optional<Result<wire::UpdateMessage>> front(std::move(updates_.front()));

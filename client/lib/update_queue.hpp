@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "common/core/error.hpp"
+#include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
@@ -23,6 +24,9 @@ class UpdateQueue {
   // The oldest entry; nullopt when there is none.
   std::optional<Result<wire::UpdateMessage>> pop();
   std::size_t size() const { return updates_.size(); }
+  // Drops what the daemon has newer: usable fields before newest_usable, everything else before
+  // newest_update, and all of another session than the state's. Entries that are errors stay.
+  void drop_older_than(const SessionState& state);
 
  private:
   std::size_t capacity_;

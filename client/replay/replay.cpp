@@ -43,6 +43,10 @@ Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile
                                               std::to_string(record.sequence) + ": " +
                                               observation.error().message);
     }
+    // A journal has the daemon's clock, by which it reckoned ages. The session is the next one's.
+    if (observation->daemon_ns != 0) observation->acquired_ns = observation->daemon_ns;
+    observation->daemon_ns = observation->sent_ns = 0;
+    observation->session = {};
     observations.push_back({record.recorded_ns, std::move(*observation)});
   }
   if (observations.empty()) {
@@ -133,11 +137,16 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
                                      .method = options.method,
                                      .boundary = boundary,
                                      .publish_iterates = options.repeat == 1,
-                                     .measure_full_solve = true});
+                                     .measure_full_solve = true,
+                                     .takeover = options.takeover,
+                                     .recorded_clock = true});
   if (!info) return tl::unexpected<Error>(info.error());
   auto model = client->model();
   if (!model) return tl::unexpected<Error>(model.error());
-  if (Status ok = client->subscribe(); !ok) return tl::unexpected<Error>(ok.error());
+  // Every update counts here, and every iterate.
+  if (Status ok = client->subscribe(Subscription::kMaxWindow); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
   return Session{std::move(*client), std::move(*info), std::move(*model)};
 }
 

@@ -29,6 +29,7 @@ struct ReplayOptions {
   // How often the recording is played; more than 1 at Speed::kMax only. Iterates are requested
   // only when it is 1: they would add to the latencies that repeating is there to measure.
   int repeat = 1;
+  bool takeover = false;  // ends another client's session
   // Written when not empty: one row per observation sent, see latency_csv(). With several
   // boundaries there is one file for each, with "-<boundary>" before the extension.
   std::filesystem::path latency_csv;

@@ -9,6 +9,7 @@
 
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
+#include "common/values/session_state.hpp"
 
 namespace brainshift {
 
@@ -43,8 +44,12 @@ struct Observation {
   std::string frame = "ras";          // only "ras" enters the inversion
   std::string source;                 // e.g. "ius", "stereopsis", "pointer"
   std::uint64_t sequence = 0;         // counts up per source, from 1, below 2^63
-  std::int64_t acquired_ns = 0;       // monotonic clock of the recording
+  std::int64_t acquired_ns = 0;       // monotonic clock of the source
   std::int64_t acquired_wall_ns = 0;  // metadata only, UTC since the epoch
+  SessionKey session;                 // that it is for; empty in a recording
+  std::int64_t sent_ns = 0;           // the source's clock at hand-over; 0: not stated
+  // acquired_ns on the clock of the daemon that journalled it; 0: not journalled, or a replay.
+  std::int64_t daemon_ns = 0;
   std::variant<TumourBoundary, CorticalSurface, LandmarkPairs, PatientPose> body;
 };
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/wire/convert.hpp"
+#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {
@@ -161,6 +162,16 @@ TriangleSurface Checked::surface(const pb::Surface& value, std::string_view fiel
   surface.triangles = index_columns<3>(value.triangle_indices(), surface.num_vertices(),
                                        std::string(field) + ".triangle_indices");
   return surface;
+}
+
+SessionKey session_key_from(const pb::SessionKey& value) {
+  return {value.boot_id(), value.session_id(), value.model_id()};
+}
+
+void set(const SessionKey& key, pb::SessionKey* out) {
+  out->set_boot_id(key.boot_id);
+  out->set_session_id(key.session_id);
+  out->set_model_id(to_utf8(key.model_id));
 }
 
 void set(const Points& points, pb::PointSet* out) {

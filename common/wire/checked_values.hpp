@@ -15,6 +15,7 @@
 #include "common/core/mesh.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/types.hpp"
+#include "common/values/session_state.hpp"
 
 namespace brainshift::wire {
 
@@ -73,6 +74,9 @@ class Checked {
   Status status_;
 };
 
+// Any key is valid: what it names is the session's to judge.
+SessionKey session_key_from(const pb::SessionKey& value);
+
 // Core values into Protobuf fields. Float fields round to 32 bits.
 void set(const Points& points, pb::PointSet* out);
 void set(const Points& points, google::protobuf::RepeatedField<float>* xyz);
@@ -82,6 +86,7 @@ void set(const TriangleSurface& surface, pb::Surface* out);
 void set(const Vec3& vector, google::protobuf::RepeatedField<double>* xyz);
 void set(const MeanStd& value, pb::MeanStd* out);
 void set(const RigidTransform& T, pb::Rigid* out);
+void set(const SessionKey& key, pb::SessionKey* out);
 
 template <int Rows>
 void set(const IndexColumns<Rows>& columns, google::protobuf::RepeatedField<std::int32_t>* out) {

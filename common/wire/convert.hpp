@@ -27,6 +27,7 @@
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
+#include "common/values/session_state.hpp"
 
 namespace brainshift::wire {
 
@@ -51,6 +52,10 @@ struct SessionRequest {
   Boundary boundary = Boundary::kContact;
   bool publish_iterates = false;
   bool measure_full_solve = false;
+  // End the running session although another client that is still connected started it.
+  bool takeover = false;
+  // Ages by the observations' own clock, which all sources share (a replay); false: by arrival.
+  bool recorded_clock = false;
 };
 
 struct SessionInfo {
@@ -63,6 +68,9 @@ struct SessionInfo {
   std::uint64_t model_bytes = 0;
   double full_solve_ms = 0.0;
   double factor_s = 0.0;
+  std::uint64_t boot_id = 0;  // of the daemon's process
+
+  SessionKey key() const { return {boot_id, session_id, model_id}; }
 };
 
 struct ObservationReceipt {
@@ -75,6 +83,9 @@ struct UpdateMessage {
   std::uint64_t session_id = 0;
   Update update;
   std::optional<Error> error;  // set when the observation gave no estimate
+  std::uint64_t boot_id = 0;   // of the daemon's process
+
+  SessionKey key() const { return {boot_id, session_id, update.model_id}; }
 };
 
 std::string encode(const DaemonStatus& status);
@@ -90,7 +101,10 @@ std::string encode(const UpdateMessage& message);
 std::string encode_without_timings(const UpdateMessage& message);
 void append_timings(const StageTimings& timings, std::string& payload);
 std::string encode(const Error& error);
-std::string encode_subscribe_reply(std::uint64_t session_id);
+std::string encode(const Subscription& subscription);
+std::string encode(const SessionState& state);
+// Adds daemon_ns (Observation) to an observation's payload that has none, without decoding it.
+void append_daemon_time(std::int64_t daemon_ns, std::string& payload);
 
 Result<DaemonStatus> decode_status(std::string_view payload);
 Result<SessionRequest> decode_session_request(std::string_view payload);
@@ -99,7 +113,10 @@ Result<BrainModel> decode_model(std::string_view payload);
 Result<Observation> decode_observation(std::string_view payload);
 Result<ObservationReceipt> decode_observation_receipt(std::string_view payload);
 Result<UpdateMessage> decode_update(std::string_view payload);
-Result<std::uint64_t> decode_subscribe_reply(std::string_view payload);
+Result<Subscription> decode_subscription(std::string_view payload);
+Result<SessionState> decode_session_state(std::string_view payload);
+// Requests that carry nothing: kProtocol unless the payload is empty. `name` of the message.
+Status decode_empty(std::string_view payload, std::string_view name);
 // The error carried by an ErrorReply; kProtocol when the payload itself is malformed.
 Error decode_error(std::string_view payload);
 

@@ -75,8 +75,17 @@ std::string encode(const Observation& observation) {
   message.set_sequence(observation.sequence);
   message.set_acquired_ns(observation.acquired_ns);
   message.set_acquired_wall_ns(observation.acquired_wall_ns);
+  if (observation.session != SessionKey{}) set(observation.session, message.mutable_session());
+  message.set_sent_ns(observation.sent_ns);
+  message.set_daemon_ns(observation.daemon_ns);
   std::visit([&](const auto& body) { set_body(body, message); }, observation.body);
   return message.SerializeAsString();
+}
+
+void append_daemon_time(std::int64_t daemon_ns, std::string& payload) {
+  pb::Observation only;
+  only.set_daemon_ns(daemon_ns);
+  only.AppendToString(&payload);
 }
 
 Result<Observation> decode_observation(std::string_view payload) {
@@ -89,6 +98,9 @@ Result<Observation> decode_observation(std::string_view payload) {
   observation.sequence = message.sequence();
   observation.acquired_ns = message.acquired_ns();
   observation.acquired_wall_ns = message.acquired_wall_ns();
+  observation.session = session_key_from(message.session());
+  observation.sent_ns = message.sent_ns();
+  observation.daemon_ns = message.daemon_ns();
   Checked checked;
   switch (message.body_case()) {
     case pb::Observation::kTumourBoundary:

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
@@ -35,6 +37,8 @@ std::string encode(const SessionRequest& request) {
   message.set_boundary(std::string(to_string(request.boundary)));
   message.set_publish_iterates(request.publish_iterates);
   message.set_measure_full_solve(request.measure_full_solve);
+  message.set_takeover(request.takeover);
+  message.set_recorded_clock(request.recorded_clock);
   return message.SerializeAsString();
 }
 
@@ -55,8 +59,13 @@ Result<SessionRequest> decode_session_request(std::string_view payload) {
                 "start_session.boundary = " + in_quotes(message.boundary()) +
                     ": must be \"contact\" or \"fixed\"");
   }
-  return SessionRequest{message.case_id(), *method, *boundary, message.publish_iterates(),
-                        message.measure_full_solve()};
+  return SessionRequest{message.case_id(),
+                        *method,
+                        *boundary,
+                        message.publish_iterates(),
+                        message.measure_full_solve(),
+                        message.takeover(),
+                        message.recorded_clock()};
 }
 
 std::string encode(const SessionInfo& info) {
@@ -70,6 +79,7 @@ std::string encode(const SessionInfo& info) {
   message.set_model_bytes(info.model_bytes);
   message.set_full_solve_ms(info.full_solve_ms);
   message.set_factor_s(info.factor_s);
+  message.set_boot_id(info.boot_id);
   return message.SerializeAsString();
 }
 
@@ -87,6 +97,7 @@ Result<SessionInfo> decode_session_info(std::string_view payload) {
   info.model_bytes = message.model_bytes();
   info.full_solve_ms = checked.non_negative(message.full_solve_ms(), "session.full_solve_ms");
   info.factor_s = checked.non_negative(message.factor_s(), "session.factor_s");
+  info.boot_id = message.boot_id();
   if (!checked.ok()) return tl::unexpected(checked.status().error());
   return info;
 }
@@ -104,16 +115,65 @@ Result<ObservationReceipt> decode_observation_receipt(std::string_view payload) 
   return ObservationReceipt{message.observation_sequence(), message.replaced_pending()};
 }
 
-std::string encode_subscribe_reply(std::uint64_t session_id) {
-  pb::SubscribeReply message;
-  message.set_session_id(session_id);
+std::string encode(const Subscription& subscription) {
+  pb::SubscribeRequest message;
+  message.set_subscription(subscription.id);
+  message.set_window(subscription.window);
+  message.set_received(subscription.received);
   return message.SerializeAsString();
 }
 
-Result<std::uint64_t> decode_subscribe_reply(std::string_view payload) {
-  pb::SubscribeReply message;
+Result<Subscription> decode_subscription(std::string_view payload) {
+  pb::SubscribeRequest message;
   if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
-  return message.session_id();
+  Checked checked;
+  if (!checked.require(message.window() <= Subscription::kMaxWindow, "subscribe.window",
+                       std::to_string(message.window()) + ", must be at most " +
+                           std::to_string(Subscription::kMaxWindow))) {
+    return tl::unexpected(checked.status().error());
+  }
+  return Subscription{message.subscription(), std::max(message.window(), 1u), message.received()};
+}
+
+std::string encode(const SessionState& state) {
+  pb::SessionState message;
+  set(state.session, message.mutable_session());
+  message.set_phase(static_cast<pb::SessionPhase>(static_cast<int>(state.phase) + 1));
+  message.set_newest_update(state.newest_update);
+  message.set_newest_usable(state.newest_usable);
+  message.set_age_ms(state.age_ms);
+  message.set_valid_ms(state.valid_ms);
+  message.set_reason(to_utf8(state.reason));
+  message.set_preparing(state.preparing);
+  return message.SerializeAsString();
+}
+
+Result<SessionState> decode_session_state(std::string_view payload) {
+  pb::SessionState message;
+  if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
+  Checked checked;
+  checked.require(
+      message.phase() >= pb::SESSION_PHASE_EMPTY && message.phase() <= pb::SESSION_PHASE_CLOSED,
+      "session_state.phase", std::to_string(message.phase()) + " is unknown");
+  checked.require(message.newest_usable() <= message.newest_update(), "session_state.newest_usable",
+                  "is above newest_update");
+  SessionState state;
+  state.session = session_key_from(message.session());
+  state.phase = static_cast<SessionPhase>(static_cast<int>(message.phase()) - 1);
+  state.newest_update = message.newest_update();
+  state.newest_usable = message.newest_usable();
+  state.age_ms = checked.non_negative(message.age_ms(), "session_state.age_ms");
+  state.valid_ms = message.valid_ms();
+  state.reason = one_line(message.reason());
+  state.preparing = message.preparing();
+  if (!checked.ok()) return tl::unexpected(checked.status().error());
+  return state;
+}
+
+Status decode_empty(std::string_view payload, std::string_view name) {
+  if (payload.empty()) return {};
+  return fail(ErrorCode::kProtocol, std::string(name) + ": carries " +
+                                        std::to_string(payload.size()) + " bytes, must be empty");
 }
 
 std::string encode(const Error& error) {

@@ -210,6 +210,7 @@ pb::Update to_message(const UpdateMessage& message) {
   out.set_case_id(to_utf8(update.case_id));
   out.set_model_id(to_utf8(update.model_id));
   out.set_session_id(message.session_id);
+  out.set_boot_id(message.boot_id);
   out.set_sequence(update.sequence);
   out.set_observation_sequence(update.observation_sequence);
   out.set_method(std::string(to_string(update.method)));
@@ -263,6 +264,7 @@ Result<UpdateMessage> decode_update(std::string_view payload) {
   Checked checked;
   UpdateMessage decoded;
   decoded.session_id = message.session_id();
+  decoded.boot_id = message.boot_id();
   decoded.update = get_envelope(message, checked);
   if (message.status() == kFailed) {
     checked.require(!message.error_code().empty(), "update.error_code",

@@ -14,6 +14,7 @@ constexpr std::size_t kTypeOffset = 6;
 constexpr std::size_t kSizeOffset = 8;
 constexpr std::size_t kCrcOffset = 12;
 constexpr std::size_t kRequestIdOffset = 16;
+constexpr std::uint16_t kRetiredType = 8;
 
 // Byte by byte, so that the layout does not depend on the machine's byte order.
 template <typename T>
@@ -32,14 +33,20 @@ T read_little_endian(std::string_view bytes, std::size_t offset) {
   return static_cast<T>(value);
 }
 
-std::uint32_t crc_of(std::string_view payload) {
+std::uint32_t continue_crc(std::uint32_t crc, std::string_view bytes) {
   return static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const Bytef*>(payload.data()), payload.size()));
+      crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+// Of a header, whose own CRC field may hold anything, and its payload.
+std::uint32_t crc_of(std::string_view header, std::string_view payload) {
+  const std::uint32_t crc = continue_crc(0, header.substr(0, kCrcOffset));
+  return continue_crc(continue_crc(crc, header.substr(kRequestIdOffset)), payload);
 }
 
 bool is_known(std::uint16_t type) {
   return type >= static_cast<std::uint16_t>(MessageType::kStatusRequest) &&
-         type <= static_cast<std::uint16_t>(MessageType::kUpdate);
+         type <= static_cast<std::uint16_t>(MessageType::kSessionState) && type != kRetiredType;
 }
 
 tl::unexpected<Error> refuse(const std::string& field, const std::string& detail) {
@@ -56,8 +63,12 @@ std::string encode_frame(MessageType type, std::uint64_t request_id, std::string
   append_little_endian(frame, kVersion);
   append_little_endian(frame, static_cast<std::uint16_t>(type));
   append_little_endian(frame, static_cast<std::uint32_t>(payload.size()));
-  append_little_endian(frame, crc_of(payload));
+  append_little_endian(frame, std::uint32_t{0});
   append_little_endian(frame, request_id);
+  const std::uint32_t crc = crc_of(frame, payload);
+  for (std::size_t i = 0; i < sizeof crc; ++i) {
+    frame[kCrcOffset + i] = static_cast<char>((crc >> (8 * i)) & 0xffu);
+  }
   frame.append(payload);
   return frame;
 }
@@ -84,8 +95,9 @@ Result<Frame> decode_frame(std::string_view bytes) {
     return refuse("payload size", std::to_string(size) + " bytes stated, " +
                                       std::to_string(payload.size()) + " received");
   }
-  if (crc_of(payload) != read_little_endian<std::uint32_t>(bytes, kCrcOffset)) {
-    return refuse("CRC-32", "does not match the payload");
+  if (crc_of(bytes.substr(0, kHeaderBytes), payload) !=
+      read_little_endian<std::uint32_t>(bytes, kCrcOffset)) {
+    return refuse("CRC-32", "does not match the message");
   }
   return Frame{static_cast<MessageType>(type),
                read_little_endian<std::uint64_t>(bytes, kRequestIdOffset), payload};

@@ -4,12 +4,13 @@
 // Protobuf alone accepts truncated and concatenated input, so every payload is framed:
 //   offset  size  field        (little-endian)
 //        0     4  magic        "BSFT"
-//        4     2  version      1
+//        4     2  version      2
 //        6     2  type         MessageType
 //        8     4  payload size bytes, <= kMaxPayloadBytes
-//       12     4  CRC-32       of the payload (zlib polynomial)
+//       12     4  CRC-32       of all other bytes: 0-11, 16-23, the payload (zlib polynomial)
 //       16     8  request id   chosen by the client, echoed in the reply; 0 for pushed updates
-// decode_frame rejects anything else: kProtocol, with the name of the header's field.
+// decode_frame rejects anything else: kProtocol, with the name of the header's field. (Version 1
+// left the header out of its CRC.)
 #pragma once
 
 #include <cstdint>
@@ -29,15 +30,16 @@ enum class MessageType : std::uint16_t {
   kModelRequest = 5,
   kModelReply = 6,
   kSubscribeRequest = 7,
-  kSubscribeReply = 8,
+  // 8 was version 1's reply to a subscription
   kObservation = 9,
   kObservationReply = 10,
   kErrorReply = 11,
   kUpdate = 12,
+  kSessionState = 13,
 };
 
 inline constexpr std::size_t kHeaderBytes = 24;
-inline constexpr std::uint16_t kVersion = 1;
+inline constexpr std::uint16_t kVersion = 2;
 // 100k nodes need about 2 MiB per update and 8 MiB per model. Anything near the cap is an attack
 // or a bug.
 inline constexpr std::size_t kMaxPayloadBytes = 64u << 20;

@@ -14,7 +14,7 @@ namespace gp = google::protobuf;
 
 // Wire types of the Protobuf encoding; groups (3, 4) are obsolete and rejected.
 enum WireType : std::uint32_t { kVarint = 0, kFixed64 = 1, kLength = 2, kFixed32 = 5 };
-constexpr int kMaxDepth = 8;  // deeper than any message of version 1
+constexpr int kMaxDepth = 8;  // deeper than any message
 
 bool take_varint(std::string_view& bytes, std::uint64_t& value) {
   value = 0;
@@ -36,12 +36,17 @@ bool take(std::string_view& bytes, std::uint64_t count, std::string_view& taken)
 
 // Wire type of one value of the field.
 WireType value_wire_type(const gp::FieldDescriptor& field) {
-  switch (field.cpp_type()) {
-    case gp::FieldDescriptor::CPPTYPE_DOUBLE: return kFixed64;
-    case gp::FieldDescriptor::CPPTYPE_FLOAT: return kFixed32;
-    case gp::FieldDescriptor::CPPTYPE_STRING:
-    case gp::FieldDescriptor::CPPTYPE_MESSAGE: return kLength;
-    default: return kVarint;  // version 1 has no fixed-width integers
+  switch (field.type()) {
+    case gp::FieldDescriptor::TYPE_DOUBLE:
+    case gp::FieldDescriptor::TYPE_FIXED64:
+    case gp::FieldDescriptor::TYPE_SFIXED64: return kFixed64;
+    case gp::FieldDescriptor::TYPE_FLOAT:
+    case gp::FieldDescriptor::TYPE_FIXED32:
+    case gp::FieldDescriptor::TYPE_SFIXED32: return kFixed32;
+    case gp::FieldDescriptor::TYPE_STRING:
+    case gp::FieldDescriptor::TYPE_BYTES:
+    case gp::FieldDescriptor::TYPE_MESSAGE: return kLength;
+    default: return kVarint;
   }
 }
 

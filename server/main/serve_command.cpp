@@ -55,8 +55,8 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.case_file = file->config.file;
   auto store =
       std::make_shared<ModelStore>(model, std::move(file->config), std::move(file->condensed));
-  options.make_model = [store](const wire::SessionRequest& request) {
-    return store->make(request);
+  options.make_model = [store](const wire::SessionRequest& request, const std::stop_token& stop) {
+    return store->make(request, stop);
   };
   return options;
 }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <random>
 #include <utility>
 
 #include "common/core/utc_time.hpp"
@@ -14,9 +15,7 @@ namespace {
 
 using wire::MessageType;
 
-Reply error_reply(const Error& error) {
-  return {MessageType::kErrorReply, wire::encode(error), false};
-}
+Reply error_reply(const Error& error) { return {MessageType::kErrorReply, wire::encode(error)}; }
 
 Reply model_not_ready() { return error_reply({ErrorCode::kModelNotReady, "no model is loaded"}); }
 
@@ -25,10 +24,18 @@ io::SurgeryRecord record(io::RecordKind kind, std::uint64_t sequence, std::strin
   return {kind, sequence, now / std::chrono::nanoseconds(1), std::move(payload)};
 }
 
+ServiceOptions with_boot_id(ServiceOptions options) {
+  std::random_device entropy;
+  while (options.boot_id == 0) {
+    options.boot_id = (static_cast<std::uint64_t>(entropy()) << 32) | entropy();
+  }
+  return options;
+}
+
 }  // namespace
 
 Service::Service(ServiceOptions options, Outbox& outbox)
-    : options_(std::move(options)), outbox_(outbox) {
+    : options_(with_boot_id(std::move(options))), outbox_(outbox) {
   if (!options_.journal_dir.empty()) {
     Journal::Options journal;
     journal.open = options_.open_journal;
@@ -42,7 +49,9 @@ Service::Service(ServiceOptions options, Outbox& outbox)
       begin_journal(request, info);
     };
     hooks.publish = [this](wire::UpdateMessage message) { publish(std::move(message)); };
-    session_ = std::make_unique<Session>(options_.model->case_id, std::move(hooks));
+    hooks.on_change = [this] { push_state(); };
+    session_ = std::make_unique<Session>(options_.model->case_id, std::move(hooks),
+                                         options_.boot_id, options_.model->model_id);
   }
 }
 
@@ -56,17 +65,19 @@ void Service::stop() {
 std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame& frame) {
   switch (frame.type) {
     case MessageType::kStatusRequest:
-      return Reply{MessageType::kStatusReply, wire::encode(status()), false};
-    case MessageType::kSubscribeRequest: {
-      const std::uint64_t session = session_ ? session_->state().session_id : 0;
-      return Reply{MessageType::kSubscribeReply, wire::encode_subscribe_reply(session), true,
-                   session};
-    }
+      if (auto empty = wire::decode_empty(frame.payload, "StatusRequest"); !empty) {
+        return error_reply(empty.error());
+      }
+      return Reply{MessageType::kStatusReply, wire::encode(status())};
+    case MessageType::kSubscribeRequest: return subscribe(frame);
     case MessageType::kStartSessionRequest: return start_session(peer, frame);
     case MessageType::kModelRequest:
+      if (auto empty = wire::decode_empty(frame.payload, "ModelRequest"); !empty) {
+        return error_reply(empty.error());
+      }
       if (!options_.model) return model_not_ready();
       if (encoded_model_.empty()) encoded_model_ = wire::encode(*options_.model);
-      return Reply{MessageType::kModelReply, encoded_model_, false};
+      return Reply{MessageType::kModelReply, encoded_model_};
     case MessageType::kObservation: return observe(frame);
     default: break;
   }
@@ -78,7 +89,7 @@ std::optional<Reply> Service::start_session(const std::string& peer, const wire:
   if (!session_) return model_not_ready();
   const auto request = wire::decode_session_request(frame.payload);
   if (!request) return error_reply(request.error());
-  session_->start(*request, [this, peer, id = frame.request_id](Result<wire::SessionInfo> info) {
+  const auto done = [this, peer, id = frame.request_id](Result<wire::SessionInfo> info) {
     std::string bytes;
     if (info) {
       spdlog::info("session ready session={} prepare_s={:.2f}", info->session_id, info->prepare_s);
@@ -89,7 +100,8 @@ std::optional<Reply> Service::start_session(const std::string& peer, const wire:
       bytes = wire::encode_frame(MessageType::kErrorReply, id, wire::encode(info.error()));
     }
     outbox_.post({Delivery::kReply, peer, std::make_shared<const std::string>(std::move(bytes))});
-  });
+  };
+  session_->start(*request, done, peer);
   return std::nullopt;
 }
 
@@ -98,11 +110,15 @@ Reply Service::observe(const wire::Frame& frame) {
   auto observation = wire::decode_observation(frame.payload);
   if (!observation) return error_reply(observation.error());
   const std::uint64_t sequence = observation->sequence;
+  const bool plain = observation->daemon_ns == 0;
   // Queued before the worker can answer it, so that the journal holds cause before effect.
-  const auto receipt = session_->submit(std::move(*observation), [&] {
+  const auto receipt = session_->submit(std::move(*observation), [&](const Observation& accepted) {
     if (!journal_) return;
     const Stopwatch watch;
-    journal_->append(record(io::RecordKind::kObservation, sequence, std::string(frame.payload)));
+    // A client has no business with daemon_ns: what it put there is left out.
+    std::string payload = plain ? std::string(frame.payload) : wire::encode(accepted);
+    if (plain) wire::append_daemon_time(accepted.daemon_ns, payload);
+    journal_->append(record(io::RecordKind::kObservation, sequence, std::move(payload)));
     journal_ms_ = watch.milliseconds();
   });
   if (!receipt) {
@@ -110,7 +126,35 @@ Reply Service::observe(const wire::Frame& frame) {
                   to_string(receipt.error().code), receipt.error().message);
     return error_reply(receipt.error());
   }
-  return {MessageType::kObservationReply, wire::encode(*receipt), false};
+  return {MessageType::kObservationReply, wire::encode(*receipt)};
+}
+
+Reply Service::subscribe(const wire::Frame& frame) const {
+  const auto subscription = wire::decode_subscription(frame.payload);
+  if (!subscription) return error_reply(subscription.error());
+  const SessionState state = session_state();
+  return {MessageType::kSessionState, wire::encode(state), *subscription, state.session.session_id};
+}
+
+SessionState Service::session_state() const {
+  SessionState state;
+  if (session_) state = session_->state().shared;
+  state.session.boot_id = options_.boot_id;
+  state.valid_ms = static_cast<std::uint32_t>(kValidity.count());
+  return state;
+}
+
+// In the order in which they were taken: an older one must not be the last.
+void Service::push_state() {
+  const std::lock_guard lock(push_mutex_);
+  const SessionState state = session_state();
+  auto frame = std::make_shared<const std::string>(
+      wire::encode_frame(MessageType::kSessionState, 0, wire::encode(state)));
+  outbox_.post({Delivery::kState, {}, std::move(frame), state.session.session_id});
+}
+
+void Service::left(const std::string& peer) {
+  if (session_) session_->leave(peer);
 }
 
 wire::DaemonStatus Service::status() const {

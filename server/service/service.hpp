@@ -6,10 +6,14 @@
 //   StatusRequest           StatusReply, always
 //   StartSessionRequest     StartSessionReply later, when the session is ready
 //   ModelRequest            ModelReply
-//   SubscribeRequest        SubscribeReply, then updates
+//   SubscribeRequest        SessionState, then updates and, when the session or its phase changes,
+//                           SessionState again
 //   Observation             ObservationReply when accepted; updates follow
 //   anything else           ErrorReply (protocol)
 // Without a model everything but status and subscribe gets ErrorReply (model_not_ready).
+//
+// What a SessionState says holds for kValidity after the viewer sent the request for it, by the
+// viewer's clock (common/values/session_state.hpp): three renewals may be lost.
 //
 // An update is encoded once: subscribers and the journal get the same bytes. They carry the time of
 // their own encoding, which is why the timings stand at their end, and as journal_ms the time that
@@ -23,9 +27,12 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -48,6 +55,7 @@ struct ServiceOptions {
   std::filesystem::path journal_dir;        // empty: no journal
   std::filesystem::path case_file;          // metadata of the journal
   OpenSink open_journal = open_surgery_file;
+  std::uint64_t boot_id = 0;  // 0: a random one
 };
 
 class Service final : public RequestHandler {
@@ -57,6 +65,9 @@ class Service final : public RequestHandler {
   ~Service() override;
 
   std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) override;
+  void left(const std::string& peer) override;
+
+  static constexpr std::chrono::milliseconds kValidity{1000};
 
   // Ends the inversion, then writes the journal out. Idempotent.
   void stop();
@@ -64,12 +75,16 @@ class Service final : public RequestHandler {
  private:
   std::optional<Reply> start_session(const std::string& peer, const wire::Frame& frame);
   Reply observe(const wire::Frame& frame);
+  Reply subscribe(const wire::Frame& frame) const;
+  SessionState session_state() const;
+  void push_state();
   wire::DaemonStatus status() const;
   void begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info);
   void publish(wire::UpdateMessage message);
 
-  const ServiceOptions options_;
+  const ServiceOptions options_;  // boot_id is set
   Outbox& outbox_;
+  std::mutex push_mutex_;
   const Stopwatch uptime_;
   std::atomic<double> journal_ms_{0.0};  // the newest observation's way into the journal
   std::string encoded_model_;            // made once, on the first request

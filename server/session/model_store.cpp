@@ -27,6 +27,10 @@ inversion::CondensedOptions condensed_options(const ScenePlan& plan, const Brain
   return options;
 }
 
+tl::unexpected<Error> stopped() {
+  return fail(ErrorCode::kUnavailable, "the preparation was stopped");
+}
+
 }  // namespace
 
 ModelStore::ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
@@ -40,10 +44,12 @@ ModelStore::ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig confi
   }
 }
 
-Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary boundary) {
+Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary boundary,
+                                                                    const std::stop_token& stop) {
   if (const auto found = factorised_.find(boundary); found != factorised_.end()) {
     return found->second;
   }
+  if (stop.stop_requested()) return stopped();
   spdlog::info("factorising boundary={}", to_string(boundary));
   auto made = PreparedModel::prepare(model_, config_, boundary);
   if (!made) return tl::unexpected(made.error());
@@ -52,16 +58,19 @@ Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary bou
   return shared;
 }
 
-Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(Boundary boundary) {
+Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
+    Boundary boundary, const std::stop_token& stop) {
   if (const auto found = condensed_.find(boundary); found != condensed_.end()) {
     return found->second;
   }
-  const auto factor = factorised(boundary);
+  const auto factor = factorised(boundary, stop);
   if (!factor) return tl::unexpected(factor.error());
   spdlog::info("condensing boundary={}: the model file holds no operators for it",
                to_string(boundary));
   const Stopwatch watch;
-  auto made = inversion::condense(**factor);
+  inversion::CondenseOptions options;
+  options.stop = stop;
+  auto made = inversion::condense(**factor, options);
   if (!made) return tl::unexpected(made.error());
   made->prepare_s = (*factor)->timings().total_s + watch.seconds();
   auto shared = std::make_shared<const CondensedOperators>(std::move(*made));
@@ -70,23 +79,25 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(Boundary
 }
 
 Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(
-    const wire::SessionRequest& request, const ScenePlan& plan) {
+    const wire::SessionRequest& request, const ScenePlan& plan, const std::stop_token& stop) {
   if (request.method == Method::kCondensed) {
-    const auto operators = condensed(request.boundary);
+    const auto operators = condensed(request.boundary, stop);
     if (!operators) return tl::unexpected(operators.error());
     return inversion::condensed_inverter(*operators, locator_, config_,
                                          condensed_options(plan, *model_, config_));
   }
-  const auto factor = factorised(request.boundary);
+  const auto factor = factorised(request.boundary, stop);
   if (!factor) return tl::unexpected(factor.error());
-  return inversion::make_inverter(*factor, request.method);
+  if (stop.stop_requested()) return stopped();
+  return inversion::make_inverter(*factor, request.method, stop);
 }
 
-Result<std::unique_ptr<SessionModel>> ModelStore::make(const wire::SessionRequest& request) {
+Result<std::unique_ptr<SessionModel>> ModelStore::make(const wire::SessionRequest& request,
+                                                       const std::stop_token& stop) {
   const Stopwatch watch;
   const auto plan = plan_scene(config_, request.method, request.boundary);
   if (!plan) return tl::unexpected(plan.error());
-  auto made = inverter(request, *plan);
+  auto made = inverter(request, *plan, stop);
   if (!made) return tl::unexpected(made.error());
   wire::SessionInfo info;
   info.model_id = model_->model_id;
@@ -103,14 +114,15 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const wire::SessionReques
     if (before_s > 0.0) info.prepare_s = before_s;
   }
   if (request.method != Method::kCondensed || request.measure_full_solve) {
-    const auto factor = factorised(request.boundary);
+    const auto factor = factorised(request.boundary, stop);
     if (!factor) return tl::unexpected(factor.error());
     info.factor_s = (*factor)->timings().factor_s;
     if (request.measure_full_solve) {
       info.full_solve_ms = inversion::measure_full_solve_ms(**factor);
     }
   }
-  return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
+  return std::make_unique<SessionModel>(
+      SessionModel{std::move(info), std::move(*pipeline), config_.sensing.max_age_s});
 }
 
 }  // namespace brainshift::server

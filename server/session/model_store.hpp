@@ -3,11 +3,12 @@
 // session first asks: the condensed method needs the operators of the model file only, the others
 // factorise.
 //
-// Belongs to one thread, the session's worker.
+// Belongs to one thread, the session's preparer.
 #pragma once
 
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -30,14 +31,19 @@ class ModelStore {
 
   // For the request's method and boundary, with the parts that the scene carries. full_solve_ms of
   // the info is measured when the request asks for it. Errors as plan_scene,
-  // PreparedModel::prepare, condensed_inverter and make_inverter.
-  Result<std::unique_ptr<SessionModel>> make(const wire::SessionRequest& request);
+  // PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable when stopped, which
+  // is asked for between a factorisation and the next, and between blocks of columns.
+  Result<std::unique_ptr<SessionModel>> make(const wire::SessionRequest& request,
+                                             const std::stop_token& stop = {});
 
  private:
-  Result<std::shared_ptr<const inversion::PreparedModel>> factorised(Boundary boundary);
-  Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary);
+  Result<std::shared_ptr<const inversion::PreparedModel>> factorised(Boundary boundary,
+                                                                     const std::stop_token& stop);
+  Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary,
+                                                              const std::stop_token& stop);
   Result<std::unique_ptr<inversion::Inverter>> inverter(const wire::SessionRequest& request,
-                                                        const ScenePlan& plan);
+                                                        const ScenePlan& plan,
+                                                        const std::stop_token& stop);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;

@@ -14,17 +14,46 @@ namespace {
 
 // A throwing library must cost one observation, not the daemon.
 constexpr const char* kUnexpected = "unexpected failure";
+constexpr const char* kSuperseded = "another session was started before this one";
+constexpr const char* kLeft = "the client that asked for the session has left";
+constexpr const char* kStopping = "the daemon is stopping";
+
+std::int64_t monotonic_ns(std::chrono::steady_clock::time_point time) {
+  return time.time_since_epoch() / std::chrono::nanoseconds(1);
+}
 
 }  // namespace
 
-Session::Session(std::string case_id, SessionHooks hooks)
+Session::Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id,
+                 std::string model_id)
     : case_id_(std::move(case_id)),
       hooks_(std::move(hooks)),
+      boot_id_(boot_id),
+      model_id_(std::move(model_id)),
+      preparer_([this](const std::stop_token& stop) { prepare(stop); }),
       worker_([this](const std::stop_token& stop) { work(stop); }) {}
 
 Session::~Session() { stop(); }
 
-void Session::start(const wire::SessionRequest& request, const StartDone& done) {
+const std::string* Session::owner() const {
+  if (pending_start_) return &pending_start_->owner;
+  if (preparing_) return &*preparing_;
+  if (prepared_) return &prepared_->start.owner;
+  return running_ ? &running_->owner : nullptr;
+}
+
+void Session::end_running() {
+  running_.reset();
+  boxes_.clear();
+  run_stop_.request_stop();
+}
+
+void Session::changed() const {
+  if (hooks_.on_change) hooks_.on_change();
+}
+
+void Session::start(const wire::SessionRequest& request, const StartDone& done,
+                    const std::string& asking) {
   if (request.case_id != case_id_) {
     done(fail(ErrorCode::kInvalidArgument,
               fmt::format("start_session.case_id = {}: the loaded model is for {}",
@@ -32,185 +61,338 @@ void Session::start(const wire::SessionRequest& request, const StartDone& done) 
     return;
   }
   std::optional<PendingStart> superseded;
-  bool refused = false;
+  const char* refusal = nullptr;
   {
     const std::lock_guard lock(mutex_);
-    refused = stopped_;
-    if (!refused) {
-      superseded = std::exchange(pending_start_, PendingStart{request, done});
-      running_.reset();
-      boxes_.clear();
-      run_stop_.request_stop();
+    const std::string* current = owner();
+    const bool foreign = current != nullptr && !current->empty() && *current != asking;
+    if (stopped_) {
+      refusal = kStopping;
+    } else if (foreign && !request.takeover) {
+      refusal =
+          "the session belongs to another client that is connected: close that one, or take over";
+    } else {
+      superseded = std::exchange(pending_start_, PendingStart{request, done, asking});
+      prepare_stop_.request_stop();
     }
   }
-  if (refused) {
-    done(fail(ErrorCode::kUnavailable, "the daemon is stopping"));
+  if (refusal != nullptr) {
+    done(fail(ErrorCode::kUnavailable, refusal));
     return;
   }
   wake_.notify_all();
-  if (superseded) {
-    superseded->done(fail(ErrorCode::kUnavailable, "another session was started before this one"));
+  if (superseded) superseded->done(fail(ErrorCode::kUnavailable, kSuperseded));
+}
+
+void Session::leave(const std::string& gone) {
+  if (gone.empty()) return;
+  std::optional<PendingStart> abandoned;
+  {
+    const std::lock_guard lock(mutex_);
+    if (running_ && running_->owner == gone) running_->owner.clear();
+    if (prepared_ && prepared_->start.owner == gone) prepared_->start.owner.clear();
+    if (pending_start_ && pending_start_->owner == gone) {
+      abandoned = std::exchange(pending_start_, std::nullopt);
+    }
+    if (preparing_ && *preparing_ == gone) prepare_stop_.request_stop();
   }
+  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, kLeft));
+}
+
+Result<Session::Source*> Session::source_of(const Observation& observation) {
+  auto& sources = running_->sources;
+  if (const auto known = sources.find(observation.source); known != sources.end()) {
+    return &known->second;
+  }
+  if (sources.size() >= kMaxSources) {
+    return fail(ErrorCode::kUnavailable,
+                fmt::format("observation.source = {}: {} other sources have observed already",
+                            in_quotes(observation.source), sources.size()));
+  }
+  Source source{SourceClock(running_->model->max_age_s), 0, 0, {}};
+  return &sources.emplace(observation.source, std::move(source)).first->second;
 }
 
 Result<wire::ObservationReceipt> Session::submit(Observation observation,
-                                                 const std::function<void()>& on_accepted) {
+                                                 const OnAccepted& on_accepted) {
   wire::ObservationReceipt receipt;
   {
     const std::lock_guard lock(mutex_);
     if (!running_) {
-      return fail(ErrorCode::kModelNotReady, busy_ || pending_start_
-                                                 ? "the session is still being prepared"
-                                                 : "no session is running: start one first");
+      const bool coming = pending_start_ || preparing_ || prepared_;
+      return fail(ErrorCode::kModelNotReady, coming ? "the session is still being prepared"
+                                                    : "no session is running: start one first");
     }
-    auto& last_sequence = running_->last_sequence;
-    const auto last = last_sequence.find(observation.source);
-    auto status =
-        check_observation(observation, case_id_, last != last_sequence.end() ? last->second : 0);
-    if (!status) return tl::unexpected(status.error());
-    if (last == last_sequence.end() && last_sequence.size() >= kMaxSources) {
-      return fail(ErrorCode::kUnavailable,
-                  fmt::format("observation.source = {}: {} other sources have observed already",
-                              in_quotes(observation.source), last_sequence.size()));
+    if (auto status = check_observation(observation, case_id_, running_->key); !status) {
+      return tl::unexpected(status.error());
     }
+    const auto known = running_->sources.find(observation.source);
+    if (known != running_->sources.end()) {
+      const Source& last = known->second;
+      if (observation.sequence == last.last_sequence &&
+          observation.acquired_ns == last.last_acquired_ns) {
+        return last.receipt;
+      }
+      if (auto status = check_sequence(observation, last.last_sequence); !status) {
+        return tl::unexpected(status.error());
+      }
+    } else if (auto status = check_sequence(observation, 0); !status) {
+      return tl::unexpected(status.error());
+    }
+    const TimePoint arrived = std::chrono::steady_clock::now();
+    auto source = source_of(observation);
+    if (!source) return tl::unexpected(source.error());
+    const auto time_ns = running_->request.recorded_clock
+                             ? recorded_time(observation)
+                             : (*source)->clock.to_daemon(observation, monotonic_ns(arrived));
+    if (!time_ns) return tl::unexpected(time_ns.error());
     receipt.observation_sequence = observation.sequence;
     receipt.replaced_pending = boxes_.count(observation.source) > 0;
-    last_sequence[observation.source] = observation.sequence;
-    if (on_accepted) on_accepted();
-    const std::string source = observation.source;
-    boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_});
+    (*source)->last_sequence = observation.sequence;
+    (*source)->last_acquired_ns = observation.acquired_ns;
+    (*source)->receipt = receipt;
+    observation.daemon_ns = *time_ns;
+    if (on_accepted) on_accepted(observation);
+    observation.acquired_ns = observation.daemon_ns;  // one clock for all sources from here on
+    const std::string name = observation.source;
+    boxes_.insert_or_assign(name, Box{std::move(observation), ++arrivals_, arrived});
   }
   wake_.notify_all();
   return receipt;
 }
 
+SessionState Session::shared_state() const {
+  SessionState state;
+  state.session = {boot_id_, running_ ? running_->key.session_id : 0, model_id_};
+  const bool coming = pending_start_ || preparing_ || prepared_;
+  state.preparing = coming && running_.has_value();
+  if (stopped_) {
+    state.phase = SessionPhase::kClosed;
+  } else if (!running_) {
+    state.phase = coming ? SessionPhase::kPreparing : SessionPhase::kEmpty;
+  } else if (running_->newest_update == 0) {
+    state.phase = SessionPhase::kReady;
+  } else if (running_->newest_update == running_->newest_usable) {
+    state.phase = SessionPhase::kTracking;
+  } else {
+    state.phase = SessionPhase::kDegraded;
+    state.reason = running_->reason;
+  }
+  if (running_) {
+    state.newest_update = running_->newest_update;
+    state.newest_usable = running_->newest_usable;
+    if (running_->newest_usable > 0) {
+      state.age_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() -
+                                                               running_->usable_arrived)
+                         .count();
+    }
+  }
+  return state;
+}
+
 Session::State Session::state() const {
   const std::lock_guard lock(mutex_);
   State state;
-  state.session_id = running_ ? running_->session_id : 0;
-  state.busy = busy_ || pending_start_.has_value() || !boxes_.empty();
+  state.shared = shared_state();
+  state.busy = working_ || pending_start_ || preparing_ || prepared_ || !boxes_.empty();
   state.updates = updates_;
   return state;
 }
 
 void Session::stop() {
   std::optional<PendingStart> abandoned;
+  std::optional<Prepared> prepared;
   {
     const std::lock_guard lock(mutex_);
     stopped_ = true;
     abandoned = std::exchange(pending_start_, std::nullopt);
-    running_.reset();
-    boxes_.clear();
-    run_stop_.request_stop();
+    prepared = std::exchange(prepared_, std::nullopt);
+    end_running();
+    prepare_stop_.request_stop();
   }
-  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, "the daemon is stopping"));
-  if (worker_.joinable()) {
-    worker_.request_stop();
-    wake_.notify_all();
-    worker_.join();
+  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, kStopping));
+  if (prepared) prepared->start.done(fail(ErrorCode::kUnavailable, kStopping));
+  const bool first = worker_.joinable();
+  for (std::jthread* thread : {&preparer_, &worker_}) thread->request_stop();
+  wake_.notify_all();
+  for (std::jthread* thread : {&preparer_, &worker_}) {
+    if (thread->joinable()) thread->join();
   }
+  if (first) changed();
 }
 
-void Session::work(const std::stop_token& stop) {
+// ---------- preparer ----------
+
+void Session::prepare(const std::stop_token& stop) {
   while (true) {
     std::optional<PendingStart> start;
-    std::optional<Observation> observation;
+    std::stop_token cancelled;
     {
       std::unique_lock lock(mutex_);
-      busy_ = false;
-      wake_.wait(lock, stop, [&] { return pending_start_ || !boxes_.empty(); });
+      wake_.wait(lock, stop, [&] { return pending_start_.has_value(); });
       if (stop.stop_requested()) return;
-      busy_ = true;
-      run_stop_ = std::stop_source();
-      if (pending_start_) {
-        start = std::exchange(pending_start_, std::nullopt);
-      } else {
-        const auto oldest = std::min_element(
-            boxes_.begin(), boxes_.end(),
-            [](const auto& a, const auto& b) { return a.second.arrival < b.second.arrival; });
-        observation = std::move(oldest->second.observation);
-        boxes_.erase(oldest);
+      start = std::exchange(pending_start_, std::nullopt);
+      preparing_ = start->owner;
+      prepare_stop_ = std::stop_source();
+      cancelled = prepare_stop_.get_token();
+      if (running_ && running_->request.method != Method::kCondensed) {
+        end_running();
+        wake_.wait(lock, stop, [&] { return !working_; });
       }
     }
-    if (start) make_ready(*start);
-    if (observation) process(*observation);
+    changed();
+    const auto model = model_for(start->request, cancelled);
+    std::optional<Error> refusal;
+    std::optional<Prepared> overtaken;
+    {
+      const std::lock_guard lock(mutex_);
+      preparing_.reset();
+      if (stopped_ || cancelled.stop_requested()) {
+        refusal = Error{ErrorCode::kUnavailable, stopped_ ? kStopping : kSuperseded};
+      } else if (!model) {
+        refusal = model.error();
+      } else {
+        overtaken = std::exchange(prepared_, Prepared{*start, *model});
+        end_running();
+      }
+    }
+    if (refusal) start->done(tl::unexpected(*refusal));
+    if (overtaken) overtaken->start.done(fail(ErrorCode::kUnavailable, kSuperseded));
+    wake_.notify_all();
+    changed();
   }
 }
 
-Result<SessionModel*> Session::model_for(const wire::SessionRequest& request) {
+Result<SessionModel*> Session::model_for(const wire::SessionRequest& request,
+                                         const std::stop_token& stop) {
   const std::tuple key{request.boundary, request.method, request.measure_full_solve};
   if (const auto found = models_.find(key); found != models_.end()) return found->second.get();
   auto made =
-      guarded(ErrorCode::kInternal, kUnexpected, [&] { return hooks_.make_model(request); });
+      guarded(ErrorCode::kInternal, kUnexpected, [&] { return hooks_.make_model(request, stop); });
   if (!made) return tl::unexpected(made.error());
   return models_.emplace(key, std::move(*made)).first->second.get();
 }
 
-void Session::make_ready(const PendingStart& start) {
-  const auto model = model_for(start.request);
-  if (!model) {
-    start.done(tl::unexpected(model.error()));
-    return;
+// ---------- worker ----------
+
+void Session::work(const std::stop_token& stop) {
+  while (true) {
+    std::optional<Prepared> prepared;
+    std::optional<Box> box;
+    {
+      std::unique_lock lock(mutex_);
+      working_ = false;
+      wake_.notify_all();
+      wake_.wait(lock, stop, [&] { return prepared_ || !boxes_.empty(); });
+      if (stop.stop_requested()) return;
+      run_stop_ = std::stop_source();
+      if (prepared_) {
+        prepared = std::exchange(prepared_, std::nullopt);
+      } else {
+        const auto oldest = std::min_element(
+            boxes_.begin(), boxes_.end(),
+            [](const auto& a, const auto& b) { return a.second.order < b.second.order; });
+        box = std::move(oldest->second);
+        boxes_.erase(oldest);
+      }
+      working_ = true;
+    }
+    if (prepared) begin(std::move(*prepared));
+    if (box) process(*box);
   }
-  (*model)->pipeline.reset();
-  wire::SessionInfo info = (*model)->info;
+}
+
+void Session::begin(Prepared prepared) {
+  const auto& [start, model] = prepared;
+  model->pipeline.reset();
+  wire::SessionInfo info = model->info;
   {
     const std::lock_guard lock(mutex_);
     info.session_id = ++last_session_id_;
+    info.boot_id = boot_id_;
   }
   if (hooks_.on_ready) hooks_.on_ready(start.request, info);
   bool superseded = false;
   {
     const std::lock_guard lock(mutex_);
-    superseded = stopped_ || pending_start_.has_value();
-    if (!superseded) running_ = Running{info.session_id, start.request, *model, {}, 0};
+    superseded = stopped_ || prepared_.has_value();
+    if (!superseded) {
+      running_.emplace();
+      running_->key = {boot_id_, info.session_id, model_id_};
+      running_->request = start.request;
+      running_->owner = start.owner;
+      running_->model = model;
+    }
   }
   if (superseded) {
-    start.done(fail(ErrorCode::kUnavailable, "another session was started before this one"));
+    start.done(fail(ErrorCode::kUnavailable, kSuperseded));
   } else {
+    changed();
     start.done(info);
   }
 }
 
-void Session::process(const Observation& observation) {
-  Running session;
+void Session::process(const Box& box) {
+  const Observation& observation = box.observation;
+  SessionKey key;
+  wire::SessionRequest request;
+  SessionModel* model = nullptr;
+  std::uint64_t number = 0;
   RunOptions options;
   {
     const std::lock_guard lock(mutex_);
     if (!running_) return;  // replaced between taking the observation and here
-    ++running_->published;
-    session = *running_;
+    number = ++running_->published;
+    key = running_->key;
+    request = running_->request;
+    model = running_->model;
     options.stop = run_stop_.get_token();
   }
-  wire::UpdateMessage message;
-  message.session_id = session.session_id;
-  if (session.request.publish_iterates) {
+  if (request.publish_iterates) {
     options.on_iterate = [&](Update iterate) {
-      iterate.sequence = session.published;
-      hooks_.publish({session.session_id, std::move(iterate), std::nullopt});
+      iterate.sequence = number;
+      hooks_.publish({key.session_id, std::move(iterate), std::nullopt, boot_id_});
     };
   }
   auto result = guarded(ErrorCode::kInternal, kUnexpected,
-                        [&] { return session.model->pipeline.run(observation, options); });
-  if (options.stop.stop_requested()) return;
+                        [&] { return model->pipeline.run(observation, options); });
 
+  wire::UpdateMessage message;
+  message.session_id = key.session_id;
+  message.boot_id = boot_id_;
   if (result) {
     message.update = std::move(*result);
   } else {
     message.error = result.error();
     message.update.case_id = case_id_;
-    message.update.model_id = session.model->info.model_id;
+    message.update.model_id = model->info.model_id;
     message.update.observation_sequence = observation.sequence;
-    message.update.method = session.request.method;
-    message.update.boundary = session.request.boundary;
+    message.update.method = request.method;
+    message.update.boundary = request.boundary;
     message.update.final = true;
   }
-  message.update.sequence = session.published;
-  {
-    const std::lock_guard lock(mutex_);
-    if (result) ++updates_;
-  }
+  message.update.sequence = number;
+  const auto phase = state().shared.phase;
+  if (!finish(box, message, options.stop)) return;
   hooks_.publish(std::move(message));
+  if (state().shared.phase != phase) changed();
+}
+
+// False when the session has ended meanwhile: nobody hears of the message.
+bool Session::finish(const Box& box, const wire::UpdateMessage& message,
+                     const std::stop_token& stop) {
+  const std::lock_guard lock(mutex_);
+  if (stop.stop_requested() || !running_) return false;
+  running_->newest_update = message.update.sequence;
+  if (!message.error) ++updates_;
+  if (!message.error && message.update.usable()) {
+    running_->newest_usable = message.update.sequence;
+    running_->usable_arrived = box.arrived;
+  } else {
+    running_->reason =
+        message.error ? message.error->message : message.update.estimate.quality.reason;
+  }
+  return true;
 }
 
 }  // namespace brainshift::server

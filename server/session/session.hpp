@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Session: one case under one boundary and method, worked on by one thread.
+// Session: one case under one boundary and method; two threads.
 //
-//   start()   ends the running session and makes the next one ready on the worker (seconds, once
-//             per boundary and method)
-//   submit()  checks an observation and leaves it in the box of its source; never waits
-//   worker    takes the observation that arrived first, runs the pipeline, hands the message to
-//             `publish`
+//   start()    asks for the next session
+//   preparer   makes its model ready (seconds to minutes, once per boundary and method) while the
+//              running session goes on; then that one ends and the new one begins. A session of
+//              another method than condensed ends first: it uses the factor that is at work then.
+//   submit()   checks an observation and leaves it in the box of its source; never waits
+//   worker     takes the observation that arrived first, runs the pipeline, hands the message to
+//              `publish`
 //
 // Every source has a box for one observation: a newer one replaces an older one that has not
 // started, so a slow inversion never works through a backlog. Only a new session and stop() end a
 // running inversion early, whatever its method: their stop token reaches every iteration and every
 // contact set. The result of such an inversion is not published. After an error, and after an
-// unusable estimate, the usable one before it stays the valid one. All members may be called from
-// any thread, except inside the hooks.
+// unusable estimate, the usable one before it stays the valid one.
+//
+// A session belongs to the client that started it, until that one leaves: another client ends it
+// only with `takeover`. A preparation ends when a later one is asked for, when its owner leaves,
+// and at stop(). All members may be called from any thread, except inside the hooks.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -29,27 +35,34 @@
 
 #include "common/core/error.hpp"
 #include "common/values/observation.hpp"
+#include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
 #include "server/pipeline/pipeline.hpp"
+#include "server/session/source_clock.hpp"
 
 namespace brainshift::server {
 
 // All that a session of one method and boundary needs: what its clients are told, and the pipeline
 // with its state. The session keeps it for the next session of the same kind, and resets it then.
 struct SessionModel {
-  wire::SessionInfo info;  // session_id is filled in by the session
+  wire::SessionInfo info;  // boot_id and session_id are filled in by the session
   Pipeline pipeline;
+  double max_age_s = CaseConfig{}.sensing.max_age_s;  // older observations are not used
 };
-using MakeSessionModel =
-    std::function<Result<std::unique_ptr<SessionModel>>(const wire::SessionRequest&)>;
+// On the preparer's thread, one at a time. kUnavailable when stopped.
+using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
+    const wire::SessionRequest&, const std::stop_token&)>;
 
-// Called on the worker thread, one at a time.
+// Called one at a time, but for on_change.
 struct SessionHooks {
   MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
   std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
   // An iterate, a final update, or the error that an observation ended in.
   std::function<void(wire::UpdateMessage)> publish;
+  // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
+  // thread, after the update that changed it. May be empty.
+  std::function<void()> on_change;
 };
 
 class Session {
@@ -57,75 +70,119 @@ class Session {
   using StartDone = std::function<void(Result<wire::SessionInfo>)>;
 
   struct State {
-    std::uint64_t session_id = 0;  // 0: none is running
-    bool busy = false;             // making a session ready, or inverting
-    std::uint64_t updates = 0;     // final updates of all sessions
+    SessionState shared;        // valid_ms is filled in by the service
+    bool busy = false;          // making a session ready, or inverting
+    std::uint64_t updates = 0;  // final updates of all sessions
   };
 
-  Session(std::string case_id, SessionHooks hooks);
+  // boot_id, model_id: of the daemon's process and of the loaded model.
+  Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id = 0,
+          std::string model_id = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // `done` is called exactly once: on the calling thread for another case (kInvalidArgument, the
-  // running session goes on), else on the worker; kUnavailable when a later start or stop() came
-  // first.
-  void start(const wire::SessionRequest& request, const StartDone& done);
+  // `owner`: who asks; empty: nobody, and anybody may end it. `done` is called exactly once. On the
+  // calling thread: kInvalidArgument for another case, kUnavailable for a session that belongs to
+  // another client (both leave the running session alone) and after stop(). Else on the preparer
+  // or the worker; kUnavailable when a later start or stop() came first.
+  void start(const wire::SessionRequest& request, const StartDone& done,
+             const std::string& owner = {});
 
-  // kModelNotReady without a running session; the errors of check_observation; kUnavailable when
-  // kMaxSources other sources have observed. `on_accepted` is called once before the worker can see
-  // an accepted observation; it must be quick and must not call back. Precondition: the
-  // observation's numbers are finite (wire::decode_observation).
+  // This client has gone: what it owns belongs to nobody.
+  void leave(const std::string& owner);
+
+  // Called once before the worker can see an accepted observation; must be quick and must not call
+  // back. The observation's daemon_ns is set.
+  using OnAccepted = std::function<void(const Observation&)>;
+
+  // kModelNotReady without a running session; the errors of check_observation and of SourceClock;
+  // kUnavailable when kMaxSources other sources have observed. The source's last observation once
+  // more gets its receipt once more, and nothing happens. Precondition: the observation's numbers
+  // are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
-                                          const std::function<void()>& on_accepted = {});
+                                          const OnAccepted& on_accepted = {});
 
   State state() const;
 
-  // Ends the inversion and the worker; idempotent.
+  // Ends the inversion, the preparation and both threads; idempotent.
   void stop();
 
   static constexpr std::size_t kMaxSources = 16;
 
  private:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
   struct PendingStart {
     wire::SessionRequest request;
     StartDone done;
+    std::string owner;
+  };
+  struct Prepared {
+    PendingStart start;
+    SessionModel* model = nullptr;  // in models_
+  };
+  struct Source {
+    SourceClock clock;
+    std::uint64_t last_sequence = 0;
+    std::int64_t last_acquired_ns = 0;
+    wire::ObservationReceipt receipt;  // of last_sequence
   };
   struct Running {
-    std::uint64_t session_id = 0;
+    SessionKey key;
     wire::SessionRequest request;
-    SessionModel* model = nullptr;                       // in models_
-    std::map<std::string, std::uint64_t> last_sequence;  // by source
-    std::uint64_t published = 0;                         // number of the last message's update
+    std::string owner;
+    SessionModel* model = nullptr;          // in models_
+    std::map<std::string, Source> sources;  // by name
+    std::uint64_t published = 0;            // number of the last message's update
+    std::uint64_t newest_update = 0;
+    std::uint64_t newest_usable = 0;
+    TimePoint usable_arrived;  // the observation that newest_usable answers
+    std::string reason;        // why the newest update is not usable
+  };
+  struct Box {
+    Observation observation;
+    std::uint64_t order = 0;
+    TimePoint arrived;
   };
 
+  void prepare(const std::stop_token& stop);
   void work(const std::stop_token& stop);
-  void make_ready(const PendingStart& start);
-  Result<SessionModel*> model_for(const wire::SessionRequest& request);
-  void process(const Observation& observation);
+  void begin(Prepared prepared);
+  Result<SessionModel*> model_for(const wire::SessionRequest& request, const std::stop_token& stop);
+  void process(const Box& box);
+  bool finish(const Box& box, const wire::UpdateMessage& message, const std::stop_token& stop);
+  Result<Source*> source_of(const Observation& observation);
+  // With the mutex held.
+  const std::string* owner() const;
+  void end_running();
+  SessionState shared_state() const;
+  void changed() const;
 
   const std::string case_id_;
   const SessionHooks hooks_;
-  // By boundary, method and whether a full solve was measured; worker only.
+  const std::uint64_t boot_id_;
+  const std::string model_id_;
+  // By boundary, method and whether a full solve was measured; preparer only.
   std::map<std::tuple<Boundary, Method, bool>, std::unique_ptr<SessionModel>> models_;
 
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::optional<PendingStart> pending_start_;
+  std::optional<std::string> preparing_;  // the owner of what the preparer works on
+  std::stop_source prepare_stop_;         // of that
+  std::optional<Prepared> prepared_;      // on its way to the worker
   std::optional<Running> running_;
-  struct Box {
-    Observation observation;
-    std::uint64_t arrival = 0;
-  };
   std::map<std::string, Box> boxes_;  // by source
   std::uint64_t arrivals_ = 0;
   std::stop_source run_stop_;  // of the inversion in progress
   std::uint64_t last_session_id_ = 0;
   std::uint64_t updates_ = 0;
-  bool busy_ = false;
+  bool working_ = false;  // the worker
   bool stopped_ = false;
 
-  std::jthread worker_;  // last: it uses everything above
+  std::jthread preparer_;  // the threads last: they use everything above
+  std::jthread worker_;
 };
 
 }  // namespace brainshift::server

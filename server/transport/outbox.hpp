@@ -21,6 +21,7 @@ enum class Delivery {
   kFinal,    // to every subscriber: a usable field; kept for those who come late
   kFailure,  // to every subscriber: an observation that became no estimate, or no usable one
   kIterate,  // to every subscriber; may be lost
+  kState,    // to every subscriber: a SessionState
 };
 
 struct Outgoing {

@@ -6,13 +6,43 @@
 
 namespace brainshift::server {
 
-void Peer::owe(Bytes bytes, bool usable) {
-  owed.push_back({std::move(bytes), usable});
-  if (owed.size() <= kMaxOwed) return;
-  const bool only_usable =
-      owed.front().usable &&
-      std::none_of(owed.begin() + 1, owed.end(), [](const Owed& entry) { return entry.usable; });
-  owed.erase(owed.begin() + (only_usable ? 1 : 0));
+bool Viewer::renew(const Subscription& subscription) {
+  const bool anew = !begun_ || subscription.id != subscription_.id;
+  if (anew) {
+    sent_ = 0;
+    owe_nothing();
+  }
+  begun_ = true;
+  const std::uint64_t acknowledged = anew ? 0 : subscription_.received;
+  subscription_ = subscription;
+  // A peer cannot take back what it has received, nor have received what was not sent.
+  subscription_.received = std::clamp(subscription.received, acknowledged, sent_);
+  return anew;
+}
+
+void Viewer::owe_usable(Bytes bytes) {
+  usable_ = std::move(bytes);
+  failure_.reset();
+}
+
+void Viewer::owe_nothing() {
+  usable_.reset();
+  failure_.reset();
+}
+
+Bytes Viewer::next() const {
+  if (under_way() >= subscription_.window) return {};
+  return usable_ ? usable_ : failure_;
+}
+
+void Viewer::sent() {
+  ++sent_;
+  (usable_ ? usable_ : failure_).reset();
+}
+
+bool Viewer::may_iterate() const {
+  const std::uint64_t spare = std::max<std::uint64_t>(1, subscription_.window - 1);
+  return !usable_ && !failure_ && under_way() < spare;
 }
 
 Peer* Peers::admit(const std::string& routing_id, int connection_fd) {
@@ -31,14 +61,22 @@ Peer* Peers::find(const std::string& routing_id) {
   return found == peers_.end() ? nullptr : &found->second;
 }
 
-std::size_t Peers::remove_connection(int connection_fd) {
-  return std::erase_if(
-      peers_, [&](const auto& entry) { return entry.second.connection_fd == connection_fd; });
+std::vector<std::string> Peers::remove_connection(int connection_fd) {
+  std::vector<std::string> removed;
+  for (auto next = peers_.begin(); next != peers_.end();) {
+    const auto peer = next++;
+    if (peer->second.connection_fd != connection_fd) continue;
+    removed.push_back(peer->first);
+    peers_.erase(peer);
+  }
+  return removed;
 }
 
 bool Peers::anything_owed() const {
-  return std::any_of(peers_.begin(), peers_.end(),
-                     [](const auto& entry) { return !entry.second.owed.empty(); });
+  return std::any_of(peers_.begin(), peers_.end(), [](const auto& entry) {
+    const Peer& peer = entry.second;
+    return !peer.replies.empty() || (peer.viewer && peer.viewer->next());
+  });
 }
 
 }  // namespace brainshift::server

@@ -1,32 +1,57 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Peers: who talks to the daemon now, who subscribed, and what a slow subscriber is still owed.
-// Plain bookkeeping of the transport thread.
+// Peers: who talks to the daemon now, who subscribed, and what each is still owed. Plain
+// bookkeeping of the transport thread.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "common/values/session_state.hpp"
 #include "server/transport/outbox.hpp"
 
 namespace brainshift::server {
 
-struct Peer {
-  int connection_fd =
-      -1;  // the daemon's descriptor of the peer's connection; names it until it closes
-  bool subscribed = false;
-  // Final updates and failures that did not fit into the peer's queue, oldest first.
-  struct Owed {
-    Bytes bytes;
-    bool usable = false;  // a usable field (Delivery::kFinal)
-  };
-  std::deque<Owed> owed;
-  static constexpr std::size_t kMaxOwed = 4;
+// A subscriber's credit and what it is owed.
+class Viewer {
+ public:
+  // Renews the subscription; true when it is a new one, which begins with full credit and is owed
+  // nothing.
+  bool renew(const Subscription& subscription);
 
-  // Beyond kMaxOwed the oldest gives way, but never the newest usable field: it stays the valid one
-  // however many failures follow.
-  void owe(Bytes bytes, bool usable);
+  // From now on it is owed this usable field and nothing older.
+  void owe_usable(Bytes bytes);
+  // The newest observation that gave no usable field, beside the field before it.
+  void owe_failure(Bytes bytes) { failure_ = std::move(bytes); }
+  void owe_nothing();
+
+  // What to send next; null when nothing is owed or its credit is used up.
+  Bytes next() const;
+  // next() has gone out.
+  void sent();
+  // Whether an iterate may go out: nothing is owed, and a final update will still find credit.
+  bool may_iterate() const;
+  void iterate_sent() { ++sent_; }
+
+ private:
+  std::uint64_t under_way() const { return sent_ - subscription_.received; }
+
+  Subscription subscription_;
+  bool begun_ = false;
+  std::uint64_t sent_ = 0;  // updates in this subscription
+  Bytes usable_;
+  Bytes failure_;
+};
+
+struct Peer {
+  int connection_fd = -1;        // the daemon's descriptor of the connection, until it closes
+  std::optional<Viewer> viewer;  // of a subscriber
+  std::deque<Bytes> replies;     // that did not fit into the peer's queue, oldest first
+  static constexpr std::size_t kMaxReplies = 256;
 };
 
 class Peers {
@@ -37,9 +62,10 @@ class Peers {
   Peer* admit(const std::string& routing_id, int connection_fd);
   Peer* find(const std::string& routing_id);
   void remove(const std::string& routing_id) { peers_.erase(routing_id); }
-  // A connection closed. Returns the number of peers removed (0 or 1).
-  std::size_t remove_connection(int connection_fd);
+  // A connection closed: the peers removed (none or one).
+  std::vector<std::string> remove_connection(int connection_fd);
   std::map<std::string, Peer>& all() { return peers_; }
+  // Something that could go out now, if the peer's queue had room.
   bool anything_owed() const;
 
  private:

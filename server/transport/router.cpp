@@ -113,14 +113,17 @@ struct Router::Impl {
     endpoint = socket.get(zmq::sockopt::last_endpoint);
   }
 
-  void serve_requests(RequestHandler& handler);
-  void answer(RequestHandler& handler, const Incoming& incoming);
+  void serve_requests();
+  void answer(const Incoming& incoming);
+  void complain(const Incoming& incoming, const Error& error);
+  void subscribe(const std::string& routing_id, const Reply& answer);
   void reply(const std::string& peer, const Bytes& bytes);
   void deliver(const Outgoing& message);
   void forget_session();
-  void push(const std::string& routing_id, Peer& peer, const Bytes& bytes, Delivery delivery);
+  void push(const std::string& routing_id, Viewer& viewer, const Outgoing& message);
   void pay_owed();
-  void pay(const std::string& routing_id, Peer& peer);
+  void pay(const std::string& routing_id);
+  void remove(const std::string& routing_id);
   void forget_closed();
 
   RouterOptions options;
@@ -133,6 +136,7 @@ struct Router::Impl {
   std::uint64_t session = 0;
   Bytes last_final;
   Bytes failure_since;
+  RequestHandler* handler = nullptr;  // of run()
 };
 
 Router::Router(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -158,6 +162,7 @@ Result<Router> Router::bind(const RouterOptions& options) {
 
 Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
   Impl& self = *impl_;
+  self.handler = &handler;
   zmq::pollitem_t items[] = {{self.socket.handle(), 0, ZMQ_POLLIN, 0},
                              {self.monitor.socket().handle(), 0, ZMQ_POLLIN, 0},
                              {nullptr, outbox.fd(), ZMQ_POLLIN, 0},
@@ -172,70 +177,85 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
       }
       if (items[3].revents != 0) return {};
       self.forget_closed();
-      if (items[0].revents != 0) self.serve_requests(handler);
+      if (items[0].revents != 0) self.serve_requests();
       for (const Outgoing& message : outbox.take()) self.deliver(message);
-      self.pay_owed();
+      if (self.peers.anything_owed()) self.pay_owed();
     }
   } catch (const zmq::error_t& error) {
     return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", self.endpoint, error.what()));
   }
 }
 
-void Router::Impl::serve_requests(RequestHandler& handler) {
+void Router::Impl::serve_requests() {
   for (int served = 0; served < kRequestsPerTurn; ++served) {
     const auto incoming = receive(socket);
     if (!incoming) return;
     forget_closed();  // before the peer is looked up, see ConnectionMonitor
-    answer(handler, *incoming);
+    answer(*incoming);
   }
 }
 
-void Router::Impl::answer(RequestHandler& handler, const Incoming& incoming) {
-  Peer* peer = peers.admit(incoming.peer, incoming.connection_fd);
-  if (peer == nullptr) {
-    const Error full{ErrorCode::kUnavailable,
-                     fmt::format("{} clients are connected already", options.max_clients)};
-    return reply(incoming.peer, error_frame(0, full));
-  }
+void Router::Impl::complain(const Incoming& incoming, const Error& error) {
+  reply(incoming.peer, error_frame(0, error));
+}
+
+void Router::Impl::answer(const Incoming& incoming) {
   if (incoming.parts != 1) {
-    const Error error{ErrorCode::kProtocol,
-                      fmt::format("a message has 1 part, this one has {}", incoming.parts)};
-    return reply(incoming.peer, error_frame(0, error));
+    return complain(incoming, {ErrorCode::kProtocol, fmt::format("a message has 1 part, this one "
+                                                                 "has {}",
+                                                                 incoming.parts)});
   }
   const auto frame = wire::decode_frame(incoming.payload.to_string_view());
   if (!frame) {
     spdlog::debug("malformed frame: {}", frame.error().message);
-    return reply(incoming.peer, error_frame(0, frame.error()));
+    return complain(incoming, frame.error());
+  }
+  if (peers.admit(incoming.peer, incoming.connection_fd) == nullptr) {
+    return complain(incoming, {ErrorCode::kUnavailable, fmt::format("{} clients are connected "
+                                                                    "already",
+                                                                    options.max_clients)});
   }
   std::optional<Reply> answer;
   try {
-    answer = handler.handle(incoming.peer, *frame);
+    answer = handler->handle(incoming.peer, *frame);
   } catch (const std::exception& exception) {
     spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
                   exception.what());
     const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
-    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error), false};
+    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
   }
   if (!answer) return;
   reply(incoming.peer, std::make_shared<const std::string>(
                            wire::encode_frame(answer->type, frame->request_id, answer->payload)));
-  peer = peers.find(incoming.peer);  // gone when the reply found no route
-  if (!answer->subscribe || peer == nullptr) return;
-  peer->subscribed = true;
-  if (answer->session != session) return;  // nothing of the running session yet
-  if (last_final) push(incoming.peer, *peer, last_final, Delivery::kFinal);
-  peer = peers.find(incoming.peer);
-  if (failure_since && peer != nullptr) {
-    push(incoming.peer, *peer, failure_since, Delivery::kFailure);
-  }
+  if (answer->subscription) subscribe(incoming.peer, *answer);
 }
 
-void Router::Impl::reply(const std::string& peer, const Bytes& bytes) {
-  const Sent sent = send(socket, peer, bytes);
+void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer) {
+  Peer* peer = peers.find(routing_id);
+  if (peer == nullptr) return;  // gone: the reply found no route
+  if (!peer->viewer) peer->viewer.emplace();
+  const bool anew = peer->viewer->renew(*answer.subscription);
+  if (anew && answer.session == session) {
+    if (last_final) peer->viewer->owe_usable(last_final);
+    if (failure_since) peer->viewer->owe_failure(failure_since);
+  }
+  pay(routing_id);
+}
+
+void Router::Impl::reply(const std::string& routing_id, const Bytes& bytes) {
+  Peer* peer = peers.find(routing_id);
+  const bool behind = peer != nullptr && !peer->replies.empty();
+  const Sent sent = behind ? Sent::kQueueFull : send(socket, routing_id, bytes);
   if (sent == Sent::kYes) return;
-  spdlog::debug("reply lost: {}",
-                sent == Sent::kPeerGone ? "the peer is gone" : "the peer does not read");
-  if (sent == Sent::kPeerGone) peers.remove(peer);
+  if (sent == Sent::kPeerGone) {
+    spdlog::debug("reply lost: the peer is gone");
+    return remove(routing_id);
+  }
+  if (peer != nullptr && peer->replies.size() < Peer::kMaxReplies) {
+    peer->replies.push_back(bytes);
+  } else {
+    spdlog::debug("reply lost: the peer does not read");
+  }
 }
 
 void Router::Impl::deliver(const Outgoing& message) {
@@ -251,47 +271,74 @@ void Router::Impl::deliver(const Outgoing& message) {
   if (message.delivery == Delivery::kFailure) failure_since = message.bytes;
   for (auto next = peers.all().begin(); next != peers.all().end();) {
     const auto peer = next++;  // push may remove it
-    if (peer->second.subscribed) push(peer->first, peer->second, message.bytes, message.delivery);
+    if (peer->second.viewer) push(peer->first, *peer->second.viewer, message);
   }
 }
 
 void Router::Impl::forget_session() {
   last_final.reset();
   failure_since.reset();
-  for (auto& [routing_id, peer] : peers.all()) peer.owed.clear();
+  for (auto& [routing_id, peer] : peers.all()) {
+    if (peer.viewer) peer.viewer->owe_nothing();
+  }
 }
 
-void Router::Impl::push(const std::string& routing_id, Peer& peer, const Bytes& bytes,
-                        Delivery delivery) {
-  if (delivery == Delivery::kIterate) {
-    // What is owed goes first: nothing may overtake it.
-    if (!peer.owed.empty()) return;
-    if (send(socket, routing_id, bytes) == Sent::kPeerGone) peers.remove(std::string(routing_id));
+void Router::Impl::push(const std::string& routing_id, Viewer& viewer, const Outgoing& message) {
+  if (message.delivery == Delivery::kState) return reply(routing_id, message.bytes);
+  if (message.delivery == Delivery::kIterate) {
+    if (!viewer.may_iterate()) return;
+    const Sent sent = send(socket, routing_id, message.bytes);
+    if (sent == Sent::kYes) viewer.iterate_sent();
+    if (sent == Sent::kPeerGone) remove(routing_id);
     return;
   }
-  peer.owe(bytes, delivery == Delivery::kFinal);
-  pay(routing_id, peer);
+  if (message.delivery == Delivery::kFinal) {
+    viewer.owe_usable(message.bytes);
+  } else {
+    viewer.owe_failure(message.bytes);
+  }
+  pay(routing_id);
 }
 
-void Router::Impl::pay(const std::string& routing_id, Peer& peer) {
-  while (!peer.owed.empty()) {
-    const Sent sent = send(socket, routing_id, peer.owed.front().bytes);
+// Replies first: they tell a viewer what to make of the updates behind them.
+void Router::Impl::pay(const std::string& routing_id) {
+  Peer* peer = peers.find(routing_id);
+  if (peer == nullptr) return;
+  while (!peer->replies.empty()) {
+    const Sent sent = send(socket, routing_id, peer->replies.front());
     if (sent == Sent::kQueueFull) return;
-    if (sent == Sent::kPeerGone) return peers.remove(std::string(routing_id));
-    peer.owed.pop_front();
+    if (sent == Sent::kPeerGone) return remove(routing_id);
+    peer->replies.pop_front();
+  }
+  if (!peer->viewer) return;
+  while (const Bytes next = peer->viewer->next()) {
+    const Sent sent = send(socket, routing_id, next);
+    if (sent == Sent::kQueueFull) return;
+    if (sent == Sent::kPeerGone) return remove(routing_id);
+    peer->viewer->sent();
   }
 }
 
 void Router::Impl::pay_owed() {
-  for (auto next = peers.all().begin(); next != peers.all().end();) {
-    const auto peer = next++;  // pay may remove it
-    pay(peer->first, peer->second);
-  }
+  std::vector<std::string> all;
+  for (const auto& [routing_id, peer] : peers.all()) all.push_back(routing_id);
+  for (const std::string& routing_id : all) pay(routing_id);
+}
+
+// The name may be the removed peer's own: it is copied first.
+void Router::Impl::remove(const std::string& routing_id) {
+  const std::string name = routing_id;
+  if (peers.find(name) == nullptr) return;
+  peers.remove(name);
+  handler->left(name);
 }
 
 void Router::Impl::forget_closed() {
   for (const int descriptor : monitor.closed()) {
-    if (peers.remove_connection(descriptor) > 0) spdlog::debug("peer left");
+    for (const std::string& name : peers.remove_connection(descriptor)) {
+      spdlog::debug("peer left");
+      handler->left(name);
+    }
   }
 }
 

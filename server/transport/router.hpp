@@ -4,12 +4,15 @@
 // for a peer.
 //
 // Peers may be hostile or broken: message size, number of parts and number of peers are capped; a
-// frame that does not decode gets an ErrorReply (kProtocol); half-open peers fall to heartbeats and
-// unfinished handshakes to a short limit. A subscriber that does not read loses iterates; it is
-// owed the newest few final updates and failures, the newest usable field among them. A late one
-// receives that field, and the newest failure since. Nothing of a session is kept once the next one
-// has published, and nobody gets a field of a session that has ended. ZeroMQ bounds the size of
-// each part, not their number within one message: expose the daemon to trusted networks only.
+// frame that does not decode gets an ErrorReply (kProtocol) and takes nobody's place; half-open
+// peers fall to heartbeats and unfinished handshakes to a short limit.
+//
+// A subscriber grants credit: the daemon sends at most `window` updates ahead of those that it says
+// it has received, so that no queue on the way can age a picture. What does not fit is replaced by
+// what is newer: it is owed the newest usable field and the newest failure since, and nothing else.
+// That is also what a late subscriber receives. Nothing of a session is kept once the next one has
+// begun, and nobody gets a field of a session that has ended. ZeroMQ bounds the size of each part,
+// not their number within one message: expose the daemon to trusted networks only.
 #pragma once
 
 #include <chrono>
@@ -19,6 +22,7 @@
 #include <string>
 
 #include "common/core/error.hpp"
+#include "common/values/session_state.hpp"
 #include "common/wire/frame.hpp"
 #include "server/transport/outbox.hpp"
 
@@ -37,8 +41,8 @@ struct RouterOptions {
 struct Reply {
   wire::MessageType type = wire::MessageType::kErrorReply;
   std::string payload;
-  bool subscribe = false;  // the peer receives updates from now on
-  // With subscribe: the running session, whose last usable update the peer gets first.
+  std::optional<Subscription> subscription = std::nullopt;  // the peer's, from now on
+  // With a subscription: the running session, whose last usable update the peer gets first.
   std::uint64_t session = 0;
 };
 
@@ -48,6 +52,8 @@ class RequestHandler {
   virtual ~RequestHandler() = default;
   // No value: the reply follows through the outbox.
   virtual std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) = 0;
+  // The peer's connection has closed. Peers that come back have another name.
+  virtual void left(const std::string& peer) = 0;
 };
 
 class Router {

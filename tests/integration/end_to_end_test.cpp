@@ -215,7 +215,14 @@ TEST_F(EndToEnd, TheJournalHoldsWhatWasAskedAndAnswered) {
     const auto observations = journal->records(io::RecordKind::kObservation);
     ASSERT_TRUE(observations.has_value());
     ASSERT_EQ(observations->size(), recorded->size());
-    EXPECT_EQ(observations->front().payload, recorded->front().payload);
+    // What was asked, with its session and the daemon's time.
+    auto observation = wire::decode_observation(observations->front().payload);
+    ASSERT_TRUE(observation.has_value()) << observation.error().message;
+    EXPECT_EQ(observation->session.model_id, journal->meta().model_id);
+    EXPECT_GT(observation->session.session_id, 0u);
+    observation->session = {};
+    observation->daemon_ns = 0;
+    EXPECT_TRUE(wire::encode(*observation) == recorded->front().payload);
     const auto updates = journal->records(io::RecordKind::kUpdate);
     ASSERT_TRUE(updates.has_value());
     ASSERT_EQ(updates->size(), recorded->size());

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the golden frames of protocol version 1: NAME.bin and its description NAME.json.
+"""Writes the golden frames of protocol version 2: NAME.bin and its description NAME.json.
 
 A second implementation of the protocol, by hand from proto/brainshift/v1/brainshift.proto and
 common/wire/frame.hpp with the Python standard library alone; it shares no code with common/wire. The
@@ -23,9 +23,16 @@ SCHEMA = {
     "CorticalSurface": {"surface": (1, "Surface"), "sd_mm": (2, "double")},
     "LandmarkPairs": {"undeformed": (1, "PointSet"), "deformed": (2, "PointSet"), "sd_mm": (3, "double")},
     "PatientPose": {"gravity_direction": (1, "*double"), "fluid_level_mm": (2, "?double")},
+    "SessionKey": {"boot_id": (1, "fixed"), "session_id": (2, "int"), "model_id": (3, "text")},
+    "SessionState": {
+        "session": (1, "SessionKey"), "phase": (2, "int"), "newest_update": (3, "int"),
+        "newest_usable": (4, "int"), "age_ms": (5, "double"), "valid_ms": (6, "int"),
+        "reason": (7, "text"), "preparing": (8, "int")},
+    "SubscribeRequest": {"subscription": (1, "int"), "window": (2, "int"), "received": (3, "int")},
     "Observation": {
         "case_id": (1, "text"), "frame": (2, "text"), "source": (3, "text"), "sequence": (4, "int"),
-        "acquired_ns": (5, "int"), "acquired_wall_ns": (6, "int"),
+        "acquired_ns": (5, "int"), "acquired_wall_ns": (6, "int"), "session": (7, "SessionKey"),
+        "sent_ns": (8, "int"), "daemon_ns": (9, "int"),
         "tumour_boundary": (10, "TumourBoundary"), "cortical_surface": (11, "CorticalSurface"),
         "landmark_pairs": (12, "LandmarkPairs"), "patient_pose": (13, "PatientPose")},
     "Empty": {},
@@ -34,11 +41,11 @@ SCHEMA = {
         "busy": (5, "int"), "updates": (6, "int"), "uptime_ms": (7, "int")},
     "StartSessionRequest": {
         "case_id": (1, "text"), "method": (2, "text"), "boundary": (3, "text"),
-        "publish_iterates": (4, "int")},
+        "publish_iterates": (4, "int"), "takeover": (6, "int"), "recorded_clock": (7, "int")},
     "StartSessionReply": {
         "session_id": (1, "int"), "model_id": (2, "text"), "nodes": (3, "int"), "tets": (4, "int"),
         "slaves": (5, "int"), "prepare_s": (6, "double"), "model_bytes": (7, "int"),
-        "full_solve_ms": (8, "double"), "factor_s": (9, "double")},
+        "full_solve_ms": (8, "double"), "factor_s": (9, "double"), "boot_id": (10, "fixed")},
     "ModelReply": {
         "case_id": (1, "text"), "model_id": (2, "text"), "nodes": (3, "PointSet"),
         "tet_indices": (4, "*int"), "boundary_indices": (5, "*int"), "skull": (6, "Surface"),
@@ -46,7 +53,6 @@ SCHEMA = {
         "slaves": (10, "*int"), "fixed": (11, "*int"), "gravity_direction": (12, "*double"),
         "fluid_plane_depth_mm": (13, "double"), "slave_plane_depth_mm": (14, "double"),
         "tet_labels": (15, "*int")},
-    "SubscribeReply": {"session_id": (1, "int")},
     "ObservationReply": {"observation_sequence": (1, "int"), "replaced_pending": (2, "int")},
     "ErrorReply": {"code": (1, "text"), "message": (2, "text")},
     "MeanStd": {"mean_mm": (1, "double"), "std_mm": (2, "double")},
@@ -71,9 +77,11 @@ SCHEMA = {
         "left_out": (19, "*Omission"), "error_code": (20, "text"), "quality": (22, "int"),
         "quality_flags": (23, "*int"), "quality_reason": (24, "text"),
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
-        "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int")},
+        "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
+        "boot_id": (31, "fixed")},
 }
 
+KEY = {"boot_id": 2**64 - 3, "session_id": 3, "model_id": "0123456789abcdef"}
 OBSERVATION = {
     "case_id": "colin27", "frame": "ras", "source": "ius", "sequence": 1,
     "acquired_ns": 123456789012345, "acquired_wall_ns": 1257850000000000000}
@@ -82,7 +90,8 @@ TETRAHEDRON = {
     "triangle_indices": [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]}
 UPDATE = {
     "case_id": "colin27", "model_id": "00ff00ff00ff00ff", "session_id": 3, "sequence": 8,
-    "observation_sequence": 2, "method": "paper", "boundary": "fixed", "final": 1}
+    "observation_sequence": 2, "method": "paper", "boundary": "fixed", "final": 1,
+    "boot_id": 2**63 + 1}
 TIMINGS = {
     "register_ms": 3.5, "invert_ms": 1234.5, "rebuild_ms": 0.0, "encode_ms": 0.7, "journal_ms": 0.1}
 
@@ -93,10 +102,12 @@ MESSAGES = {
         "version": "0.1.0", "model_ready": 1, "case_id": "Fall Köln", "model_id": "0123456789abcdef",
         "busy": 1, "updates": 300, "uptime_ms": 86400000}),
     "start_session_request": (3, 2, "StartSessionRequest", {
-        "case_id": "colin27", "method": "paper", "boundary": "fixed", "publish_iterates": 1}),
+        "case_id": "colin27", "method": "paper", "boundary": "fixed", "publish_iterates": 1,
+        "takeover": 1, "recorded_clock": 1}),
     "start_session_reply": (4, 2, "StartSessionReply", {
         "session_id": 3, "model_id": "0123456789abcdef", "nodes": 18475, "tets": 101083, "slaves": 906,
-        "prepare_s": 12.3, "model_bytes": 5000000000, "full_solve_ms": 33.1, "factor_s": 2.3}),
+        "prepare_s": 12.3, "model_bytes": 5000000000, "full_solve_ms": 33.1, "factor_s": 2.3,
+        "boot_id": 2**63 + 1}),
     "model_request": (5, 3, "Empty", {}),
     "model_reply": (6, 3, "ModelReply", {
         "case_id": "one-tetrahedron", "model_id": "fedcba9876543210", "nodes": TETRAHEDRON["vertices"],
@@ -108,8 +119,10 @@ MESSAGES = {
         "craniotomy": [3], "brainstem": [], "slaves": [1, 2], "fixed": [0],
         "gravity_direction": [0.6, -0.8, 0.0], "fluid_plane_depth_mm": -1.5,
         "slave_plane_depth_mm": 18.5, "tet_labels": [2]}),
-    "subscribe_request": (7, 4, "Empty", {}),
-    "subscribe_reply": (8, 4, "SubscribeReply", {"session_id": 3}),
+    "subscribe_request": (7, 4, "SubscribeRequest", {"subscription": 5, "window": 1, "received": 70000}),
+    "session_state": (13, 4, "SessionState", {
+        "session": KEY, "phase": 5, "newest_update": 12, "newest_usable": 9, "age_ms": 1250.5,
+        "valid_ms": 1000, "reason": "observation 12: no point is inside the brain", "preparing": 1}),
     "observation_tumour": (9, 2**63 + 5, "Observation", OBSERVATION | {
         "tumour_boundary": {"points": {"xyz_mm": [12.5, -40.1, 1 / 3, -0.1, 1e-300, 55.0]},
                             "sd_mm": 0.51}}),
@@ -117,7 +130,7 @@ MESSAGES = {
         "source": "stereopsis", "sequence": 2**64 - 1, "acquired_ns": -5, "acquired_wall_ns": 0,
         "cortical_surface": {"surface": TETRAHEDRON, "sd_mm": 0.1}}),
     "observation_landmarks": (9, 7, "Observation", OBSERVATION | {
-        "source": "pointer",
+        "source": "pointer", "session": KEY, "sent_ns": 123456799012345, "daemon_ns": -7,
         "landmark_pairs": {"undeformed": {"xyz_mm": [1.0, 2.0, 3.0]},
                            "deformed": {"xyz_mm": [1.5, -2.0, 2.7]}, "sd_mm": 0.3}}),
     "observation_pose": (9, 8, "Observation", OBSERVATION | {
@@ -184,10 +197,12 @@ def block(number, data):
 def scalar(kind, value):
     if kind == "int":
         return varint(value)
+    if kind == "fixed":
+        return struct.pack("<Q", value)
     return struct.pack("<d" if kind == "double" else "<f", value)
 
 
-WIRE_TYPE = {"int": 0, "double": 1, "float": 5}
+WIRE_TYPE = {"int": 0, "fixed": 1, "double": 1, "float": 5}
 
 
 def encode_field(number, kind, value):
@@ -216,8 +231,9 @@ def main():
     folder = pathlib.Path(__file__).parent
     for name, (frame_type, request_id, message, value) in MESSAGES.items():
         payload = encode(message, value)
-        header = b"BSFT" + struct.pack("<HHIIQ", 1, frame_type, len(payload), zlib.crc32(payload), request_id)
-        (folder / f"{name}.bin").write_bytes(header + payload)
+        start, end = b"BSFT" + struct.pack("<HHI", 2, frame_type, len(payload)), struct.pack("<Q", request_id)
+        crc = struct.pack("<I", zlib.crc32(start + end + payload))
+        (folder / f"{name}.bin").write_bytes(start + crc + end + payload)
         description = {"type": frame_type, "request_id": request_id, "message": message, "value": value}
         (folder / f"{name}.json").write_text(json.dumps(description, indent=1, ensure_ascii=False) + "\n")
 

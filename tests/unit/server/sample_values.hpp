@@ -13,8 +13,9 @@ namespace brainshift::server {
 
 inline constexpr const char* kCase = "test-case";
 inline constexpr const char* kModelId = "0123456789abcdef";
+inline constexpr std::uint64_t kBootId = 0xb007;
 
-// Four landmark pairs, each moved by `shift_mm` along x.
+// Four landmark pairs, each moved by `shift_mm` along x, for the first session.
 inline Observation landmarks(std::uint64_t sequence, const std::string& source = "pointer",
                              double shift_mm = 1.0) {
   LandmarkPairs pairs;
@@ -28,7 +29,14 @@ inline Observation landmarks(std::uint64_t sequence, const std::string& source =
   observation.case_id = kCase;
   observation.source = source;
   observation.sequence = sequence;
+  observation.session = {kBootId, 1, kModelId};
   observation.body = pairs;
+  return observation;
+}
+
+// The same for another session of the daemon.
+inline Observation in_session(std::uint64_t session_id, Observation observation) {
+  observation.session.session_id = session_id;
   return observation;
 }
 

@@ -116,7 +116,8 @@ class TransportTest : public testing::Test {
     ServiceOptions options;
     options.version = "1.2.3";
     options.model = small_model();
-    options.make_model = [nodes](const wire::SessionRequest& request) {
+    options.boot_id = kBootId;
+    options.make_model = [nodes](const wire::SessionRequest& request, const auto&) {
       return fake_session(std::make_unique<FakeInverter>(nodes), request);
     };
     return options;
@@ -129,14 +130,29 @@ class TransportTest : public testing::Test {
   }
 
   static void start_session(RawPeer& peer) {
-    const auto reply = peer.ask(
+    peer.request(
         MessageType::kStartSessionRequest,
         wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
+    Received reply = peer.receive();
+    while (reply.type == MessageType::kSessionState) reply = peer.receive();
     ASSERT_EQ(reply.type, MessageType::kStartSessionReply);
   }
 
-  static void subscribe(RawPeer& peer) {
-    ASSERT_EQ(peer.ask(MessageType::kSubscribeRequest).type, MessageType::kSubscribeReply);
+  // With room for many updates, so that none has to be acknowledged.
+  static void subscribe(RawPeer& peer, std::uint32_t window = Subscription::kMaxWindow) {
+    ASSERT_EQ(renew(peer, {1, window, 0}).session.boot_id, kBootId);
+  }
+
+  // The state that answers a renewal; updates and pushed states on the way are lost.
+  static SessionState renew(RawPeer& peer, const Subscription& subscription) {
+    peer.request(MessageType::kSubscribeRequest, wire::encode(subscription), 7);
+    Received received = peer.receive();
+    while (received.type != MessageType::kSessionState || received.request_id != 7) {
+      received = peer.receive();
+    }
+    const auto state = wire::decode_session_state(received.payload);
+    EXPECT_TRUE(state.has_value());
+    return state ? *state : SessionState{};
   }
 
   // A session of which `peer` has received the update of one observation.

@@ -50,6 +50,10 @@ TriangleSurface surface_from(const json& value) {
 
 MeanStd mean_std_from(const json& value) { return {value["mean_mm"], value["std_mm"]}; }
 
+SessionKey session_key_from(const json& value) {
+  return {value["boot_id"], value["session_id"], value["model_id"]};
+}
+
 Observation observation_from(const json& value) {
   Observation observation;
   observation.case_id = value["case_id"];
@@ -57,6 +61,11 @@ Observation observation_from(const json& value) {
   observation.source = value["source"];
   observation.sequence = value["sequence"];
   observation.acquired_ns = value["acquired_ns"];
+  if (value.contains("session")) {
+    observation.session = session_key_from(value["session"]);
+    observation.sent_ns = value["sent_ns"];
+    observation.daemon_ns = value["daemon_ns"];
+  }
   observation.acquired_wall_ns = value["acquired_wall_ns"];
   if (value.contains("tumour_boundary")) {
     const json& body = value["tumour_boundary"];
@@ -134,6 +143,7 @@ Estimate estimate_from(const json& value) {
 UpdateMessage update_from(const json& value) {
   UpdateMessage message;
   message.session_id = value["session_id"];
+  message.boot_id = value["boot_id"];
   Update& update = message.update;
   update.case_id = value["case_id"];
   update.model_id = value["model_id"];
@@ -169,16 +179,34 @@ DaemonStatus status_from(const json& value) {
           value["busy"] == 1, value["updates"],          value["uptime_ms"]};
 }
 
+SessionState session_state_from(const json& value) {
+  EXPECT_EQ(value["phase"], 5);
+  return {session_key_from(value["session"]),
+          SessionPhase::kDegraded,
+          value["newest_update"],
+          value["newest_usable"],
+          value["age_ms"],
+          value["valid_ms"],
+          value["reason"],
+          value["preparing"] == 1};
+}
+
 SessionRequest session_request_from(const json& value) {
   EXPECT_EQ(value["method"], "paper");
   EXPECT_EQ(value["boundary"], "fixed");
-  return {value["case_id"], Method::kPaper, Boundary::kFixed, value["publish_iterates"] == 1};
+  return {value["case_id"],
+          Method::kPaper,
+          Boundary::kFixed,
+          value["publish_iterates"] == 1,
+          false,
+          value["takeover"] == 1,
+          value["recorded_clock"] == 1};
 }
 
 SessionInfo session_info_from(const json& value) {
-  return {value["session_id"],  value["model_id"],      value["nodes"],
-          value["tets"],        value["slaves"],        value["prepare_s"],
-          value["model_bytes"], value["full_solve_ms"], value["factor_s"]};
+  return {value["session_id"], value["model_id"],  value["nodes"],       value["tets"],
+          value["slaves"],     value["prepare_s"], value["model_bytes"], value["full_solve_ms"],
+          value["factor_s"],   value["boot_id"]};
 }
 
 // ---------- the check ----------
@@ -207,10 +235,12 @@ std::string check_message(const std::string& message, const json& value, std::st
                  decode_observation_receipt(payload));
   }
   if (message == "Update") return check(update_from(value), decode_update(payload));
-  if (message == "SubscribeReply") {
-    const std::uint64_t session_id = value["session_id"];
-    EXPECT_EQ(decode_subscribe_reply(payload).value(), session_id);
-    return encode_subscribe_reply(session_id);
+  if (message == "SubscribeRequest") {
+    return check(Subscription{value["subscription"], value["window"], value["received"]},
+                 decode_subscription(payload));
+  }
+  if (message == "SessionState") {
+    return check(session_state_from(value), decode_session_state(payload));
   }
   if (message == "ErrorReply") {
     EXPECT_EQ(value["code"], "model_not_ready");
@@ -241,7 +271,7 @@ INSTANTIATE_TEST_SUITE_P(Frames, Golden,
                          ::testing::Values("status_request", "status_reply",
                                            "start_session_request", "start_session_reply",
                                            "model_request", "model_reply", "subscribe_request",
-                                           "subscribe_reply", "observation_tumour",
+                                           "session_state", "observation_tumour",
                                            "observation_cortex", "observation_landmarks",
                                            "observation_pose", "observation_reply", "error_reply",
                                            "update", "update_unusable", "update_failed"));

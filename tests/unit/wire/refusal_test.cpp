@@ -227,6 +227,25 @@ TEST(Refusal, UnknownNamesAreQuoted) {
                  "update.boundary");
 }
 
+TEST(Refusal, AStateThatContradictsItselfAndAWindowBeyondTheLimit) {
+  pb::SessionState state;
+  expect_refused(decode_session_state(state.SerializeAsString()), ErrorCode::kProtocol,
+                 "session_state.phase: 0 is unknown");
+  state.set_phase(pb::SESSION_PHASE_TRACKING);
+  state.set_newest_usable(2);
+  state.set_newest_update(1);
+  expect_refused(decode_session_state(state.SerializeAsString()), ErrorCode::kProtocol,
+                 "session_state.newest_usable: is above");
+  state.set_newest_update(2);
+  state.set_age_ms(-1.0);
+  expect_refused(decode_session_state(state.SerializeAsString()), ErrorCode::kProtocol,
+                 "session_state.age_ms");
+  pb::SubscribeRequest request;
+  request.set_window(Subscription::kMaxWindow + 1);
+  expect_refused(decode_subscription(request.SerializeAsString()), ErrorCode::kProtocol,
+                 "subscribe.window: 257, must be at most 256");
+}
+
 TEST(Refusal, AFailedUpdateWithAFieldAndAGoodOneWithAnError) {
   expect_refused(decode_changed_update([](auto& m) { m.set_status("failed"); }),
                  ErrorCode::kProtocol, "update.error_code: is absent");

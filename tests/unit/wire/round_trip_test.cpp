@@ -149,17 +149,45 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
       decode_status);
   expect_round_trip(DaemonStatus{}, decode_status);
   for (const Method method : kAllMethods) {
-    expect_round_trip(SessionRequest{"c", method, Boundary::kFixed, true, true},
+    expect_round_trip(SessionRequest{"c", method, Boundary::kFixed, true, true, true, true},
                       decode_session_request);
   }
   expect_round_trip(SessionRequest{"", Method::kPaper, Boundary::kContact, false},
                     decode_session_request);
   expect_round_trip(SessionInfo{7, "id", 18475, std::numeric_limits<int>::max(), 906, 0.1,
-                                1ull << 40, 1.0 / 3.0, 2.3},
+                                1ull << 40, 1.0 / 3.0, 2.3, ~0ull},
                     decode_session_info);
   expect_round_trip(ObservationReceipt{std::numeric_limits<std::uint64_t>::max(), true},
                     decode_observation_receipt);
-  EXPECT_EQ(decode_subscribe_reply(encode_subscribe_reply(1ull << 63)).value(), 1ull << 63);
+  expect_round_trip(Subscription{~0ull, Subscription::kMaxWindow, 1ull << 40}, decode_subscription);
+  SessionState state;
+  state.session = {~0ull, 3, "id"};
+  state.newest_update = 9;
+  state.newest_usable = 8;
+  state.age_ms = 1.0 / 3.0;
+  state.valid_ms = 1000;
+  state.reason = "no luck";
+  state.preparing = true;
+  for (int phase = 0; phase <= static_cast<int>(SessionPhase::kClosed); ++phase) {
+    state.phase = static_cast<SessionPhase>(phase);
+    expect_round_trip(state, decode_session_state);
+  }
+}
+
+// A viewer that does not say how much it can take gets one update at a time.
+TEST(RoundTrip, AnAbsentWindowIsOne) {
+  EXPECT_EQ(decode_subscription("").value(), (Subscription{0, 1, 0}));
+}
+
+TEST(RoundTrip, TheDaemonsTimeIsAddedWithoutDecoding) {
+  Observation observation = sample_observation(2);
+  observation.daemon_ns = 0;
+  std::string payload = encode(observation);
+  append_daemon_time(-5, payload);
+  observation.daemon_ns = -5;
+  const auto decoded = decode_observation(payload);
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  expect_same(observation, *decoded);
 }
 
 TEST(RoundTrip, EveryErrorCodeIsReproduced) {

@@ -50,6 +50,9 @@ inline void expect_same(const Observation& a, const Observation& b) {
   EXPECT_EQ(a.sequence, b.sequence);
   EXPECT_EQ(a.acquired_ns, b.acquired_ns);
   EXPECT_EQ(a.acquired_wall_ns, b.acquired_wall_ns);
+  EXPECT_EQ(a.session, b.session);
+  EXPECT_EQ(a.sent_ns, b.sent_ns);
+  EXPECT_EQ(a.daemon_ns, b.daemon_ns);
   ASSERT_EQ(a.body.index(), b.body.index());
   std::visit(
       [&](const auto& body) { expect_same(body, std::get<std::decay_t<decltype(body)>>(b.body)); },
@@ -90,7 +93,13 @@ inline void expect_same(const SessionRequest& a, const SessionRequest& b) {
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.publish_iterates, b.publish_iterates);
   EXPECT_EQ(a.measure_full_solve, b.measure_full_solve);
+  EXPECT_EQ(a.takeover, b.takeover);
+  EXPECT_EQ(a.recorded_clock, b.recorded_clock);
 }
+
+inline void expect_same(const Subscription& a, const Subscription& b) { EXPECT_EQ(a, b); }
+
+inline void expect_same(const SessionState& a, const SessionState& b) { EXPECT_EQ(a, b); }
 
 inline void expect_same(const SessionInfo& a, const SessionInfo& b) {
   EXPECT_EQ(a.session_id, b.session_id);
@@ -102,6 +111,7 @@ inline void expect_same(const SessionInfo& a, const SessionInfo& b) {
   EXPECT_EQ(a.model_bytes, b.model_bytes);
   EXPECT_EQ(a.full_solve_ms, b.full_solve_ms);
   EXPECT_EQ(a.factor_s, b.factor_s);
+  EXPECT_EQ(a.boot_id, b.boot_id);
 }
 
 inline void expect_same(const ObservationReceipt& a, const ObservationReceipt& b) {

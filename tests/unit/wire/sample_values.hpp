@@ -59,6 +59,9 @@ inline Observation sample_observation(int kind) {
   observation.sequence = std::numeric_limits<std::uint64_t>::max();
   observation.acquired_ns = std::numeric_limits<std::int64_t>::min();
   observation.acquired_wall_ns = std::numeric_limits<std::int64_t>::max();
+  observation.session = {~std::uint64_t{0}, 7, "0123456789abcdef"};
+  observation.sent_ns = -1;
+  observation.daemon_ns = std::numeric_limits<std::int64_t>::max();
   switch (kind) {
     case 0: observation.body = TumourBoundary{awkward_points(7), 0.1}; break;
     case 1: observation.body = CorticalSurface{sample_surface(), 0.0}; break;

@@ -71,7 +71,7 @@ TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
         return reply(MessageType::kModelReply, wire::encode(model));
       }
       case MessageType::kSubscribeRequest:
-        return reply(MessageType::kSubscribeReply, wire::encode_subscribe_reply(1));
+        return reply(MessageType::kSessionState, wire::encode(SessionState()));
       case MessageType::kObservation: {
         const auto observation = wire::decode_observation(request.payload).value();
         return reply(MessageType::kObservationReply,

@@ -6,10 +6,14 @@
 namespace brainshift::client {
 namespace {
 
+SessionKey key(std::uint64_t session, std::uint64_t boot = 1) { return {boot, session, "m"}; }
+
 wire::UpdateMessage update(std::uint64_t session, std::uint64_t sequence,
                            Quality quality = Quality::kGood, bool final = true) {
   wire::UpdateMessage message;
   message.session_id = session;
+  message.boot_id = 1;
+  message.update.model_id = "m";
   message.update.sequence = sequence;
   message.update.final = final;
   message.update.estimate.quality.quality = quality;
@@ -45,7 +49,7 @@ TEST(LatestUsable, OnlyAnotherUsableUpdateReplacesIt) {
 
 TEST(LatestUsable, OfAnotherSessionIsForgottenAndDoesNotComeBack) {
   LatestUsable latest;
-  latest.begin(4);
+  latest.begin(key(4));
   latest.take(update(4, 9));
   latest.take(update(5, 1, Quality::kUnusable));  // another client has started session 5
   EXPECT_FALSE(latest.get());
@@ -58,17 +62,32 @@ TEST(LatestUsable, OfAnotherSessionIsForgottenAndDoesNotComeBack) {
 // Session numbers of a restarted daemon begin again.
 TEST(LatestUsable, BeginForgetsWhateverTheNumber) {
   LatestUsable latest;
-  latest.begin(7);
+  latest.begin(key(7));
   latest.take(update(7, 3));
-  latest.follow(7);  // subscribed again
+  latest.follow(key(7));  // subscribed again
   EXPECT_EQ(sequence_of(latest), 3u);
-  latest.begin(7);
+  latest.begin(key(7));
   EXPECT_FALSE(latest.get());
   latest.take(update(7, 4));
-  latest.follow(1);
+  latest.follow(key(1));
   EXPECT_FALSE(latest.get());
   latest.take(update(1, 1));
   EXPECT_EQ(sequence_of(latest), 1u);
+}
+
+TEST(LatestUsable, OfAnotherDaemonIsNotTakenUntilThatOneIsFollowed) {
+  LatestUsable latest;
+  latest.begin(key(1));
+  latest.take(update(1, 1));
+  auto foreign = update(9, 1);
+  foreign.boot_id = 2;
+  EXPECT_FALSE(latest.belongs(foreign.key()));
+  latest.take(foreign);
+  EXPECT_EQ(latest.get()->boot_id, 1u);
+  latest.follow(key(9, 2));
+  EXPECT_FALSE(latest.get());
+  latest.take(foreign);
+  EXPECT_EQ(latest.get()->boot_id, 2u);
 }
 
 }  // namespace

@@ -47,6 +47,31 @@ TEST(UpdateQueue, FinalUpdatesAndErrorsAreNeverDropped) {
   EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 0, 3, 4}));
 }
 
+TEST(UpdateQueue, WhatTheDaemonHasNewerIsDropped) {
+  UpdateQueue queue(10);
+  const auto usable = [](std::uint64_t sequence, std::uint64_t session) {
+    wire::UpdateMessage message = update(sequence, true);
+    message.session_id = session;
+    message.update.estimate.quality.quality = Quality::kGood;
+    return message;
+  };
+  wire::UpdateMessage failure = update(4, true);
+  failure.session_id = 2;
+  failure.error = Error{ErrorCode::kEmptySet, "no point"};
+  wire::UpdateMessage last = failure;
+  last.update.sequence = 5;
+  for (const auto& message : {usable(9, 1), usable(2, 2), usable(3, 2), failure, last}) {
+    queue.push(message);
+  }
+  queue.push(fail(ErrorCode::kProtocol, "bad"));
+  SessionState state;
+  state.session = {0, 2, ""};
+  state.newest_usable = 3;
+  state.newest_update = 5;
+  queue.drop_older_than(state);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{3, 5, 0}));
+}
+
 TEST(UpdateQueue, IteratesAloneNeverExceedTheCapacity) {
   UpdateQueue queue(4);
   for (std::uint64_t i = 1; i <= 1000; ++i) {

@@ -55,7 +55,7 @@ TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
   start_session(sender);
   RawPeer late(endpoint_);
   subscribe(late);
-  sender.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  sender.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
   for (RawPeer* peer : {&late, &sender}) {
     const auto message = next_update(*peer);
     EXPECT_EQ(message.session_id, 2u);
@@ -69,7 +69,7 @@ TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
 
 TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   ServiceOptions options = with_model();
-  options.make_model = [](const wire::SessionRequest& request) {
+  options.make_model = [](const wire::SessionRequest& request, const auto&) {
     return fake_session(
         std::make_unique<FakeInverter>(
             [](int call, const SparseData& data, const auto&, Estimate& estimate) -> Status {
@@ -128,35 +128,145 @@ TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {
   RawPeer later(endpoint_);
   subscribe(later);
   EXPECT_EQ(next_update(later).update.observation_sequence, 8u);
-  EXPECT_EQ(later.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply)
+  later.request(MessageType::kStatusRequest);
+  Received received = later.receive();
+  while (received.type == MessageType::kSessionState) received = later.receive();
+  EXPECT_EQ(received.type, MessageType::kStatusReply)
       << "the failures before the snapshot are over";
 }
 
-TEST_F(TransportTest, ASubscriberThatDoesNotReadDelaysNobodyAndIsOwedTheNewestUpdate) {
-  constexpr int kNodes = 40'000;  // 0.5 MB per update
+// It reads one update, the one that was under way, and then the newest; nothing between.
+TEST_F(TransportTest, AViewerThatDoesNotReadDelaysNobodyAndGetsTheNewestUpdate) {
   constexpr std::uint64_t kUpdates = 60;
-  RouterOptions options;
-  options.send_queue = 2;
-  serve(with_model(kNodes), options);
+  serve(with_model(40'000));  // 0.5 MB per update
   RawPeer sender(endpoint_);
-  RawPeer slow(endpoint_, 1);
+  RawPeer slow(endpoint_);
   start_session(sender);
   subscribe(sender);
-  subscribe(slow);
+  subscribe(slow, 1);
   for (std::uint64_t sequence = 1; sequence <= kUpdates; ++sequence) {
     sender.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
     ASSERT_EQ(next_update(sender).update.observation_sequence, sequence);
   }
-  std::uint64_t received = 0;
-  std::uint64_t last = 0;
-  while (last < kUpdates) {
-    const std::uint64_t sequence = next_update(slow).update.observation_sequence;
-    EXPECT_GT(sequence, last);
-    last = sequence;
-    ++received;
+  EXPECT_EQ(next_update(slow).update.observation_sequence, 1u);
+  slow.request(MessageType::kSubscribeRequest, wire::encode(Subscription{1, 1, 1}));
+  EXPECT_EQ(next_update(slow).update.observation_sequence, kUpdates);
+}
+
+TEST_F(TransportTest, TheStateSaysWhatIsNewestAndHowOldItIs) {
+  ServiceOptions options = with_model();
+  options.make_model = [](const wire::SessionRequest& request, const auto&) {
+    return fake_session(
+        std::make_unique<FakeInverter>(
+            [](int call, const SparseData& data, const auto&, Estimate& estimate) -> Status {
+              if (call == 2) return fail(ErrorCode::kNotConverged, "no luck");
+              return follow_the_data(data, estimate, 4);
+            }),
+        request);
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  EXPECT_EQ(renew(peer, {1, 8, 0}).phase, SessionPhase::kEmpty);
+  begin_with_update(peer, 5);
+  const SessionState tracking = renew(peer, {1, 8, 1});
+  EXPECT_EQ(tracking.phase, SessionPhase::kTracking);
+  EXPECT_EQ(tracking.newest_update, 1u);
+  EXPECT_EQ(tracking.newest_usable, 1u);
+  EXPECT_GT(tracking.age_ms, 0.0);
+  peer.request(MessageType::kObservation, wire::encode(landmarks(6)));
+  ASSERT_TRUE(next_update(peer).error.has_value());
+  const SessionState degraded = renew(peer, {1, 8, 2});
+  EXPECT_EQ(degraded.phase, SessionPhase::kDegraded);
+  EXPECT_EQ(degraded.reason, "no luck");
+  EXPECT_EQ(degraded.newest_update, 2u);
+  EXPECT_EQ(degraded.newest_usable, 1u);
+  EXPECT_GT(degraded.age_ms, tracking.age_ms);
+}
+
+TEST_F(TransportTest, EverySubscriberIsToldWhenTheSessionOrItsPhaseChanges) {
+  serve(with_model());
+  RawPeer owner(endpoint_);
+  RawPeer watcher(endpoint_);
+  subscribe(watcher);
+  const auto next_phase = [&] {
+    Received received = watcher.receive();
+    while (received.type != MessageType::kSessionState) received = watcher.receive();
+    EXPECT_EQ(received.request_id, 0u);
+    return wire::decode_session_state(received.payload)->phase;
+  };
+  start_session(owner);
+  SessionPhase phase = next_phase();
+  while (phase == SessionPhase::kPreparing) phase = next_phase();
+  EXPECT_EQ(phase, SessionPhase::kReady);
+  owner.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  EXPECT_EQ(next_phase(), SessionPhase::kTracking);
+}
+
+TEST_F(TransportTest, ASessionOfAnotherClientEndsOnlyByTakeoverOrWhenThatClientHasLeft) {
+  serve(with_model());
+  auto owner = std::make_unique<RawPeer>(endpoint_);
+  RawPeer other(endpoint_);
+  start_session(*owner);
+  wire::SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
+  const auto ask = [&] {
+    return other.ask(MessageType::kStartSessionRequest, wire::encode(request));
+  };
+  const Error refused = error_of(ask());
+  EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
+  EXPECT_THAT(refused.message, HasSubstr("belongs to another client"));
+  request.takeover = true;
+  EXPECT_EQ(ask().type, MessageType::kStartSessionReply);
+  request.takeover = false;
+  EXPECT_EQ(ask().type, MessageType::kStartSessionReply) << "its own";
+  const auto mine = owner->ask(MessageType::kStartSessionRequest, wire::encode(request));
+  EXPECT_EQ(error_of(mine).code, ErrorCode::kUnavailable);
+  request.takeover = true;
+  ASSERT_EQ(owner->ask(MessageType::kStartSessionRequest, wire::encode(request)).type,
+            MessageType::kStartSessionReply);
+  owner.reset();
+  request.takeover = false;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  MessageType answered = MessageType::kErrorReply;
+  while (answered == MessageType::kErrorReply && std::chrono::steady_clock::now() < deadline) {
+    answered = ask().type;
   }
-  EXPECT_LT(received, kUpdates)
-      << "nothing was lost: the queues never filled, the test shows nothing";
+  EXPECT_EQ(answered, MessageType::kStartSessionReply);
+}
+
+TEST_F(TransportTest, BadPeersTakeNobodysPlace) {
+  RouterOptions options;
+  options.max_clients = 2;
+  serve(with_model(), options);
+  std::vector<std::unique_ptr<RawPeer>> bad;
+  for (int i = 0; i < 8; ++i) {
+    bad.push_back(std::make_unique<RawPeer>(endpoint_));
+    bad.back()->send("x");
+    EXPECT_EQ(error_of(bad.back()->receive()).code, ErrorCode::kProtocol);
+  }
+  expect_alive();
+}
+
+// More requests than the queue of a connection holds: every one is answered, in order.
+TEST_F(TransportTest, ManyRequestsInFlightAreAllAnswered) {
+  RouterOptions options;
+  options.send_queue = 2;
+  serve(with_model(), options);
+  RawPeer peer(endpoint_, 1);
+  constexpr std::uint64_t kRequests = 200;
+  for (std::uint64_t id = 1; id <= kRequests; ++id) {
+    peer.request(MessageType::kStatusRequest, {}, id);
+  }
+  for (std::uint64_t id = 1; id <= kRequests; ++id) ASSERT_EQ(peer.receive().request_id, id);
+}
+
+TEST_F(TransportTest, ARequestThatCarriesNothingMustBeEmpty) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  for (const MessageType type : {MessageType::kStatusRequest, MessageType::kModelRequest}) {
+    const Error error = error_of(peer.ask(type, "rubbish"));
+    EXPECT_EQ(error.code, ErrorCode::kProtocol);
+    EXPECT_THAT(error.message, HasSubstr("must be empty"));
+  }
 }
 
 TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
@@ -230,7 +340,14 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
   for (std::size_t i = 0; i < published.size(); ++i) {
     EXPECT_EQ(kept->records[i].kind,
               i % 2 == 0 ? io::RecordKind::kObservation : io::RecordKind::kUpdate);
-    EXPECT_TRUE(kept->records[i].payload == published[i]) << "record " << i;
+    std::string expected = published[i];
+    if (i % 2 == 0) {  // an observation, to which the daemon adds its own time
+      const auto observation = wire::decode_observation(kept->records[i].payload);
+      ASSERT_TRUE(observation.has_value());
+      EXPECT_GT(observation->daemon_ns, 0);
+      wire::append_daemon_time(observation->daemon_ns, expected);
+    }
+    EXPECT_TRUE(kept->records[i].payload == expected) << "record " << i;
   }
 }
 
@@ -259,7 +376,7 @@ TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
   ServiceOptions options = with_model();
   auto entered = std::make_shared<std::promise<void>>();
-  options.make_model = [entered](const wire::SessionRequest& request) {
+  options.make_model = [entered](const wire::SessionRequest& request, const auto&) {
     return fake_session(std::make_unique<FakeInverter>([entered](int, const SparseData&,
                                                                  const auto& asked, Estimate&) {
                           std::promise<void> stopped;

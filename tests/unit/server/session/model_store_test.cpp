@@ -122,15 +122,16 @@ TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
   auto inverter = std::make_unique<StoppedOnTheWay>(std::move(*real));
   StoppedOnTheWay& watched = *inverter;
   SessionHooks hooks;
-  hooks.make_model = [&](const wire::SessionRequest& request) {
+  hooks.make_model = [&](const wire::SessionRequest& request, const std::stop_token&) {
     auto pipeline =
         Pipeline::build(patient(), config(), request.method, request.boundary, std::move(inverter));
     EXPECT_TRUE(pipeline.has_value());
-    return std::make_unique<SessionModel>(SessionModel{{}, std::move(*pipeline)});
+    wire::SessionInfo info;
+    return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
   };
   std::promise<wire::UpdateMessage> published;
   hooks.publish = [&](wire::UpdateMessage message) { published.set_value(std::move(message)); };
-  Session session("toy", std::move(hooks));
+  Session session("toy", std::move(hooks), kBootId, kModelId);
   wire::SessionRequest request;
   request.case_id = "toy";
   const auto start = [&] {
@@ -142,7 +143,7 @@ TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
   ASSERT_TRUE(session.submit(tumour_moved(1)).has_value());
   watched.entered.get_future().wait();
   ASSERT_TRUE(start());
-  ASSERT_TRUE(session.submit(tumour_moved(2)).has_value());
+  ASSERT_TRUE(session.submit(in_session(2, tumour_moved(2))).has_value());
   const wire::UpdateMessage message = published.get_future().get();
   session.stop();
   EXPECT_EQ(message.update.observation_sequence, 2u);  // the first one is not published

@@ -27,9 +27,13 @@ class ObservationRules : public testing::TestWithParam<BadObservation> {};
 
 TEST_P(ObservationRules, AreNamedWhenBroken) {
   Observation observation = landmarks(2);
-  ASSERT_TRUE(check_observation(observation, kCase, 1).has_value());
+  const auto check = [&] {
+    auto status = check_observation(observation, kCase, {kBootId, 1, kModelId});
+    return status ? check_sequence(observation, 1) : status;
+  };
+  ASSERT_TRUE(check().has_value());
   GetParam().spoil(observation);
-  const auto status = check_observation(observation, kCase, 1);
+  const auto status = check();
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, GetParam().code);
   EXPECT_THAT(status.error().message, HasSubstr(GetParam().says));
@@ -47,6 +51,17 @@ INSTANTIATE_TEST_SUITE_P(
                     BadObservation{"EndlessSource",
                                    [](Observation& o) { o.source.assign(1000, 'a'); },
                                    ErrorCode::kInvalidArgument, "1 to 64 characters"},
+                    BadObservation{"NoSession", [](Observation& o) { o.session = {}; },
+                                   ErrorCode::kInvalidArgument, "session is absent"},
+                    BadObservation{"EarlierSession",
+                                   [](Observation& o) { o.session.session_id = 0; },
+                                   ErrorCode::kInvalidArgument, "the running session is 1"},
+                    BadObservation{"OtherModel", [](Observation& o) { o.session.model_id = "x"; },
+                                   ErrorCode::kInvalidArgument, "model_id = \"x\""},
+                    BadObservation{"OtherDaemon", [](Observation& o) { o.session.boot_id = 1; },
+                                   ErrorCode::kInvalidArgument, "restarted"},
+                    BadObservation{"Pose", [](Observation& o) { o.body = PatientPose{}; },
+                                   ErrorCode::kInvalidArgument, "patient_pose"},
                     BadObservation{"OldSequence", [](Observation& o) { o.sequence = 1; },
                                    ErrorCode::kInvalidArgument, "sequence = 1"}),
     [](const auto& row) { return row.param.name; });

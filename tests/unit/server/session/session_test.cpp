@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <stdexcept>
@@ -41,6 +42,11 @@ class Published {
   std::vector<wire::UpdateMessage> messages_;
 };
 
+class TestSession : public Session {
+ public:
+  explicit TestSession(SessionHooks hooks) : Session(kCase, std::move(hooks), kBootId, kModelId) {}
+};
+
 // A gate that a fake inversion waits at.
 struct Gate {
   std::promise<void> entered;
@@ -60,7 +66,8 @@ class SessionTest : public testing::Test {
   // One fake inverter per preparation.
   SessionHooks hooks(FakeInverter::Update update) {
     SessionHooks hooks;
-    hooks.make_model = [this, update = std::move(update)](const wire::SessionRequest& request) {
+    hooks.make_model = [this, update = std::move(update)](const wire::SessionRequest& request,
+                                                          const std::stop_token&) {
       prepared_boundaries_.push_back(request.boundary);
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
@@ -92,15 +99,15 @@ class SessionTest : public testing::Test {
 };
 
 TEST_F(SessionTest, RefusesObservationsBeforeASessionRuns) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   const auto receipt = session.submit(landmarks(1));
   ASSERT_FALSE(receipt.has_value());
   EXPECT_EQ(receipt.error().code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(session.state().session_id, 0u);
+  EXPECT_EQ(session.state().shared.session.session_id, 0u);
 }
 
 TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   const auto info = start(session);
   ASSERT_TRUE(info.has_value());
   EXPECT_EQ(info->session_id, 1u);
@@ -119,7 +126,7 @@ TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
 }
 
 TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session).has_value());
   const auto other = start(session, Boundary::kContact, "someone-else");
   ASSERT_FALSE(other.has_value());
@@ -129,29 +136,28 @@ TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
 }
 
 TEST_F(SessionTest, SequenceNumbersMustGrow) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session).has_value());
   EXPECT_FALSE(session.submit(landmarks(0)).has_value());
   EXPECT_TRUE(session.submit(landmarks(4)).has_value());
-  const auto again = session.submit(landmarks(4));
-  ASSERT_FALSE(again.has_value());
-  EXPECT_THAT(again.error().message, HasSubstr("observation.sequence = 4: must be above 4"));
-  EXPECT_FALSE(session.submit(landmarks(3)).has_value());
+  const auto late = session.submit(landmarks(3));
+  ASSERT_FALSE(late.has_value());
+  EXPECT_THAT(late.error().message, HasSubstr("observation.sequence = 3: must be above 4"));
   EXPECT_TRUE(session.submit(landmarks(9)).has_value());
 }
 
 // A camera that counts fast does not shut out the ultrasound.
 TEST_F(SessionTest, EverySourceCountsForItself) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session).has_value());
   EXPECT_TRUE(session.submit(landmarks(50, "camera")).has_value());
   EXPECT_TRUE(session.submit(landmarks(6, "ius")).has_value());
-  EXPECT_FALSE(session.submit(landmarks(50, "camera")).has_value());
+  EXPECT_FALSE(session.submit(landmarks(49, "camera")).has_value());
   EXPECT_TRUE(session.submit(landmarks(7, "ius")).has_value());
 }
 
 TEST_F(SessionTest, ASequenceThatTheJournalCannotHoldIsRefusedAndLocksNothing) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session).has_value());
   for (const std::uint64_t sequence : {kMaxSequence + 1, ~std::uint64_t{0}}) {
     const auto refused = session.submit(landmarks(sequence));
@@ -164,14 +170,14 @@ TEST_F(SessionTest, ASequenceThatTheJournalCannotHoldIsRefusedAndLocksNothing) {
 }
 
 TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(4)).has_value());
   published_.wait_for(1);
   const auto second = start(session);
   ASSERT_TRUE(second.has_value());
   EXPECT_EQ(second->session_id, 2u);
-  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+  EXPECT_TRUE(session.submit(in_session(2, landmarks(1))).has_value());
   const auto messages = published_.wait_for(2);
   ASSERT_EQ(messages.size(), 2u);
   EXPECT_EQ(messages[1].update.sequence, 1u);
@@ -183,7 +189,7 @@ TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
   std::vector<std::size_t> sources;
   FakeInverter* inverter = nullptr;
   SessionHooks watched = hooks(echo);
-  watched.make_model = [&](const wire::SessionRequest& request) {
+  watched.make_model = [&](const wire::SessionRequest& request, const std::stop_token&) {
     auto made = std::make_unique<FakeInverter>(
         [&](int, const SparseData& data, const auto&, Estimate& out) {
           sources.push_back(data.sources.size());
@@ -192,14 +198,14 @@ TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
     inverter = made.get();
     return fake_session(std::move(made), request);
   };
-  Session session(kCase, std::move(watched));
+  TestSession session(std::move(watched));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
   published_.wait_for(1);
   ASSERT_TRUE(session.submit(landmarks(2, "pointer")).has_value());
   published_.wait_for(2);
   ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1, "pointer")).has_value());
+  ASSERT_TRUE(session.submit(in_session(2, landmarks(1, "pointer"))).has_value());
   ASSERT_EQ(published_.wait_for(3).size(), 3u);
   EXPECT_THAT(sources, ElementsAre(1u, 2u, 1u));
   EXPECT_EQ(inverter->resets, 2);  // one model for both sessions
@@ -207,13 +213,13 @@ TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
 
 TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
   Gate gate;
-  Session session(kCase, hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
-                    if (call == 1) {
-                      gate.entered.set_value();
-                      gate.leave.get_future().wait();
-                    }
-                    return follow_the_data(data, out, 4);
-                  }));
+  TestSession session(hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
+    if (call == 1) {
+      gate.entered.set_value();
+      gate.leave.get_future().wait();
+    }
+    return follow_the_data(data, out, 4);
+  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
   gate.entered.get_future().wait();
@@ -232,13 +238,13 @@ TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
 
 TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
   Gate gate;
-  Session session(kCase, hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
-                    if (call == 1) {
-                      gate.entered.set_value();
-                      gate.leave.get_future().wait();
-                    }
-                    return follow_the_data(data, out, 4);
-                  }));
+  TestSession session(hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
+    if (call == 1) {
+      gate.entered.set_value();
+      gate.leave.get_future().wait();
+    }
+    return follow_the_data(data, out, 4);
+  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   gate.entered.get_future().wait();
@@ -252,11 +258,11 @@ TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
 }
 
 TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
-  Session session(kCase,
-                  hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
-                    if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
-                    return follow_the_data(data, out, 4);
-                  }));
+  TestSession session(
+      hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
+        if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
+        return follow_the_data(data, out, 4);
+      }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   const auto failed = published_.wait_for(1);
@@ -273,10 +279,10 @@ TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
 }
 
 TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
-  Session session(kCase, hooks([](int call, const SparseData& data, const auto&, Estimate& out) {
-                    if (call == 1) throw std::runtime_error("thrown");
-                    return follow_the_data(data, out, 4);
-                  }));
+  TestSession session(hooks([](int call, const SparseData& data, const auto&, Estimate& out) {
+    if (call == 1) throw std::runtime_error("thrown");
+    return follow_the_data(data, out, 4);
+  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   const auto failed = published_.wait_for(1);
@@ -289,16 +295,16 @@ TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
 
 TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished) {
   std::promise<void> entered;
-  Session session(kCase,
-                  hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
-                    if (call == 1) wait_for_stop(options, entered);
-                    return follow_the_data(data, out, 4);
-                  }));
+  TestSession session(
+      hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
+        if (call == 1) wait_for_stop(options, entered);
+        return follow_the_data(data, out, 4);
+      }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
   ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
+  ASSERT_TRUE(session.submit(in_session(2, landmarks(2))).has_value());
   const auto messages = published_.wait_for(1);
   ASSERT_EQ(messages.size(), 1u);
   EXPECT_EQ(messages[0].update.observation_sequence, 2u);
@@ -306,11 +312,10 @@ TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished)
 
 TEST_F(SessionTest, StopEndsARunningInversion) {
   std::promise<void> entered;
-  Session session(kCase,
-                  hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
-                    wait_for_stop(options, entered);
-                    return fail(ErrorCode::kNotConverged, "stopped");
-                  }));
+  TestSession session(hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
+    wait_for_stop(options, entered);
+    return fail(ErrorCode::kNotConverged, "stopped");
+  }));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   entered.get_future().wait();
@@ -321,7 +326,7 @@ TEST_F(SessionTest, StopEndsARunningInversion) {
 }
 
 TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
-  Session session(kCase, hooks(echo));
+  TestSession session(hooks(echo));
   ASSERT_TRUE(start(session, Boundary::kContact).has_value());
   ASSERT_TRUE(start(session, Boundary::kFixed).has_value());
   ASSERT_TRUE(start(session, Boundary::kContact).has_value());
@@ -331,13 +336,13 @@ TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
 TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   int attempts = 0;
   SessionHooks failing = hooks(echo);
-  failing.make_model =
-      [&, make = failing.make_model](
-          const wire::SessionRequest& request) -> Result<std::unique_ptr<SessionModel>> {
+  failing.make_model = [&, make = failing.make_model](
+                           const wire::SessionRequest& request,
+                           const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
     if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
-    return make(request);
+    return make(request, stop);
   };
-  Session session(kCase, std::move(failing));
+  TestSession session(std::move(failing));
   const auto first = start(session);
   ASSERT_FALSE(first.has_value());
   EXPECT_EQ(first.error().code, ErrorCode::kFloatingBody);
@@ -350,14 +355,15 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   std::promise<void> leave;
   SessionHooks slow = hooks(echo);
   bool first = true;
-  slow.make_model = [&, make = slow.make_model](const wire::SessionRequest& request) {
+  slow.make_model = [&, make = slow.make_model](const wire::SessionRequest& request,
+                                                const std::stop_token& stop) {
     if (std::exchange(first, false)) {
       entered.set_value();
       leave.get_future().wait();
     }
-    return make(request);
+    return make(request, stop);
   };
-  Session session(kCase, std::move(slow));
+  TestSession session(std::move(slow));
   std::promise<Result<wire::SessionInfo>> preparing;
   session.start({kCase, Method::kPaper, Boundary::kContact},
                 [&](Result<wire::SessionInfo> info) { preparing.set_value(std::move(info)); });
@@ -373,6 +379,151 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   EXPECT_TRUE(later.get_future().get().has_value());
 }
 
+// A model that waits in its preparation until it is let go or stopped.
+struct SlowPreparation {
+  std::promise<void> entered;
+  std::promise<void> leave;
+  std::shared_future<void> left = leave.get_future().share();
+  std::atomic<bool> stopped{false};
+
+  // The second preparation waits.
+  MakeSessionModel around(MakeSessionModel make) {
+    return [this, make, call = std::make_shared<int>(0)](
+               const wire::SessionRequest& request,
+               const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
+      if (++*call == 2) {
+        const std::stop_callback wake(stop, [this] {
+          stopped = true;
+          leave.set_value();
+        });
+        entered.set_value();
+        left.wait();
+        if (stopped) return fail(ErrorCode::kUnavailable, "stopped");
+      }
+      return make(request, stop);
+    };
+  }
+};
+
+wire::SessionRequest condensed(Boundary boundary) {
+  return {kCase, Method::kCondensed, boundary, false};
+}
+
+TEST_F(SessionTest, TheRunningSessionGoesOnUntilTheNextIsReady) {
+  SlowPreparation slow;
+  SessionHooks watched = hooks(echo);
+  watched.make_model = slow.around(watched.make_model);
+  TestSession session(std::move(watched));
+  std::promise<bool> first;
+  session.start(condensed(Boundary::kContact),
+                [&](const auto& info) { first.set_value(info.has_value()); });
+  ASSERT_TRUE(first.get_future().get());
+  std::promise<Result<wire::SessionInfo>> second;
+  session.start(condensed(Boundary::kFixed),
+                [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); });
+  slow.entered.get_future().wait();
+  EXPECT_TRUE(session.state().shared.preparing);
+  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  const auto messages = published_.wait_for(1);
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_EQ(messages[0].session_id, 1u);
+  slow.leave.set_value();
+  const auto info = second.get_future().get();
+  ASSERT_TRUE(info.has_value());
+  EXPECT_EQ(info->key(), (SessionKey{kBootId, 2, kModelId}));
+  EXPECT_FALSE(session.submit(landmarks(2)).has_value()) << "the first session has ended";
+  EXPECT_TRUE(session.submit(in_session(2, landmarks(2))).has_value());
+}
+
+TEST_F(SessionTest, StopEndsAPreparation) {
+  SlowPreparation slow;
+  SessionHooks watched = hooks(echo);
+  watched.make_model = slow.around(watched.make_model);
+  TestSession session(std::move(watched));
+  ASSERT_TRUE(start(session).has_value());
+  std::promise<Result<wire::SessionInfo>> second;
+  session.start(condensed(Boundary::kFixed),
+                [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); });
+  slow.entered.get_future().wait();
+  session.stop();
+  EXPECT_TRUE(slow.stopped);
+  EXPECT_EQ(second.get_future().get().error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(session.state().shared.phase, SessionPhase::kClosed);
+}
+
+TEST_F(SessionTest, APreparationEndsWhenItsOwnerLeavesAndTheRunningSessionStays) {
+  SlowPreparation slow;
+  SessionHooks watched = hooks(echo);
+  watched.make_model = slow.around(watched.make_model);
+  TestSession session(std::move(watched));
+  std::promise<bool> first;
+  session.start(condensed(Boundary::kContact),
+                [&](const auto& info) { first.set_value(info.has_value()); });
+  ASSERT_TRUE(first.get_future().get());
+  std::promise<Result<wire::SessionInfo>> second;
+  session.start(
+      condensed(Boundary::kFixed),
+      [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); }, "viewer");
+  slow.entered.get_future().wait();
+  session.leave("somebody else");
+  EXPECT_FALSE(slow.stopped);
+  session.leave("viewer");
+  EXPECT_EQ(second.get_future().get().error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+}
+
+// A client that has lost the first answer asks again: nothing is estimated twice.
+TEST_F(SessionTest, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
+  std::atomic<int> calls{0};
+  TestSession session(hooks([&](int, const SparseData& data, const auto&, Estimate& out) {
+    ++calls;
+    return follow_the_data(data, out, 4);
+  }));
+  ASSERT_TRUE(start(session).has_value());
+  const auto first = session.submit(landmarks(4));
+  ASSERT_TRUE(first.has_value());
+  published_.wait_for(1);
+  const auto again = session.submit(landmarks(4));
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ(again->observation_sequence, 4u);
+  EXPECT_EQ(again->replaced_pending, first->replaced_pending);
+  ASSERT_TRUE(session.submit(landmarks(5)).has_value());
+  ASSERT_EQ(published_.wait_for(2).size(), 2u);
+  EXPECT_EQ(calls, 2);
+  Observation other = landmarks(5);
+  other.acquired_ns += 1;
+  EXPECT_FALSE(session.submit(other).has_value()) << "the same number for another observation";
+}
+
+TEST_F(SessionTest, AnImplausibleClockIsRefusedAndAgesNobodyOut) {
+  TestSession session(hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1, "camera")).has_value());
+  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
+  Observation ahead = landmarks(2, "ius");
+  ahead.acquired_ns = 3'600'000'000'000;
+  const auto refused = session.submit(ahead);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().message, HasSubstr("jumped ahead"));
+  EXPECT_TRUE(session.submit(landmarks(2, "ius")).has_value()) << "its number is still free";
+}
+
+// The clock of one source an hour ahead of the other's: both are as young as they are.
+TEST_F(SessionTest, SourcesNeedNotShareAClock) {
+  TestSession session(hooks(echo));
+  ASSERT_TRUE(start(session).has_value());
+  Observation camera = landmarks(1, "camera");
+  camera.acquired_ns = 3'600'000'000'000;
+  ASSERT_TRUE(session.submit(camera).has_value());
+  ASSERT_EQ(published_.wait_for(1).size(), 1u);
+  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
+  const auto messages = published_.wait_for(2);
+  ASSERT_EQ(messages.size(), 2u);
+  for (const Omission& omission : messages[1].update.left_out) {
+    EXPECT_EQ(omission.part.find("source"), std::string::npos) << omission.reason;
+  }
+}
+
 TEST_F(SessionTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
   const auto iterating = [](int, const SparseData& data, const auto& options, Estimate& out) {
     Estimate iterate;
@@ -381,12 +532,12 @@ TEST_F(SessionTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumbe
     if (options.on_iterate) options.on_iterate(iterate);
     return follow_the_data(data, out, 4);
   };
-  Session session(kCase, hooks(iterating));
+  TestSession session(hooks(iterating));
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   ASSERT_EQ(published_.wait_for(1).size(), 1u);
   ASSERT_TRUE(start(session, Boundary::kContact, kCase, true).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  ASSERT_TRUE(session.submit(in_session(2, landmarks(1))).has_value());
   const auto messages = published_.wait_for(3);
   ASSERT_EQ(messages.size(), 3u);
   EXPECT_TRUE(messages[0].update.final);

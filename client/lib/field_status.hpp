@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether the field that a viewer shows may be shown as current.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace brainshift::client {
+
+enum class Currency {
+  kNone,        // there is no usable field of the running session
+  kCurrent,     // it is the newest usable one, and every observation since is answered by it
+  kSuperseded,  // a newer usable one is on its way
+  kDegraded,    // it is the newest usable one, but a newer observation gave none
+  kStale,       // nothing is known of the daemon any more: it may be older than it looks
+};
+
+struct FieldStatus {
+  Currency currency = Currency::kNone;
+  std::string reason;  // one sentence to show; empty when current
+  double age_s = 0.0;  // since the observation that it answers reached the daemon; NaN: not known
+};
+
+}  // namespace brainshift::client

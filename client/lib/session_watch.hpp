@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a viewer knows of the daemon's session, and for how long. Private to client/lib. Not
+// thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/lib/field_status.hpp"
+#include "common/values/session_state.hpp"
+
+namespace brainshift::client {
+
+class SessionWatch {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  // A request for the state goes out: what its answer says holds from here.
+  void asked(std::uint64_t request_id, TimePoint now);
+  // The answer to that request; nothing is proven when the request is not known.
+  void answered(std::uint64_t request_id, const SessionState& state);
+  // A state that nobody asked for: news, but no proof of time.
+  void told(const SessionState& state) { state_ = state; }
+  // The connection is gone; requests that are under way get no answer.
+  void lost() { asked_.clear(); }
+
+  // The model that this viewer draws with: fields of another one are none of its business.
+  void expect_model(std::string model_id) { model_id_ = std::move(model_id); }
+  // The daemon's session is of the model that the viewer draws with, or none was named.
+  bool model_fits(const std::string& model_id) const;
+  const std::string& model_id() const { return model_id_; }
+
+  // Last heard, by an answer or otherwise; empty before the first time.
+  const std::optional<SessionState>& state() const { return state_; }
+  // When the request was sent that was answered last; empty before the first time.
+  const std::optional<TimePoint>& as_of() const { return as_of_; }
+  // What the state says still holds.
+  bool holds(TimePoint now) const;
+  // Whether a field may be shown as current. shown: session and number of the newest usable field
+  // that the viewer has; empty: it has none.
+  FieldStatus judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
+                    const std::string& endpoint, TimePoint now) const;
+
+ private:
+  static constexpr std::size_t kMaxAsked = 64;
+
+  std::string model_id_;
+  std::deque<std::pair<std::uint64_t, TimePoint>> asked_;  // oldest first
+  std::optional<SessionState> state_;
+  std::optional<TimePoint> as_of_;  // when the answered request was sent
+};
+
+}  // namespace brainshift::client
