@@ -8,8 +8,8 @@
 
 namespace brainshift::server {
 
-// Prints "brainshiftd: <message>" to stderr, on one line whatever the message holds. Returns the
-// exit status of the error's code.
+// Prints "brainshiftd: <message>" to stderr, on one line whatever the message holds. A reader
+// that stalls is not waited for beyond half a second. Returns the exit status of the error's code.
 int print_error(const Error& error);
 
 }  // namespace brainshift::server

@@ -66,7 +66,9 @@ Status serve(const ServeArguments& arguments) {
   if (!signals) return tl::unexpected(signals.error());
   const auto config = configuration(arguments);
   if (!config) return tl::unexpected(config.error());
-  start_logging(config->log_level);
+  LogOptions log_options;
+  log_options.level = config->log_level;
+  const Log log(log_options);
   auto options = service_options(*config);
   if (!options) return tl::unexpected(options.error());
 
