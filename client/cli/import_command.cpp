@@ -5,11 +5,15 @@
 
 #include "client/cli/command.hpp"
 #include "client/ultrasound/import.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 namespace {
 
 Status run(const ImportOptions& options) {
+  if (!options.out.empty()) {  // import_recording names what is missing
+    if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
+  }
   const auto report = import_recording(options, terminal_progress());
   if (!report) return tl::unexpected(report.error());
   for (const std::string& line : report_lines(*report)) std::printf("%s\n", line.c_str());

@@ -8,6 +8,7 @@
 
 #include "client/cli/command.hpp"
 #include "client/replay/replay.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -38,6 +39,10 @@ Status run(Arguments arguments) {
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
+  if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
+  if (!options.latency_csv.empty()) {
+    if (Status ok = io::check_output_file("--latency-csv", options.latency_csv); !ok) return ok;
+  }
   return replay(options, terminal_progress(),
                 [](const RunReport& report) { std::puts(summary_line(report).c_str()); });
 }

@@ -4,6 +4,7 @@
 
 #include "client/cli/command.hpp"
 #include "client/report/write_report.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 
@@ -17,7 +18,11 @@ void add_report(CLI::App& app, Status& status) {
   command->footer(
       "Writes report.json (all runs), report.html and the pictures as PNG. Example:\n"
       "  brainshift report paper.json paper-icp.json --out report");
-  command->callback([options, &status] { status = write_report(*options, terminal_progress()); });
+  command->callback([options, &status] {
+    status = io::check_output_folder("--out", options->out).and_then([&] {
+      return write_report(*options, terminal_progress());
+    });
+  });
 }
 
 }  // namespace brainshift::client

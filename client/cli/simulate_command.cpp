@@ -5,6 +5,7 @@
 
 #include "client/cli/command.hpp"
 #include "client/twin/simulate.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -32,6 +33,7 @@ Status run(const Arguments& arguments) {
   if (Status ok = required(!arguments.options.case_file.empty(), "--case"); !ok) return ok;
   if (Status ok = required(!arguments.options.scenario.empty(), "--scenario"); !ok) return ok;
   if (Status ok = required(!arguments.options.out.empty(), "--out"); !ok) return ok;
+  if (Status ok = io::check_output_file("--out", arguments.options.out); !ok) return ok;
   return simulate(arguments.options, terminal_progress());
 }
 

@@ -12,6 +12,7 @@
 #include "common/forward/build_problem.hpp"
 #include "common/io/config/problem_file.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/output_path.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
 
@@ -218,6 +219,10 @@ void print(const ProblemSpec& spec, const forward::ForwardSolution& solution,
 }
 
 Status run(const Arguments& arguments) {
+  if (Status ok = io::check_output_file("--out", arguments.out); !ok) return ok;
+  if (!arguments.probes.empty()) {
+    if (Status ok = io::check_output_file("--probes", arguments.probes); !ok) return ok;
+  }
   const Progress progress = terminal_progress();
   const auto spec = io::read_problem(arguments.problem);
   if (!spec) return tl::unexpected(spec.error());

@@ -5,11 +5,13 @@
 
 #include "client/cli/command.hpp"
 #include "client/stereo/jobs.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 namespace {
 
 Status run_calibrate(const CalibrateJob& job) {
+  if (Status ok = io::check_output_file("--out", job.out); !ok) return ok;
   const auto result = calibrate_files(job, terminal_progress());
   if (!result) return tl::unexpected(result.error());
   const StereoCalibration& c = result->calibration;
@@ -27,6 +29,10 @@ Status run_calibrate(const CalibrateJob& job) {
 }
 
 Status run_reconstruct(const ReconstructJob& job) {
+  if (Status ok = io::check_output_file("--out", job.out); !ok) return ok;
+  if (!job.disparity_picture.empty()) {
+    if (Status ok = io::check_output_file("--disparity-png", job.disparity_picture); !ok) return ok;
+  }
   const auto summary = reconstruct_files(job, terminal_progress());
   if (!summary) return tl::unexpected(summary.error());
   const stereo::ReconstructedSurface& made = summary->made;
@@ -41,6 +47,7 @@ Status run_reconstruct(const ReconstructJob& job) {
 }
 
 Status run_observe(const ObserveJob& job) {
+  if (Status ok = io::check_output_file("--out", job.out); !ok) return ok;
   const auto summary = observe_surface(job);
   if (!summary) return tl::unexpected(summary.error());
   const geometry::CheckedSurface& checked = summary->checked;

@@ -12,6 +12,7 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/io/config/config_file.hpp"
+#include "common/io/files/output_path.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/prepare_model.hpp"
 #include "server/main/exit_status.hpp"
@@ -30,24 +31,15 @@ struct Outcome {
   double total_s = 0.0;
 };
 
-// A bad --out is reported before minutes of work rather than after.
-Status check_output(const std::filesystem::path& out) {
-  const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(folder, ignored)) {
-    return fail(ErrorCode::kNotFound,
-                fmt::format("{}: the folder {} does not exist", out.string(), folder.string()));
-  }
-  if (std::filesystem::is_directory(out, ignored)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: is a folder, --out must name a file", out.string()));
-  }
-  return {};
-}
-
 Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   const Stopwatch whole;
-  if (auto status = check_output(arguments.out); !status) return tl::unexpected(status.error());
+  patient::PrepareOptions options;
+  options.checkpoint = arguments.out.string() + ".partial";
+  for (const std::filesystem::path& path : {arguments.out, options.checkpoint}) {
+    if (auto status = io::check_output_file("--out", path); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
   const auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
   if (auto plan = plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
@@ -56,9 +48,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   for (const std::string& note : config->notes) {
     bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
   }
-  patient::PrepareOptions options;
   options.progress = bar.progress("");
-  options.checkpoint = arguments.out.string() + ".partial";
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));
   };

@@ -12,6 +12,7 @@
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "server/main/exit_status.hpp"
+#include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/stop_signals.hpp"
 #include "server/service/service.hpp"
@@ -26,7 +27,13 @@ Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
   if (!config) return config;
   if (arguments.model) config->model = *arguments.model;
-  if (arguments.endpoint) config->endpoint = *arguments.endpoint;
+  if (arguments.endpoint) {
+    config->endpoint = *arguments.endpoint;
+    if (auto ok = io::check_endpoint(config->endpoint, config->allow_remote); !ok) {
+      return tl::unexpected(ok.error());
+    }
+  }
+  if (auto ok = check_ipc_path(config->endpoint); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
   if (!config->journal_dir.empty() &&
       !std::filesystem::is_directory(config->journal_dir, ignored)) {
@@ -76,7 +83,10 @@ Status serve(const ServeArguments& arguments) {
   router_options.endpoint = config->endpoint;
   router_options.max_clients = config->max_clients;
   router_options.max_message_mib = config->max_message_mib;
-  auto router = Router::bind(router_options);
+  auto router = [&] {
+    const OwnerOnly ipc_socket;  // no thread of ours creates files yet
+    return Router::bind(router_options);
+  }();
   if (!router) return tl::unexpected(router.error());
 
   if (options->model) {

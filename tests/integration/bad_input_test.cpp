@@ -3,8 +3,10 @@
 // prints nothing to stdout and leaves nothing behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <array>
+#include <csignal>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -174,6 +176,21 @@ INSTANTIATE_TEST_SUITE_P(
                 with("images", "brain", "brain: /nonexistent/brain.nii.gz"),
                 {"/nonexistent/brain.nii.gz"}},
         BadCase{"ImageThatIsNone", with_brain("not an image"), {"mask.nii"}},
+        BadCase{"ImageWhoseVoxelsBeginNowhere",
+                [](const Workspace& files) {
+                  std::string bytes = nifti(1);
+                  const float offset = 1e30F;
+                  std::memcpy(bytes.data() + 108, &offset, sizeof offset);
+                  return with_brain(bytes)(files);
+                },
+                {"mask.nii", "vox_offset"}},
+        BadCase{"ImageOfNoDimensions",
+                [](const Workspace& files) {
+                  std::string bytes = nifti(1);
+                  bytes[40] = 0;
+                  return with_brain(bytes)(files);
+                },
+                {"mask.nii", "not a 3-D image"}},
         BadCase{"TruncatedImage", with_brain(nifti(1).substr(0, 1000)), {"mask.nii"}},
         BadCase{"MaskWithoutComponent", with_brain(nifti(0)), {"brain"}},
         BadCase{"UnknownKey", with("mesh", "edge_mm", "edge_cm: 1.2"), {"bad.yaml", "edge_cm"}},
@@ -253,6 +270,44 @@ TEST(BadUsage, ExitsTwoWithOneLine) {
   }
 }
 
+// Each would make the daemon serve nobody, or everybody, or end a file.
+TEST(BadUsage, EndpointsThatMayNotServeAreRefusedInOneLine) {
+  const Workspace files;
+  const auto config = files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n");
+  const auto open = files.write("open.yaml", "endpoint: tcp://0.0.0.0:*\n");
+  const auto patient = files.write("patient.h5", "model");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> table = {
+      {{"--config", config, "--endpoint", "inproc://x"}, "inproc://x"},
+      {{"--config", config, "--endpoint", "tcp://0.0.0.0:*"}, "allow_remote"},
+      {{"--config", config, "--endpoint", "tcp://*:*"}, "allow_remote"},
+      {{"--config", config, "--endpoint", "ipc://@x"}, "ipc://@x"},
+      {{"--config", config, "--endpoint", "ipc://" + patient}, "no socket"},
+      {{"--config", config, "--endpoint", "ipc://" + files.path("no/s")}, "does not exist"},
+      {{"--config", open}, "open.yaml"}};
+  for (const auto& [arguments, says] : table) {
+    std::vector<std::string> argv = {brainshiftd(), "serve"};
+    argv.insert(argv.end(), arguments.begin(), arguments.end());
+    SCOPED_TRACE(testing::PrintToString(arguments));
+    expect_refused(run(argv, 30.0), "brainshiftd", {says});
+  }
+  EXPECT_TRUE(std::filesystem::is_regular_file(patient));
+}
+
+TEST(GoodUsage, TheSocketOfAnIpcEndpointIsForTheOwnerAlone) {
+  const Workspace files;
+  const auto config = files.write("daemon.yaml", "endpoint: ipc://" + files.path("socket") + "\n");
+  Background daemon({brainshiftd(), "serve", "--config", config}, files.path("log"));
+  ASSERT_THAT(daemon.first_line(), StartsWith("listening on ipc://"));
+  using std::filesystem::perms;
+  EXPECT_EQ(std::filesystem::status(files.path("socket")).permissions(),
+            perms::owner_read | perms::owner_write);
+  // A second daemon does not take the endpoint over.
+  const Finished second = run({brainshiftd(), "serve", "--config", config}, 30.0);
+  EXPECT_EQ(second.exit_status, 1);
+  EXPECT_THAT(second.err, HasSubstr("another process listens"));
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+}
+
 TEST(GoodUsage, HelpTeachesAndVersionTells) {
   const Finished help = run({brainshiftd(), "--help"});
   EXPECT_EQ(help.exit_status, 0);
@@ -280,6 +335,57 @@ TEST(BadUsage, OfTheClientExitsTwoWithOneLine) {
     argv.insert(argv.end(), arguments.begin(), arguments.end());
     SCOPED_TRACE(testing::PrintToString(arguments));
     expect_refused(run(argv, 30.0), "brainshift", {});
+  }
+}
+
+// Every option that names an output. The inputs do not exist: the outputs are looked at first.
+TEST(BadOutput, IsRefusedBeforeTheWorkWithOptionAndPath) {
+  const Workspace files;
+  const std::string none = files.path("none");
+  const std::string good = files.path("good.json");
+  const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
+      {"--out", {brainshiftd(), "prepare", "--case", none, "--out"}},
+      {"--out", {brainshift(), "simulate", "--case", none, "--scenario", "paper", "--out"}},
+      {"--report", {brainshift(), "replay", none, "--report"}},
+      {"--latency-csv", {brainshift(), "replay", none, "--report", good, "--latency-csv"}},
+      {"--out", {brainshift(), "solve", "--problem", none, "--out"}},
+      {"--probes", {brainshift(), "solve", "--problem", none, "--out", good, "--probes"}},
+      {"--out", {brainshift(), "import", "--recording", none, "--out"}},
+      {"--out",
+       {brainshift(), "stereo", "calibrate", "--left", none, "--right", none, "--square-mm", "5",
+        "--out"}},
+      {"--out",
+       {brainshift(), "stereo", "reconstruct", "--left", none, "--right", none, "--calibration",
+        none, "--pose", none, "--out"}},
+      {"--disparity-png",
+       {brainshift(), "stereo", "reconstruct", "--left", none, "--right", none, "--calibration",
+        none, "--pose", none, "--out", good, "--disparity-png"}},
+      {"--out",
+       {brainshift(), "stereo", "observe", "--surface", none, "--model", none, "--sd-mm", "1",
+        "--out"}}};
+  const std::string pipe = files.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const auto& [option, command] : commands) {
+    for (const std::string& path : {std::string("/dev/null"), pipe, files.folder().string(),
+                                    files.path("no/out"), std::string("/proc/out")}) {
+      std::vector<std::string> argv = command;
+      argv.push_back(path);
+      SCOPED_TRACE(testing::PrintToString(argv));
+      const std::string program = argv[0] == brainshiftd() ? "brainshiftd" : "brainshift";
+      expect_refused(run(argv, 30.0), program, {option + ": " + path + ": "});
+    }
+  }
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_FALSE(std::filesystem::exists(good));
+}
+
+TEST(BadOutput, AReportsFolderIsLookedAtBeforeTheWork) {
+  const Workspace files;
+  const std::string file = files.write("file", "");
+  for (const std::string& path : {file, file + "/below", std::string("/dev/null")}) {
+    expect_refused(run({brainshift(), "report", files.path("none.json"), "--out", path}, 30.0),
+                   "brainshift", {"--out: " + path + ": "});
   }
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/config/daemon_file.hpp"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
 #include "common/io/config/key_reader.hpp"
 #include "common/io/files/file_access.hpp"
 
@@ -10,12 +13,19 @@ namespace {
 constexpr Word<const char*> kLogLevels[] = {
     {"trace", "trace"}, {"debug", "debug"}, {"info", "info"}, {"warn", "warn"}, {"error", "error"}};
 
+constexpr Word<bool> kTruthWords[] = {{true, "true"}, {false, "false"}};
+
 // The table of the daemon's keys.
 template <typename A, Of<DaemonConfig> V>
 void visit(A& a, V& v) {
   a({"endpoint", "", "Where clients connect: tcp://HOST:PORT or ipc://PATH", "this machine only",
-     "There is no authentication, so open it to a network only where everybody on it is trusted."},
+     "The socket of an ipc endpoint is for the daemon's own account. Other addresses than those of "
+     "this machine need allow_remote."},
     v.endpoint);
+  a({"allow_remote", "", "Whether the endpoint may be an address that other machines reach", "",
+     "There is no authentication and no encryption: say true only where everybody on the network "
+     "is trusted."},
+    v.allow_remote, kTruthWords);
   a({"model", "", "Model file made by `brainshiftd prepare`", "",
      "Clients are told model_not_ready until one is loaded. The command line's --model takes "
      "precedence."},
@@ -34,22 +44,55 @@ void visit(A& a, V& v) {
     v.max_message_mib, between(1, 1024));
 }
 
-Status check_endpoint(const std::string& endpoint) {
-  const bool ipc = endpoint.rfind("ipc://", 0) == 0 && endpoint.size() > 6;
+// HOST of tcp://HOST:PORT, without the brackets of IPv6; empty when that is not the form.
+std::string tcp_host(const std::string& endpoint) {
+  const std::string scheme = "tcp://";
   const std::size_t colon = endpoint.rfind(':');
-  const bool tcp = endpoint.rfind("tcp://", 0) == 0 && colon > 6 && colon + 1 < endpoint.size();
-  if (ipc || tcp) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "endpoint = " + endpoint + ": must be tcp://HOST:PORT or ipc://PATH");
+  if (endpoint.rfind(scheme, 0) != 0 || colon <= scheme.size() || colon + 1 >= endpoint.size()) {
+    return {};
+  }
+  std::string host = endpoint.substr(scheme.size(), colon - scheme.size());
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  }
+  return host;
+}
+
+// Only what is certain: an interface's or a machine's name may mean any address.
+bool is_loopback(const std::string& host) {
+  if (host == "localhost" || host == "lo") return true;
+  in_addr v4{};
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+  in6_addr v6{};
+  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
 Status validate(const DaemonConfig& config) {
   KeyChecker checker;
   visit(checker, config);
-  return checker.status().and_then([&] { return check_endpoint(config.endpoint); });
+  return checker.status().and_then(
+      [&] { return check_endpoint(config.endpoint, config.allow_remote); });
 }
 
 }  // namespace
+
+Status check_endpoint(const std::string& endpoint, bool allow_remote) {
+  const auto refuse = [&](const std::string& reason) {
+    return fail(ErrorCode::kInvalidArgument, "endpoint = " + endpoint + ": " + reason);
+  };
+  const std::string ipc = "ipc://";
+  if (endpoint.rfind(ipc, 0) == 0 && endpoint.size() > ipc.size()) {
+    // An abstract socket has no permissions; * is a folder that nobody knows.
+    const char first = endpoint[ipc.size()];
+    return first == '@' || first == '*' ? refuse("must name the path of a socket") : Status();
+  }
+  const std::string host = tcp_host(endpoint);
+  if (host.empty()) return refuse("must be tcp://HOST:PORT or ipc://PATH");
+  if (allow_remote || is_loopback(host)) return {};
+  return refuse(
+      "other machines may reach it, and there is no authentication: must be an address of this "
+      "machine alone, such as 127.0.0.1, unless allow_remote is true");
+}
 
 Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path) {
   const Result<std::string> text = read_file(path);

@@ -15,6 +15,7 @@ namespace brainshift::io {
 // What a daemon file says (config/daemon.yaml documents every key; the table is in the .cpp).
 struct DaemonConfig {
   std::string endpoint = "tcp://127.0.0.1:5555";  // tcp://HOST:PORT or ipc://PATH
+  bool allow_remote = false;                      // endpoints that other machines reach
   // Model file. Empty: clients get model_not_ready until one is loaded.
   std::filesystem::path model;
   std::filesystem::path journal_dir;  // empty: no journal
@@ -25,6 +26,11 @@ struct DaemonConfig {
 
 // Reads and validates; relative paths are taken from the file's folder.
 Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path);
+
+// Ok for ipc://PATH, and for tcp://HOST:PORT where HOST is surely this machine alone (127.0.0.0/8,
+// ::1, localhost, lo) or allow_remote is true. kInvalidArgument: "endpoint = ...: reason". Every
+// other transport of ZeroMQ is refused.
+Status check_endpoint(const std::string& endpoint, bool allow_remote);
 
 // The documentation of every key.
 std::vector<KeyDocument> daemon_key_documents();

@@ -110,6 +110,9 @@ Result<PendingFile> PendingFile::create(const fs::path& path) {
   if (path.filename().empty() || fs::is_directory(path, ignored)) {
     return file_error(ErrorCode::kWriteFailed, path, "is not a file name");
   }
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
+    return file_error(ErrorCode::kWriteFailed, path, "is not a regular file");
+  }
   const fs::path temporary = folder_of(path) / name;
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
   if (file.get() < 0) return write_error(path, "create a temporary file beside it", errno);

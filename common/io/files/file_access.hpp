@@ -20,14 +20,15 @@ Status check_regular_file(const std::filesystem::path& path);
 // The bytes of a regular file. kNotFound, or kUnreadable.
 Result<std::string> read_file(const std::filesystem::path& path);
 
-// Replaces `path` by `content`, or leaves it as it was. kWriteFailed.
+// Replaces `path` by `content`, or leaves it as it was. kWriteFailed. What is no regular file is
+// never replaced.
 Status write_file(const std::filesystem::path& path, std::string_view content);
 
 // For libraries that write the file themselves: they write to temporary_path(), and commit() puts
 // the complete file in place. Without commit() the temporary file is removed.
 class PendingFile {
  public:
-  // The temporary file exists and is empty. kWriteFailed.
+  // The temporary file exists and is empty. kWriteFailed, also when `path` is a device or the like.
   static Result<PendingFile> create(const std::filesystem::path& path);
   PendingFile(PendingFile&& other) noexcept;
   PendingFile& operator=(PendingFile&&) = delete;

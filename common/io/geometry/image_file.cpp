@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "common/io/files/file_access.hpp"
+#include "common/io/geometry/nifti_header.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -22,45 +23,6 @@ struct FreeImage {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
 };
 using ImageHandle = std::unique_ptr<nifti_image, FreeImage>;
-
-// deflate cannot do better than about 1032:1, so a header that promises more than this lies.
-constexpr double kLargestExpansion = 1040.0;
-
-std::string check_dimensions(const nifti_image& image) {
-  for (int axis = 1; axis <= 3; ++axis) {
-    if (image.ndim < 3 || image.dim[axis] < 1) {
-      return "is not a 3-D image (" + std::to_string(image.ndim) + " dimensions)";
-    }
-    if (image.dim[axis] > 32767) {
-      return "dimension " + std::to_string(axis) + " has " + std::to_string(image.dim[axis]) +
-             " voxels: must be at most 32767";
-    }
-  }
-  for (int axis = 4; axis <= std::min<int>(7, static_cast<int>(image.ndim)); ++axis) {
-    if (image.dim[axis] > 1) {
-      return "dimension " + std::to_string(axis) + " has " + std::to_string(image.dim[axis]) +
-             " entries: only one volume can be read";
-    }
-  }
-  return {};
-}
-
-bool supported(int datatype) {
-  switch (datatype) {
-    case DT_UINT8:
-    case DT_INT8:
-    case DT_UINT16:
-    case DT_INT16:
-    case DT_UINT32:
-    case DT_INT32:
-    case DT_UINT64:
-    case DT_INT64:
-    case DT_FLOAT32:
-    case DT_FLOAT64:
-    case DT_FLOAT128: return true;
-    default: return false;
-  }
-}
 
 // The sform when there is one, else the qform; NIfTI-1 "method 3" before "method 2".
 Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path) {
@@ -116,29 +78,17 @@ void convert_any(const nifti_image& image, double slope, double intercept,
     case DT_FLOAT32: return convert<float>(data, slope, intercept, values);
     case DT_FLOAT64: return convert<double>(data, slope, intercept, values);
     case DT_FLOAT128: return convert<long double>(data, slope, intercept, values);
-    default: assert(false && "supported() admitted an unknown type");
+    default: assert(false && "check_nifti_header() admitted an unknown type");
   }
 }
 
-// Everything that the header alone can tell, before any voxel is read.
-Status check_header(const nifti_image& image, const fs::path& path) {
-  if (const std::string problem = check_dimensions(image); !problem.empty()) {
-    return file_error(ErrorCode::kUnreadable, path, problem);
-  }
-  if (!supported(image.datatype)) {
-    return file_error(ErrorCode::kUnreadable, path,
-                      std::string("voxel type ") + nifti_datatype_string(image.datatype) + " (" +
-                          std::to_string(image.datatype) +
-                          ") is not supported: must be integer or real");
-  }
+// Before any voxel is read: the file is large enough for them.
+Status check_voxels(const nifti_image& image, const fs::path& path) {
   // The data may lie in a second file (.img); libnifti has looked it up.
   const fs::path data_file = image.iname != nullptr ? fs::path(image.iname) : path;
   if (Status exists = check_regular_file(data_file); !exists) return exists;
   const double needed = static_cast<double>(image.nvox) * image.nbyper;
-  const double size = static_cast<double>(fs::file_size(data_file));
-  const bool gzipped = nifti_is_gzfile(image.iname) != 0;
-  const double available =
-      gzipped ? size * kLargestExpansion : size - static_cast<double>(image.iname_offset);
+  const double available = largest_content(data_file) - static_cast<double>(image.iname_offset);
   if (needed > available) {
     std::ostringstream text;
     text << std::fixed;
@@ -153,13 +103,14 @@ Status check_header(const nifti_image& image, const fs::path& path) {
 
 Result<VoxelImage> read_nifti(const fs::path& path) {
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
-  nifti_set_debug_level(0);  // else the library prints to stderr
+  nifti_set_debug_level(0);  // else the library prints to stderr even for good files
+  if (Status header = check_nifti_header(path); !header) return tl::unexpected(header.error());
   ImageHandle image(nifti_image_read(path.c_str(), 0));
   // libnifti also reads ANALYZE 7.5 (which has no affine) and an ASCII form that nobody writes.
   const bool is_nifti =
       image && image->nifti_type != NIFTI_FTYPE_ANALYZE && image->nifti_type != NIFTI_FTYPE_ASCII;
   if (!is_nifti) return file_error(ErrorCode::kUnreadable, path, "is not a NIfTI image");
-  if (Status header = check_header(*image, path); !header) return tl::unexpected(header.error());
+  if (Status voxels = check_voxels(*image, path); !voxels) return tl::unexpected(voxels.error());
   Result<AffineTransform> affine = affine_of(*image, path);
   if (!affine) return tl::unexpected(affine.error());
 

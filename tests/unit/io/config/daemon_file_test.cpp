@@ -20,6 +20,7 @@ TEST(DaemonFile, ShippedFileHasTheDefaults) {
   ASSERT_TRUE(read) << read.error().message;
   const DaemonConfig defaults;
   EXPECT_EQ(read->endpoint, defaults.endpoint);
+  EXPECT_EQ(read->allow_remote, defaults.allow_remote);
   EXPECT_EQ(read->model, defaults.model);
   EXPECT_EQ(read->journal_dir, defaults.journal_dir);
   EXPECT_EQ(read->log_level, defaults.log_level);
@@ -43,9 +44,10 @@ class DaemonFileKeys : public testing::Test {
 TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   const auto config = read(
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
-      "max_message_mib: 5\n");
+      "max_message_mib: 5\nallow_remote: true\n");
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
+  EXPECT_TRUE(config->allow_remote);
   EXPECT_EQ(config->model, folder_ / "m.h5");
   EXPECT_EQ(config->journal_dir, "/j");
   EXPECT_EQ(config->log_level, "debug");
@@ -68,6 +70,12 @@ TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
       {"endpoint: 'tcp://host'", "endpoint = tcp://host: must be"},
       {"endpoint: 'tcp://host:'", "endpoint = tcp://host:: must be"},
       {"endpoint: 'ipc://'", "endpoint = ipc://: must be"},
+      {"endpoint: 'inproc://x'", "endpoint = inproc://x: must be tcp://HOST:PORT or ipc://PATH"},
+      {"endpoint: 'ws://127.0.0.1:80'", "must be tcp://HOST:PORT or ipc://PATH"},
+      {"endpoint: 'ipc://@abstract'", "must name the path of a socket"},
+      {"endpoint: 'ipc://*'", "must name the path of a socket"},
+      {"endpoint: 'tcp://0.0.0.0:5555'", "d.yaml:1: endpoint = tcp://0.0.0.0:5555: other machines"},
+      {"allow_remote: maybe", "d.yaml:1: allow_remote = maybe: must be one of true, false"},
       {"model: [a]", "d.yaml:1: model = [a]: must be text"},
   };
   for (const auto& [text, message] : kBad) {
@@ -77,6 +85,31 @@ TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
     EXPECT_THAT(config.error().message,
                 AllOf(HasSubstr(message), HasSubstr(folder_.path().string())));
   }
+}
+
+TEST_F(DaemonFileKeys, WithoutAllowRemoteTheEndpointIsOnThisMachineAlone) {
+  for (const char* local : {"tcp://127.0.0.1:5555", "tcp://127.9.9.9:*", "tcp://[::1]:5555",
+                            "tcp://localhost:1", "tcp://lo:1", "ipc:///run/brainshift"}) {
+    EXPECT_TRUE(check_endpoint(local, false)) << local;
+  }
+  for (const char* remote :
+       {"tcp://0.0.0.0:5555", "tcp://*:5555", "tcp://10.0.0.1:5555", "tcp://[::]:5555",
+        "tcp://::1:5555:5555", "tcp://[fe80::1]:5555", "tcp://eth0:5555", "tcp://localhost.org:1",
+        "tcp://127.0.0.1.org:1", "tcp://0.0.0.0;127.0.0.1:5555", "tcp://[::ffff:10.0.0.1]:1",
+        "tcp://127.1:1", "tcp://2130706433:1"}) {
+    const Status status = check_endpoint(remote, false);
+    ASSERT_FALSE(status) << remote;
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(status.error().message, AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
+    EXPECT_TRUE(check_endpoint(remote, true)) << remote;
+  }
+  EXPECT_FALSE(check_endpoint("inproc://x", true));
+  EXPECT_TRUE(read("endpoint: tcp://0.0.0.0:5555\nallow_remote: true\n"));
+}
+
+TEST_F(DaemonFileKeys, TheImagesFileIsRead) {
+  const auto config = read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "docker/daemon.yaml");
+  EXPECT_TRUE(config) << config.error().message;
 }
 
 TEST_F(DaemonFileKeys, MissingFileIsNotFound) {

@@ -346,6 +346,65 @@ TEST_F(ImageFile, ComplexAndColourVoxelsAreRefused) {
   EXPECT_THAT(refusal(Header().type(kRgb, 24), voxels<float>(24)), HasSubstr("RGB24"));
 }
 
+TEST_F(ImageFile, VoxelsThatBeginOutsideTheFileOrInItsHeaderAreRefused) {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  for (const float offset :
+       {-1.0f, -352.0f, 1.0f, 347.0f, 352.5f, 1e9f, 1e30f, kInf, -kInf, kNan}) {
+    EXPECT_THAT(refusal(Header().set<float>(108, offset)), HasSubstr("vox_offset is ")) << offset;
+  }
+  // An int overflows at 2^31.
+  EXPECT_THAT(refusal(Header().set<float>(108, 4294967296.0f)), HasSubstr("vox_offset is "));
+}
+
+TEST_F(ImageFile, VoxelsOfAPairThatBeginOutsideTheSecondFileAreRefused) {
+  for (const float offset : {-1.0f, 1.0f, 1e30f, std::numeric_limits<float>::quiet_NaN()}) {
+    std::string bytes = Header().set<float>(108, offset).bytes();
+    std::memcpy(&bytes[344], "ni1", 4);
+    folder_.write("pair.img", voxels<float>(24));
+    testing::internal::CaptureStderr();
+    EXPECT_FALSE(read_nifti(folder_.write("pair.hdr", bytes))) << offset;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  }
+}
+
+TEST_F(ImageFile, VoxelsRightBehindTheHeaderWithoutAnOffsetAreRead) {
+  std::string bytes = Header().set<float>(108, 0.0f).bytes();
+  bytes.resize(348);
+  const auto image = read_nifti(folder_.write("i.nii", bytes + voxels<float>(24)));
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->values[23], 24.0f);
+}
+
+// Each made libnifti print a line of its own.
+TEST_F(ImageFile, BadHeadersAreRefusedInOneLine) {
+  EXPECT_THAT(refusal(Header().dims({0, 2, 3, 4})), HasSubstr("not a 3-D image (0 dimensions)"));
+  EXPECT_THAT(refusal(Header().dims({9, 2, 3, 4})), HasSubstr("not a 3-D image (9 dimensions)"));
+  EXPECT_THAT(refusal(Header().dims({-3, 2, 3, 4})), HasSubstr("not a 3-D image"));
+  EXPECT_THAT(refusal(Header().dims({3, 0, 3, 4})), HasSubstr("not a 3-D image"));
+  EXPECT_THAT(refusal(Header().dims({3, -2, 3, 4})), HasSubstr("not a 3-D image"));
+  constexpr std::int16_t kCodes[] = {0, 1, 3, 999, -1};
+  for (const std::int16_t code : kCodes) {
+    EXPECT_THAT(refusal(Header().type(code, 32)), HasSubstr("is not supported")) << code;
+  }
+  Header ascii;
+  EXPECT_THAT(refusal(ascii.set(0, std::array<char, 12>{'<', 'n', 'i', 'f', 't', 'i', '_', 'i', 'm',
+                                                        'a', 'g', 'e'})),
+              HasSubstr("is not a NIfTI image"));
+}
+
+TEST_F(ImageFile, ATruncatedNifti2HeaderIsRefusedInOneLine) {
+  std::string bytes(400, '\0');
+  const std::int32_t size = 540;
+  std::memcpy(bytes.data(), &size, sizeof size);
+  std::memcpy(&bytes[4], "n+2\0\r\n\x1a\n", 8);
+  testing::internal::CaptureStderr();
+  const auto image = read_nifti(folder_.write("two.nii", bytes));
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(image);
+  EXPECT_THAT(image.error().message, HasSubstr("is not a NIfTI image"));
+}
+
 TEST_F(ImageFile, ImageWithoutAffineIsRefused) {
   EXPECT_THAT(refusal(Header().no_sform()), HasSubstr("no affine"));
 }
