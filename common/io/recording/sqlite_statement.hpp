@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// RAII around one prepared SQLite statement. Private to surgery_file.cpp.
+// RAII around one prepared SQLite statement. Private to the surgery file.
 #pragma once
 
 #include <sqlite3.h>

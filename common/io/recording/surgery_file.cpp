@@ -2,137 +2,61 @@
 #include "common/io/recording/surgery_file.hpp"
 
 #include <fcntl.h>
-#include <sqlite3.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
-#include <bit>
 #include <cerrno>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <limits>
-#include <string_view>
+#include <utility>
 
 #include "common/io/files/file_access.hpp"
+#include "common/io/recording/record_chain.hpp"
+#include "common/io/recording/sqlite_database.hpp"
 #include "common/io/recording/sqlite_statement.hpp"
+#include "common/io/recording/surgery_layout.hpp"
+#include "common/io/recording/surgery_truth.hpp"
 
 namespace brainshift::io {
 namespace {
 
 namespace fs = std::filesystem;
+using Access = SqliteDatabase::Access;
 
-static_assert(std::endian::native == std::endian::little, "truth fields are little-endian blobs");
-
-constexpr int kApplicationId = 0x42534652;  // "BSFR"; tells a surgery from any other SQLite file
-constexpr int kSchemaVersion = 1;
-constexpr int kBusyTimeoutMs = 500;
-constexpr std::string_view kWrite = "cannot write";
-constexpr std::string_view kRead = "cannot read";
-
-constexpr const char* kSchema = R"sql(
-CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value TEXT NOT NULL);
-CREATE TABLE record(
-  id INTEGER PRIMARY KEY,
-  kind TEXT NOT NULL CHECK (kind IN ('observation', 'update')),
-  sequence INTEGER NOT NULL,
-  recorded_ns INTEGER NOT NULL,
-  payload BLOB NOT NULL);
-CREATE TABLE truth_field(
-  observation_sequence INTEGER PRIMARY KEY,
-  nodes INTEGER NOT NULL,
-  displacement BLOB NOT NULL);
-CREATE TABLE truth_point(
-  id INTEGER PRIMARY KEY,
-  observation_sequence INTEGER NOT NULL,
-  kind TEXT NOT NULL,
-  node0 INTEGER NOT NULL, node1 INTEGER NOT NULL, node2 INTEGER NOT NULL, node3 INTEGER NOT NULL,
-  weight0 REAL NOT NULL, weight1 REAL NOT NULL, weight2 REAL NOT NULL, weight3 REAL NOT NULL);
-CREATE INDEX truth_point_by_observation ON truth_point(observation_sequence, id);
-CREATE TABLE truth_scalar(
-  observation_sequence INTEGER NOT NULL,
-  name TEXT NOT NULL,
-  value REAL NOT NULL,
-  PRIMARY KEY (observation_sequence, name));
-)sql";
-
-constexpr const char* kInsertRecord =
+constexpr const char* kInsert =
+    "INSERT INTO record(kind, sequence, recorded_ns, payload, crc) VALUES(?1, ?2, ?3, ?4, ?5)";
+constexpr const char* kInsertOf1 =
     "INSERT INTO record(kind, sequence, recorded_ns, payload) VALUES(?1, ?2, ?3, ?4)";
-constexpr const char* kSelectRecords =
-    "SELECT sequence, recorded_ns, payload FROM record WHERE kind = ?1 ORDER BY id";
-constexpr const char* kSelectField =
-    "SELECT nodes, displacement FROM truth_field WHERE observation_sequence = ?1";
-constexpr const char* kSelectPoints =
-    "SELECT kind, node0, node1, node2, node3, weight0, weight1, weight2, weight3 FROM truth_point"
-    " WHERE observation_sequence = ?1 ORDER BY id";
-constexpr const char* kSelectScalars =
-    "SELECT name, value FROM truth_scalar WHERE observation_sequence = ?1";
-
-// Every key of the meta table is named once; MetaWriter and MetaReader walk the same list.
-template <typename A, typename Meta>
-void visit(A& a, Meta& meta) {
-  a("case_id", meta.case_id), a("model_id", meta.model_id), a("case_file", meta.case_file);
-  a("scenario", meta.scenario), a("seed", meta.seed), a("method", meta.method);
-  a("boundary", meta.boundary), a("created_utc", meta.created_utc), a("software", meta.software);
-}
-
-struct MetaWriter {
-  std::map<std::string, std::string> rows;
-  void operator()(const char* key, const std::string& value) {
-    if (!value.empty()) rows[key] = value;
-  }
-  void operator()(const char* key, const std::optional<std::uint64_t>& value) {
-    if (value) rows[key] = std::to_string(*value);
-  }
-};
-
-struct MetaReader {
-  std::map<std::string, std::string> rows;
-  void operator()(const char* key, std::string& value) { value = rows[key]; }
-  // A seed that is not a whole number counts as not given.
-  void operator()(const char* key, std::optional<std::uint64_t>& value) {
-    const std::string& text = rows[key];
-    std::uint64_t number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error == std::errc() && end == text.data() + text.size()) value = number;
-  }
-};
+constexpr const char* kSelect =
+    "SELECT id, kind, sequence, recorded_ns, payload, crc FROM record ORDER BY id";
+constexpr const char* kSelectOf1 =
+    "SELECT id, kind, sequence, recorded_ns, payload FROM record ORDER BY id";
 
 // SQLite integers are signed; a sequence beyond them would come back negative.
 bool fits(std::uint64_t sequence) {
   return sequence <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
 }
 
-Status check_truth(const fs::path& path, const SurgeryTruth& truth) {
-  const auto nodes = static_cast<int>(truth.displacement.cols());
-  if (!truth.displacement.allFinite()) {
-    return file_error(ErrorCode::kNotFinite, path, "truth displacement is not finite");
+std::optional<RecordKind> kind_of(std::string_view text) {
+  for (const RecordKind kind :
+       {RecordKind::kObservation, RecordKind::kUpdate, RecordKind::kDecision}) {
+    if (text == to_string(kind)) return kind;
   }
-  for (const auto& [kind, points] : truth.points) {
-    for (const ScorePoint& point : points) {
-      if (!point.weights.allFinite()) {
-        return file_error(ErrorCode::kNotFinite, path, "truth point " + kind + ": weight");
-      }
-      if (point.nodes.minCoeff() < 0 || point.nodes.maxCoeff() >= nodes) {
-        const int bad =
-            point.nodes.minCoeff() < 0 ? point.nodes.minCoeff() : point.nodes.maxCoeff();
-        return file_error(ErrorCode::kInvalidArgument, path,
-                          "truth point " + kind + ": node " + std::to_string(bad) +
-                              ", must be in [0, " + std::to_string(nodes) + ")");
-      }
-    }
-  }
-  for (const auto& [name, value] : truth.scalars) {
-    if (!std::isfinite(value)) {
-      return file_error(ErrorCode::kNotFinite, path, "truth scalar " + name + " is not finite");
-    }
-  }
-  return {};
+  return std::nullopt;
 }
 
 }  // namespace
 
-std::string_view to_string(RecordKind kind) {
-  return kind == RecordKind::kObservation ? "observation" : "update";
+std::string describe(const SurgeryState& state) {
+  const std::string count =
+      fmt::format("{} record{}", state.records, state.records == 1 ? "" : "s");
+  if (!state.checksums) {
+    return fmt::format("{} without checksums (version {})", count, state.version);
+  }
+  if (state.closed) return count + ", closed";
+  return count + (state.log_beside
+                      ? ", not closed: it crashed or is still written; its -wal file is beside it"
+                      : ", not closed: its end is missing if a -wal file was left behind");
 }
 
 void discard_surgery(const fs::path& path) {
@@ -143,169 +67,152 @@ void discard_surgery(const fs::path& path) {
 }
 
 struct SurgeryFile::Impl {
-  fs::path path;
-  sqlite3* db = nullptr;
+  // The end of the chain.
+  struct Tail {
+    std::uint64_t records = 0;
+    std::uint32_t crc = 0;
+  };
+
+  explicit Impl(const fs::path& path) : database(path) {}
+
+  SqliteDatabase database;
   bool writable = false;
-  SurgeryMeta meta;
-  std::unique_ptr<Statement> insert_record;
+  SurgeryHeader header;
+  SurgeryState state;
+  Tail tail;                          // of a file that is written
+  std::unique_ptr<Statement> insert;  // goes before the database
 
-  Impl() = default;
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-  ~Impl() {
-    insert_record.reset();
-    sqlite3_close_v2(db);
-  }
-
-  // "PATH: cannot write record: database or disk is full"
-  tl::unexpected<Error> failure(ErrorCode code, std::string_view action,
-                                std::string_view what) const {
-    return file_error(code, path,
-                      std::string(action) + " " + std::string(what) + ": " +
-                          (db ? sqlite3_errmsg(db) : "the file is closed"));
-  }
-  tl::unexpected<Error> write_failure(std::string_view what) const {
-    return failure(ErrorCode::kWriteFailed, kWrite, what);
-  }
-  tl::unexpected<Error> read_failure(std::string_view what) const {
-    return failure(ErrorCode::kUnreadable, kRead, what);
-  }
-
-  bool execute(const std::string& sql) const {
-    return sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
-  }
-  // The first column of the only row; nullopt on failure.
-  std::optional<std::string> query(const std::string& sql) const {
-    Statement statement(db, sql.c_str());
-    if (!statement.row()) return std::nullopt;
-    return statement.bytes(0);
-  }
-
-  Status connect(int flags) {
-    // Absolute: SQLite gives a meaning to names such as ":memory:" and "file:...".
-    if (sqlite3_open_v2(fs::absolute(path).c_str(), &db, flags, nullptr) != SQLITE_OK) {
-      return read_failure("surgery file");
-    }
-    sqlite3_extended_result_codes(db, 1);
-    sqlite3_busy_timeout(db, kBusyTimeoutMs);
-    return {};
-  }
-
-  Status initialise();
-  Status verify();
+  static Result<std::unique_ptr<Impl>> open(const fs::path& path, Access access);
+  Status describe_state(bool damaged);
+  Status check_length() const;
   Status check_writable(std::string_view what) const;
-  Status write_truth_rows(std::int64_t sequence, const SurgeryTruth& truth) const;
-  Status fold_log() const;
+  Status insert_records(std::span<const SurgeryRecord> records, Tail& end);
+  Result<Tail> walk(const std::function<Status(const SurgeryRecord&)>& visitor) const;
+  Status check_end(const Tail& end) const;
+  tl::unexpected<Error> broken(std::uint64_t id, const std::string& reason) const {
+    return database.unreadable(fmt::format("record {}: {}", id, reason));
+  }
 };
 
-Status SurgeryFile::Impl::initialise() {
-  // WAL and FULL before the first row, so that nothing is ever acknowledged without them.
-  if (query("PRAGMA journal_mode = WAL") != "wal" || !execute("PRAGMA synchronous = FULL") ||
-      query("PRAGMA synchronous") != "2") {
-    return write_failure("surgery file");
+Result<std::unique_ptr<SurgeryFile::Impl>> SurgeryFile::Impl::open(const fs::path& path,
+                                                                   Access access) {
+  const bool damaged = access == Access::kReadDamaged;
+  if (Status ok = check_regular_file(path); !ok) return tl::unexpected(ok.error());
+  auto impl = std::make_unique<Impl>(path);
+  if (Status ok = impl->database.connect(access); !ok) return tl::unexpected(ok.error());
+  auto header = read_header(impl->database, damaged);
+  if (!header) return tl::unexpected(header.error());
+  impl->header = std::move(*header);
+  if (Status ok = impl->describe_state(damaged); !ok) return tl::unexpected(ok.error());
+  return impl;
+}
+
+Status SurgeryFile::Impl::describe_state(bool damaged) {
+  state.version = header.version;
+  state.checksums = header.has_checksums();
+  state.log_beside = database.has_log();
+  if (!damaged) {
+    if (Status ok = check_length(); !ok) return ok;
   }
-  const std::string header = "PRAGMA application_id = " + std::to_string(kApplicationId) +
-                             "; PRAGMA user_version = " + std::to_string(kSchemaVersion) + ";";
-  if (!execute("BEGIN IMMEDIATE") || !execute(kSchema) || !execute(header)) {
-    return write_failure("schema");
+  const auto seal = read_closed_seal(database, header);
+  const auto last = database.query("SELECT coalesce(max(id), 0) FROM record");
+  if (damaged) {
+    state.closed = seal && seal->has_value();
+    state.records = last ? std::stoull(*last) : 0;
+    return {};
   }
-  Statement insert(db, "INSERT INTO meta(key, value) VALUES(?1, ?2)");
-  MetaWriter writer;
-  visit(writer, meta);
-  for (const auto& [key, value] : writer.rows) {
-    if (!insert.bind_text(1, key).bind_text(2, value).run()) return write_failure("meta");
+  if (!seal) return tl::unexpected(seal.error());
+  if (!last) return database.read_failure("records");
+  state.closed = seal->has_value();
+  state.records = std::stoull(*last);
+  if (state.closed && (*seal)->records != state.records) {
+    return database.unreadable(
+        fmt::format("was closed with {} records, but holds {}", (*seal)->records, state.records));
   }
-  if (!execute("COMMIT")) return write_failure("meta");
-  writable = true;
   return {};
 }
 
-Status SurgeryFile::Impl::verify() {
-  const auto application = query("PRAGMA application_id");
-  const auto version = query("PRAGMA user_version");
-  if (!application || !version) return read_failure("surgery file");
-  if (*application != std::to_string(kApplicationId)) {
-    return file_error(ErrorCode::kUnreadable, path, "is not a surgery file");
-  }
-  if (*version != std::to_string(kSchemaVersion)) {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "surgery file of version " + *version + ", must be version " +
-                          std::to_string(kSchemaVersion));
-  }
-  for (const char* sql : {kSelectRecords, kSelectField, kSelectPoints, kSelectScalars}) {
-    if (!Statement(db, sql).ok()) return read_failure("surgery file");
-  }
-  // SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file
-  // itself may rightly be torn, and the log mends it.
+// SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file
+// itself may rightly be torn, and the log mends it.
+Status SurgeryFile::Impl::check_length() const {
+  const auto page_size = database.query("PRAGMA page_size");
   std::error_code ignored;
-  const auto page_size = query("PRAGMA page_size");
-  const auto log_bytes = fs::file_size(fs::path(path) += "-wal", ignored);
-  const bool has_log = !ignored && log_bytes > 0;
-  const auto bytes = fs::file_size(path, ignored);
-  if (!page_size || (!has_log && bytes % std::stoull(*page_size) != 0)) {
-    return file_error(ErrorCode::kUnreadable, path, "is truncated");
+  const auto bytes = fs::file_size(database.path(), ignored);
+  if (!page_size || (!state.log_beside && bytes % std::stoull(*page_size) != 0)) {
+    return database.unreadable("is truncated");
   }
-  Statement select(db, "SELECT key, value FROM meta");
-  MetaReader reader;
-  while (select.row()) reader.rows[select.bytes(0)] = select.bytes(1);
-  if (!select.ok()) return read_failure("meta");
-  visit(reader, meta);
   return {};
 }
 
 Status SurgeryFile::Impl::check_writable(std::string_view what) const {
-  if (db == nullptr) return write_failure(what);
+  if (database.handle() == nullptr) return database.write_failure(what);
   if (!writable) {
-    return file_error(ErrorCode::kWriteFailed, path,
+    return file_error(ErrorCode::kWriteFailed, database.path(),
                       "cannot write " + std::string(what) + ": opened for reading");
   }
   return {};
 }
 
-Status SurgeryFile::Impl::write_truth_rows(std::int64_t sequence, const SurgeryTruth& truth) const {
-  const auto bytes = static_cast<std::size_t>(truth.displacement.size()) * sizeof(double);
-  Statement field(db, "INSERT INTO truth_field VALUES(?1, ?2, ?3)");
-  if (!field.bind(1, sequence)
-           .bind(2, std::int64_t{truth.displacement.cols()})
-           .bind_blob(3, truth.displacement.data(), bytes)
-           .run()) {
-    return write_failure("truth_field");
+Status SurgeryFile::Impl::insert_records(std::span<const SurgeryRecord> records, Tail& end) {
+  if (!insert) {
+    insert = std::make_unique<Statement>(database.handle(), state.checksums ? kInsert : kInsertOf1);
   }
-  Statement insert(db,
-                   "INSERT INTO truth_point VALUES(NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
-  for (const auto& [kind, points] : truth.points) {
-    for (const ScorePoint& point : points) {
-      insert.bind(1, sequence).bind_text(2, kind);
-      for (int i = 0; i < 4; ++i) {
-        insert.bind(3 + i, std::int64_t{point.nodes[i]}).bind(7 + i, point.weights[i]);
-      }
-      if (!insert.run()) return write_failure("truth_point");
-    }
-  }
-  Statement scalar(db, "INSERT INTO truth_scalar VALUES(?1, ?2, ?3)");
-  for (const auto& [name, value] : truth.scalars) {
-    if (!scalar.bind(1, sequence).bind_text(2, name).bind(3, value).run()) {
-      return write_failure("truth_scalar");
-    }
+  for (const SurgeryRecord& record : records) {
+    end = {end.records + 1, chain_link(end.crc, record)};
+    insert->bind_text(1, to_string(record.kind))
+        .bind(2, static_cast<std::int64_t>(record.sequence))
+        .bind(3, record.recorded_ns)
+        .bind_blob(4, record.payload.data(), record.payload.size());
+    if (state.checksums) insert->bind(5, std::int64_t{end.crc});
+    if (!insert->run()) return database.write_failure("record");
   }
   return {};
 }
 
-// Leaving WAL mode needs every page in the main file and nobody else on it.
-Status SurgeryFile::Impl::fold_log() const {
-  const auto busy = query("PRAGMA wal_checkpoint(TRUNCATE)");
-  if (!busy) return write_failure("write-ahead log back");
-  if (*busy != "0" || query("PRAGMA journal_mode = DELETE") != "delete") {
-    return file_error(ErrorCode::kWriteFailed, path,
-                      "cannot fold the write-ahead log back: the file is in use");
+Result<SurgeryFile::Impl::Tail> SurgeryFile::Impl::walk(
+    const std::function<Status(const SurgeryRecord&)>& visitor) const {
+  Tail end{0, header.chain_start};
+  Statement select(database.handle(), state.checksums ? kSelect : kSelectOf1);
+  while (select.row()) {
+    const std::uint64_t id = end.records + 1;
+    const auto kind = kind_of(select.bytes(1));
+    if (!kind) return broken(id, "its kind is unknown");
+    const SurgeryRecord record{*kind, static_cast<std::uint64_t>(select.integer(2)),
+                               select.integer(3), select.bytes(4)};
+    end = {id, chain_link(end.crc, record)};
+    if (state.checksums) {
+      if (select.integer(0) != static_cast<std::int64_t>(id)) {
+        return broken(id, fmt::format("is missing; record {} follows", select.integer(0)));
+      }
+      if (select.integer(5) != std::int64_t{end.crc}) {
+        return broken(id, "the checksum does not match; it, or the order, was changed");
+      }
+    }
+    if (Status ok = visitor(record); !ok) return tl::unexpected(ok.error());
   }
+  if (!select.ok()) {
+    return broken(end.records + 1,
+                  std::string("cannot be read: ") + sqlite3_errmsg(database.handle()));
+  }
+  return end;
+}
+
+Status SurgeryFile::Impl::check_end(const Tail& end) const {
+  const auto seal = read_closed_seal(database, header);
+  if (!seal) return tl::unexpected(seal.error());
+  if (!*seal) return {};
+  const Seal expected{end.records, chain_end(end.crc, end.records)};
+  if ((*seal)->records != expected.records) {
+    return broken(end.records + 1,
+                  fmt::format("is missing; the file was closed with {} records", (*seal)->records));
+  }
+  if ((*seal)->crc != expected.crc) return database.unreadable("the closing seal does not match");
   return {};
 }
 
 SurgeryFile::SurgeryFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SurgeryFile::SurgeryFile(SurgeryFile&&) noexcept = default;
 SurgeryFile& SurgeryFile::operator=(SurgeryFile&&) noexcept = default;
-// Without close() SQLite folds the log as well as it can; nobody is left to be told of a failure.
 SurgeryFile::~SurgeryFile() = default;
 
 Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta& meta) {
@@ -317,28 +224,35 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta&
         errno == EEXIST ? "exists already" : std::string("cannot create: ") + std::strerror(errno));
   }
   ::close(reserved);
-  auto impl = std::make_unique<Impl>();
-  impl->path = path;
-  impl->meta = meta;
-  Status status = impl->connect(SQLITE_OPEN_READWRITE);
-  if (status) status = impl->initialise();
-  if (!status) {
+  auto impl = std::make_unique<Impl>(path);
+  Result<SurgeryHeader> header;
+  if (Status ok = impl->database.connect(Access::kWrite); !ok) {
+    header = tl::unexpected(ok.error());
+  } else {
+    header = create_layout(impl->database, meta);
+  }
+  if (!header) {
     impl.reset();
     discard_surgery(path);
-    return fail(ErrorCode::kWriteFailed, status.error().message);
+    return fail(ErrorCode::kWriteFailed, header.error().message);
   }
+  impl->header = std::move(*header);
+  impl->state = {impl->header.version, impl->header.has_checksums(), false, true, 0};
+  impl->tail = {0, impl->header.chain_start};
+  impl->writable = true;
   return SurgeryFile(std::move(impl));
 }
 
 Result<SurgeryFile> SurgeryFile::open(const fs::path& path) {
-  if (Status status = check_regular_file(path); !status) return tl::unexpected(status.error());
-  auto impl = std::make_unique<Impl>();
-  impl->path = path;
-  if (Status status = impl->connect(SQLITE_OPEN_READONLY); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (Status status = impl->verify(); !status) return tl::unexpected(status.error());
-  return SurgeryFile(std::move(impl));
+  auto impl = Impl::open(path, Access::kRead);
+  if (!impl) return tl::unexpected(impl.error());
+  return SurgeryFile(std::move(*impl));
+}
+
+Result<SurgeryFile> SurgeryFile::open_damaged(const fs::path& path) {
+  auto impl = Impl::open(path, Access::kReadDamaged);
+  if (!impl) return tl::unexpected(impl.error());
+  return SurgeryFile(std::move(*impl));
 }
 
 Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
@@ -354,123 +268,108 @@ Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
     if (!readable) return tl::unexpected(readable.error());
     if (Status status = readable->close(); !status) return tl::unexpected(status.error());
   }
-  auto impl = std::make_unique<Impl>();
-  impl->path = path;
-  if (Status status = impl->connect(SQLITE_OPEN_READWRITE); !status) {
-    return tl::unexpected(status.error());
+  auto opened = Impl::open(path, Access::kWrite);
+  if (!opened) return tl::unexpected(opened.error());
+  Impl& impl = **opened;
+  const auto end = impl.walk([](const SurgeryRecord&) { return Status(); });
+  if (!end) return tl::unexpected(end.error());
+  if (Status ok = impl.check_end(*end); !ok) return tl::unexpected(ok.error());
+  impl.tail = *end;
+  if (Status ok = impl.database.use_log(); !ok) return tl::unexpected(ok.error());
+  if (impl.state.closed) {
+    if (Status ok = remove_closed_seal(impl.database); !ok) return tl::unexpected(ok.error());
+    impl.state.closed = false;
   }
-  if (impl->query("PRAGMA journal_mode = WAL") != "wal" ||
-      !impl->execute("PRAGMA synchronous = FULL")) {
-    return impl->write_failure("surgery file");
-  }
-  if (Status status = impl->verify(); !status) return tl::unexpected(status.error());
-  impl->writable = true;
-  return SurgeryFile(std::move(impl));
+  impl.writable = true;
+  return SurgeryFile(std::move(*opened));
 }
 
-Status SurgeryFile::append(const SurgeryRecord& record) {
+Status SurgeryFile::append(const SurgeryRecord& record) { return append({&record, 1}); }
+
+Status SurgeryFile::append(std::span<const SurgeryRecord> records) {
   if (Status status = impl_->check_writable("record"); !status) return status;
-  if (!fits(record.sequence)) {
+  for (const SurgeryRecord& record : records) {
+    if (fits(record.sequence)) continue;
     return file_error(
-        ErrorCode::kInvalidArgument, impl_->path,
+        ErrorCode::kInvalidArgument, impl_->database.path(),
         "record of sequence " + std::to_string(record.sequence) + ": must be below 2^63");
   }
-  if (!impl_->insert_record) {
-    impl_->insert_record = std::make_unique<Statement>(impl_->db, kInsertRecord);
+  SqliteDatabase& database = impl_->database;
+  if (!database.execute("BEGIN IMMEDIATE")) return database.write_failure("record");
+  Impl::Tail end = impl_->tail;
+  Status status = impl_->insert_records(records, end);
+  if (status && !database.execute("COMMIT")) status = database.write_failure("record");
+  if (status) {
+    impl_->tail = end;
+    impl_->state.records = end.records;
+    return {};
   }
-  const bool written = impl_->insert_record->bind_text(1, to_string(record.kind))
-                           .bind(2, static_cast<std::int64_t>(record.sequence))
-                           .bind(3, record.recorded_ns)
-                           .bind_blob(4, record.payload.data(), record.payload.size())
-                           .run();
-  if (written) return {};
-  Status status = impl_->write_failure("record");
-  impl_->insert_record.reset();  // a failed statement is not reused
+  impl_->insert.reset();  // a failed statement is not reused
+  // After some errors SQLite has rolled back by itself; then there is nothing left to undo.
+  if (sqlite3_get_autocommit(database.handle()) == 0) database.execute("ROLLBACK");
   return status;
 }
 
 Status SurgeryFile::write_truth(std::uint64_t observation_sequence, const SurgeryTruth& truth) {
   if (Status status = impl_->check_writable("truth"); !status) return status;
-  if (Status status = check_truth(impl_->path, truth); !status) return status;
   if (!fits(observation_sequence)) {
-    return file_error(ErrorCode::kInvalidArgument, impl_->path,
+    return file_error(ErrorCode::kInvalidArgument, impl_->database.path(),
                       "truth: sequence must be below 2^63");
   }
-  if (!impl_->execute("BEGIN IMMEDIATE")) return impl_->write_failure("truth");
-  Status status = impl_->write_truth_rows(static_cast<std::int64_t>(observation_sequence), truth);
-  if (status && !impl_->execute("COMMIT")) status = impl_->write_failure("truth");
-  // After some errors SQLite has rolled back by itself; then there is nothing left to undo.
-  if (!status && sqlite3_get_autocommit(impl_->db) == 0) impl_->execute("ROLLBACK");
-  return status;
+  return write_truth_rows(impl_->database, impl_->state.checksums,
+                          static_cast<std::int64_t>(observation_sequence), truth);
 }
 
 Status SurgeryFile::close() {
-  if (impl_->db == nullptr) return {};
-  impl_->insert_record.reset();
+  SqliteDatabase& database = impl_->database;
+  if (database.handle() == nullptr) return {};
+  impl_->insert.reset();
   Status status;
-  if (impl_->writable) status = impl_->fold_log();
-  if (sqlite3_close(impl_->db) != SQLITE_OK) {
-    if (status) status = impl_->write_failure("surgery file");
-    return status;
+  if (impl_->writable && !database.in_place()) {
+    status = file_error(ErrorCode::kWriteFailed, database.path(),
+                        "was deleted or replaced while it was written");
+  } else if (impl_->writable) {
+    if (impl_->state.checksums) {
+      const Impl::Tail& tail = impl_->tail;
+      status = write_closed_seal(database, {tail.records, chain_end(tail.crc, tail.records)});
+    }
+    if (status) status = database.fold_log();
+    impl_->state.closed = status && impl_->state.checksums;
   }
-  impl_->db = nullptr;
+  const Status closed = database.close();
+  return status ? closed : status;
+}
+
+bool SurgeryFile::in_place() const { return impl_->database.in_place(); }
+const fs::path& SurgeryFile::path() const { return impl_->database.path(); }
+const SurgeryMeta& SurgeryFile::meta() const { return impl_->header.meta; }
+const SurgeryState& SurgeryFile::state() const { return impl_->state; }
+
+Status SurgeryFile::visit(const std::function<Status(const SurgeryRecord&)>& visitor) const {
+  const SqliteDatabase& database = impl_->database;
+  if (database.handle() == nullptr) return database.read_failure("records");
+  // One moment for records and seal: another process may be writing.
+  if (!database.execute("BEGIN")) return database.read_failure("records");
+  const auto end = impl_->walk(visitor);
+  Status status = end ? impl_->check_end(*end) : Status(tl::unexpected(end.error()));
+  database.execute("COMMIT");
   return status;
 }
 
-const SurgeryMeta& SurgeryFile::meta() const { return impl_->meta; }
-
 Result<std::vector<SurgeryRecord>> SurgeryFile::records(RecordKind kind) const {
-  if (impl_->db == nullptr) return impl_->read_failure("records");
   std::vector<SurgeryRecord> records;
-  Statement select(impl_->db, kSelectRecords);
-  select.bind_text(1, to_string(kind));
-  while (select.row()) {
-    records.push_back(
-        {kind, static_cast<std::uint64_t>(select.integer(0)), select.integer(1), select.bytes(2)});
-  }
-  if (!select.ok()) return impl_->read_failure("records");
+  const Status status = visit([&](const SurgeryRecord& record) {
+    if (record.kind == kind) records.push_back(record);
+    return Status();
+  });
+  if (!status) return tl::unexpected(status.error());
   return records;
 }
 
 Result<SurgeryTruth> SurgeryFile::read_truth(std::uint64_t observation_sequence) const {
-  if (impl_->db == nullptr) return impl_->read_failure("truth");
-  const auto sequence = static_cast<std::int64_t>(observation_sequence);
-  Statement field(impl_->db, kSelectField);
-  if (!field.bind(1, sequence).row()) {
-    if (!field.ok()) return impl_->read_failure("truth");
-    return file_error(ErrorCode::kNotFound, impl_->path,
-                      "no truth for observation " + std::to_string(observation_sequence));
-  }
-  SurgeryTruth truth;
-  const std::int64_t nodes = field.integer(0);
-  const std::string blob = field.bytes(1);
-  if (nodes < 0 || blob.size() / (3 * sizeof(double)) != static_cast<std::uint64_t>(nodes) ||
-      blob.size() % (3 * sizeof(double)) != 0) {
-    return file_error(ErrorCode::kUnreadable, impl_->path,
-                      "truth field of " + std::to_string(nodes) + " nodes has " +
-                          std::to_string(blob.size()) + " bytes");
-  }
-  truth.displacement.resize(3, nodes);
-  if (!blob.empty()) std::memcpy(truth.displacement.data(), blob.data(), blob.size());
-
-  Statement points(impl_->db, kSelectPoints);
-  points.bind(1, sequence);
-  while (points.row()) {
-    ScorePoint point;
-    for (int i = 0; i < 4; ++i) {
-      point.nodes[i] = static_cast<int>(points.integer(1 + i));
-      point.weights[i] = points.real(5 + i);
-    }
-    truth.points[points.bytes(0)].push_back(point);
-  }
-  Statement scalars(impl_->db, kSelectScalars);
-  scalars.bind(1, sequence);
-  while (scalars.row()) truth.scalars[scalars.bytes(0)] = scalars.real(1);
-  if (!points.ok() || !scalars.ok()) return impl_->read_failure("truth");
-  if (Status status = check_truth(impl_->path, truth); !status) {
-    return fail(ErrorCode::kUnreadable, status.error().message);
-  }
-  return truth;
+  if (impl_->database.handle() == nullptr) return impl_->database.read_failure("truth");
+  return read_truth_rows(impl_->database, impl_->state.checksums,
+                         static_cast<std::int64_t>(observation_sequence));
 }
 
 }  // namespace brainshift::io

@@ -1,75 +1,57 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Surgery file: a recorded (or simulated) surgery, and the daemon's journal; one SQLite database.
 //
-// Tables (schema version 1, `PRAGMA user_version`):
+// Tables (schema version 2, `PRAGMA user_version`):
 //   meta(key, value)               the members of SurgeryMeta
-//   record(id, kind, sequence, recorded_ns, payload)   kind 'observation' | 'update'; payload is an
-//                                  encoded wire message, opaque here
-//   truth_field(observation_sequence, nodes, displacement)  simulated surgeries only:
-//                                  float64 3 x nodes, mm
+//   record(id, kind, sequence, recorded_ns, payload, crc)   kind 'observation' | 'update' |
+//                                  'decision'; id counts from 1; payload is an encoded wire
+//                                  message, opaque here; crc: record_chain.hpp
+//   seal(name, records, crc)       'meta': checksum of meta, from which the chain starts;
+//                                  'closed': written by close(), the number of records and the end
+//                                  of the chain
+//   truth_field(observation_sequence, nodes, displacement, crc)  simulated surgeries only:
+//                                  float64 3 x nodes, mm; crc over all truth of the observation
 //   truth_point(observation_sequence, kind, node0..3, weight0..3)  where truth is scored: kind
 //                                  'sparse' | 'cross' | 'craniotomy'; a point is
 //                                  sum(weight_i * node_i)
 //   truth_scalar(observation_sequence, name, value)
+// Version 1 has no seal table and no column crc. Such files are read, and added to, as they are:
+// SurgeryState says that they carry no checksums.
+//
 // Truth is read only by the code that scores.
 // Synchronous FULL, WAL: an acknowledged record survives power loss. create() refuses to
 // overwrite. `PRAGMA application_id` is 0x42534652 ("BSFR"). Sequences are below 2^63 (SQLite's
 // integers are signed). Another process may read the file while it is written. One SurgeryFile
 // belongs to one thread at a time. Destroying a file without close() keeps every record but may
-// leave the -wal file beside it.
+// leave the -wal file beside it, which then holds a part of the records: SurgeryState::closed is
+// false. A file on a disk that cannot be written is read as it is.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
+#include <functional>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/types.hpp"
+#include "common/io/recording/surgery_record.hpp"
 
 namespace brainshift::io {
 
-// What the meta table says. Empty texts are not written; keys that are not listed here are not
-// read.
-struct SurgeryMeta {
-  std::string case_id = {};
-  std::string model_id = {};
-  std::string case_file = {};
-  std::string scenario = {};  // "recorded" for a journal
-  std::optional<std::uint64_t> seed = {};
-  std::string method = {};  // of a journal's session, as is the boundary
-  std::string boundary = {};
-  std::string created_utc = {};
-  std::string software = {};
-
-  bool operator==(const SurgeryMeta&) const = default;
+// What a file is when it is opened.
+struct SurgeryState {
+  int version = 0;
+  bool checksums = false;  // false: version 1; a changed record cannot be told from a good one
+  // The file was closed, and nothing was added since: no record is missing at its end. False for a
+  // file that is still written, a crashed one, and for version 1, which does not tell.
+  bool closed = false;
+  bool log_beside = false;  // a -wal file with content
+  std::uint64_t records = 0;
 };
-
-enum class RecordKind { kObservation, kUpdate };
-std::string_view to_string(RecordKind kind);  // "observation", "update", as in the file
-
-struct SurgeryRecord {
-  RecordKind kind = RecordKind::kObservation;
-  std::uint64_t sequence = 0;
-  std::int64_t recorded_ns = 0;  // monotonic clock of the recording
-  std::string payload;
-};
-
-// A point of the undeformed mesh where truth and estimate are compared.
-struct ScorePoint {
-  Eigen::Vector4i nodes = Eigen::Vector4i::Zero();
-  Eigen::Vector4d weights = Eigen::Vector4d(1, 0, 0, 0);  // barycentric, sum 1
-};
-
-struct SurgeryTruth {
-  Points displacement;                                    // 3 x n, mm, every node
-  std::map<std::string, std::vector<ScorePoint>> points;  // by kind
-  std::map<std::string, double> scalars;                  // e.g. "fluid_level_mm"
-};
+// "797 records, not closed: the end is missing if a -wal file was left behind"
+std::string describe(const SurgeryState& state);
 
 // Removes a surgery file that could not be completed, with what the database keeps beside it.
 void discard_surgery(const std::filesystem::path& path);
@@ -78,23 +60,42 @@ class SurgeryFile {
  public:
   // A new file; kWriteFailed if it exists or cannot be made.
   static Result<SurgeryFile> create(const std::filesystem::path& path, const SurgeryMeta& meta);
-  // An existing file, read-only; kNotFound, or kUnreadable if it is not a surgery file of this
-  // version.
+  // An existing file, read-only; kNotFound, or kUnreadable if it is not a surgery file of a known
+  // version, lacks a part, or was closed with another number of records than it has.
   static Result<SurgeryFile> open(const std::filesystem::path& path);
-  // An existing file to add to, with the same promises as one that create() made. As open;
-  // kWriteFailed when it cannot be written. Truth that is there stays as it is.
+  // As open, but what is missing at the end is no error here; visit() gives the valid prefix.
+  static Result<SurgeryFile> open_damaged(const std::filesystem::path& path);
+  // An existing file to add to, with the same promises as one that create() made. As open, and
+  // every record is checked; kWriteFailed when it cannot be written. Truth that is there stays as
+  // it is.
   static Result<SurgeryFile> open_to_append(const std::filesystem::path& path);
   SurgeryFile(SurgeryFile&&) noexcept;
   SurgeryFile& operator=(SurgeryFile&&) noexcept;
   ~SurgeryFile();
 
+  // All of the records or none, with one sync.
+  Status append(std::span<const SurgeryRecord> records);
   Status append(const SurgeryRecord& record);
   Status write_truth(std::uint64_t observation_sequence, const SurgeryTruth& truth);
-  // Folds the write-ahead log into the file, so that it is one file on disk.
+  // Seals the file and folds the write-ahead log into it, so that it is one file on disk.
+  // kWriteFailed, with nothing touched, when the file is not in place.
   Status close();
+  // False when the file, or its write-ahead log, was deleted, moved or replaced since it was
+  // opened: what is appended now is lost.
+  bool in_place() const;
 
+  const std::filesystem::path& path() const;
   const SurgeryMeta& meta() const;
-  Result<std::vector<SurgeryRecord>> records(RecordKind kind) const;  // by id
+  // As it was when opened; of a file that is written, as it is now.
+  const SurgeryState& state() const;
+
+  // Hands over every record in the order of the file, each one after its checksum has been
+  // compared. Ends with the visitor's first error, or with kUnreadable at the first record that is
+  // not what was written; what was handed over before is the valid prefix. A file that was closed
+  // must end where it was closed.
+  Status visit(const std::function<Status(const SurgeryRecord&)>& visitor) const;
+  // The records of a kind, in order; an error when any record of the file is not what was written.
+  Result<std::vector<SurgeryRecord>> records(RecordKind kind) const;
   // kNotFound when the surgery carries no truth for that observation (a real recording).
   Result<SurgeryTruth> read_truth(std::uint64_t observation_sequence) const;
 

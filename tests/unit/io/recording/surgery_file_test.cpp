@@ -253,9 +253,9 @@ TEST_F(SurgeryFileTest, OpenRefusesWhatIsNoSurgeryFile) {
 
 TEST_F(SurgeryFileTest, OpenRefusesOtherVersionsAndMissingTables) {
   make_complete();
-  tamper("PRAGMA user_version = 2");
-  expect_open_refused(ErrorCode::kUnreadable, "version 2, must be version 1");
-  tamper("PRAGMA user_version = 1; DROP TABLE truth_scalar");
+  tamper("PRAGMA user_version = 3");
+  expect_open_refused(ErrorCode::kUnreadable, "version 3, must be version 1 or 2");
+  tamper("PRAGMA user_version = 2; DROP TABLE truth_scalar");
   expect_open_refused(ErrorCode::kUnreadable, "truth_scalar");
 }
 

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The tables of a surgery file, its version, its meta table and its seals; private to it. The
+// layout itself is described in surgery_file.hpp.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "common/io/recording/sqlite_database.hpp"
+#include "common/io/recording/surgery_record.hpp"
+
+namespace brainshift::io {
+
+inline constexpr int kFirstVersion = 1;    // without checksums and seals
+inline constexpr int kSurgeryVersion = 2;  // what is written
+
+// A row of the seal table.
+struct Seal {
+  std::uint64_t records = 0;
+  std::uint32_t crc = 0;
+};
+
+// What stands in front of the records.
+struct SurgeryHeader {
+  int version = kSurgeryVersion;
+  SurgeryMeta meta;
+  std::uint32_t chain_start = 0;  // version 2
+
+  bool has_checksums() const { return version >= kSurgeryVersion; }
+};
+
+// Tables and meta of a new file, on disk before the first record; then the write-ahead log.
+// kWriteFailed.
+Result<SurgeryHeader> create_layout(SqliteDatabase& database, const SurgeryMeta& meta);
+
+// kUnreadable for another program's file, another version, a missing table, or a meta table that
+// is not what was written; the last is let pass for a damaged file.
+Result<SurgeryHeader> read_header(const SqliteDatabase& database, bool damaged);
+
+// Present after close(), gone while records may still be added; nullopt too for version 1.
+Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database,
+                                             const SurgeryHeader& header);
+Status write_closed_seal(const SqliteDatabase& database, const Seal& seal);
+Status remove_closed_seal(const SqliteDatabase& database);
+
+}  // namespace brainshift::io

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What happens around a surgery file: read-only folders, files that are deleted or replaced.
+#include "common/io/recording/sqlite_database.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/io/recording/surgery_records.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class SurgeryOnDisk : public ::testing::Test {
+ protected:
+  void TearDown() override { fs::permissions(folder.path(), fs::perms::owner_all); }
+
+  // A writer that keeps the log beside the file, as a crash does.
+  SurgeryFile live(std::uint64_t records) const {
+    auto file = SurgeryFile::create(path, {.case_id = "c"});
+    EXPECT_TRUE(file) << file.error().message;
+    for (std::uint64_t i = 1; i <= records; ++i) EXPECT_TRUE(file->append(numbered_record(i)));
+    return std::move(*file);
+  }
+
+  // The reason for a failure is all that the process with fewer rights can leave behind.
+  static Result<SurgeryFile> opened(const fs::path& path) {
+    auto file = SurgeryFile::open(path);
+    if (!file) std::fprintf(stderr, "%s\n", file.error().message.c_str());
+    return file;
+  }
+  // Runs `check` as somebody who may not write into the folder; its exit status. Root may write
+  // everywhere, hence another user in a process of its own.
+  int in_a_folder_for_reading(const std::function<bool()>& check) const {
+    for (const auto& entry : fs::directory_iterator(folder.path())) {
+      fs::permissions(entry.path(), static_cast<fs::perms>(0444));
+    }
+    fs::permissions(folder.path(), static_cast<fs::perms>(0555));
+    const pid_t child = ::fork();
+    if (child == 0) {
+      constexpr uid_t kNobody = 65534;
+      if (::geteuid() == 0 && ::setresuid(kNobody, kNobody, kNobody) != 0) ::_exit(3);
+      ::_exit(check() ? 0 : 1);
+    }
+    int how = 0;
+    EXPECT_EQ(::waitpid(child, &how, 0), child);
+    return WIFEXITED(how) ? WEXITSTATUS(how) : -1;
+  }
+
+  const test_support::TemporaryFolder folder;
+  const fs::path path = folder / "what? a #1%20.surgery";
+};
+
+// ---------- a disk that cannot be written ----------
+
+TEST_F(SurgeryOnDisk, AClosedFileOpensWhereNothingCanBeWritten) {
+  write_numbered(path, 3);
+  EXPECT_EQ(in_a_folder_for_reading([&] {
+              const auto file = opened(path);
+              return file && visit_all(*file).records.size() == 3;
+            }),
+            0);
+}
+
+TEST_F(SurgeryOnDisk, ACrashedFileWithoutItsLogOpensWhereNothingCanBeWritten) {
+  const fs::path copy = folder / "copy.surgery";
+  {
+    const SurgeryFile file = live(3);
+    fs::copy_file(path, copy);
+  }
+  EXPECT_EQ(in_a_folder_for_reading([&] {
+              const auto file = opened(copy);
+              return file && !file->state().closed && visit_all(*file).status;
+            }),
+            0);
+}
+
+TEST_F(SurgeryOnDisk, ALogThatCannotBeReadIsNamed) {
+  const fs::path copy = folder / "copy.surgery";
+  {
+    const SurgeryFile file = live(3);
+    fs::copy_file(path, copy);
+    fs::copy_file(fs::path(path) += "-wal", fs::path(copy) += "-wal");
+  }
+  EXPECT_EQ(in_a_folder_for_reading([&] {
+              const auto file = opened(copy);
+              return !file && file.error().message.find("copy both") != std::string::npos;
+            }),
+            0);
+}
+
+// ---------- deleted or replaced ----------
+
+TEST_F(SurgeryOnDisk, AFileThatIsDeletedOrReplacedIsNoLongerInPlace) {
+  SurgeryFile file = live(2);
+  EXPECT_TRUE(file.in_place());
+  fs::remove(path);
+  EXPECT_FALSE(file.in_place());
+  std::ofstream(path) << "somebody else's";
+  EXPECT_FALSE(file.in_place());
+  const Status closed = file.close();
+  ASSERT_FALSE(closed);
+  EXPECT_EQ(closed.error().code, ErrorCode::kWriteFailed);
+  EXPECT_EQ(closed.error().message,
+            path.string() + ": was deleted or replaced while it was written");
+  EXPECT_EQ(test_support::content_of(path), "somebody else's");
+}
+
+TEST_F(SurgeryOnDisk, ALogThatIsDeletedOrReplacedIsNoticedToo) {
+  for (const bool replace : {false, true}) {
+    fs::remove(path);
+    SurgeryFile file = live(2);
+    const fs::path log = fs::path(path) += "-wal";
+    ASSERT_TRUE(fs::exists(log));
+    fs::remove(log);
+    if (replace) std::ofstream(log) << "somebody else's";
+    EXPECT_FALSE(file.in_place());
+    EXPECT_FALSE(file.close());
+    EXPECT_EQ(fs::exists(log), replace);
+    fs::remove(log);
+  }
+}
+
+TEST_F(SurgeryOnDisk, NeitherClosingNorDroppingAReplacedFileTouchesItsSuccessor) {
+  for (const bool close : {false, true}) {
+    discard_surgery(path);
+    SurgeryFile successor = [&] {
+      SurgeryFile file = live(2);
+      discard_surgery(path);
+      SurgeryFile next = live(3);
+      if (close) {
+        EXPECT_FALSE(file.close());
+      }
+      return next;
+    }();
+    EXPECT_TRUE(successor.in_place());
+    EXPECT_TRUE(successor.append(numbered_record(4)));
+    EXPECT_TRUE(successor.close());
+    EXPECT_EQ(visit_all(*SurgeryFile::open(path)).records.size(), 4u);
+  }
+}
+
+}  // namespace
+}  // namespace brainshift::io
