@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
 #include <system_error>
 #include <utility>
 
@@ -12,15 +11,10 @@
 namespace brainshift::server {
 namespace {
 
-class SurgeryFileSink final : public RecordSink {
- public:
-  explicit SurgeryFileSink(io::SurgeryFile file) : file_(std::move(file)) {}
-  Status append(const io::SurgeryRecord& record) override { return file_.append(record); }
-  Status close() override { return file_.close(); }
+namespace fs = std::filesystem;
 
- private:
-  io::SurgeryFile file_;
-};
+// Nothing happens by itself before the first session; any far time will do.
+constexpr std::chrono::hours kIdle{1};
 
 // A sink that throws ends its file, not the thread.
 template <typename Function>
@@ -28,72 +22,95 @@ auto writing(Function&& function) {
   return guarded(ErrorCode::kWriteFailed, "journal", std::forward<Function>(function));
 }
 
-}  // namespace
-
-Result<std::unique_ptr<RecordSink>> open_surgery_file(const std::filesystem::path& path,
-                                                      const JournalMeta& meta) {
-  auto file = io::SurgeryFile::create(path, meta);
-  if (!file) return tl::unexpected(file.error());
-  return std::make_unique<SurgeryFileSink>(std::move(*file));
+// Of the disk that holds the folder; nullopt when it cannot be told.
+std::optional<std::uintmax_t> free_bytes(const fs::path& folder) {
+  std::error_code failed;
+  const fs::space_info space = fs::space(folder, failed);
+  if (failed) return std::nullopt;
+  return space.available;
 }
 
-std::filesystem::path journal_path(const std::filesystem::path& folder, const std::string& case_id,
-                                   const std::string& session) {
-  std::string name = case_id;
-  for (char& c : name) {
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
+}  // namespace
+
+bool Recorded::holds(const std::string& source, std::uint64_t sequence) const {
+  const auto written = held.observations.find(source);
+  if (written == held.observations.end() || sequence > written->second.last) return false;
+  const auto lost = missing.observations.find(source);
+  return lost == missing.observations.end() || sequence > lost->second.last;
+}
+
+RecordRanges Journal::Group::ranges() const {
+  RecordRanges ranges;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    ranges.add(records[i].kind, sources[i], records[i].sequence);
   }
-  std::filesystem::path path = folder / fmt::format("{}-{}.surgery", name, session);
-  std::error_code ignored;
-  for (int attempt = 2; std::filesystem::exists(path, ignored); ++attempt) {
-    path = folder / fmt::format("{}-{}-{}.surgery", name, session, attempt);
-  }
-  return path;
+  return ranges;
 }
 
 Journal::Journal(Options options)
-    : options_(std::move(options)), thread_([this](const std::stop_token& stop) { work(stop); }) {}
+    : options_(std::move(options)),
+      next_check_(Clock::now() + kIdle),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 Journal::~Journal() { stop(); }
 
-void Journal::begin(const std::filesystem::path& path, const JournalMeta& meta) {
+void Journal::begin(const fs::path& path, const JournalMeta& meta, std::uint64_t session_id) {
   {
     const std::lock_guard lock(mutex_);
+    phase_ = Phase::kRecording;
     error_.reset();
+    overrun_ = false;
+    gap_ = {};
+    recorded_ = {};
+    recorded_.session_id = session_id;
+    recorded_.reason = "the file is being opened";
     Item item;
     item.opening = Opening{path, meta, ++generation_};
     queue_.push_back(std::move(item));
+    ++openings_;
   }
   wake_.notify_all();
 }
 
-void Journal::append(io::SurgeryRecord record) {
-  std::optional<Error> overrun;
+void Journal::append(io::SurgeryRecord record, std::string source) {
+  bool wake = false;
   {
     const std::lock_guard lock(mutex_);
-    if (generation_ == 0 || error_) return;
-    if (queue_.size() >= options_.max_queued ||
-        queued_bytes_ + record.payload.size() > options_.max_queued_bytes) {
-      overrun =
+    if (phase_ == Phase::kIdle) return;
+    const bool full = queue_.size() >= options_.max_queued ||
+                      queued_bytes_ + record.payload.size() > options_.max_queued_bytes;
+    if (full && phase_ != Phase::kFailed) {
+      phase_ = Phase::kFailed;
+      error_ =
           Error{ErrorCode::kWriteFailed,
                 fmt::format("journal: storage is too slow, {} records are waiting", queue_.size())};
-      error_ = overrun;
+      overrun_ = true;
+      recorded_.recording = false;
+      recorded_.reason = error_->message;
+      wake = true;
+    }
+    if (phase_ == Phase::kFailed) {
+      gap_.add(record.kind, source, record.sequence);
+      recorded_.missing.add(record.kind, source, record.sequence);
     } else {
+      // The thread waits for the first record, then for the time to be up or for half a queue.
+      wake = queue_.empty() || queue_.size() == options_.max_queued / 2;
       queued_bytes_ += record.payload.size();
-      queue_.push_back(Item{std::nullopt, std::move(record)});
+      queue_.push_back(Item{std::nullopt, std::move(record), std::move(source)});
     }
   }
-  if (overrun) {
-    if (options_.on_error) options_.on_error(*overrun);
-    return;
-  }
-  wake_.notify_all();
+  if (wake) wake_.notify_all();
 }
 
 Status Journal::status() const {
   const std::lock_guard lock(mutex_);
   if (error_) return tl::unexpected(*error_);
   return {};
+}
+
+Recorded Journal::recorded() const {
+  const std::lock_guard lock(mutex_);
+  return recorded_;
 }
 
 void Journal::stop() {
@@ -104,56 +121,217 @@ void Journal::stop() {
 }
 
 void Journal::work(const std::stop_token& stop) {
-  while (true) {
-    Item item;
-    {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock, stop, [&] { return !queue_.empty(); });
-      if (queue_.empty()) break;  // asked to stop, and everything is written
-      item = std::move(queue_.front());
-      queue_.pop_front();
-      queued_bytes_ -= item.record.payload.size();
-    }
-    write(std::move(item));
+  Group group;
+  std::optional<Opening> opening;
+  while (take(stop, group, opening)) {
+    if (opening) begin_file(*opening);
+    if (!group.records.empty()) write(std::move(group));
+    supervise();
   }
+  lose(unwritten_.ranges());
   close_sink();
 }
 
-void Journal::write(Item item) {
-  if (item.opening) {
-    close_sink();
-    writing_generation_ = item.opening->generation;
-    auto sink = writing([&] { return options_.open(item.opening->path, item.opening->meta); });
-    if (sink) {
-      sink_ = std::move(*sink);
-    } else {
-      set_error(writing_generation_, sink.error());
-    }
+bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening) {
+  group = {};
+  opening.reset();
+  std::unique_lock lock(mutex_);
+  wake_.wait_until(lock, stop, next_check_, [&] { return !queue_.empty() || overrun_; });
+  if (queue_.empty()) return !stop.stop_requested();
+  if (openings_ == 0) {
+    wake_.wait_until(lock, stop, Clock::now() + options_.commit_interval, [&] {
+      return openings_ > 0 || overrun_ || queue_.size() > options_.max_queued / 2;
+    });
+  }
+  if (queue_.front().opening) {
+    opening = std::move(queue_.front().opening);
+    queue_.pop_front();
+    --openings_;
+    return true;
+  }
+  while (!queue_.empty() && !queue_.front().opening) {
+    Item& item = queue_.front();
+    queued_bytes_ -= item.record.payload.size();
+    group.records.push_back(std::move(item.record));
+    group.sources.push_back(std::move(item.source));
+    queue_.pop_front();
+  }
+  return true;
+}
+
+void Journal::begin_file(const Opening& opening) {
+  close_sink();
+  unwritten_ = {};
+  contents_ = {};
+  current_ = opening;
+  path_.clear();
+  auto sink = writing([&] { return options_.open(opening.path, opening.meta); });
+  if (!sink) {
+    end_file(sink.error(), false);
+    next_check_ = Clock::now() + options_.retry_interval;
     return;
   }
-  if (!sink_) return;  // this file has failed already
-  const auto status = writing([&] { return sink_->append(item.record); });
-  if (status) return;
-  set_error(writing_generation_, status.error());
-  // A gap in a journal is worse than its end: the file ends with the last record before the
-  // failure.
-  static_cast<void>(writing([&] { return sink_->close(); }));
-  sink_.reset();
+  sink_ = std::move(*sink);
+  path_ = opening.path;
+  next_check_ = Clock::now() + options_.check_interval;
+  {
+    const std::lock_guard lock(mutex_);
+    if (current_.generation != generation_) return;
+    recorded_.file = path_;
+    recorded_.recording = phase_ == Phase::kRecording;
+    if (recorded_.recording) recorded_.reason.clear();
+  }
+  tell_recorded();
+}
+
+void Journal::write(Group group) {
+  if (!sink_) {
+    lose(group.ranges());
+    return;
+  }
+  const Status status = commit(group);
+  if (status) {
+    tell_recorded();
+    return;
+  }
+  const Status in_place = writing([&] { return sink_->check(); });
+  unwritten_ = std::move(group);
+  end_file(in_place ? status.error() : in_place.error(), !in_place);
+}
+
+Status Journal::commit(const Group& group) {
+  if (Status ok = writing([&] { return sink_->append(group.records); }); !ok) return ok;
+  // A commit to a file that nobody will find again is none.
+  if (Status ok = writing([&] { return sink_->check(); }); !ok) return ok;
+  next_check_ = Clock::now() + options_.check_interval;
+  const RecordRanges ranges = group.ranges();
+  contents_.add(ranges);
+  const std::lock_guard lock(mutex_);
+  if (current_.generation == generation_) {
+    recorded_.records += group.records.size();
+    recorded_.held.add(ranges);
+  }
+  return {};
+}
+
+// What is due besides writing: a failure that append() has found, the file's place, the next try.
+void Journal::supervise() {
+  std::optional<Error> overrun;
+  {
+    const std::lock_guard lock(mutex_);
+    // What was queued before it is written first.
+    if (overrun_ && queue_.empty() && current_.generation == generation_) {
+      overrun = error_;
+      overrun_ = false;
+    }
+  }
+  if (overrun) {
+    end_file(*overrun, false);
+    next_check_ = Clock::now() + options_.retry_interval;
+    return;
+  }
+  if (current_.generation == 0) {
+    next_check_ = Clock::now() + kIdle;
+    return;
+  }
+  if (Clock::now() < next_check_) return;
+  if (sink_) {
+    next_check_ = Clock::now() + options_.check_interval;
+    if (Status ok = writing([&] { return sink_->check(); }); !ok) end_file(ok.error(), true);
+  }
+  if (!sink_) resume();
+}
+
+void Journal::resume() {
+  next_check_ = Clock::now() + options_.retry_interval;
+  const fs::path path = free_path(current_.path, path_);
+  const auto available = free_bytes(path.parent_path());
+  const bool scarce = available && *available < options_.resume_free_bytes;
+  Opening next = current_;
+  {
+    const std::lock_guard lock(mutex_);
+    if (current_.generation != generation_ || phase_ != Phase::kFailed) return;
+    if (!scarce) phase_ = Phase::kResuming;
+    next.meta.continues = path_.filename().string();
+    next.meta.gap = fmt::format("{}; not recorded: {}", error_->message, describe(gap_));
+  }
+  auto sink = scarce ? fail(ErrorCode::kWriteFailed, "no space")
+                     : writing([&] { return options_.open(path, next.meta); });
+  if (sink) {
+    sink_ = std::move(*sink);
+    contents_ = {};
+    if (unwritten_.records.empty() || commit(unwritten_)) {
+      unwritten_ = {};
+      path_ = path;
+      next_check_ = Clock::now() + options_.check_interval;
+      {
+        const std::lock_guard lock(mutex_);
+        if (current_.generation != generation_) return;
+        if (phase_ == Phase::kResuming) {  // no overrun meanwhile
+          phase_ = Phase::kRecording;
+          error_.reset();
+          gap_ = {};
+          recorded_.recording = true;
+          recorded_.reason.clear();
+        }
+        recorded_.file = path_;
+      }
+      if (options_.on_resumed) options_.on_resumed(path_);
+      tell_recorded();
+      return;
+    }
+    close_sink();
+    io::discard_surgery(path);
+  }
+  lose(unwritten_.ranges());
+  unwritten_ = {};
+  const std::lock_guard lock(mutex_);
+  if (current_.generation == generation_) phase_ = Phase::kFailed;
+}
+
+// The file ends with the last record before the failure. contents_lost: nobody will find it again.
+void Journal::end_file(const Error& error, bool contents_lost) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (current_.generation == generation_) {
+      phase_ = Phase::kFailed;
+      error_ = error;
+      overrun_ = false;
+      recorded_.recording = false;
+      recorded_.reason = error.message;
+    }
+  }
+  if (contents_lost) lose(contents_);
+  contents_ = {};
+  close_sink();
+  next_check_ = Clock::now();
+  if (options_.on_error) options_.on_error(error);
+  tell_recorded();
 }
 
 void Journal::close_sink() {
   if (!sink_) return;
   const auto status = writing([&] { return sink_->close(); });
   sink_.reset();
-  if (!status) set_error(writing_generation_, status.error());
-}
-
-void Journal::set_error(std::uint64_t generation, const Error& error) {
+  std::optional<Error> told;
   {
     const std::lock_guard lock(mutex_);
-    if (generation == generation_ && !error_) error_ = error;
+    if (status || error_) return;  // the failure before this one is what matters
+    told = status.error();
+    if (current_.generation == generation_) error_ = told;
   }
-  if (options_.on_error) options_.on_error(error);
+  if (options_.on_error) options_.on_error(*told);
+}
+
+void Journal::lose(const RecordRanges& ranges) {
+  const std::lock_guard lock(mutex_);
+  if (current_.generation != generation_) return;
+  gap_.add(ranges);
+  recorded_.missing.add(ranges);
+}
+
+void Journal::tell_recorded() {
+  if (options_.on_recorded) options_.on_recorded(recorded());
 }
 
 }  // namespace brainshift::server

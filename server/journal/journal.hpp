@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Journal: every accepted observation and every final update, appended to a surgery file by a
-// thread of its own, so that no commit lies on the latency path. One file per session; it can be
-// replayed.
+// Journal: every accepted observation, every final update and every decision, written to a surgery
+// file by a thread of its own, so that no commit lies on the latency path. One file per session,
+// and one more after every failure; they can be replayed.
 //
-// append() only queues. The first failure (file not creatable, disk full, queue overrun) is kept:
-// status() says so until the next begin(), nothing more is written to that file, and `on_error` is
-// told once. What was committed before stays readable; the surgery file survives a crash at any
-// instant.
+// append() only queues. The thread writes what came within `commit_interval` in one transaction
+// with one sync. What recorded() then says is on the disk stays there through a crash and a power
+// cut. An observation thus has two acknowledgements: *accepted* when it is queued, *recorded* when
+// Recorded::holds() says so.
+//
+// A failure (a file that cannot be made, a full disk, a failing sync, a file that was deleted or
+// replaced, storage so slow that the queue is full) ends the file. status() and recorded() say why
+// from then on, and `on_error` is told once. The records of the failed transaction are tried again
+// in a new file at once; if that fails too, they are lost, and so is what is appended until a new
+// file can be written, which is tried every `retry_interval`. The new file has the next free name.
+// Its meta names the file before it and what neither of them holds.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -20,40 +28,45 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/core/error.hpp"
-#include "common/io/recording/surgery_file.hpp"
+#include "common/io/recording/surgery_record.hpp"
+#include "server/journal/record_ranges.hpp"
+#include "server/journal/record_sink.hpp"
 
 namespace brainshift::server {
 
-using JournalMeta = io::SurgeryMeta;
+// What is durable of the running session.
+struct Recorded {
+  std::uint64_t session_id = 0;  // as begin() was told; 0 before the first
+  bool recording = false;        // what is appended now will be written
+  std::string reason;            // why not; empty while recording
+  std::filesystem::path file;    // that is written, or was last
+  std::uint64_t records = 0;     // on the disk, in all files of the session
+  RecordRanges held;             // what was committed and synced
+  RecordRanges missing;          // what no file holds and none will
 
-// Where records go; a surgery file, or a stand-in that fails on purpose.
-class RecordSink {
- public:
-  virtual ~RecordSink() = default;
-  virtual Status append(const io::SurgeryRecord& record) = 0;
-  virtual Status close() = 0;
+  // Whether an accepted observation is on the disk. After a loss, those before it count as lost.
+  bool holds(const std::string& source, std::uint64_t sequence) const;
 };
-using OpenSink = std::function<Result<std::unique_ptr<RecordSink>>(
-    const std::filesystem::path& path, const JournalMeta& meta)>;
-
-// A new io::SurgeryFile.
-Result<std::unique_ptr<RecordSink>> open_surgery_file(const std::filesystem::path& path,
-                                                      const JournalMeta& meta);
-
-// First free name "<case>-<session>.surgery", "<case>-<session>-2.surgery", ... in the folder;
-// every character of the case id that is not a letter, digit, '-', '_' or '.' becomes '_'.
-std::filesystem::path journal_path(const std::filesystem::path& folder, const std::string& case_id,
-                                   const std::string& session);
 
 class Journal {
  public:
   struct Options {
-    std::function<void(const Error&)> on_error;  // on the journal's thread; may be empty
+    // All on the journal's thread; may be empty.
+    std::function<void(const Error&)> on_error;
+    std::function<void(const std::filesystem::path&)> on_resumed;  // recording goes on there
+    // After every commit, and whenever recording begins, fails or goes on.
+    std::function<void(const Recorded&)> on_recorded;
     OpenSink open = open_surgery_file;
     std::size_t max_queued = 4096;  // records
     std::size_t max_queued_bytes = 256u << 20;
+    std::chrono::milliseconds commit_interval{5};
+    std::chrono::milliseconds check_interval{250};  // whether the file is still there
+    std::chrono::milliseconds retry_interval{1000};
+    // With less free space recording does not go on: it would fail again within moments.
+    std::uintmax_t resume_free_bytes = 16u << 20;
   };
 
   explicit Journal(Options options);
@@ -61,16 +74,27 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  // Closes the current file and opens the next one; returns at once.
-  void begin(const std::filesystem::path& path, const JournalMeta& meta);
-  // Queues a record; ignored before the first begin().
-  void append(io::SurgeryRecord record);
-  // The failure of the current file, if there is one.
+  // A session begins: closes the current file and opens the next one; returns at once.
+  void begin(const std::filesystem::path& path, const JournalMeta& meta,
+             std::uint64_t session_id = 0);
+  // Queues a record; never waits for the disk. Ignored before the first begin(). source: of an
+  // observation.
+  void append(io::SurgeryRecord record, std::string source = {});
+  // Why records are lost at the moment, if they are.
   Status status() const;
+  Recorded recorded() const;
   // Writes what is queued, closes the file, ends the thread; idempotent.
   void stop();
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  enum class Phase {
+    kIdle,       // before the first begin()
+    kRecording,  // records are queued
+    kFailed,     // records are lost
+    kResuming,   // a new file is being opened: records are queued for it
+  };
   struct Opening {
     std::filesystem::path path;
     JournalMeta meta;
@@ -79,23 +103,49 @@ class Journal {
   struct Item {
     std::optional<Opening> opening;
     io::SurgeryRecord record;
+    std::string source;
+  };
+  // Records that are committed together.
+  struct Group {
+    std::vector<io::SurgeryRecord> records;
+    std::vector<std::string> sources;
+    RecordRanges ranges() const;
   };
 
   void work(const std::stop_token& stop);
-  void write(Item item);
+  // Waits for records, a session, or the time of the next check. False at the end.
+  bool take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening);
+  void begin_file(const Opening& opening);
+  void write(Group group);
+  Status commit(const Group& group);
+  void supervise();
+  void resume();
+  void end_file(const Error& error, bool contents_lost);
   void close_sink();
-  void set_error(std::uint64_t generation, const Error& error);
+  void lose(const RecordRanges& ranges);
+  void tell_recorded();
 
   const Options options_;
-  std::unique_ptr<RecordSink> sink_;      // journal thread only
-  std::uint64_t writing_generation_ = 0;  // journal thread only
+
+  // Of the journal's thread.
+  std::unique_ptr<RecordSink> sink_;
+  Opening current_;               // the session being written
+  std::filesystem::path path_;    // of sink_, or of the file before it; empty: none
+  RecordRanges contents_;         // of that file
+  Group unwritten_;               // of the transaction that failed
+  Clock::time_point next_check_;  // of the file, or the next try to go on
 
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::deque<Item> queue_;
   std::size_t queued_bytes_ = 0;
+  std::size_t openings_ = 0;      // in the queue
   std::uint64_t generation_ = 0;  // counts begin()
-  std::optional<Error> error_;    // of the current generation
+  Phase phase_ = Phase::kIdle;
+  std::optional<Error> error_;  // of the current generation
+  bool overrun_ = false;        // error_ is one that the thread has not seen yet
+  RecordRanges gap_;            // lost since the last file
+  Recorded recorded_;
 
   std::jthread thread_;
 };

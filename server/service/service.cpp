@@ -40,6 +40,7 @@ Service::Service(ServiceOptions options, Outbox& outbox)
     Journal::Options journal;
     journal.open = options_.open_journal;
     journal.on_error = [](const Error& error) { spdlog::error("{}", error.message); };
+    journal.on_resumed = [](const auto& path) { spdlog::info("journal {}", path.string()); };
     journal_ = std::make_unique<Journal>(std::move(journal));
   }
   if (options_.model) {
@@ -111,6 +112,7 @@ Reply Service::observe(const wire::Frame& frame) {
   if (!observation) return error_reply(observation.error());
   const std::uint64_t sequence = observation->sequence;
   const bool plain = observation->daemon_ns == 0;
+  const std::string source = observation->source;
   // Queued before the worker can answer it, so that the journal holds cause before effect.
   const auto receipt = session_->submit(std::move(*observation), [&](const Observation& accepted) {
     if (!journal_) return;
@@ -118,7 +120,7 @@ Reply Service::observe(const wire::Frame& frame) {
     // A client has no business with daemon_ns: what it put there is left out.
     std::string payload = plain ? std::string(frame.payload) : wire::encode(accepted);
     if (plain) wire::append_daemon_time(accepted.daemon_ns, payload);
-    journal_->append(record(io::RecordKind::kObservation, sequence, std::move(payload)));
+    journal_->append(record(io::RecordKind::kObservation, sequence, std::move(payload)), source);
     journal_ms_ = watch.milliseconds();
   });
   if (!receipt) {
@@ -175,15 +177,17 @@ void Service::begin_journal(const wire::SessionRequest& request, const wire::Ses
   if (!journal_) return;
   const auto path = journal_path(options_.journal_dir, request.case_id,
                                  fmt::format("{}-{}", utc_now("%Y%m%dT%H%M%SZ"), info.session_id));
-  journal_->begin(path, {.case_id = request.case_id,
-                         .model_id = info.model_id,
-                         .case_file = options_.case_file.string(),
-                         .scenario = "recorded",
-                         .seed = std::nullopt,
-                         .method = std::string(to_string(request.method)),
-                         .boundary = std::string(to_string(request.boundary)),
-                         .created_utc = utc_now(),
-                         .software = "brainshiftd " + options_.version});
+  journal_->begin(path,
+                  {.case_id = request.case_id,
+                   .model_id = info.model_id,
+                   .case_file = options_.case_file.string(),
+                   .scenario = "recorded",
+                   .seed = std::nullopt,
+                   .method = std::string(to_string(request.method)),
+                   .boundary = std::string(to_string(request.boundary)),
+                   .created_utc = utc_now(),
+                   .software = "brainshiftd " + options_.version},
+                  info.session_id);
   spdlog::info("journal {}", path.string());
 }
 

@@ -23,7 +23,7 @@
 // Every subscriber receives every final update with its verdict, the unusable ones too. A late
 // subscriber's first field is the last usable one.
 //
-// An error of the journal is added to the left_out of every update until the next session.
+// While the journal does not record, its error is added to the left_out of every update.
 #pragma once
 
 #include <atomic>

@@ -3,65 +3,37 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
-#include <cstdlib>
-#include <filesystem>
+#include <atomic>
 #include <future>
-#include <optional>
+#include <limits>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/server/journal/journal_fakes.hpp"
 
 namespace brainshift::server {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 using test_support::TemporaryFolder;
 
-// What a fake sink was asked to do; the sink itself belongs to the journal.
-struct SinkLog {
-  std::vector<std::uint64_t> appended;
-  int closed = 0;
-  std::uint64_t fail_at = 0;   // sequence whose append fails
-  std::uint64_t throw_at = 0;  // sequence whose append throws
-};
-
-class FakeSink final : public RecordSink {
- public:
-  explicit FakeSink(SinkLog& log) : log_(log) {}
-  Status append(const io::SurgeryRecord& record) override {
-    if (record.sequence == log_.throw_at) throw std::runtime_error("thrown");
-    if (record.sequence == log_.fail_at) return fail(ErrorCode::kWriteFailed, "x: disk full");
-    log_.appended.push_back(record.sequence);
-    return {};
+// Whether the journal comes to count an observation as lost. Nothing tells of it.
+bool lost(const Journal& journal, const std::string& source, std::uint64_t sequence) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (std::chrono::steady_clock::now() < deadline) {
+    const RecordRanges missing = journal.recorded().missing;
+    const auto found = missing.observations.find(source);
+    if (found != missing.observations.end() && found->second.last >= sequence) return true;
+    std::this_thread::yield();
   }
-  Status close() override {
-    ++log_.closed;
-    return {};
-  }
-
- private:
-  SinkLog& log_;
-};
-
-Journal::Options fake_options(SinkLog& log, std::vector<std::string>& errors) {
-  Journal::Options options;
-  options.open = [&log](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
-    return std::make_unique<FakeSink>(log);
-  };
-  options.on_error = [&errors](const Error& error) { errors.push_back(error.message); };
-  return options;
-}
-
-io::SurgeryRecord record(std::uint64_t sequence,
-                         io::RecordKind kind = io::RecordKind::kObservation) {
-  return {kind, sequence, 0, "payload " + std::to_string(sequence)};
+  return false;
 }
 
 TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
@@ -77,6 +49,7 @@ TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   EXPECT_TRUE(journal.status().has_value());
   const auto file = io::SurgeryFile::open(path);
   ASSERT_TRUE(file.has_value());
+  EXPECT_TRUE(file->state().closed);
   EXPECT_EQ(file->meta().case_id, "c");
   const auto observations = file->records(io::RecordKind::kObservation);
   ASSERT_TRUE(observations.has_value());
@@ -88,157 +61,323 @@ TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 20u);
 }
 
-TEST(Journal, AppendsNothingAfterAFailedRecordAndSaysSoOnce) {
-  SinkLog log;
-  log.fail_at = 2;
-  std::vector<std::string> errors;
-  Journal journal(fake_options(log, errors));
-  journal.begin("x", {});
-  for (std::uint64_t i = 1; i <= 5; ++i) journal.append(record(i));
+TEST(Journal, IgnoresRecordsBeforeTheFirstFile) {
+  FakeStorage storage;
+  Witness witness;
+  Journal journal(quick_options(storage, witness));
+  journal.append(record(1));
   journal.stop();
-  const auto status = journal.status();
-  ASSERT_FALSE(status.has_value());
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
-  EXPECT_EQ(status.error().message, "x: disk full");
-  EXPECT_THAT(errors, ElementsAre("x: disk full"));
-  EXPECT_THAT(log.appended, ElementsAre(1));
-  EXPECT_EQ(log.closed, 1);
+  EXPECT_THAT(storage.files(), IsEmpty());
+  EXPECT_TRUE(journal.status().has_value());
+  EXPECT_FALSE(journal.recorded().recording);
+}
+
+// ---------- groups, and what is recorded ----------
+
+TEST(Journal, WhatWaitsIsCommittedTogether) {
+  FakeStorage storage;
+  Witness witness;
+  std::promise<void> go;
+  storage.on_open = [&](int) {
+    go.get_future().wait();
+    return Status();
+  };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {});
+  for (std::uint64_t i = 1; i <= 20; ++i) journal.append(record(i), "ius");
+  go.set_value();
+  journal.stop();
+  ASSERT_EQ(storage.files().size(), 1u);
+  ASSERT_EQ(storage.files()[0].groups.size(), 1u);
+  EXPECT_EQ(storage.files()[0].groups[0].size(), 20u);
+}
+
+TEST(Journal, AGroupIsCommittedWhenItsTimeIsUp) {
+  FakeStorage storage;
+  Witness witness;
+  Journal::Options options = quick_options(storage, witness);
+  options.commit_interval = std::chrono::milliseconds(5);
+  Journal journal(options);
+  journal.begin("x.surgery", {});
+  journal.append(record(1), "ius");
+  EXPECT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+}
+
+TEST(Journal, WhatIsRecordedIsOnTheDiskAndNothingElse) {
+  FakeStorage storage;
+  Witness witness;
+  std::promise<void> reached, go;
+  storage.on_append = [&](int attempt) {
+    if (attempt == 1) reached.set_value(), go.get_future().wait();
+    return Status();
+  };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {}, 7);
+  journal.append(record(3), "ius");
+  reached.get_future().wait();
+  journal.append(record(50), "camera");  // never waits for the disk
+  journal.append(record(9, io::RecordKind::kUpdate));
+  EXPECT_TRUE(journal.recorded().recording);
+  EXPECT_FALSE(journal.recorded().holds("ius", 3)) << "accepted, not recorded";
+  go.set_value();
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.records == 3; }));
+  const Recorded recorded = journal.recorded();
+  EXPECT_EQ(recorded.session_id, 7u);
+  EXPECT_EQ(recorded.file, "x.surgery");
+  EXPECT_TRUE(recorded.reason.empty());
+  EXPECT_TRUE(recorded.holds("ius", 3));
+  EXPECT_FALSE(recorded.holds("ius", 4));
+  EXPECT_TRUE(recorded.holds("camera", 50));
+  EXPECT_FALSE(recorded.holds("pointer", 1));
+  EXPECT_EQ(recorded.held.updates.last, 9u);
+  EXPECT_TRUE(recorded.missing.empty());
+}
+
+TEST(Journal, ANewSessionStartsItsOwnCount) {
+  FakeStorage storage;
+  Witness witness;
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {}, 1);
+  journal.append(record(3), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 3); }));
+  journal.begin("y.surgery", {}, 2);
+  EXPECT_EQ(journal.recorded().session_id, 2u);
+  EXPECT_FALSE(journal.recorded().holds("ius", 3));
+  journal.stop();
+  EXPECT_TRUE(storage.files()[0].closed);
+}
+
+// ---------- failures ----------
+
+TEST(Journal, AFailedTransactionGoesToANewFileAsAWhole) {
+  FakeStorage storage;
+  Witness witness;
+  storage.on_append = [](int attempt) { return attempt == 2 ? disk_full() : Status(); };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {.case_id = "c"});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  journal.append(record(2), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 2); }));
+  journal.append(record(3), "ius");
+  journal.stop();
+  EXPECT_TRUE(journal.status().has_value());
+  EXPECT_THAT(witness.errors(), ElementsAre("x: disk full"));
+  EXPECT_THAT(witness.resumed(), ElementsAre("x-2.surgery"));
+  const auto files = storage.files();
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_TRUE(files[0].closed);
+  EXPECT_THAT(files[0].groups, ElementsAre(ElementsAre(1)));
+  EXPECT_THAT(files[1].groups, ElementsAre(ElementsAre(2), ElementsAre(3)));
+  EXPECT_EQ(files[1].meta.case_id, "c");
+  EXPECT_EQ(files[1].meta.continues, "x.surgery");
+  EXPECT_EQ(files[1].meta.gap, "x: disk full; not recorded: nothing");
+  EXPECT_TRUE(journal.recorded().missing.empty());
+}
+
+TEST(Journal, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
+  FakeStorage storage;
+  Witness witness;
+  std::atomic<bool> broken{true};
+  storage.on_append = [&](int attempt) { return attempt == 2 ? disk_full() : Status(); };
+  storage.on_open = [&](int attempt) { return attempt > 1 && broken ? disk_full() : Status(); };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  journal.append(record(2), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return !r.recording; }));
+  ASSERT_FALSE(journal.status().has_value());
+  EXPECT_EQ(journal.status().error().code, ErrorCode::kWriteFailed);
+  EXPECT_EQ(journal.status().error().message, "x: disk full");
+  EXPECT_EQ(journal.recorded().reason, "x: disk full");
+  // Until the failed transaction is given up, these may still be queued for the next try.
+  ASSERT_TRUE(lost(journal, "ius", 2));
+  journal.append(record(3), "ius");
+  journal.append(record(4), "camera");
+  journal.append(record(5, io::RecordKind::kUpdate));
+  ASSERT_TRUE(lost(journal, "camera", 4));
+  broken = false;
+  ASSERT_TRUE(witness.sees_resumption());
+  EXPECT_TRUE(journal.status().has_value());
+  journal.append(record(6), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 6); }));
+  journal.stop();
+  const auto files = storage.files();
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_EQ(files[1].meta.gap,
+            "x: disk full; not recorded: observations 4 of camera (1), observations 2 to 3 of ius "
+            "(2), updates 5 (1)");
+  const Recorded recorded = journal.recorded();
+  EXPECT_FALSE(recorded.holds("ius", 3));
+  EXPECT_FALSE(recorded.holds("camera", 4));
+  EXPECT_EQ(recorded.missing.updates.last, 5u);
+  EXPECT_THAT(witness.errors(), ElementsAre("x: disk full"));
+}
+
+TEST(Journal, RecordingWaitsForEnoughSpace) {
+  const TemporaryFolder folder;
+  FakeStorage storage;
+  Witness witness;
+  storage.on_append = [](int attempt) { return attempt == 1 ? disk_full() : Status(); };
+  Journal::Options options = quick_options(storage, witness);
+  options.resume_free_bytes = std::numeric_limits<std::uintmax_t>::max();
+  Journal journal(options);
+  journal.begin(folder / "x.surgery", {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(lost(journal, "ius", 1));
+  journal.stop();
+  EXPECT_EQ(storage.files().size(), 1u);
+  EXPECT_FALSE(journal.status().has_value());
+}
+
+TEST(Journal, AFileThatIsGoneIsNoticedWithoutAnyRecordAndWhatItHeldIsLost) {
+  FakeStorage storage;
+  Witness witness;
+  std::atomic<bool> gone{false};
+  storage.on_check = [&] {
+    return gone.exchange(false) ? Status(fail(ErrorCode::kWriteFailed, "x: was deleted"))
+                                : Status();
+  };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  gone = true;
+  ASSERT_TRUE(witness.sees_resumption());
+  EXPECT_FALSE(journal.recorded().holds("ius", 1));
+  journal.append(record(2), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 2); }));
+  journal.stop();
+  EXPECT_EQ(storage.files()[1].meta.gap, "x: was deleted; not recorded: observations 1 of ius (1)");
+}
+
+TEST(Journal, ACommitToAFileThatIsGoneIsDoneAgain) {
+  FakeStorage storage;
+  Witness witness;
+  std::atomic<bool> gone{false};
+  storage.on_append = [&](int attempt) {
+    if (attempt == 1) gone = true;
+    return Status();
+  };
+  storage.on_check = [&] {
+    return gone ? Status(fail(ErrorCode::kWriteFailed, "x: was deleted")) : Status();
+  };
+  storage.on_open = [&](int) {
+    gone = false;
+    return Status();
+  };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  journal.stop();
+  ASSERT_EQ(storage.files().size(), 2u);
+  EXPECT_THAT(storage.files()[1].groups, ElementsAre(ElementsAre(1)));
 }
 
 TEST(Journal, AThrowingSinkIsAFailureToo) {
-  SinkLog log;
-  log.throw_at = 1;
-  std::vector<std::string> errors;
-  Journal journal(fake_options(log, errors));
-  journal.begin("x", {});
-  journal.append(record(1));
+  FakeStorage storage;
+  Witness witness;
+  storage.on_append = [](int attempt) -> Status {
+    if (attempt == 1) throw std::runtime_error("thrown");
+    return {};
+  };
+  Journal journal(quick_options(storage, witness));
+  journal.begin("x.surgery", {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
   journal.stop();
-  EXPECT_FALSE(journal.status().has_value());
-  EXPECT_THAT(errors, ElementsAre(HasSubstr("thrown")));
+  EXPECT_THAT(witness.errors(), ElementsAre(HasSubstr("thrown")));
 }
 
 TEST(Journal, ANewFileForgetsTheFailureOfTheOldOne) {
-  SinkLog log;
-  log.fail_at = 1;
-  std::vector<std::string> errors;
-  Journal journal(fake_options(log, errors));
-  journal.begin("x", {});
-  journal.append(record(1));
-  journal.begin("y", {});
-  journal.append(record(2));
+  FakeStorage storage;
+  Witness witness;
+  storage.on_open = [](int attempt) { return attempt == 1 ? disk_full() : Status(); };
+  Journal::Options options = quick_options(storage, witness);
+  options.retry_interval = std::chrono::hours(1);
+  Journal journal(options);
+  journal.begin("x.surgery", {});
+  ASSERT_TRUE(witness.sees([](const Recorded& r) { return !r.reason.empty(); }));
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(lost(journal, "ius", 1));
+  journal.begin("y.surgery", {});
+  EXPECT_TRUE(journal.status().has_value());
+  journal.append(record(2), "ius");
   journal.stop();
   EXPECT_TRUE(journal.status().has_value());
-  EXPECT_THAT(log.appended, ElementsAre(2));
+  ASSERT_EQ(storage.files().size(), 1u);
+  EXPECT_THAT(storage.files()[0].groups, ElementsAre(ElementsAre(2)));
+  EXPECT_TRUE(storage.files()[0].meta.gap.empty());
 }
 
 TEST(Journal, AFolderThatDoesNotExistIsAnError) {
-  std::vector<std::string> errors;
+  Witness witness;
   Journal::Options options;
-  options.on_error = [&](const Error& error) { errors.push_back(error.message); };
+  witness.watch(options);
   Journal journal(options);
   journal.begin("/nonexistent/folder/a.surgery", {});
-  journal.append(record(1));
+  journal.append(record(1), "ius");
   journal.stop();
   ASSERT_FALSE(journal.status().has_value());
   EXPECT_THAT(journal.status().error().message, HasSubstr("/nonexistent/folder/a.surgery"));
-  EXPECT_EQ(errors.size(), 1u);
+  EXPECT_EQ(witness.errors().size(), 1u);
+  EXPECT_EQ(journal.recorded().missing.observations.at("ius").count, 1u);
 }
 
-TEST(Journal, IgnoresRecordsBeforeTheFirstFile) {
-  SinkLog log;
-  std::vector<std::string> errors;
-  Journal journal(fake_options(log, errors));
-  journal.append(record(1));
-  journal.stop();
-  EXPECT_TRUE(log.appended.empty());
-  EXPECT_TRUE(journal.status().has_value());
-}
+// ---------- slow storage ----------
 
-TEST(Journal, StorageThatStallsEndsTheJournalInsteadOfFillingMemory) {
-  std::promise<void> opening;
-  std::promise<void> resume;
-  SinkLog log;
-  std::vector<std::string> errors;
-  Journal::Options options = fake_options(log, errors);
-  options.max_queued = 3;
-  options.open = [&, open = options.open](const auto& path, const auto& meta) {
-    opening.set_value();
-    resume.get_future().wait();
-    return open(path, meta);
+TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
+  FakeStorage storage;
+  Witness witness;
+  std::promise<void> opening, go;
+  storage.on_open = [&](int attempt) {
+    if (attempt == 1) opening.set_value(), go.get_future().wait();
+    return Status();
   };
+  Journal::Options options = quick_options(storage, witness);
+  options.max_queued = 3;
   Journal journal(options);
-  journal.begin("x", {});
+  journal.begin("x.surgery", {});
   opening.get_future().wait();
-  for (std::uint64_t i = 1; i <= 3; ++i) journal.append(record(i));
+  for (std::uint64_t i = 1; i <= 3; ++i) journal.append(record(i), "ius");
   EXPECT_TRUE(journal.status().has_value());
-  journal.append(record(4));
-  ASSERT_FALSE(journal.status().has_value());
+  journal.append(record(4), "ius");
+  ASSERT_FALSE(journal.status().has_value()) << "at once, while the storage still stalls";
   EXPECT_THAT(journal.status().error().message, HasSubstr("3 records are waiting"));
-  resume.set_value();
+  EXPECT_FALSE(journal.recorded().recording);
+  go.set_value();
+  ASSERT_TRUE(witness.sees_resumption());
+  journal.append(record(5), "ius");
   journal.stop();
-  EXPECT_THAT(log.appended, ElementsAre(1, 2, 3));
+  const auto files = storage.files();
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_THAT(files[0].groups, ElementsAre(ElementsAre(1, 2, 3)));
+  EXPECT_THAT(files[1].groups, ElementsAre(ElementsAre(5)));
+  EXPECT_THAT(files[1].meta.gap, HasSubstr("observations 4 of ius (1)"));
+  EXPECT_FALSE(journal.recorded().holds("ius", 4));
+  EXPECT_TRUE(journal.recorded().holds("ius", 5));
 }
 
 TEST(Journal, BytesInTheQueueAreBoundedToo) {
-  std::promise<void> opening;
-  std::promise<void> resume;
-  SinkLog log;
-  std::vector<std::string> errors;
-  Journal::Options options = fake_options(log, errors);
-  options.max_queued_bytes = 100;
-  options.open = [&, open = options.open](const auto& path, const auto& meta) {
-    opening.set_value();
-    resume.get_future().wait();
-    return open(path, meta);
+  FakeStorage storage;
+  Witness witness;
+  std::promise<void> opening, go;
+  storage.on_open = [&](int attempt) {
+    if (attempt == 1) opening.set_value(), go.get_future().wait();
+    return Status();
   };
+  Journal::Options options = quick_options(storage, witness);
+  options.max_queued_bytes = 100;
   Journal journal(options);
-  journal.begin("x", {});
+  journal.begin("x.surgery", {});
   opening.get_future().wait();
   journal.append({io::RecordKind::kUpdate, 1, 0, std::string(60, 'a')});
   EXPECT_TRUE(journal.status().has_value());
   journal.append({io::RecordKind::kUpdate, 2, 0, std::string(60, 'a')});
   EXPECT_FALSE(journal.status().has_value());
-  resume.set_value();
-}
-
-// A file-size limit stands for a full disk. It holds for the whole process, hence the child.
-void journal_on_a_full_disk(const std::filesystem::path& path) {
-  std::signal(SIGXFSZ, SIG_IGN);
-  Journal journal({});
-  journal.begin(path, io::SurgeryMeta{"c"});
-  journal.append(record(1));
-  const rlimit limit{128 * 1024, 128 * 1024};
-  setrlimit(RLIMIT_FSIZE, &limit);
-  journal.append({io::RecordKind::kUpdate, 2, 0, std::string(1 << 20, 'a')});
-  journal.stop();
-  std::exit(journal.status() ? 0 : 42);
-}
-
-TEST(JournalDeathTest, AFullDiskIsReportedAndLeavesAReadableFile) {
-  testing::FLAGS_gtest_death_test_style = "threadsafe";
-  // The dying process runs this test from its start: it must find the folder of the one that
-  // watches.
-  constexpr const char* kVariable = "BRAINSHIFT_FULL_DISK_FOLDER";
-  std::optional<TemporaryFolder> folder;
-  if (getenv(kVariable) == nullptr) setenv(kVariable, folder.emplace().path().c_str(), 1);
-  const auto path = std::filesystem::path(getenv(kVariable)) / "j.surgery";
-  EXPECT_EXIT(journal_on_a_full_disk(path), testing::ExitedWithCode(42), "");
-  const auto file = io::SurgeryFile::open(path);
-  ASSERT_TRUE(file.has_value()) << file.error().message;
-  EXPECT_EQ(file->records(io::RecordKind::kObservation)->size(), 1u);
-  EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 0u);
-}
-
-TEST(JournalPath, KeepsTheCaseIdInsideTheFolder) {
-  EXPECT_EQ(journal_path("/j", "../a b/c", "1"), "/j/.._a_b_c-1.surgery");
-}
-
-TEST(JournalPath, NeverNamesAFileThatExists) {
-  const TemporaryFolder folder;
-  const auto first = journal_path(folder.path(), "c", "1");
-  ASSERT_TRUE(io::SurgeryFile::create(first, {}).has_value());
-  const auto second = journal_path(folder.path(), "c", "1");
-  EXPECT_EQ(second.filename(), "c-1-2.surgery");
+  go.set_value();
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -298,9 +299,9 @@ struct KeptRecords {
 class KeepingSink final : public RecordSink {
  public:
   explicit KeepingSink(std::shared_ptr<KeptRecords> kept) : kept_(std::move(kept)) {}
-  Status append(const io::SurgeryRecord& record) override {
+  Status append(std::span<const io::SurgeryRecord> records) override {
     const std::lock_guard lock(kept_->mutex);
-    kept_->records.push_back(record);
+    kept_->records.insert(kept_->records.end(), records.begin(), records.end());
     return {};
   }
   Status close() override { return {}; }
