@@ -232,6 +232,42 @@ TEST_F(EndToEnd, TheJournalHoldsWhatWasAskedAndAnswered) {
   }
 }
 
+// A session is recorded, checked, exported, damaged and mended, as a user does it.
+TEST_F(EndToEnd, AJournalIsCheckedExportedAndRepaired) {
+  const auto surgery = simulate("paper");
+  {
+    const auto daemon = serve();
+    replay(surgery, *daemon);
+    ASSERT_EQ(daemon->end(SIGTERM), 0);
+  }
+  const std::string journal = journals().front();
+  const auto checked = run({brainshift(), "journal", "check", surgery, journal});
+  ASSERT_EQ(checked.exit_status, 0) << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr(journal + ": "));
+  EXPECT_THAT(checked.out, HasSubstr("records, closed"));
+  EXPECT_THAT(checked.out, HasSubstr("checksums    all match"));
+
+  const auto csv = files_.path("records.csv"), fields = files_.path("fields");
+  const auto exported = run({brainshift(), "journal", "export", journal, "--csv", csv, "--vtu",
+                             fields, "--model", model()});
+  ASSERT_EQ(exported.exit_status, 0) << exported.err;
+  EXPECT_TRUE(std::filesystem::exists(csv));
+  EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(fields) /
+                                          std::filesystem::path(journal).stem() += ".pvd"));
+
+  const auto damaged = files_.path("damaged.surgery"), mended = files_.path("mended.surgery");
+  std::filesystem::copy_file(journal, damaged);
+  std::filesystem::resize_file(damaged, std::filesystem::file_size(damaged) * 9 / 10);
+  const auto broken = run({brainshift(), "journal", "check", damaged});
+  EXPECT_EQ(broken.exit_status, 2);
+  EXPECT_THAT(broken.err, HasSubstr(damaged));
+  const auto repaired = run({brainshift(), "journal", "repair", damaged, "--out", mended});
+  ASSERT_EQ(repaired.exit_status, 0) << repaired.err;
+  EXPECT_EQ(run({brainshift(), "journal", "check", mended}).exit_status, 0);
+  EXPECT_EQ(run({brainshift(), "journal", "repair", damaged, "--out", mended}).exit_status, 1)
+      << "nothing is replaced";
+}
+
 // ---------- without a model ----------
 
 TEST(WithoutAModel, TheDaemonRunsAndTellsClientsThatNoModelIsLoaded) {

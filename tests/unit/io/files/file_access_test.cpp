@@ -72,6 +72,21 @@ TEST(FileAccess, WritingOverAFolderFailsAndLeavesNothing) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
+TEST(FileAccess, OnlyARegularFileIsReplaced) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/null", folder / "device");
+  for (const char* name : {"pipe", "device"}) {
+    const auto before = std::filesystem::symlink_status(folder / name).type();
+    const Status status = write_file(folder / name, "x");
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+    EXPECT_THAT(status.error().message, HasSubstr("exists and is not a regular file"));
+    EXPECT_EQ(std::filesystem::symlink_status(folder / name).type(), before);
+  }
+  EXPECT_EQ(folder.entries(), 2u);
+}
+
 TEST(FileAccess, UncommittedFileIsRemovedAndTheOldOneKept) {
   const TemporaryFolder folder;
   folder.write("f", "old");

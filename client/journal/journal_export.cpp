@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/journal/journal_export.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kNanosecondsPerSecond = 1e9;
+
+// Seconds since the first record that it was asked for.
+class Clock {
+ public:
+  double seconds(std::int64_t recorded_ns) {
+    if (!first_ns_) first_ns_ = recorded_ns;
+    return static_cast<double>(recorded_ns - *first_ns_) / kNanosecondsPerSecond;
+  }
+
+ private:
+  std::optional<std::int64_t> first_ns_;
+};
+
+tl::unexpected<Error> undecodable(const fs::path& path, const io::SurgeryRecord& record,
+                                  const Error& error) {
+  return io::file_error(
+      ErrorCode::kUnreadable, path,
+      fmt::format("{} {}: {}", to_string(record.kind), record.sequence, error.message));
+}
+
+// Quoted where a comma or a quote would end it.
+std::string csv_text(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c;
+    if (c == '"') quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string xml_text(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '&') {
+      escaped += "&amp;";
+    } else if (c == '<') {
+      escaped += "&lt;";
+    } else if (c == '"') {
+      escaped += "&quot;";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string flags_of(const QualityVerdict& verdict) {
+  std::string text;
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (!verdict.flags.has(flag)) continue;
+    text += text.empty() ? "" : "+";
+    text += to_string(flag);
+  }
+  return text;
+}
+
+std::string update_columns(const Update& update) {
+  const StageTimings& t = update.timings;
+  const Estimate& estimate = update.estimate;
+  const double motion =
+      estimate.displacement.cols() == 0 ? 0.0 : estimate.displacement.colwise().norm().maxCoeff();
+  return fmt::format("{},{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.6f}",
+                     update.observation_sequence, to_string(estimate.status),
+                     to_string(estimate.quality.quality), flags_of(estimate.quality), t.register_ms,
+                     t.invert_ms, t.rebuild_ms, t.encode_ms, t.journal_ms, estimate.contact.active,
+                     motion);
+}
+
+Status write_field(const fs::path& out, const BrainModel& model, const Estimate& estimate) {
+  std::vector<io::NodeField> fields;
+  fields.push_back({"displacement", estimate.displacement});
+  if (estimate.sd_mm.size() > 0) {
+    fields.push_back({"sd_mm", estimate.sd_mm.transpose()});
+  }
+  return io::write_vtu(out, model.mesh, fields);
+}
+
+}  // namespace
+
+Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& path) {
+  std::string text =
+      "record,kind,sequence,source,recorded_s,bytes,observation_sequence,status,quality,flags,"
+      "register_ms,invert_ms,rebuild_ms,encode_ms,journal_ms,active,max_motion_mm\n";
+  Clock clock;
+  std::uint64_t id = 0;
+  const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
+    std::string source;
+    std::string columns(10, ',');
+    if (record.kind == io::RecordKind::kObservation) {
+      const auto observation = wire::decode_observation(record.payload);
+      if (!observation) return undecodable(path, record, observation.error());
+      source = csv_text(observation->source);
+    } else if (record.kind == io::RecordKind::kUpdate) {
+      const auto message = wire::decode_update(record.payload);
+      if (!message) return undecodable(path, record, message.error());
+      columns = update_columns(message->update);
+    }
+    text += fmt::format("{},{},{},{},{:.6f},{},{}\n", ++id, to_string(record.kind), record.sequence,
+                        source, clock.seconds(record.recorded_ns), record.payload.size(), columns);
+    return {};
+  });
+  if (!ok) return tl::unexpected(ok.error());
+  return text;
+}
+
+Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
+                               const FieldSeries& series) {
+  const auto model = io::read_model(series.model);
+  if (!model) return tl::unexpected(model.error());
+  if (model->model.model_id != file.meta().model_id) {
+    return io::file_error(
+        ErrorCode::kInvalidArgument, path,
+        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
+                    series.model.string(), model->model.model_id));
+  }
+  std::error_code failed;
+  fs::create_directories(series.folder, failed);
+  if (failed) return io::file_error(ErrorCode::kWriteFailed, series.folder, failed.message());
+  Clock clock;
+  std::string list;
+  int fields = 0;
+  const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
+    const double time_s = clock.seconds(record.recorded_ns);
+    if (record.kind != io::RecordKind::kUpdate) return {};
+    const auto message = wire::decode_update(record.payload);
+    if (!message) return undecodable(path, record, message.error());
+    if (message->error || !message->update.usable()) return {};
+    const Estimate& estimate = message->update.estimate;
+    if (estimate.displacement.cols() != model->model.mesh.num_nodes()) {
+      return undecodable(
+          path, record,
+          {ErrorCode::kUnreadable,
+           fmt::format("displacement of {} nodes, the model has {}", estimate.displacement.cols(),
+                       model->model.mesh.num_nodes())});
+    }
+    const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), record.sequence);
+    list += fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
+    ++fields;
+    return write_field(series.folder / name, model->model, estimate);
+  });
+  if (!ok) return tl::unexpected(ok.error());
+  if (fields == 0) return io::file_error(ErrorCode::kEmptySet, path, "holds no usable update");
+  const std::string pvd =
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n" +
+      list + "  </Collection>\n</VTKFile>\n";
+  const fs::path out = series.folder / (path.stem().string() + ".pvd");
+  if (Status written = io::write_file(out, pvd); !written) return tl::unexpected(written.error());
+  return fields;
+}
+
+}  // namespace brainshift::client
