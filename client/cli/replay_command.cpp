@@ -38,6 +38,7 @@ Status run(Arguments arguments) {
   if (!std::isfinite(arguments.timeout_s)) {  // CLI::Range lets NaN pass
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
+  options.on_note = [](const std::string& sentence) { print_error("note: " + sentence); };
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
   if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
   if (!options.latency_csv.empty()) {
@@ -78,6 +79,8 @@ void add_replay(CLI::App& app, Status& status) {
       ->add_option("--sources", options.sources,
                    "play the observations of these sources only, e.g. ius,stereopsis")
       ->delimiter(',');
+  command->add_option("--resume", options.resume,
+                      "journal of a session that crashed: go on after what it holds");
   command
       ->add_option("--repeat", options.repeat,
                    "play the observations so many times in a cycle, to measure latency; needs "
@@ -102,7 +105,11 @@ void add_replay(CLI::App& app, Status& status) {
       "2,000 updates of a surgery with 20 observations, timed one by one:\n"
       "  brainshift replay sag.surgery --boundary contact --repeat 100 --latency-csv "
       "sag_latency.csv "
-      "--report sag.json");
+      "--report sag.json\n"
+      "After a crash of the daemon, on from the last observation that its journal holds:\n"
+      "  brainshift replay sag.surgery --resume journal/colin27-20250131T120000Z-1.surgery "
+      "--report "
+      "rest.json");
   command->callback([arguments, &status] { status = run(*arguments); });
 }
 

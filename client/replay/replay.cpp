@@ -6,6 +6,7 @@
 #include <set>
 
 #include "client/lib/client.hpp"
+#include "client/replay/resume.hpp"
 #include "client/replay/score.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
@@ -75,10 +76,33 @@ Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted
   return {};
 }
 
+void note(const ReplayOptions& options, const fs::path& path, const std::string& text) {
+  if (options.on_note) options.on_note(path.string() + ": " + text);
+}
+
+// Leaves what the interrupted session has not recorded.
+Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
+              std::vector<RecordedObservation>& observations) {
+  if (options.resume.empty()) return {};
+  const auto point = read_resume_point(options.resume);
+  if (!point) return tl::unexpected<Error>(point.error());
+  if (point->meta.model_id != meta.model_id) {
+    return io::file_error(ErrorCode::kInvalidArgument, options.resume,
+                          "meta.model_id is \"" + point->meta.model_id + "\", that of " +
+                              options.surgery.string() + " is \"" + meta.model_id + "\"");
+  }
+  if (point->broken) note(options, options.resume, point->broken->message);
+  note(options, options.resume, describe(*point));
+  observations = remaining(observations, *point);
+  return {};
+}
+
 Result<Surgery> open_surgery(const ReplayOptions& options) {
   const fs::path& path = options.surgery;
   auto file = io::SurgeryFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
+  const io::SurgeryState& state = file->state();
+  if (state.checksums && !state.closed) note(options, path, describe(state));
   const io::SurgeryMeta meta = file->meta();
   if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
     return tl::unexpected<Error>(ok.error());
@@ -89,6 +113,9 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   auto observations = read_observations(*file, path);
   if (!observations) return tl::unexpected<Error>(observations.error());
   if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  if (Status ok = resume(options, meta, *observations); !ok) {
     return tl::unexpected<Error>(ok.error());
   }
 
@@ -252,6 +279,9 @@ Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
   const std::string given = "repeat = " + std::to_string(options.repeat) + ": ";
   if (options.repeat < 1) return fail(ErrorCode::kInvalidArgument, given + "must be at least 1");
   if (options.repeat == 1) return {};
+  if (!options.resume.empty()) {
+    return fail(ErrorCode::kInvalidArgument, given + "a surgery that goes on is played once");
+  }
   if (options.speed != Speed::kMax) {
     return fail(ErrorCode::kInvalidArgument, given + "recorded times have no cycle; use speed max");
   }

@@ -17,6 +17,7 @@
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
 #include "tests/support/report_keys.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::integration {
 namespace {
@@ -266,6 +267,53 @@ TEST_F(EndToEnd, AJournalIsCheckedExportedAndRepaired) {
   EXPECT_EQ(run({brainshift(), "journal", "check", mended}).exit_status, 0);
   EXPECT_EQ(run({brainshift(), "journal", "repair", damaged, "--out", mended}).exit_status, 1)
       << "nothing is replaced";
+}
+
+// A daemon is killed. Another one goes on where the journal ends, with the same final field.
+TEST_F(EndToEnd, AfterACrashTheReplayGoesOnToTheSameFinalField) {
+  const auto surgery = simulate("sag-progress");
+  const auto play = [&](const Background& daemon, const std::string& name,
+                        const std::vector<std::string>& more) {
+    std::vector<std::string> command = {brainshift(),
+                                        "replay",
+                                        surgery,
+                                        "--endpoint",
+                                        endpoint(daemon),
+                                        "--report",
+                                        files_.path(name + ".json"),
+                                        "--boundary",
+                                        "contact"};
+    command.insert(command.end(), more.begin(), more.end());
+    const auto played = run(command);
+    EXPECT_EQ(played.exit_status, 0) << played.err;
+    return played;
+  };
+  {
+    const auto daemon = serve();
+    play(*daemon, "whole", {});
+    daemon->end(SIGKILL);
+  }
+  // What a crash after the third observation leaves.
+  const auto paths = journals();
+  const auto journal = std::find_if(paths.begin(), paths.end(), [](const std::string& path) {
+    return std::filesystem::path(path).extension() == ".surgery";
+  });
+  ASSERT_NE(journal, paths.end());
+  const auto crashed = files_.path("crashed.surgery");
+  const auto trimmed = run(
+      {brainshift(), "journal", "trim", *journal, "--from", "1", "--to", "3", "--out", crashed});
+  ASSERT_EQ(trimmed.exit_status, 0) << trimmed.err;
+
+  const auto daemon = serve();
+  const auto resumed = play(*daemon, "rest", {"--resume", crashed});
+  EXPECT_THAT(resumed.err, HasSubstr("goes on after observation 3 of "));
+  const json whole = read_json(files_.path("whole.json"))[0];
+  const json rest = read_json(files_.path("rest.json"))[0];
+  EXPECT_EQ(rest.at("updates").get<int>(), whole.at("updates").get<int>() - 2);
+  EXPECT_EQ(rest.at("error_mm"), whole.at("error_mm"));
+  EXPECT_EQ(test_support::content_of(files_.path("rest-sag-progress-contact.vtu")),
+            test_support::content_of(files_.path("whole-sag-progress-contact.vtu")));
+  EXPECT_EQ(daemon->end(SIGTERM), 0);
 }
 
 // ---------- without a model ----------
