@@ -51,6 +51,9 @@
 // An observation from which no estimate could be made is not an error of next_update(): its
 // message arrives with UpdateMessage::error set. The usable estimate before it stays the valid one.
 //
+// Recording. submit() returns when the daemon has accepted an observation. session_state() tells
+// which are on its disk (RecordingState::holds), and why it does not record when it does not.
+//
 // Threads. A Client is not thread-safe: use each from one thread at a time. Several Clients may
 // talk to one daemon, which has one session at a time for all of them.
 //

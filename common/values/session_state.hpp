@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace brainshift {
 
@@ -27,6 +29,25 @@ enum class SessionPhase {
 };
 std::string_view to_string(SessionPhase phase);  // "empty", "preparing", ...
 
+// What is on the daemon's disk of a source: its observations above lost_until, up to until.
+struct RecordedSource {
+  std::string source;
+  std::uint64_t until = 0;
+  std::uint64_t lost_until = 0;  // the newest that no file holds; 0: none is lost
+
+  bool operator==(const RecordedSource&) const = default;
+};
+
+struct RecordingState {
+  bool recording = false;  // what is accepted now will be written
+  std::string reason;      // why not; one sentence, else empty
+  std::vector<RecordedSource> sources;
+
+  // Whether an accepted observation is written and synced.
+  bool holds(std::string_view source, std::uint64_t sequence) const;
+  bool operator==(const RecordingState&) const = default;
+};
+
 // What holds at the moment when the daemon sends it. A viewer may show a field as current for
 // valid_ms after it SENT the request that this answers, as long as `session` is the field's and
 // newest_usable its number: however long the answer was on its way, it makes no field look younger.
@@ -39,6 +60,7 @@ struct SessionState {
   std::uint32_t valid_ms = 0;
   std::string reason;      // why it is degraded; one sentence, else empty
   bool preparing = false;  // another session is being prepared; this one goes on until then
+  std::optional<RecordingState> recording;  // empty: the daemon keeps no journal
 
   bool operator==(const SessionState&) const = default;
 };

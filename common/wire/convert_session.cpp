@@ -145,6 +145,17 @@ std::string encode(const SessionState& state) {
   message.set_valid_ms(state.valid_ms);
   message.set_reason(to_utf8(state.reason));
   message.set_preparing(state.preparing);
+  if (state.recording) {
+    auto* recording = message.mutable_recording();
+    recording->set_recording(state.recording->recording);
+    recording->set_reason(to_utf8(state.recording->reason));
+    for (const RecordedSource& source : state.recording->sources) {
+      auto* entry = recording->add_sources();
+      entry->set_source(to_utf8(source.source));
+      entry->set_until(source.until);
+      entry->set_lost_until(source.lost_until);
+    }
+  }
   return message.SerializeAsString();
 }
 
@@ -166,6 +177,14 @@ Result<SessionState> decode_session_state(std::string_view payload) {
   state.valid_ms = message.valid_ms();
   state.reason = one_line(message.reason());
   state.preparing = message.preparing();
+  if (message.has_recording()) {
+    state.recording.emplace();
+    state.recording->recording = message.recording().recording();
+    state.recording->reason = one_line(message.recording().reason());
+    for (const auto& entry : message.recording().sources()) {
+      state.recording->sources.push_back({entry.source(), entry.until(), entry.lost_until()});
+    }
+  }
   if (!checked.ok()) return tl::unexpected(checked.status().error());
   return state;
 }

@@ -24,6 +24,18 @@ io::SurgeryRecord record(io::RecordKind kind, std::uint64_t sequence, std::strin
   return {kind, sequence, now / std::chrono::nanoseconds(1), std::move(payload)};
 }
 
+RecordingState recording_state(const Recorded& recorded) {
+  RecordingState state;
+  state.recording = recorded.recording;
+  state.reason = recorded.reason;
+  for (const auto& [source, held] : recorded.held.observations) {
+    const auto lost = recorded.missing.observations.find(source);
+    const bool none_lost = lost == recorded.missing.observations.end();
+    state.sources.push_back({source, held.last, none_lost ? 0 : lost->second.last});
+  }
+  return state;
+}
+
 ServiceOptions with_boot_id(ServiceOptions options) {
   std::random_device entropy;
   while (options.boot_id == 0) {
@@ -39,8 +51,14 @@ Service::Service(ServiceOptions options, Outbox& outbox)
   if (!options_.journal_dir.empty()) {
     Journal::Options journal;
     journal.open = options_.open_journal;
-    journal.on_error = [](const Error& error) { spdlog::error("{}", error.message); };
-    journal.on_resumed = [](const auto& path) { spdlog::info("journal {}", path.string()); };
+    journal.on_error = [this](const Error& error) {
+      spdlog::error("{}", error.message);
+      push_state();
+    };
+    journal.on_resumed = [this](const auto& path) {
+      spdlog::info("journal {}", path.string());
+      push_state();
+    };
     journal_ = std::make_unique<Journal>(std::move(journal));
   }
   if (options_.model) {
@@ -142,6 +160,7 @@ SessionState Service::session_state() const {
   SessionState state;
   if (session_) state = session_->state().shared;
   state.session.boot_id = options_.boot_id;
+  if (journal_) state.recording = recording_state(journal_->recorded());
   state.valid_ms = static_cast<std::uint32_t>(kValidity.count());
   return state;
 }

@@ -111,7 +111,7 @@ Result<PendingFile> PendingFile::create(const fs::path& path) {
     return file_error(ErrorCode::kWriteFailed, path, "is not a file name");
   }
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
-    return file_error(ErrorCode::kWriteFailed, path, "is not a regular file");
+    return file_error(ErrorCode::kWriteFailed, path, "exists and is not a regular file");
   }
   const fs::path temporary = folder_of(path) / name;
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));

@@ -25,5 +25,17 @@ TEST(SessionKey, DiffersWithEachMember) {
   }
 }
 
+TEST(RecordingState, HoldsWhatIsWrittenAndWasNotLost) {
+  RecordingState state;
+  state.sources = {{"ius", 9, 4}, {"camera", 2, 0}};
+  EXPECT_TRUE(state.holds("ius", 5));
+  EXPECT_TRUE(state.holds("ius", 9));
+  EXPECT_TRUE(state.holds("camera", 1));
+  EXPECT_FALSE(state.holds("ius", 4));
+  EXPECT_FALSE(state.holds("ius", 10));
+  EXPECT_FALSE(state.holds("camera", 3));
+  EXPECT_FALSE(state.holds("pointer", 1));
+}
+
 }  // namespace
 }  // namespace brainshift

@@ -188,7 +188,8 @@ SessionState session_state_from(const json& value) {
           value["age_ms"],
           value["valid_ms"],
           value["reason"],
-          value["preparing"] == 1};
+          value["preparing"] == 1,
+          RecordingState{true, "", {{"ius", 12, 3}}}};
 }
 
 SessionRequest session_request_from(const json& value) {

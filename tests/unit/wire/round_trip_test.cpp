@@ -168,6 +168,9 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
   state.valid_ms = 1000;
   state.reason = "no luck";
   state.preparing = true;
+  state.recording.emplace();
+  state.recording->reason = "j.surgery: disk full";
+  state.recording->sources = {{"ius", ~0ull, 1}, {"", 0, 0}};
   for (int phase = 0; phase <= static_cast<int>(SessionPhase::kClosed); ++phase) {
     state.phase = static_cast<SessionPhase>(phase);
     expect_round_trip(state, decode_session_state);

@@ -374,6 +374,45 @@ TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
   EXPECT_EQ(told, "j.surgery: disk full");
 }
 
+// Accepted is one thing, recorded another: the state says which observations are on the disk.
+TEST_F(TransportTest, TheStateSaysWhatIsRecordedAndWhyNothingIs) {
+  const test_support::TemporaryFolder folder;
+  ServiceOptions options = with_model();
+  options.journal_dir = folder.path();
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  begin_with_update(peer, 3);
+  const auto recorded = [&] {
+    const auto state = renew(peer, {1, 8, 1}).recording;
+    return state && state->recording && state->holds("pointer", 3);
+  };
+  bool held = recorded();
+  for (int attempt = 0; attempt < 1000 && !held; ++attempt) held = recorded();
+  EXPECT_TRUE(held);
+  EXPECT_FALSE(renew(peer, {1, 8, 1}).recording->holds("pointer", 4));
+}
+
+TEST_F(TransportTest, EverySubscriberIsToldWhenTheDaemonDoesNotRecord) {
+  const test_support::TemporaryFolder folder;
+  ServiceOptions options = with_model();
+  options.journal_dir = folder.path();
+  options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
+    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
+  };
+  serve(std::move(options));
+  RawPeer watcher(endpoint_);
+  subscribe(watcher);
+  RawPeer owner(endpoint_);
+  start_session(owner);
+  std::string reason;
+  while (reason.find("disk full") == std::string::npos) {
+    const Received received = watcher.receive();
+    if (received.type != MessageType::kSessionState) continue;
+    const auto state = wire::decode_session_state(received.payload);
+    if (!state->recording->recording) reason = state->recording->reason;
+  }
+}
+
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
   ServiceOptions options = with_model();
   auto entered = std::make_shared<std::promise<void>>();
