@@ -109,12 +109,11 @@ void add_export(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, 
       "  brainshift journal export journal/colin27-20250131T120000Z-1.surgery --csv records.csv "
       "\\\n"
       "    --vtu fields --model colin27.h5\n"
-      "The table has a row per record: kind, sequence, source, time, bytes; of updates also "
-      "status,\n"
-      "quality, flags, times of the stages, active slaves and the largest motion. The series has "
-      "a\n"
-      ".vtu per usable update and a .pvd that lists them by time. A broken file must be repaired\n"
-      "first.");
+      "The table has a row per record: kind, sequence, source, time, bytes; of decisions the\n"
+      "outcome; of updates status, quality, flags, times of the stages, active slaves and the\n"
+      "largest motion. The series has a .vtu per usable update and a .pvd that lists them by "
+      "time.\n"
+      "A broken file must be repaired first.");
   action->add_option("file", arguments->file, "surgery file (.surgery)")->required();
   action->add_option("--csv", arguments->csv, "table to write; replaced if it exists");
   action->add_option("--vtu", arguments->fields.folder, "folder for the fields; needs --model");

@@ -9,6 +9,7 @@
 #include "client/cli/command.hpp"
 #include "client/replay/replay.hpp"
 #include "common/io/files/output_path.hpp"
+#include "client/replay/verify.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -19,12 +20,25 @@ struct Arguments {
   std::string boundary = "both";
   std::string method;
   double timeout_s = 600.0;
+  bool verify = false;
 };
 
 std::vector<std::string> method_names() {
   std::vector<std::string> names;
   for (const Method method : kAllMethods) names.emplace_back(to_string(method));
   return names;
+}
+
+Status verify(const ReplayOptions& options) {
+  const auto verification =
+      verify_journal({options.surgery, options.endpoint, options.timeout}, terminal_progress());
+  if (!verification) return tl::unexpected(verification.error());
+  for (const std::string& line : report_lines(*verification)) std::puts(line.c_str());
+  if (verification->differences.empty()) return {};
+  return fail(ErrorCode::kNotConverged,
+              options.surgery.string() + ": " + std::to_string(verification->differences.size()) +
+                  " of " + std::to_string(verification->compared) +
+                  " answers differ; the first: " + verification->differences.front());
 }
 
 Status run(Arguments arguments) {
@@ -38,12 +52,16 @@ Status run(Arguments arguments) {
   if (!std::isfinite(arguments.timeout_s)) {  // CLI::Range lets NaN pass
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
-  options.on_note = [](const std::string& sentence) { print_error("note: " + sentence); };
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
+  if (arguments.verify) return verify(options);
+  if (options.report.empty()) {
+    return fail(ErrorCode::kInvalidArgument, "--report is required (see brainshift replay --help)");
+  }
   if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
   if (!options.latency_csv.empty()) {
     if (Status ok = io::check_output_file("--latency-csv", options.latency_csv); !ok) return ok;
   }
+  options.on_note = [](const std::string& sentence) { print_error("note: " + sentence); };
   return replay(options, terminal_progress(),
                 [](const RunReport& report) { std::puts(summary_line(report).c_str()); });
 }
@@ -58,9 +76,15 @@ void add_replay(CLI::App& app, Status& status) {
   command->add_option("surgery", options.surgery, "surgery file (.surgery)")->required();
   command->add_option("--endpoint", options.endpoint, "where brainshiftd listens")
       ->capture_default_str();
-  command
-      ->add_option("--report", options.report, "report.json to write; fields go beside it as .vtu")
-      ->required();
+  CLI::Option* report =
+      command->add_option("--report", options.report,
+                          "report.json to write; fields go beside it as .vtu; required "
+                          "without --verify");
+  CLI::Option* verify =
+      command->add_flag("--verify", arguments->verify,
+                        "compare the daemon's updates with those of a journal, and write nothing; "
+                        "method and boundary are the journal's");
+  verify->excludes(report);
   command
       ->add_option("--speed", arguments->speed,
                    "max: as fast as answers come; 1x: at the recorded times")
@@ -79,8 +103,10 @@ void add_replay(CLI::App& app, Status& status) {
       ->add_option("--sources", options.sources,
                    "play the observations of these sources only, e.g. ius,stereopsis")
       ->delimiter(',');
-  command->add_option("--resume", options.resume,
-                      "journal of a session that crashed: go on after what it holds");
+  command
+      ->add_option("--resume", options.resume,
+                   "journal of a session that crashed: go on after what it holds")
+      ->excludes(verify);
   command
       ->add_option("--repeat", options.repeat,
                    "play the observations so many times in a cycle, to measure latency; needs "
@@ -109,7 +135,11 @@ void add_replay(CLI::App& app, Status& status) {
       "After a crash of the daemon, on from the last observation that its journal holds:\n"
       "  brainshift replay sag.surgery --resume journal/colin27-20250131T120000Z-1.surgery "
       "--report "
-      "rest.json");
+      "rest.json\n"
+      "Does this daemon still answer as it did when the journal was recorded? Exit status 1 when "
+      "an "
+      "update differs:\n"
+      "  brainshift replay journal/colin27-20250131T120000Z-1.surgery --verify");
   command->callback([arguments, &status] { status = run(*arguments); });
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/io/files/file_access.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/decision.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -31,7 +32,12 @@ Status count(const io::SurgeryRecord& record, JournalCheck& check) {
       check.updates.add(record.sequence);
       break;
     }
-    case io::RecordKind::kDecision: check.decisions.add(record.sequence); break;
+    case io::RecordKind::kDecision: {
+      const auto decision = wire::decode_decision(record.payload);
+      if (!decision) return undecodable(decision.error());
+      ++check.decisions[std::string(to_string(decision->outcome))];
+      break;
+    }
   }
   ++check.records;
   return {};
@@ -89,7 +95,11 @@ std::vector<std::string> report_lines(const JournalCheck& check) {
     add("observations", fmt::format("{} of {}", text_of(numbers), source));
   }
   if (check.updates.count > 0) add("updates", text_of(check.updates));
-  if (check.decisions.count > 0) add("decisions", fmt::format("{}", check.decisions.count));
+  std::string decisions;
+  for (const auto& [outcome, count] : check.decisions) {
+    decisions += fmt::format("{}{} {}", decisions.empty() ? "" : ", ", count, outcome);
+  }
+  add("decisions", decisions);
   add("goes on from", meta.continues);
   add("gap", meta.gap);
   if (check.broken) {

@@ -33,7 +33,7 @@ struct JournalCheck {
   std::uint64_t records = 0;
   std::map<std::string, Numbers> observations;  // by source
   Numbers updates;
-  Numbers decisions;
+  std::map<std::string, std::uint64_t> decisions;  // by outcome: how many
   // The first thing that is not what was written; the message names file and record.
   std::optional<Error> broken;
 };

@@ -9,6 +9,7 @@
 #include "common/io/geometry/vtu_writer.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/decision.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -109,7 +110,13 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& pat
       const auto observation = wire::decode_observation(record.payload);
       if (!observation) return undecodable(path, record, observation.error());
       source = csv_text(observation->source);
-    } else if (record.kind == io::RecordKind::kUpdate) {
+    } else if (record.kind == io::RecordKind::kDecision) {
+      const auto decision = wire::decode_decision(record.payload);
+      if (!decision) return undecodable(path, record, decision.error());
+      source = csv_text(decision->source);
+      columns = fmt::format("{},{},,,,,,,,{},", decision->observation_sequence,
+                            to_string(decision->outcome), decision->active);
+    } else {
       const auto message = wire::decode_update(record.payload);
       if (!message) return undecodable(path, record, message.error());
       columns = update_columns(message->update);

@@ -13,9 +13,10 @@ namespace brainshift::client {
 // A heading and one row per record, in the order of the file:
 //   record,kind,sequence,source,recorded_s,bytes,observation_sequence,status,quality,flags,
 //   register_ms,invert_ms,rebuild_ms,encode_ms,journal_ms,active,max_motion_mm
-// recorded_s counts from the first record. Observations have a source; updates have what follows
-// `bytes`; flags are joined by '+'. Fields that a record does not have are empty. An error at the
-// first record that is not what was written.
+// recorded_s counts from the first record. Observations and decisions have a source; updates have
+// what follows `bytes`; decisions have their outcome as status, and active; flags are joined by
+// '+'. Fields that a record does not have are empty. An error at the first record that is not what
+// was written.
 Result<std::string> records_csv(const io::SurgeryFile& file, const std::filesystem::path& path);
 
 struct FieldSeries {

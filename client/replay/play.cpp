@@ -200,6 +200,13 @@ std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recordin
          static_cast<std::uint64_t>(cycle) * (last - first + 1);
 }
 
+Observation for_replay(Observation recorded) {
+  if (recorded.daemon_ns != 0) recorded.acquired_ns = recorded.daemon_ns;
+  recorded.daemon_ns = recorded.sent_ns = 0;
+  recorded.session = {};
+  return recorded;
+}
+
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress) {
   return Player(link, recording, options, progress).run();

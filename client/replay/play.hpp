@@ -33,6 +33,10 @@ struct RecordedObservation {
   Observation observation;
 };
 
+// A recorded observation as it is sent to another session: without its own session, and acquired by
+// the clock of the daemon that journalled it, where one did (wire::SessionRequest::recorded_clock).
+Observation for_replay(Observation recorded);
+
 enum class Speed {
   kMax,       // next observation as soon as the former is answered
   kRecorded,  // at the recorded times, relative to the first

@@ -44,11 +44,7 @@ Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile
                                               std::to_string(record.sequence) + ": " +
                                               observation.error().message);
     }
-    // A journal has the daemon's clock, by which it reckoned ages. The session is the next one's.
-    if (observation->daemon_ns != 0) observation->acquired_ns = observation->daemon_ns;
-    observation->daemon_ns = observation->sent_ns = 0;
-    observation->session = {};
-    observations.push_back({record.recorded_ns, std::move(*observation)});
+    observations.push_back({record.recorded_ns, for_replay(std::move(*observation))});
   }
   if (observations.empty()) {
     return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation");

@@ -44,6 +44,10 @@ struct DaemonStatus {
   bool busy = false;
   std::uint64_t updates = 0;
   std::uint64_t uptime_ms = 0;
+  // On what updates are computed: bits are comparable only where all three agree.
+  std::string build = {};
+  std::string machine = {};
+  std::string blas_kernel = {};
 };
 
 struct SessionRequest {

@@ -19,15 +19,19 @@ std::string encode(const DaemonStatus& status) {
   message.set_busy(status.busy);
   message.set_updates(status.updates);
   message.set_uptime_ms(status.uptime_ms);
+  message.set_build(to_utf8(status.build));
+  message.set_machine(to_utf8(status.machine));
+  message.set_blas_kernel(to_utf8(status.blas_kernel));
   return message.SerializeAsString();
 }
 
 Result<DaemonStatus> decode_status(std::string_view payload) {
   pb::StatusReply message;
   if (Status status = parse(payload, message); !status) return tl::unexpected(status.error());
-  return DaemonStatus{message.version(),  message.model_ready(), message.case_id(),
-                      message.model_id(), message.busy(),        message.updates(),
-                      message.uptime_ms()};
+  return DaemonStatus{message.version(),    message.model_ready(), message.case_id(),
+                      message.model_id(),   message.busy(),        message.updates(),
+                      message.uptime_ms(),  message.build(),       message.machine(),
+                      message.blas_kernel()};
 }
 
 std::string encode(const SessionRequest& request) {

@@ -14,6 +14,7 @@
 #include "server/main/exit_status.hpp"
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
+#include "server/main/platform.hpp"
 #include "server/main/stop_signals.hpp"
 #include "server/service/service.hpp"
 #include "server/session/model_store.hpp"
@@ -47,6 +48,9 @@ Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
 Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   ServiceOptions options;
   options.version = BRAINSHIFT_VERSION;
+  options.build = program_build(BRAINSHIFT_VERSION);
+  options.machine = machine_type();
+  options.blas_kernel = linalg::blas_kernel();
   options.journal_dir = config.journal_dir;
   if (config.model.empty()) return options;
   auto file = io::read_model(config.model);
@@ -95,9 +99,7 @@ Status serve(const ServeArguments& arguments) {
   } else {
     spdlog::warn("no model is loaded: clients get model_not_ready");
   }
-  if (const std::string kernel = linalg::blas_kernel(); !kernel.empty()) {
-    spdlog::info("OpenBLAS kernel {}", kernel);
-  }
+  if (!options->blas_kernel.empty()) spdlog::info("OpenBLAS kernel {}", options->blas_kernel);
   Outbox outbox;
   Service service(std::move(*options), outbox);
   fmt::print("listening on {}\n", router->endpoint());

@@ -68,6 +68,7 @@ Service::Service(ServiceOptions options, Outbox& outbox)
       begin_journal(request, info);
     };
     hooks.publish = [this](wire::UpdateMessage message) { publish(std::move(message)); };
+    hooks.decided = [this](const wire::Decision& decision) { record_decision(decision); };
     hooks.on_change = [this] { push_state(); };
     session_ = std::make_unique<Session>(options_.model->case_id, std::move(hooks),
                                          options_.boot_id, options_.model->model_id);
@@ -182,6 +183,9 @@ wire::DaemonStatus Service::status() const {
   wire::DaemonStatus status;
   status.version = options_.version;
   status.uptime_ms = static_cast<std::uint64_t>(uptime_.milliseconds());
+  status.build = options_.build;
+  status.machine = options_.machine;
+  status.blas_kernel = options_.blas_kernel;
   if (!session_) return status;
   const Session::State state = session_->state();
   status.model_ready = true;
@@ -205,9 +209,18 @@ void Service::begin_journal(const wire::SessionRequest& request, const wire::Ses
                    .method = std::string(to_string(request.method)),
                    .boundary = std::string(to_string(request.boundary)),
                    .created_utc = utc_now(),
-                   .software = "brainshiftd " + options_.version},
+                   .software = "brainshiftd " + options_.version,
+                   .build = options_.build,
+                   .machine = options_.machine,
+                   .blas_kernel = options_.blas_kernel},
                   info.session_id);
   spdlog::info("journal {}", path.string());
+}
+
+void Service::record_decision(const wire::Decision& decision) {
+  if (!journal_) return;
+  journal_->append(
+      record(io::RecordKind::kDecision, decision.observation_sequence, wire::encode(decision)));
 }
 
 void Service::publish(wire::UpdateMessage message) {

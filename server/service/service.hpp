@@ -54,6 +54,10 @@ struct ServiceOptions {
   MakeSessionModel make_model;              // needed with a model
   std::filesystem::path journal_dir;        // empty: no journal
   std::filesystem::path case_file;          // metadata of the journal
+  // On what updates are computed, for the journal and for clients (wire::DaemonStatus).
+  std::string build = {};
+  std::string machine = {};
+  std::string blas_kernel = {};
   OpenSink open_journal = open_surgery_file;
   std::uint64_t boot_id = 0;  // 0: a random one
 };
@@ -81,6 +85,7 @@ class Service final : public RequestHandler {
   wire::DaemonStatus status() const;
   void begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info);
   void publish(wire::UpdateMessage message);
+  void record_decision(const wire::Decision& decision);
 
   const ServiceOptions options_;  // boot_id is set
   Outbox& outbox_;

@@ -16,6 +16,7 @@ namespace {
 constexpr const char* kUnexpected = "unexpected failure";
 constexpr const char* kSuperseded = "another session was started before this one";
 constexpr const char* kLeft = "the client that asked for the session has left";
+constexpr const char* kSessionEnded = "the session ended";
 constexpr const char* kStopping = "the daemon is stopping";
 
 std::int64_t monotonic_ns(std::chrono::steady_clock::time_point time) {
@@ -42,9 +43,29 @@ const std::string* Session::owner() const {
   return running_ ? &running_->owner : nullptr;
 }
 
+// Of the session that runs, or has just ended: the worker begins the next one only after this.
+void Session::decide(const Observation& observation, wire::Outcome outcome, std::string reason,
+                     const Update* answer) const {
+  if (!hooks_.decided) return;
+  wire::Decision decision;
+  decision.session_id = last_session_id_;
+  decision.source = observation.source;
+  decision.observation_sequence = observation.sequence;
+  decision.outcome = outcome;
+  decision.reason = std::move(reason);
+  if (answer != nullptr) {
+    decision.update_sequence = answer->sequence;
+    decision.active = answer->estimate.contact.active;
+  }
+  hooks_.decided(decision);
+}
+
 void Session::end_running() {
-  running_.reset();
+  for (const auto& [source, box] : boxes_) {
+    decide(box.observation, wire::Outcome::kSkipped, kSessionEnded);
+  }
   boxes_.clear();
+  running_.reset();
   run_stop_.request_stop();
 }
 
@@ -155,6 +176,10 @@ Result<wire::ObservationReceipt> Session::submit(Observation observation,
     if (on_accepted) on_accepted(observation);
     observation.acquired_ns = observation.daemon_ns;  // one clock for all sources from here on
     const std::string name = observation.source;
+    if (receipt.replaced_pending) {
+      decide(boxes_[name].observation, wire::Outcome::kSuperseded,
+             fmt::format("observation {} came before it was begun", observation.sequence));
+    }
     boxes_.insert_or_assign(name, Box{std::move(observation), ++arrivals_, arrived});
   }
   wake_.notify_all();
@@ -341,7 +366,10 @@ void Session::process(const Box& box) {
   RunOptions options;
   {
     const std::lock_guard lock(mutex_);
-    if (!running_) return;  // replaced between taking the observation and here
+    if (!running_) {  // ended between taking the observation and here
+      decide(observation, wire::Outcome::kSkipped, kSessionEnded);
+      return;
+    }
     number = ++running_->published;
     key = running_->key;
     request = running_->request;
@@ -382,7 +410,10 @@ void Session::process(const Box& box) {
 bool Session::finish(const Box& box, const wire::UpdateMessage& message,
                      const std::stop_token& stop) {
   const std::lock_guard lock(mutex_);
-  if (stop.stop_requested() || !running_) return false;
+  if (stop.stop_requested() || !running_) {
+    decide(box.observation, wire::Outcome::kSkipped, kSessionEnded);
+    return false;
+  }
   running_->newest_update = message.update.sequence;
   if (!message.error) ++updates_;
   if (!message.error && message.update.usable()) {
@@ -392,6 +423,9 @@ bool Session::finish(const Box& box, const wire::UpdateMessage& message,
     running_->reason =
         message.error ? message.error->message : message.update.estimate.quality.reason;
   }
+  decide(box.observation, message.error ? wire::Outcome::kFailed : wire::Outcome::kUsed,
+         running_->newest_usable == message.update.sequence ? std::string() : running_->reason,
+         &message.update);
   return true;
 }
 

@@ -37,6 +37,7 @@
 #include "common/values/observation.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/decision.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "server/session/source_clock.hpp"
 
@@ -53,7 +54,7 @@ struct SessionModel {
 using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
     const wire::SessionRequest&, const std::stop_token&)>;
 
-// Called one at a time, but for on_change.
+// Called one at a time, but for on_change and decided.
 struct SessionHooks {
   MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
@@ -63,6 +64,10 @@ struct SessionHooks {
   // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
   // thread, after the update that changed it. May be empty.
   std::function<void()> on_change;
+  // What became of an accepted observation; once for each, before its update is published. Called
+  // on any thread and under the session's lock: it must be quick and must not call back. May be
+  // empty.
+  std::function<void(const wire::Decision&)> decided;
 };
 
 class Session {
@@ -158,6 +163,8 @@ class Session {
   void end_running();
   SessionState shared_state() const;
   void changed() const;
+  void decide(const Observation& observation, wire::Outcome outcome, std::string reason,
+              const Update* answer = nullptr) const;
 
   const std::string case_id_;
   const SessionHooks hooks_;

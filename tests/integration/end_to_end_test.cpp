@@ -316,6 +316,54 @@ TEST_F(EndToEnd, AfterACrashTheReplayGoesOnToTheSameFinalField) {
   EXPECT_EQ(daemon->end(SIGTERM), 0);
 }
 
+// The same daemon gives the same bits again; a journal that says otherwise is found out.
+TEST_F(EndToEnd, AJournalIsVerifiedBitForBit) {
+  const auto surgery = simulate("joint-sag");
+  {
+    const auto daemon = serve();
+    const auto played = run({brainshift(), "replay", surgery, "--endpoint", endpoint(*daemon),
+                             "--report", files_.path("report.json"), "--boundary", "contact"});
+    ASSERT_EQ(played.exit_status, 0) << played.err;
+    ASSERT_EQ(daemon->end(SIGTERM), 0);
+  }
+  const std::string journal = journals().front();
+  const auto meta = io::SurgeryFile::open(journal)->meta();
+  EXPECT_FALSE(meta.build.empty());
+  EXPECT_FALSE(meta.machine.empty());
+  const auto daemon = serve();
+  const auto verified =
+      run({brainshift(), "replay", journal, "--verify", "--endpoint", endpoint(*daemon)});
+  EXPECT_EQ(verified.exit_status, 0) << verified.out << verified.err;
+  if (!meta.blas_kernel.empty()) {
+    EXPECT_THAT(verified.out, HasSubstr("agree bit for bit"));
+  }
+  EXPECT_THAT(verified.out, HasSubstr("greatest difference 0 mm"));
+
+  // Another observation than the one that was answered.
+  const auto other = files_.path("other.surgery");
+  {
+    const auto original = io::SurgeryFile::open(journal);
+    auto changed = io::SurgeryFile::create(other, meta);
+    bool first = true;
+    ASSERT_TRUE(original->visit([&](io::SurgeryRecord record) {
+      if (record.kind == io::RecordKind::kObservation && first) {
+        first = false;
+        auto observation = wire::decode_observation(record.payload).value();
+        std::get<TumourBoundary>(observation.body).points.array() += 0.1;
+        record.payload = wire::encode(observation);
+      }
+      return changed->append(record);
+    }));
+    ASSERT_TRUE(changed->close());
+  }
+  const auto differs =
+      run({brainshift(), "replay", other, "--verify", "--endpoint", endpoint(*daemon)});
+  EXPECT_EQ(differs.exit_status, 1);
+  EXPECT_THAT(differs.err, HasSubstr("answers differ; the first: update 1 "));
+  EXPECT_THAT(differs.out, HasSubstr("displacement"));
+  EXPECT_EQ(daemon->end(SIGTERM), 0);
+}
+
 // ---------- without a model ----------
 
 TEST(WithoutAModel, TheDaemonRunsAndTellsClientsThatNoModelIsLoaded) {

@@ -62,7 +62,7 @@ void visit(A& a, Meta& meta) {
   a("case_id", meta.case_id), a("model_id", meta.model_id), a("case_file", meta.case_file);
   a("scenario", meta.scenario), a("seed", meta.seed), a("method", meta.method);
   a("boundary", meta.boundary), a("created_utc", meta.created_utc), a("software", meta.software);
-  a("machine", meta.machine), a("blas_kernel", meta.blas_kernel);
+  a("build", meta.build), a("machine", meta.machine), a("blas_kernel", meta.blas_kernel);
   a("continues", meta.continues), a("gap", meta.gap);
 }
 

@@ -26,6 +26,7 @@ struct SurgeryMeta {
   std::string created_utc = {};
   std::string software = {};
   // Of a journal: on what the updates were computed. Bits are comparable only where these agree.
+  std::string build = {};
   std::string machine = {};
   std::string blas_kernel = {};
   // Of a journal that goes on after a failure: the file before it, and what neither of them holds.

@@ -20,4 +20,9 @@ inline Result<std::unique_ptr<SessionModel>> fake_session(
   return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
 }
 
+class TestSession : public Session {
+ public:
+  explicit TestSession(SessionHooks hooks) : Session(kCase, std::move(hooks), kBootId, kModelId) {}
+};
+
 }  // namespace brainshift::server

@@ -33,6 +33,24 @@ TEST_F(CheckJournal, CountsWhatAGoodFileHolds) {
   EXPECT_THAT(lines, Contains("  checksums    all match"));
 }
 
+TEST_F(CheckJournal, DecisionsAreCountedByOutcome) {
+  {
+    auto file = io::SurgeryFile::create(path, {});
+    ASSERT_TRUE(file);
+    for (std::uint64_t i = 1; i <= 5; ++i) {
+      const auto outcome = i < 4 ? wire::Outcome::kUsed : wire::Outcome::kSkipped;
+      ASSERT_TRUE(file->append(decision(i, outcome)));
+    }
+    ASSERT_TRUE(file->append({io::RecordKind::kDecision, 6, 0, "\xff\xff"}));
+    ASSERT_TRUE(file->close());
+  }
+  const auto check = check_journal(path);
+  ASSERT_TRUE(check);
+  EXPECT_THAT(report_lines(*check), Contains("  decisions    2 skipped, 3 used"));
+  ASSERT_TRUE(check->broken);
+  EXPECT_THAT(check->broken->message, HasSubstr("record 6: decision 6: "));
+}
+
 TEST_F(CheckJournal, NamesTheFirstBadRecordAndCountsWhatIsInFrontOfIt) {
   write(path, 9);
   run_sql(path, "UPDATE record SET recorded_ns = 0 WHERE id = 7");

@@ -71,7 +71,7 @@ TEST_F(CopyJournal, ATrimmedFileHoldsTheRangeWithItsUpdatesAndTruth) {
     io::SurgeryTruth truth;
     for (std::uint64_t i = 1; i <= 9; ++i) {
       ASSERT_TRUE(file->append(observation(i, "ius")));
-      ASSERT_TRUE(file->append({io::RecordKind::kDecision, i, 0, "used"}));
+      ASSERT_TRUE(file->append(decision(i, wire::Outcome::kUsed)));
       ASSERT_TRUE(file->append(update(100 + i, i)));
       truth.displacement = Points::Constant(3, 4, static_cast<double>(i));
       ASSERT_TRUE(file->write_truth(i, truth));

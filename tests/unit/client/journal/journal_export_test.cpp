@@ -59,6 +59,20 @@ TEST_F(ExportJournal, TheTableHasARowPerRecord) {
   EXPECT_THAT(lines[6], testing::EndsWith(",11,0.375000"));
 }
 
+TEST_F(ExportJournal, ADecisionIsARowWithItsOutcome) {
+  {
+    auto file = io::SurgeryFile::create(path, {});
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->append(decision(4, wire::Outcome::kSuperseded)));
+    ASSERT_TRUE(file->close());
+  }
+  const std::string csv = records_csv(open(), path).value();
+  const std::string row = csv.substr(csv.find('\n') + 1);
+  EXPECT_THAT(row, testing::StartsWith("1,decision,4,ius,0.000000,"));
+  EXPECT_THAT(row, testing::EndsWith(",4,superseded,,,,,,,,11,\n"));
+  EXPECT_EQ(std::count(row.begin(), row.end(), ','), std::count(csv.begin(), csv.end(), ',') / 2);
+}
+
 TEST_F(ExportJournal, ASourceWithACommaStaysOneField) {
   {
     auto file = io::SurgeryFile::create(path, {});

@@ -12,6 +12,7 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/model_id.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/decision.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -52,6 +53,10 @@ class SmallJournal : public testing::Test {
     estimate.quality.quality = estimate.quality.flags.quality();
     message.update.timings.invert_ms = 2.5;
     return {io::RecordKind::kUpdate, sequence, at(observation, 250), wire::encode(message)};
+  }
+  static io::SurgeryRecord decision(std::uint64_t observation, wire::Outcome outcome) {
+    const wire::Decision made{1, "ius", observation, outcome, observation, 11, ""};
+    return {io::RecordKind::kDecision, observation, at(observation, 200), wire::encode(made)};
   }
   // Observations 1 to `count` of ius, every third of the camera instead.
   void write(const std::filesystem::path& to, std::uint64_t count) const {

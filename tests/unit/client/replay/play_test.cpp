@@ -246,5 +246,19 @@ TEST(Repeat, OnceSendsTheRecordedSequences) {
   EXPECT_THAT(daemon.submitted, testing::ElementsAre(1, 40));
 }
 
+TEST(ForReplay, IsForAnySessionAndByTheClockOfTheDaemonThatJournalledIt) {
+  Observation recorded;
+  recorded.acquired_ns = 5;
+  recorded.sent_ns = 6;
+  recorded.session = {1, 2, "m"};
+  EXPECT_EQ(for_replay(recorded).acquired_ns, 5);
+  recorded.daemon_ns = 700;
+  const Observation sent = for_replay(recorded);
+  EXPECT_EQ(sent.acquired_ns, 700);
+  EXPECT_EQ(sent.sent_ns, 0);
+  EXPECT_EQ(sent.daemon_ns, 0);
+  EXPECT_EQ(sent.session, SessionKey{});
+}
+
 }  // namespace
 }  // namespace brainshift::client

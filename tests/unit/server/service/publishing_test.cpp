@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/wire/decision.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -294,14 +295,18 @@ TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
 // Keeps what would be written.
 struct KeptRecords {
   std::mutex mutex;
-  std::vector<io::SurgeryRecord> records;
+  std::vector<io::SurgeryRecord> records;  // observations and updates
+  std::vector<io::SurgeryRecord> decisions;
 };
 class KeepingSink final : public RecordSink {
  public:
   explicit KeepingSink(std::shared_ptr<KeptRecords> kept) : kept_(std::move(kept)) {}
   Status append(std::span<const io::SurgeryRecord> records) override {
     const std::lock_guard lock(kept_->mutex);
-    kept_->records.insert(kept_->records.end(), records.begin(), records.end());
+    for (const io::SurgeryRecord& record : records) {
+      const bool decision = record.kind == io::RecordKind::kDecision;
+      (decision ? kept_->decisions : kept_->records).push_back(record);
+    }
     return {};
   }
   Status close() override { return {}; }
@@ -349,6 +354,14 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
       wire::append_daemon_time(observation->daemon_ns, expected);
     }
     EXPECT_TRUE(kept->records[i].payload == expected) << "record " << i;
+  }
+  ASSERT_EQ(kept->decisions.size(), 3u);
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const auto decision = wire::decode_decision(kept->decisions[i].payload);
+    ASSERT_TRUE(decision.has_value()) << decision.error().message;
+    EXPECT_EQ(decision->outcome, wire::Outcome::kUsed);
+    EXPECT_EQ(decision->observation_sequence, i + 1);
+    EXPECT_EQ(decision->update_sequence, i + 1);
   }
 }
 

@@ -42,11 +42,6 @@ class Published {
   std::vector<wire::UpdateMessage> messages_;
 };
 
-class TestSession : public Session {
- public:
-  explicit TestSession(SessionHooks hooks) : Session(kCase, std::move(hooks), kBootId, kModelId) {}
-};
-
 // A gate that a fake inversion waits at.
 struct Gate {
   std::promise<void> entered;

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/wire/decision.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "brainshift/v1/decision.pb.h"
+
+namespace brainshift::wire {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Decision, ComesBackAsItWasWritten) {
+  for (const Outcome outcome :
+       {Outcome::kUsed, Outcome::kFailed, Outcome::kSuperseded, Outcome::kSkipped}) {
+    const Decision decision{7, "ius", (1ull << 63) - 1, outcome, 12, 657, "the session ended"};
+    const auto decoded = decode_decision(encode(decision));
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(*decoded, decision);
+  }
+}
+
+TEST(Decision, WhatNobodyDecidesIsRefused) {
+  v1::Decision message;
+  message.set_outcome("forgotten");
+  const auto unknown = decode_decision(message.SerializeAsString());
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::kProtocol);
+  EXPECT_THAT(unknown.error().message, HasSubstr("decision.outcome: \"forgotten\""));
+  message.set_outcome("used");
+  message.set_active(1u << 31);
+  EXPECT_THAT(decode_decision(message.SerializeAsString()).error().message,
+              HasSubstr("decision.active"));
+  EXPECT_FALSE(decode_decision("\xff\xff"));
+}
+
+}  // namespace
+}  // namespace brainshift::wire
