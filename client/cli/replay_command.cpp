@@ -31,7 +31,8 @@ std::vector<std::string> method_names() {
 
 Status verify(const ReplayOptions& options) {
   const auto verification =
-      verify_journal({options.surgery, options.endpoint, options.timeout}, terminal_progress());
+      verify_journal({options.surgery, options.endpoint, options.timeout, options.takeover},
+                     terminal_progress());
   if (!verification) return tl::unexpected(verification.error());
   for (const std::string& line : report_lines(*verification)) std::puts(line.c_str());
   if (verification->differences.empty()) return {};
