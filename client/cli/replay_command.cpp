@@ -8,8 +8,8 @@
 
 #include "client/cli/command.hpp"
 #include "client/replay/replay.hpp"
-#include "common/io/files/output_path.hpp"
 #include "client/replay/verify.hpp"
+#include "common/io/files/output_path.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -30,9 +30,8 @@ std::vector<std::string> method_names() {
 }
 
 Status verify(const ReplayOptions& options) {
-  const auto verification =
-      verify_journal({options.surgery, options.endpoint, options.timeout, options.takeover},
-                     terminal_progress());
+  const auto verification = verify_journal(
+      {options.surgery, options.endpoint, options.timeout, options.takeover}, terminal_progress());
   if (!verification) return tl::unexpected(verification.error());
   for (const std::string& line : report_lines(*verification)) std::puts(line.c_str());
   if (verification->differences.empty()) return {};

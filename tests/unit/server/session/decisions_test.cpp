@@ -63,9 +63,9 @@ class Decisions : public testing::Test {
 TEST_F(Decisions, UsedAndSupersededStandInTheOrderInWhichTheyHappened) {
   std::promise<void> entered, leave;
   TestSession session(hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
-                    if (call == 1) entered.set_value(), leave.get_future().wait();
-                    return follow_the_data(data, out, 4);
-                  }));
+    if (call == 1) entered.set_value(), leave.get_future().wait();
+    return follow_the_data(data, out, 4);
+  }));
   start(session);
   ASSERT_TRUE(session.submit(landmarks(1, "ius")));
   entered.get_future().wait();
@@ -84,9 +84,9 @@ TEST_F(Decisions, UsedAndSupersededStandInTheOrderInWhichTheyHappened) {
 
 TEST_F(Decisions, AFailureCarriesItsReason) {
   TestSession session(hooks([](int, const SparseData&, const auto&, Estimate& estimate) -> Status {
-                    estimate.contact.active = 3;
-                    return fail(ErrorCode::kNotConverged, "no luck");
-                  }));
+    estimate.contact.active = 3;
+    return fail(ErrorCode::kNotConverged, "no luck");
+  }));
   start(session);
   ASSERT_TRUE(session.submit(landmarks(4, "ius")));
   EXPECT_THAT(wait_for(2), ElementsAre("failed ius 4", "update 1"));
@@ -97,15 +97,15 @@ TEST_F(Decisions, WhatASessionLeavesIsSkipped) {
   for (const bool restart : {false, true}) {
     decisions_.clear(), told_.clear();
     std::promise<void> entered;
-    TestSession session(hooks([&](int call, const SparseData& data, const auto& options,
-                                     Estimate& out) -> Status {
-                      if (call > 1) return follow_the_data(data, out, 4);
-                      std::promise<void> stopped;
-                      const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
-                      entered.set_value();
-                      stopped.get_future().wait();
-                      return fail(ErrorCode::kNotConverged, "stopped");
-                    }));
+    TestSession session(
+        hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) -> Status {
+          if (call > 1) return follow_the_data(data, out, 4);
+          std::promise<void> stopped;
+          const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
+          entered.set_value();
+          stopped.get_future().wait();
+          return fail(ErrorCode::kNotConverged, "stopped");
+        }));
     start(session);
     ASSERT_TRUE(session.submit(landmarks(1, "ius")));
     entered.get_future().wait();
@@ -121,8 +121,8 @@ TEST_F(Decisions, WhatASessionLeavesIsSkipped) {
 
 TEST_F(Decisions, WhatIsRefusedIsNotDecided) {
   TestSession session(hooks([](int, const SparseData& data, const auto&, Estimate& out) {
-                    return follow_the_data(data, out, 4);
-                  }));
+    return follow_the_data(data, out, 4);
+  }));
   start(session);
   EXPECT_FALSE(session.submit(landmarks(0, "ius")));
   EXPECT_THAT(told_, IsEmpty());
