@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <sstream>
 
 namespace brainshift::io {
@@ -65,13 +66,23 @@ class CycleFinder : public YAML::EventHandler {
   int line_ = 0;
 };
 
-int line_of_cycle(const std::string& text) {
+// Whether the text is at most one document without a cycle; else what is wrong, with its line.
+struct TextProblem {
+  int line = 0;  // 0: unknown
+  std::string message;
+};
+std::optional<TextProblem> problem_of(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   CycleFinder finder;
-  while (finder.line() == 0 && parser.HandleNextDocument(finder)) {
+  // No further than the second: yaml-cpp finds documents without end in front of a stray comma.
+  int documents = 0;
+  while (documents < 2 && parser.HandleNextDocument(finder)) ++documents;
+  if (finder.line() > 0) {
+    return TextProblem{finder.line(), "an alias stands inside the node that it names"};
   }
-  return finder.line();
+  if (documents > 1) return TextProblem{0, "holds 2 YAML documents or more: must be one"};
+  return std::nullopt;
 }
 
 int line_of(const YAML::Node& node) { return node.Mark().is_null() ? 0 : node.Mark().line + 1; }
@@ -133,19 +144,12 @@ YamlDocument YamlDocument::parse(const std::string& text, const fs::path& file) 
   auto state = std::make_unique<State>();
   state->file = file;
   try {
-    if (const int line = line_of_cycle(text); line > 0) {
-      state->fail_at(line, "an alias stands inside the node that it names");
+    if (const auto problem = problem_of(text)) {
+      state->fail_at(problem->line, problem->message);
       return YamlDocument(std::move(state));
     }
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) {
-      state->fail_at(0,
-                     "holds " + std::to_string(documents.size()) + " YAML documents: must be one");
-    } else if (documents.empty() || !documents.front().IsMap()) {
-      state->fail_at(0, "is not a YAML mapping of keys to values");
-    } else {
-      state->root = documents.front();
-    }
+    state->root = YAML::Load(text);
+    if (!state->root.IsMap()) state->fail_at(0, "is not a YAML mapping of keys to values");
   } catch (const YAML::Exception& exception) {
     const int line = exception.mark.is_null() ? 0 : exception.mark.line + 1;
     state->fail_at(line, "is not valid YAML: " + exception.msg);

@@ -345,6 +345,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"GravityWithoutDirection", "[0, 0, -2]", "[0, 0, 0]",
                 ":19: gravity.direction length = 0"},
         BadCase{"NotYaml", "mesh:", "mesh: [", "is not valid YAML"},
+        BadCase{"StrayComma", "mesh:", ", A\nmesh:", "YAML"},
         BadCase{"TwoDocuments", "mesh:", "---\nmesh:", "holds 2 YAML documents"}),
     [](const auto& param) { return param.param.name; });
 
