@@ -2,6 +2,8 @@
 option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
 set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
+option(BRAINSHIFT_FUZZ "Build the fuzz targets with libFuzzer (clang)" OFF)
+
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -22,6 +24,17 @@ target_compile_options(brainshift_warnings INTERFACE
 target_compile_options(brainshift_warnings INTERFACE -Wno-array-bounds -Wno-restrict
   -Wno-stringop-overflow)
 
+if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
+  # GCC is the compiler whose warnings are errors.
+  target_compile_options(brainshift_warnings INTERFACE -Wno-error -Wno-unknown-warning-option)
+endif()
+
+if(BRAINSHIFT_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES Clang)
+    message(FATAL_ERROR "BRAINSHIFT_FUZZ needs clang: use the preset fuzz")
+  endif()
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
 if(BRAINSHIFT_SANITIZE)
   # With a sanitizer GCC 12 takes parts of std::regex (GCC bug 105562) and CGAL for uninitialised. Builds without one
   # keep the warning.

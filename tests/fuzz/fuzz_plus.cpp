@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// PLUS device sets.
+#include "common/io/config/plus_config.hpp"
+#include "tests/fuzz/fuzz_target.hpp"
+#include "tests/fuzz/scratch_file.hpp"
+
+namespace brainshift::fuzz {
+
+void run(std::string_view bytes) {
+  const auto config = io::read_plus_config(scratch_file("device.xml", bytes));
+  if (!config) return;
+  for (const io::PlusTransform& transform : config->transforms) {
+    require(transform.link.T_to_from.matrix().allFinite(), "a transform goes somewhere");
+  }
+}
+
+}  // namespace brainshift::fuzz

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Frames, and every message that a daemon or a client decodes. The bytes are a frame, and a
+// payload too: behind the frame's checksum a fuzzer would never come.
+#include "common/wire/convert.hpp"
+#include "common/wire/frame.hpp"
+#include "tests/fuzz/fuzz_target.hpp"
+
+namespace brainshift::fuzz {
+namespace {
+
+void decode_all(std::string_view payload) {
+  (void)wire::decode_status(payload);
+  (void)wire::decode_session_request(payload);
+  (void)wire::decode_session_info(payload);
+  (void)wire::decode_observation_receipt(payload);
+  (void)wire::decode_subscribe_reply(payload);
+  (void)wire::decode_error(payload);
+  if (const auto observation = wire::decode_observation(payload)) {
+    require(wire::decode_observation(wire::encode(*observation)).has_value(),
+            "an observation that was decoded can be decoded again");
+  }
+  if (const auto update = wire::decode_update(payload)) {
+    require(wire::decode_update(wire::encode(*update)).has_value(),
+            "an update that was decoded can be decoded again");
+  }
+  if (const auto model = wire::decode_model(payload)) {
+    require(wire::decode_model(wire::encode(*model)).has_value(),
+            "a model that was decoded can be decoded again");
+  }
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  if (const auto frame = wire::decode_frame(bytes)) decode_all(frame->payload);
+  decode_all(bytes);
+}
+
+}  // namespace brainshift::fuzz
