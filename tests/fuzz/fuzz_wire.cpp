@@ -2,6 +2,7 @@
 // Frames, and every message that a daemon or a client decodes. The bytes are a frame, and a
 // payload too: behind the frame's checksum a fuzzer would never come.
 #include "common/wire/convert.hpp"
+#include "common/wire/decision.hpp"
 #include "common/wire/frame.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
@@ -13,11 +14,16 @@ void decode_all(std::string_view payload) {
   (void)wire::decode_session_request(payload);
   (void)wire::decode_session_info(payload);
   (void)wire::decode_observation_receipt(payload);
-  (void)wire::decode_subscribe_reply(payload);
+  (void)wire::decode_subscription(payload);
+  (void)wire::decode_decision(payload);
   (void)wire::decode_error(payload);
   if (const auto observation = wire::decode_observation(payload)) {
     require(wire::decode_observation(wire::encode(*observation)).has_value(),
             "an observation that was decoded can be decoded again");
+  }
+  if (const auto state = wire::decode_session_state(payload)) {
+    require(wire::decode_session_state(wire::encode(*state)).has_value(),
+            "a state that was decoded can be decoded again");
   }
   if (const auto update = wire::decode_update(payload)) {
     require(wire::decode_update(wire::encode(*update)).has_value(),

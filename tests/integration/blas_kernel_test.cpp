@@ -60,7 +60,7 @@ TEST(BlasKernel, ArgumentsReachAProgramThatStartsItselfAgain) {
     if (line.rfind("brainshiftd: ", 0) == 0) told.push_back(line);
   }
   ASSERT_THAT(told, SizeIs(1)) << finished.err;
-  EXPECT_THAT(told[0], HasSubstr("no such case.yaml"));
+  EXPECT_THAT(told[0], HasSubstr("--out: \"\" must name a file"));
 }
 
 }  // namespace

@@ -276,10 +276,6 @@ Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
   if (Status ok = impl.check_end(*end); !ok) return tl::unexpected(ok.error());
   impl.tail = *end;
   if (Status ok = impl.database.use_log(); !ok) return tl::unexpected(ok.error());
-  if (impl.state.closed) {
-    if (Status ok = remove_closed_seal(impl.database); !ok) return tl::unexpected(ok.error());
-    impl.state.closed = false;
-  }
   impl.writable = true;
   return SurgeryFile(std::move(*opened));
 }
@@ -297,11 +293,14 @@ Status SurgeryFile::append(std::span<const SurgeryRecord> records) {
   SqliteDatabase& database = impl_->database;
   if (!database.execute("BEGIN IMMEDIATE")) return database.write_failure("record");
   Impl::Tail end = impl_->tail;
-  Status status = impl_->insert_records(records, end);
+  // Until the first record is added, a file that was closed stays so.
+  Status status = impl_->state.closed ? remove_closed_seal(database) : Status();
+  if (status) status = impl_->insert_records(records, end);
   if (status && !database.execute("COMMIT")) status = database.write_failure("record");
   if (status) {
     impl_->tail = end;
     impl_->state.records = end.records;
+    impl_->state.closed = false;
     return {};
   }
   impl_->insert.reset();  // a failed statement is not reused

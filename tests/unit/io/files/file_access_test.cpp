@@ -52,17 +52,6 @@ TEST(FileAccess, WritingIntoAMissingFolderFailsAndNamesTheFile) {
   EXPECT_THAT(status.error().message, HasSubstr("no/f: cannot create"));
 }
 
-TEST(FileAccess, WhatIsNoRegularFileIsNotReplaced) {
-  const TemporaryFolder folder;
-  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
-  const Status status = write_file(folder / "pipe", "x");
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(status.error().message, HasSubstr("pipe: is not a regular file"));
-  EXPECT_TRUE(std::filesystem::is_fifo(folder / "pipe"));
-  EXPECT_EQ(folder.entries(), 1u);
-}
-
 TEST(FileAccess, WritingOverAFolderFailsAndLeavesNothing) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "d");
