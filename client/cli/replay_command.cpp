@@ -61,7 +61,9 @@ Status run(Arguments arguments) {
   if (!options.latency_csv.empty()) {
     if (Status ok = io::check_output_file("--latency-csv", options.latency_csv); !ok) return ok;
   }
-  options.on_note = [](const std::string& sentence) { print_error("note: " + sentence); };
+  options.on_note = [](const std::string& sentence) {
+    std::printf("note: %s\n", sentence.c_str());
+  };
   return replay(options, terminal_progress(),
                 [](const RunReport& report) { std::puts(summary_line(report).c_str()); });
 }

@@ -25,6 +25,7 @@ struct Surgery {
   std::string scenario;
   std::optional<std::uint64_t> seed;
   std::vector<RecordedObservation> observations;
+  std::vector<std::string> notes;  // what is remarkable about the files
 };
 
 Status check_given(const fs::path& path, const char* key, const std::string& value) {
@@ -72,13 +73,9 @@ Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted
   return {};
 }
 
-void note(const ReplayOptions& options, const fs::path& path, const std::string& text) {
-  if (options.on_note) options.on_note(path.string() + ": " + text);
-}
-
 // Leaves what the interrupted session has not recorded.
 Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
-              std::vector<RecordedObservation>& observations) {
+              std::vector<RecordedObservation>& observations, std::vector<std::string>& notes) {
   if (options.resume.empty()) return {};
   const auto point = read_resume_point(options.resume);
   if (!point) return tl::unexpected<Error>(point.error());
@@ -87,8 +84,8 @@ Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
                           "meta.model_id is \"" + point->meta.model_id + "\", that of " +
                               options.surgery.string() + " is \"" + meta.model_id + "\"");
   }
-  if (point->broken) note(options, options.resume, point->broken->message);
-  note(options, options.resume, describe(*point));
+  if (point->broken) notes.push_back(point->broken->message);
+  notes.push_back(options.resume.string() + ": " + describe(*point));
   observations = remaining(observations, *point);
   return {};
 }
@@ -98,7 +95,8 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   auto file = io::SurgeryFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   const io::SurgeryState& state = file->state();
-  if (state.checksums && !state.closed) note(options, path, describe(state));
+  std::vector<std::string> notes;
+  if (state.checksums && !state.closed) notes.push_back(path.string() + ": " + describe(state));
   const io::SurgeryMeta meta = file->meta();
   if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
     return tl::unexpected<Error>(ok.error());
@@ -111,14 +109,15 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
     return tl::unexpected<Error>(ok.error());
   }
-  if (Status ok = resume(options, meta, *observations); !ok) {
+  if (Status ok = resume(options, meta, *observations, notes); !ok) {
     return tl::unexpected<Error>(ok.error());
   }
 
   const std::string scenario = meta.scenario.empty() ? path.stem().string() : meta.scenario;
   Surgery surgery{
-      std::move(*file), meta.case_id, meta.model_id, meta.case_file, scenario, meta.seed, {}};
+      std::move(*file), meta.case_id, meta.model_id, meta.case_file, scenario, meta.seed, {}, {}};
   surgery.observations = std::move(*observations);
+  surgery.notes = std::move(notes);
   return surgery;
 }
 
@@ -302,6 +301,9 @@ Status replay(const ReplayOptions& options, const Progress& progress,
   const auto surgery = open_surgery(options);
   if (!surgery) return tl::unexpected<Error>(surgery.error());
   if (Status ok = check_repeat(options, *surgery); !ok) return ok;
+  for (const std::string& note : surgery->notes) {
+    if (options.on_note) options.on_note(note);
+  }
   std::vector<RunReport> runs;
   for (const Boundary boundary : options.boundaries) {
     auto run = run_boundary(*surgery, options, boundary, progress);

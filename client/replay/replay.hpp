@@ -29,7 +29,7 @@ struct ReplayOptions {
   // The journal of a session that was interrupted: what it holds is not played again, but for the
   // last observation of every source (resume.hpp). Empty: everything is played.
   std::filesystem::path resume;
-  // Told in a sentence what is remarkable about the files; may be empty.
+  // Told in a sentence what is remarkable about the files, before the first run; may be empty.
   std::function<void(const std::string&)> on_note;
   // How often the recording is played; more than 1 at Speed::kMax only. Iterates are requested
   // only when it is 1: they would add to the latencies that repeating is there to measure.

@@ -306,7 +306,7 @@ TEST_F(EndToEnd, AfterACrashTheReplayGoesOnToTheSameFinalField) {
 
   const auto daemon = serve();
   const auto resumed = play(*daemon, "rest", {"--resume", crashed});
-  EXPECT_THAT(resumed.err, HasSubstr("goes on after observation 3 of "));
+  EXPECT_THAT(resumed.out, HasSubstr("goes on after observation 3 of "));
   const json whole = read_json(files_.path("whole.json"))[0];
   const json rest = read_json(files_.path("rest.json"))[0];
   EXPECT_EQ(rest.at("updates").get<int>(), whole.at("updates").get<int>() - 2);

@@ -37,7 +37,7 @@ Result<SurgeryHeader> create_layout(SqliteDatabase& database, const SurgeryMeta&
 // is not what was written; the last is let pass for a damaged file.
 Result<SurgeryHeader> read_header(const SqliteDatabase& database, bool damaged);
 
-// Present after close(), gone while records may still be added; nullopt too for version 1.
+// Present after close(), gone with the first record that is added; nullopt too for version 1.
 Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database,
                                              const SurgeryHeader& header);
 Status write_closed_seal(const SqliteDatabase& database, const Seal& seal);

@@ -90,11 +90,20 @@ TEST_F(SurgeryLayout, ALiveFileIsNotClosedAndAnAddedOneNoLonger) {
   EXPECT_TRUE(state().closed);
   auto added = SurgeryFile::open_to_append(path);
   ASSERT_TRUE(added);
-  EXPECT_FALSE(state().closed);
+  EXPECT_TRUE(state().closed) << "nothing was added";
   ASSERT_TRUE(added->append(numbered_record(1)));
+  EXPECT_FALSE(state().closed);
+  EXPECT_FALSE(added->state().closed);
   ASSERT_TRUE(added->close());
   EXPECT_TRUE(state().closed);
   EXPECT_EQ(state().records, 1u);
+}
+
+TEST_F(SurgeryLayout, AFileThatWasOpenedToAddToAndGivenUpIsStillClosed) {
+  write_numbered(path, 3);
+  { const auto given_up = SurgeryFile::open_to_append(path); }
+  EXPECT_TRUE(state().closed);
+  EXPECT_EQ(state().records, 3u);
 }
 
 TEST_F(SurgeryLayout, AClosedFileThatLostItsLastRecordsIsRefused) {
