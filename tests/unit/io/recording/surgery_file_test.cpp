@@ -291,19 +291,6 @@ TEST_F(SurgeryFileTest, AFileIsAddedToAndKeepsWhatItHas) {
   EXPECT_TRUE(file->read_truth(1));
 }
 
-// A command that is refused after it has opened the file leaves it as closed as it was.
-TEST_F(SurgeryFileTest, AFileThatIsOpenedToAddAndGetsNothingStaysClosed) {
-  make_complete();
-  { ASSERT_TRUE(SurgeryFile::open_to_append(path)); }
-  EXPECT_TRUE(SurgeryFile::open(path)->state().closed);
-  {
-    auto added = SurgeryFile::open_to_append(path);
-    ASSERT_TRUE(added->append(record(21)));
-    EXPECT_FALSE(SurgeryFile::open(path)->state().closed);
-  }
-  EXPECT_FALSE(SurgeryFile::open(path)->state().closed);
-}
-
 TEST_F(SurgeryFileTest, NothingIsAddedToWhatIsNoSurgeryFile) {
   EXPECT_EQ(SurgeryFile::open_to_append(path).error().code, ErrorCode::kNotFound);
   const std::string other(4096, 'x');
