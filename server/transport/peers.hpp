@@ -51,7 +51,15 @@ struct Peer {
   int connection_fd = -1;        // the daemon's descriptor of the connection, until it closes
   std::optional<Viewer> viewer;  // of a subscriber
   std::deque<Bytes> replies;     // that did not fit into the peer's queue, oldest first
+  std::size_t reply_bytes = 0;   // of these
   static constexpr std::size_t kMaxReplies = 256;
+  static constexpr std::size_t kMaxReplyBytes = 64u << 20;
+
+  // Whether one more reply may wait; a peer that does not read loses it otherwise.
+  bool may_wait(const Bytes& reply) const {
+    return replies.empty() ||
+           (replies.size() < kMaxReplies && reply_bytes + reply->size() <= kMaxReplyBytes);
+  }
 };
 
 class Peers {

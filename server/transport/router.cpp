@@ -43,8 +43,15 @@ zmq::message_t share(const Bytes& bytes) {
 
 Sent send(zmq::socket_t& socket, const std::string& peer, const Bytes& bytes) {
   constexpr auto kNow = zmq::send_flags::dontwait;
+  const auto begin = [&] {
+    return socket.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore).has_value();
+  };
   try {
-    if (!socket.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore)) return Sent::kQueueFull;
+    if (!begin()) {
+      // libzmq takes note only now and then of what a peer has read; asked for its events, it does.
+      static_cast<void>(socket.get(zmq::sockopt::events));
+      if (!begin()) return Sent::kQueueFull;
+    }
     return socket.send(share(bytes), kNow) ? Sent::kYes : Sent::kQueueFull;
   } catch (const zmq::error_t& error) {
     if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
@@ -251,8 +258,9 @@ void Router::Impl::reply(const std::string& routing_id, const Bytes& bytes) {
     spdlog::debug("reply lost: the peer is gone");
     return remove(routing_id);
   }
-  if (peer != nullptr && peer->replies.size() < Peer::kMaxReplies) {
+  if (peer != nullptr && peer->may_wait(bytes)) {
     peer->replies.push_back(bytes);
+    peer->reply_bytes += bytes->size();
   } else {
     spdlog::debug("reply lost: the peer does not read");
   }
@@ -308,6 +316,7 @@ void Router::Impl::pay(const std::string& routing_id) {
     const Sent sent = send(socket, routing_id, peer->replies.front());
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return remove(routing_id);
+    peer->reply_bytes -= peer->replies.front()->size();
     peer->replies.pop_front();
   }
   if (!peer->viewer) return;

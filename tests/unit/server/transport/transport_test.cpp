@@ -205,6 +205,21 @@ TEST(Outbox, KeepsTheNewestIteratesAndEverythingElse) {
   EXPECT_TRUE(outbox.take().empty());
 }
 
+TEST(Peers, RepliesThatWaitAreBoundedInNumberAndBytes) {
+  const auto reply = [](std::size_t size) {
+    return std::make_shared<const std::string>(size, 'x');
+  };
+  Peer peer;
+  EXPECT_TRUE(peer.may_wait(reply(Peer::kMaxReplyBytes + 1))) << "one always may";
+  peer.replies.push_back(reply(1));
+  peer.reply_bytes = Peer::kMaxReplyBytes - 10;
+  EXPECT_TRUE(peer.may_wait(reply(10)));
+  EXPECT_FALSE(peer.may_wait(reply(11)));
+  peer.reply_bytes = 0;
+  while (peer.replies.size() < Peer::kMaxReplies) peer.replies.push_back(reply(0));
+  EXPECT_FALSE(peer.may_wait(reply(0)));
+}
+
 TEST(Peers, AConnectionThatClosesTakesItsPeerAlong) {
   Peers peers(2);
   ASSERT_NE(peers.admit("a", 10), nullptr);
