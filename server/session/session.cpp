@@ -19,6 +19,10 @@ constexpr const char* kLeft = "the client that asked for the session has left";
 constexpr const char* kSessionEnded = "the session ended";
 constexpr const char* kStopping = "the daemon is stopping";
 
+Result<wire::SessionInfo> unavailable(const std::string& why) {
+  return fail(ErrorCode::kUnavailable, why);
+}
+
 std::int64_t monotonic_ns(std::chrono::steady_clock::time_point time) {
   return time.time_since_epoch() / std::chrono::nanoseconds(1);
 }
@@ -98,11 +102,11 @@ void Session::start(const wire::SessionRequest& request, const StartDone& done,
     }
   }
   if (refusal != nullptr) {
-    done(fail(ErrorCode::kUnavailable, refusal));
+    done(unavailable(refusal));
     return;
   }
   wake_.notify_all();
-  if (superseded) superseded->done(fail(ErrorCode::kUnavailable, kSuperseded));
+  if (superseded) superseded->done(unavailable(kSuperseded));
 }
 
 void Session::leave(const std::string& gone) {
@@ -117,7 +121,7 @@ void Session::leave(const std::string& gone) {
     }
     if (preparing_ && *preparing_ == gone) prepare_stop_.request_stop();
   }
-  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, kLeft));
+  if (abandoned) abandoned->done(unavailable(kLeft));
 }
 
 Result<Session::Source*> Session::source_of(const Observation& observation) {
@@ -235,8 +239,8 @@ void Session::stop() {
     end_running();
     prepare_stop_.request_stop();
   }
-  if (abandoned) abandoned->done(fail(ErrorCode::kUnavailable, kStopping));
-  if (prepared) prepared->start.done(fail(ErrorCode::kUnavailable, kStopping));
+  if (abandoned) abandoned->done(unavailable(kStopping));
+  if (prepared) prepared->start.done(unavailable(kStopping));
   const bool first = worker_.joinable();
   for (std::jthread* thread : {&preparer_, &worker_}) thread->request_stop();
   wake_.notify_all();
@@ -272,8 +276,10 @@ void Session::prepare(const std::stop_token& stop) {
     {
       const std::lock_guard lock(mutex_);
       preparing_.reset();
-      if (stopped_ || cancelled.stop_requested()) {
-        refusal = Error{ErrorCode::kUnavailable, stopped_ ? kStopping : kSuperseded};
+      if (stopped_) {
+        refusal = Error{ErrorCode::kUnavailable, kStopping};
+      } else if (cancelled.stop_requested()) {
+        refusal = Error{ErrorCode::kUnavailable, kSuperseded};
       } else if (!model) {
         refusal = model.error();
       } else {
@@ -282,7 +288,7 @@ void Session::prepare(const std::stop_token& stop) {
       }
     }
     if (refusal) start->done(tl::unexpected(*refusal));
-    if (overtaken) overtaken->start.done(fail(ErrorCode::kUnavailable, kSuperseded));
+    if (overtaken) overtaken->start.done(unavailable(kSuperseded));
     wake_.notify_all();
     changed();
   }
@@ -350,7 +356,7 @@ void Session::begin(Prepared prepared) {
     }
   }
   if (superseded) {
-    start.done(fail(ErrorCode::kUnavailable, kSuperseded));
+    start.done(unavailable(kSuperseded));
   } else {
     changed();
     start.done(info);

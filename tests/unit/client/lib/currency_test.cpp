@@ -197,11 +197,19 @@ TEST(Currency, AnotherPatientsModelIsShownByNoViewerAndEachSaysWhy) {
 
 TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
   auto daemon = std::make_shared<Simulated>(kKey);
-  SessionKey named;
+  std::mutex mutex;
+  SessionKey last;
+  const auto named = [&] {
+    const std::lock_guard lock(mutex);
+    return last;
+  };
   FakeDaemon server([&](const Frame& request) -> Answers {
     if (request.type != MessageType::kObservation) return (*daemon)(request);
     const auto observation = wire::decode_observation(request.payload).value();
-    named = observation.session;
+    {
+      const std::lock_guard lock(mutex);
+      last = observation.session;
+    }
     return {encode_frame(MessageType::kObservationReply, request.request_id,
                          encode(wire::ObservationReceipt{observation.sequence, false}))};
   });
@@ -211,10 +219,10 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
   observation.body = TumourBoundary{Points::Random(3, 4), 0.5};
   ASSERT_TRUE(source.subscribe());
   ASSERT_TRUE(source.submit(observation));
-  EXPECT_EQ(named, kKey);
+  EXPECT_EQ(named(), kKey);
   observation.session = {1, 2, "other"};
   ASSERT_TRUE(source.submit(observation));
-  EXPECT_EQ(named, observation.session) << "what the caller names is left as it is";
+  EXPECT_EQ(named(), observation.session) << "what the caller names is left as it is";
 }
 
 TEST(Currency, AWindowOutsideItsRangeIsRefused) {
