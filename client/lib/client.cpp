@@ -61,14 +61,24 @@ struct Client::Impl {
                                             MessageType reply_type);
   void take_state(std::uint64_t request_id, std::string_view payload);
   void take_update(std::string_view payload);
-  // Subscribes again where the connection was lost since the last time.
-  void notice_losses();
-  // Tells the daemon what was received, and asks what is current. Never waits for the answer.
-  void renew(Deadline deadline);
+  // True when the connection was lost since the last time; the next renewal subscribes again.
+  bool notice_losses();
+  // Tells the daemon what was received, and asks what is current. Waits neither for a connection
+  // nor for the answer: without a connection field_status() tells in time. kUnavailable when the
+  // connection was found to be lost.
+  Status renew();
+  tl::unexpected<Error> lost() const {
+    return fail(ErrorCode::kUnavailable, "lost the connection to " + dealer->endpoint());
+  }
   Deadline next_renewal() const;
   // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
   // said what is newest.
   Status confirm(Deadline deadline);
+  // Whether a wait for a push ends with this error: not when only a renewal is due.
+  bool gives_up(const Error& error, Deadline deadline) {
+    return notice_losses() || error.code != ErrorCode::kUnavailable ||
+           std::chrono::steady_clock::now() >= deadline;
+  }
   // Receives one message for nobody in particular.
   Status receive_push(Deadline deadline);
   // The oldest queued update, on its way to the caller.
@@ -148,26 +158,27 @@ void Client::Impl::take_update(std::string_view payload) {
   updates.push(std::move(update));
 }
 
-void Client::Impl::notice_losses() {
-  if (dealer->losses() == losses) return;
+bool Client::Impl::notice_losses() {
+  if (dealer->losses() == losses) return false;
   losses = dealer->losses();
   watch.lost();
-  if (!subscription) return;
+  if (!subscription) return true;
   ++subscription->id;
   subscription->received = acknowledged = 0;
   renewed = {};
+  return true;
 }
 
-void Client::Impl::renew(Deadline deadline) {
-  notice_losses();
+Status Client::Impl::renew() {
   const Deadline now = std::chrono::steady_clock::now();
   const std::uint64_t id = ++last_request_id;
   watch.asked(id, now);
   renewed = now;
   acknowledged = subscription->received;
-  // Without a connection there is nothing to renew: field_status() tells in time.
   static_cast<void>(dealer->send(
-      encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), deadline));
+      encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), now));
+  if (notice_losses()) return lost();
+  return {};
 }
 
 Deadline Client::Impl::next_renewal() const {
@@ -187,9 +198,12 @@ Status Client::Impl::receive_push(Deadline deadline) {
 
 Status Client::Impl::confirm(Deadline deadline) {
   const Deadline asked = std::chrono::steady_clock::now();
-  renew(deadline);
   while (!watch.as_of() || *watch.as_of() < asked) {
-    if (auto status = receive_push(deadline); !status) return status;
+    if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
+      if (auto status = renew(); !status) return status;
+    }
+    const auto status = receive_push(std::min(deadline, next_renewal()));
+    if (!status && gives_up(status.error(), deadline)) return status;
   }
   updates.drop_older_than(*watch.state());
   return {};
@@ -297,16 +311,14 @@ Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
     if (auto update = self.hand_out()) return *std::move(update);
     Deadline until = deadline;
     if (self.subscription) {
-      if (self.next_renewal() <= std::chrono::steady_clock::now()) self.renew(deadline);
+      if (self.next_renewal() <= std::chrono::steady_clock::now()) {
+        if (auto status = self.renew(); !status) return tl::unexpected(status.error());
+      }
       until = std::min(deadline, self.next_renewal());
     }
     const auto status = self.receive_push(until);
     if (status) continue;
-    const bool lost = self.dealer->losses() != self.losses;
-    self.notice_losses();
-    const bool waiting = status.error().code == ErrorCode::kUnavailable && !lost &&
-                         std::chrono::steady_clock::now() < deadline;
-    if (!waiting) return tl::unexpected(status.error());
+    if (self.gives_up(status.error(), deadline)) return tl::unexpected(status.error());
   }
 }
 
