@@ -400,71 +400,55 @@ struct SlowPreparation {
   }
 };
 
-wire::SessionRequest condensed(Boundary boundary) {
-  return {kCase, Method::kCondensed, boundary, false};
-}
+// One session runs, and the next one is being prepared.
+class PreparingTest : public SessionTest {
+ protected:
+  void SetUp() override {
+    SessionHooks watched = hooks(echo);
+    watched.make_model = slow_.around(watched.make_model);
+    session_ = std::make_unique<TestSession>(std::move(watched));
+    std::promise<bool> first;
+    session_->start({kCase, Method::kCondensed, Boundary::kContact},
+                    [&](const auto& info) { first.set_value(info.has_value()); });
+    ASSERT_TRUE(first.get_future().get());
+    session_->start(
+        {kCase, Method::kCondensed, Boundary::kFixed},
+        [this](Result<wire::SessionInfo> info) { next_.set_value(std::move(info)); }, "viewer");
+    slow_.entered.get_future().wait();
+  }
 
-TEST_F(SessionTest, TheRunningSessionGoesOnUntilTheNextIsReady) {
-  SlowPreparation slow;
-  SessionHooks watched = hooks(echo);
-  watched.make_model = slow.around(watched.make_model);
-  TestSession session(std::move(watched));
-  std::promise<bool> first;
-  session.start(condensed(Boundary::kContact),
-                [&](const auto& info) { first.set_value(info.has_value()); });
-  ASSERT_TRUE(first.get_future().get());
-  std::promise<Result<wire::SessionInfo>> second;
-  session.start(condensed(Boundary::kFixed),
-                [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); });
-  slow.entered.get_future().wait();
-  EXPECT_TRUE(session.state().shared.preparing);
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
+  SlowPreparation slow_;
+  std::promise<Result<wire::SessionInfo>> next_;
+  std::unique_ptr<TestSession> session_;
+};
+
+TEST_F(PreparingTest, TheRunningSessionGoesOnUntilTheNextIsReady) {
+  EXPECT_TRUE(session_->state().shared.preparing);
+  ASSERT_TRUE(session_->submit(landmarks(1)).has_value());
   const auto messages = published_.wait_for(1);
   ASSERT_EQ(messages.size(), 1u);
   EXPECT_EQ(messages[0].session_id, 1u);
-  slow.leave.set_value();
-  const auto info = second.get_future().get();
+  slow_.leave.set_value();
+  const auto info = next_.get_future().get();
   ASSERT_TRUE(info.has_value());
   EXPECT_EQ(info->key(), (SessionKey{kBootId, 2, kModelId}));
-  EXPECT_FALSE(session.submit(landmarks(2)).has_value()) << "the first session has ended";
-  EXPECT_TRUE(session.submit(in_session(2, landmarks(2))).has_value());
+  EXPECT_FALSE(session_->submit(landmarks(2)).has_value()) << "the first session has ended";
+  EXPECT_TRUE(session_->submit(in_session(2, landmarks(2))).has_value());
 }
 
-TEST_F(SessionTest, StopEndsAPreparation) {
-  SlowPreparation slow;
-  SessionHooks watched = hooks(echo);
-  watched.make_model = slow.around(watched.make_model);
-  TestSession session(std::move(watched));
-  ASSERT_TRUE(start(session).has_value());
-  std::promise<Result<wire::SessionInfo>> second;
-  session.start(condensed(Boundary::kFixed),
-                [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); });
-  slow.entered.get_future().wait();
-  session.stop();
-  EXPECT_TRUE(slow.stopped);
-  EXPECT_EQ(second.get_future().get().error().code, ErrorCode::kUnavailable);
-  EXPECT_EQ(session.state().shared.phase, SessionPhase::kClosed);
+TEST_F(PreparingTest, StopEndsAPreparation) {
+  session_->stop();
+  EXPECT_TRUE(slow_.stopped);
+  EXPECT_EQ(next_.get_future().get().error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(session_->state().shared.phase, SessionPhase::kClosed);
 }
 
-TEST_F(SessionTest, APreparationEndsWhenItsOwnerLeavesAndTheRunningSessionStays) {
-  SlowPreparation slow;
-  SessionHooks watched = hooks(echo);
-  watched.make_model = slow.around(watched.make_model);
-  TestSession session(std::move(watched));
-  std::promise<bool> first;
-  session.start(condensed(Boundary::kContact),
-                [&](const auto& info) { first.set_value(info.has_value()); });
-  ASSERT_TRUE(first.get_future().get());
-  std::promise<Result<wire::SessionInfo>> second;
-  session.start(
-      condensed(Boundary::kFixed),
-      [&](Result<wire::SessionInfo> info) { second.set_value(std::move(info)); }, "viewer");
-  slow.entered.get_future().wait();
-  session.leave("somebody else");
-  EXPECT_FALSE(slow.stopped);
-  session.leave("viewer");
-  EXPECT_EQ(second.get_future().get().error().code, ErrorCode::kUnavailable);
-  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+TEST_F(PreparingTest, EndsWhenItsOwnerLeavesAndTheRunningSessionStays) {
+  session_->leave("somebody else");
+  EXPECT_FALSE(slow_.stopped);
+  session_->leave("viewer");
+  EXPECT_EQ(next_.get_future().get().error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(session_->submit(landmarks(1)).has_value());
 }
 
 // A client that has lost the first answer asks again: nothing is estimated twice.
