@@ -30,9 +30,8 @@ class SessionWatch {
 
   // The model that this viewer draws with: fields of another one are none of its business.
   void expect_model(std::string model_id) { model_id_ = std::move(model_id); }
-  // The daemon's session is of the model that the viewer draws with, or none was named.
+  // True for that model, and for any before one was named.
   bool model_fits(const std::string& model_id) const;
-  const std::string& model_id() const { return model_id_; }
 
   // Last heard, by an answer or otherwise; empty before the first time.
   const std::optional<SessionState>& state() const { return state_; }

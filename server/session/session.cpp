@@ -124,20 +124,6 @@ void Session::leave(const std::string& gone) {
   if (abandoned) abandoned->done(unavailable(kLeft));
 }
 
-Result<Session::Source*> Session::source_of(const Observation& observation) {
-  auto& sources = running_->sources;
-  if (const auto known = sources.find(observation.source); known != sources.end()) {
-    return &known->second;
-  }
-  if (sources.size() >= kMaxSources) {
-    return fail(ErrorCode::kUnavailable,
-                fmt::format("observation.source = {}: {} other sources have observed already",
-                            in_quotes(observation.source), sources.size()));
-  }
-  Source source{SourceClock(running_->model->max_age_s), 0, 0, {}};
-  return &sources.emplace(observation.source, std::move(source)).first->second;
-}
-
 Result<wire::ObservationReceipt> Session::submit(Observation observation,
                                                  const OnAccepted& on_accepted) {
   wire::ObservationReceipt receipt;
@@ -151,32 +137,13 @@ Result<wire::ObservationReceipt> Session::submit(Observation observation,
     if (auto status = check_observation(observation, case_id_, running_->key); !status) {
       return tl::unexpected(status.error());
     }
-    const auto known = running_->sources.find(observation.source);
-    if (known != running_->sources.end()) {
-      const Source& last = known->second;
-      if (observation.sequence == last.last_sequence &&
-          observation.acquired_ns == last.last_acquired_ns) {
-        return last.receipt;
-      }
-      if (auto status = check_sequence(observation, last.last_sequence); !status) {
-        return tl::unexpected(status.error());
-      }
-    } else if (auto status = check_sequence(observation, 0); !status) {
-      return tl::unexpected(status.error());
-    }
     const TimePoint arrived = std::chrono::steady_clock::now();
-    auto source = source_of(observation);
-    if (!source) return tl::unexpected(source.error());
-    const auto time_ns = running_->request.recorded_clock
-                             ? recorded_time(observation)
-                             : (*source)->clock.to_daemon(observation, monotonic_ns(arrived));
-    if (!time_ns) return tl::unexpected(time_ns.error());
-    receipt.observation_sequence = observation.sequence;
-    receipt.replaced_pending = boxes_.count(observation.source) > 0;
-    (*source)->last_sequence = observation.sequence;
-    (*source)->last_acquired_ns = observation.acquired_ns;
-    (*source)->receipt = receipt;
-    observation.daemon_ns = *time_ns;
+    const auto admission = running_->sources.admit(observation, monotonic_ns(arrived),
+                                                   boxes_.count(observation.source) > 0);
+    if (!admission) return tl::unexpected(admission.error());
+    receipt = admission->receipt;
+    if (admission->repeated) return receipt;
+    observation.daemon_ns = admission->daemon_ns;
     if (on_accepted) on_accepted(observation);
     observation.acquired_ns = observation.daemon_ns;  // one clock for all sources from here on
     const std::string name = observation.source;
@@ -279,7 +246,7 @@ void Session::prepare(const std::stop_token& stop) {
       if (stopped_) {
         refusal = Error{ErrorCode::kUnavailable, kStopping};
       } else if (cancelled.stop_requested()) {
-        refusal = Error{ErrorCode::kUnavailable, kSuperseded};
+        refusal = Error{ErrorCode::kUnavailable, pending_start_ ? kSuperseded : kLeft};
       } else if (!model) {
         refusal = model.error();
       } else {
@@ -348,11 +315,11 @@ void Session::begin(Prepared prepared) {
     const std::lock_guard lock(mutex_);
     superseded = stopped_ || prepared_.has_value();
     if (!superseded) {
-      running_.emplace();
-      running_->key = {boot_id_, info.session_id, model_id_};
-      running_->request = start.request;
-      running_->owner = start.owner;
-      running_->model = model;
+      running_ = Running{{boot_id_, info.session_id, model_id_},
+                         start.request,
+                         start.owner,
+                         model,
+                         Sources(model->max_age_s, start.request.recorded_clock)};
     }
   }
   if (superseded) {

@@ -39,7 +39,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
 #include "server/pipeline/pipeline.hpp"
-#include "server/session/source_clock.hpp"
+#include "server/session/sources.hpp"
 
 namespace brainshift::server {
 
@@ -81,8 +81,7 @@ class Session {
   };
 
   // boot_id, model_id: of the daemon's process and of the loaded model.
-  Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id = 0,
-          std::string model_id = {});
+  Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id, std::string model_id);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -101,9 +100,9 @@ class Session {
   // back. The observation's daemon_ns is set.
   using OnAccepted = std::function<void(const Observation&)>;
 
-  // kModelNotReady without a running session; the errors of check_observation and of SourceClock;
-  // kUnavailable when kMaxSources other sources have observed. The source's last observation once
-  // more gets its receipt once more, and nothing happens. Precondition: the observation's numbers
+  // kModelNotReady without a running session; the errors of check_observation and of
+  // Sources::admit. The source's last observation once more gets its receipt once more, and nothing
+  // happens. Precondition: the observation's numbers
   // are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
                                           const OnAccepted& on_accepted = {});
@@ -112,8 +111,6 @@ class Session {
 
   // Ends the inversion, the preparation and both threads; idempotent.
   void stop();
-
-  static constexpr std::size_t kMaxSources = 16;
 
  private:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -127,23 +124,17 @@ class Session {
     PendingStart start;
     SessionModel* model = nullptr;  // in models_
   };
-  struct Source {
-    SourceClock clock;
-    std::uint64_t last_sequence = 0;
-    std::int64_t last_acquired_ns = 0;
-    wire::ObservationReceipt receipt;  // of last_sequence
-  };
   struct Running {
     SessionKey key;
     wire::SessionRequest request;
     std::string owner;
-    SessionModel* model = nullptr;          // in models_
-    std::map<std::string, Source> sources;  // by name
-    std::uint64_t published = 0;            // number of the last message's update
+    SessionModel* model = nullptr;  // in models_
+    Sources sources;
+    std::uint64_t published = 0;  // number of the last message's update
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
-    TimePoint usable_arrived;  // the observation that newest_usable answers
-    std::string reason;        // why the newest update is not usable
+    TimePoint usable_arrived = {};  // the observation that newest_usable answers
+    std::string reason = {};        // why the newest update is not usable
   };
   struct Box {
     Observation observation;
@@ -157,7 +148,6 @@ class Session {
   Result<SessionModel*> model_for(const wire::SessionRequest& request, const std::stop_token& stop);
   void process(const Box& box);
   bool finish(const Box& box, const wire::UpdateMessage& message, const std::stop_token& stop);
-  Result<Source*> source_of(const Observation& observation);
   // With the mutex held.
   const std::string* owner() const;
   void end_running();

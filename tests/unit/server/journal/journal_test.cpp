@@ -328,26 +328,32 @@ TEST(Journal, AFolderThatDoesNotExistIsAnError) {
 
 // ---------- slow storage ----------
 
-TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
-  FakeStorage storage;
-  Witness witness;
+// The first file opens when it is let go.
+struct StallingStorage : FakeStorage {
+  StallingStorage() {
+    on_open = [this](int attempt) {
+      if (attempt == 1) opening.set_value(), go.get_future().wait();
+      return Status();
+    };
+  }
   std::promise<void> opening, go;
-  storage.on_open = [&](int attempt) {
-    if (attempt == 1) opening.set_value(), go.get_future().wait();
-    return Status();
-  };
+};
+
+TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
+  StallingStorage storage;
+  Witness witness;
   Journal::Options options = quick_options(storage, witness);
   options.max_queued = 3;
   Journal journal(options);
   journal.begin("x.surgery", {});
-  opening.get_future().wait();
+  storage.opening.get_future().wait();
   for (std::uint64_t i = 1; i <= 3; ++i) journal.append(record(i), "ius");
   EXPECT_TRUE(journal.status().has_value());
   journal.append(record(4), "ius");
   ASSERT_FALSE(journal.status().has_value()) << "at once, while the storage still stalls";
   EXPECT_THAT(journal.status().error().message, HasSubstr("3 records are waiting"));
   EXPECT_FALSE(journal.recorded().recording);
-  go.set_value();
+  storage.go.set_value();
   ASSERT_TRUE(witness.sees_resumption());
   journal.append(record(5), "ius");
   journal.stop();
@@ -361,23 +367,18 @@ TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
 }
 
 TEST(Journal, BytesInTheQueueAreBoundedToo) {
-  FakeStorage storage;
+  StallingStorage storage;
   Witness witness;
-  std::promise<void> opening, go;
-  storage.on_open = [&](int attempt) {
-    if (attempt == 1) opening.set_value(), go.get_future().wait();
-    return Status();
-  };
   Journal::Options options = quick_options(storage, witness);
   options.max_queued_bytes = 100;
   Journal journal(options);
   journal.begin("x.surgery", {});
-  opening.get_future().wait();
+  storage.opening.get_future().wait();
   journal.append({io::RecordKind::kUpdate, 1, 0, std::string(60, 'a')});
   EXPECT_TRUE(journal.status().has_value());
   journal.append({io::RecordKind::kUpdate, 2, 0, std::string(60, 'a')});
   EXPECT_FALSE(journal.status().has_value());
-  go.set_value();
+  storage.go.set_value();
 }
 
 }  // namespace

@@ -243,7 +243,7 @@ TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
   ASSERT_TRUE(start(session).has_value());
   ASSERT_TRUE(session.submit(landmarks(1)).has_value());
   gate.entered.get_future().wait();
-  for (std::uint64_t i = 1; i < Session::kMaxSources; ++i) {
+  for (std::uint64_t i = 1; i < Sources::kMaxSources; ++i) {
     EXPECT_TRUE(session.submit(landmarks(2 + i, "source " + std::to_string(i))).has_value());
   }
   const auto refused = session.submit(landmarks(100, "one too many"));
@@ -447,7 +447,10 @@ TEST_F(PreparingTest, EndsWhenItsOwnerLeavesAndTheRunningSessionStays) {
   session_->leave("somebody else");
   EXPECT_FALSE(slow_.stopped);
   session_->leave("viewer");
-  EXPECT_EQ(next_.get_future().get().error().code, ErrorCode::kUnavailable);
+  const auto refused = next_.get_future().get();
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(refused.error().message, HasSubstr("has left"));
   EXPECT_TRUE(session_->submit(landmarks(1)).has_value());
 }
 
