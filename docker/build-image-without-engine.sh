@@ -3,11 +3,13 @@
 # build-image-without-engine.sh: builds docker/Dockerfile and starts the daemon from the image once,
 # with debootstrap and buildah alone: no container engine, no registry. Needs root on Debian 12.
 #
-#   1. debootstrap a Debian 12 root file system; commit it under the Dockerfile's base, debian:12
+#   1. debootstrap a Debian 12 root file system; commit it under the names of the Dockerfile's bases:
+#      debian:12, and debian:12-slim without manuals and translations
 #   2. buildah bud in a chroot, never pulling
 #   3. run `brainshiftd serve` from the image as its own user, without a model, on a loopback port;
-#      check that it names its endpoint and greets a peer; stop it
-#   4. write build/image/brainshift.tar for `docker load` or `podman load`
+#      run the image's health check, which must pass; stop the daemon; now it must fail
+#   4. write build/image/brainshift.tar for `docker load` or `podman load`, and the image's bill of
+#      materials beside it; fail when the image is larger than 300 MiB
 #
 # Environment:
 #   BRAINSHIFT_HOST_APT=1   the build uses this machine's apt sources, settings and certificates,
@@ -20,6 +22,8 @@ cd "$(dirname "$0")/.."
 
 image=brainshift
 base=debian:12
+slim=debian:12-slim
+max_mib=300
 suite=bookworm
 dir=$(realpath -m "${BRAINSHIFT_IMAGE_DIR:-build/image}")
 rootfs=$dir/rootfs
@@ -66,6 +70,13 @@ if [ "${BRAINSHIFT_HOST_APT:-0}" = 1 ]; then
   done
 fi
 
+commit_rootfs() {
+  local scratch
+  scratch=$(bud from scratch)
+  bud add --quiet "$scratch" "$rootfs" / >/dev/null
+  bud config --cmd /bin/bash --env PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin "$scratch"
+  bud commit --quiet --rm "$scratch" "$1" >/dev/null
+}
 make_base() {
   local keyring=/usr/share/keyrings/debian-archive-keyring.gpg
   [ -r "$keyring" ] || fail "$keyring not found: apt-get install debian-archive-keyring"
@@ -76,15 +87,14 @@ make_base() {
   rm -rf "$rootfs"/var/cache/apt/archives/*.deb "$rootfs"/var/lib/apt/lists/*
   printf 'deb http://deb.debian.org/%s %s main\n' \
     debian "$suite" debian "$suite-updates" debian-security "$suite-security" >"$rootfs/etc/apt/sources.list"
-  local scratch
-  scratch=$(bud from scratch)
-  bud add --quiet "$scratch" "$rootfs" / >/dev/null
-  bud config --cmd /bin/bash --env PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin "$scratch"
-  bud commit --quiet --rm "$scratch" "$base" >/dev/null
+  commit_rootfs "$base"
+  rm -rf "$rootfs"/usr/share/{man,locale,info,lintian}
+  find "$rootfs/usr/share/doc" -type f ! -name copyright -delete
+  commit_rootfs "$slim"
   rm -rf --one-file-system "$rootfs"
 }
 
-if bud inspect --type image "$base" >/dev/null 2>&1; then
+if bud inspect --type image "$slim" >/dev/null 2>&1; then
   say "base image $base is there already (remove $dir to remake it)"
 else
   say "making base image $base with debootstrap"
@@ -111,17 +121,21 @@ while IFS= read -r -t 60 -u "$output" line; do
 done
 [ -n "$endpoint" ] || { tail -n 5 "$dir/daemon.log" >&2; fail "the daemon did not say that it listens"; }
 say "daemon says: listening on $endpoint; it runs as $(in_image id -un)"
-# A ZeroMQ peer greets with 0xff, eight bytes of length and 0x7f (ZMTP 3.1, section 3).
-hostport=${endpoint#tcp://}
-greeting=$(timeout 10 bash -c 'exec 3<>"/dev/tcp/$1/$2" && head -c 10 <&3 | od -An -tx1 | tr -d " \n"' \
-  greet "${hostport%:*}" "${hostport##*:}") || fail "nothing accepts connections at $endpoint"
-[[ $greeting =~ ^ff[0-9a-f]{16}7f$ ]] || fail "no ZeroMQ greeting at $endpoint but '$greeting'"
-say "it greets as a ZeroMQ peer"
+health() { in_image brainshiftd health --config /etc/brainshift/daemon.yaml --endpoint "$endpoint"; }
+answer=$(health) || fail "the health check fails at $endpoint"
+say "the health check says: $answer"
 
 stop_daemon || fail "the daemon did not end cleanly; see $dir/daemon.log"
 say "it stopped when asked to"
+! health >/dev/null 2>&1 || fail "the health check passes without a daemon"
+say "and the health check fails then"
 
 say "writing $dir/$image.tar"
 rm -f "$dir/$image.tar"
 bud push --quiet "$image" "docker-archive:$dir/$image.tar:$image:latest"
-say "done: $(du -h "$dir/$image.tar" | cut -f1) in $dir/$image.tar"
+in_image cat /usr/local/share/doc/brainshift/bill-of-materials.json >"$dir/bill-of-materials.json"
+say "$(grep -c '"type":"library"' "$dir/bill-of-materials.json") packages in $dir/bill-of-materials.json"
+# The archive's layers are not compressed.
+mib=$(($(stat -c %s "$dir/$image.tar") / 1048576))
+[ "$mib" -le "$max_mib" ] || fail "the image has $mib MiB, more than $max_mib"
+say "done: $mib MiB (at most $max_mib) in $dir/$image.tar"

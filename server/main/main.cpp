@@ -8,6 +8,7 @@
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "server/main/exit_status.hpp"
+#include "server/main/health_command.hpp"
 #include "server/main/prepare_command.hpp"
 #include "server/main/serve_command.hpp"
 #include "server/main/stop_signals.hpp"
@@ -58,6 +59,18 @@ int parse_and_run(int argc, char** argv) {
       "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
       "  brainshiftd serve --config config/daemon.yaml --endpoint 'tcp://127.0.0.1:*'");
 
+  HealthArguments health;
+  auto* health_command = app.add_subcommand("health", "Ask a running daemon whether it answers");
+  health_command->add_option("--config", health.config_file, "The running daemon's file (YAML)")
+      ->required();
+  health_command->add_option("--endpoint", health.endpoint, "Instead of the daemon file's");
+  health_command->footer(
+      "For containers and scripts: prints one line; exit status 0 when the daemon answers within\n"
+      "3 s, with or without a model, and 1 when it does not. What it is doing tells\n"
+      "`brainshift status`.\n"
+      "Example:\n"
+      "  brainshiftd health --config /etc/brainshift/daemon.yaml");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -70,6 +83,7 @@ int parse_and_run(int argc, char** argv) {
         {brainshift::ErrorCode::kInvalidArgument, reason + " (see brainshiftd --help)"});
   }
   if (prepare_command->parsed()) return run_prepare(prepare);
+  if (health_command->parsed()) return run_health(health);
   return run_serve(serve);
 }
 
