@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/lib/dealer.hpp"
+#include "client/lib/field_assembly.hpp"
 #include "client/lib/latest_usable.hpp"
 #include "client/lib/session_watch.hpp"
 #include "client/lib/update_queue.hpp"
@@ -46,6 +47,7 @@ struct Client::Impl {
   std::unique_ptr<Dealer> dealer;
   std::uint64_t last_request_id = 0;
   UpdateQueue updates{kMaxQueuedUpdates};
+  FieldAssembly assembly;
   LatestUsable latest_usable;
   SessionWatch watch;
   std::optional<Subscription> subscription;
@@ -61,6 +63,8 @@ struct Client::Impl {
                                             MessageType reply_type);
   void take_state(std::uint64_t request_id, std::string_view payload);
   void take_update(std::string_view payload);
+  // The daemon is to take this for a new subscription, and to send the whole choice first.
+  void ask_anew();
   // True when the connection was lost since the last time; the next renewal subscribes again.
   bool notice_losses();
   // Tells the daemon what was received, and asks what is current. Waits neither for a connection
@@ -151,21 +155,31 @@ void Client::Impl::take_state(std::uint64_t request_id, std::string_view payload
 void Client::Impl::take_update(std::string_view payload) {
   if (subscription) ++subscription->received;
   auto update = wire::decode_update(payload);
-  if (update &&
-      (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id))) {
-    return;
+  if (!update) {
+    // It may have been what the next changes are to be applied to.
+    if (subscription && subscription->choice.tolerance_mm > 0.0) ask_anew();
+    return updates.push(std::move(update));
   }
-  updates.push(std::move(update));
+  if (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id)) return;
+  update->received_bytes = payload.size();
+  update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
+  const FieldAssembly::Outcome outcome = assembly.complete(*update);
+  if (outcome == FieldAssembly::Outcome::kLost && subscription) ask_anew();
+  if (outcome == FieldAssembly::Outcome::kWhole) updates.push(std::move(update));
+}
+
+void Client::Impl::ask_anew() {
+  ++subscription->id;
+  subscription->received = acknowledged = 0;
+  renewed = {};
+  assembly.forget();
 }
 
 bool Client::Impl::notice_losses() {
   if (dealer->losses() == losses) return false;
   losses = dealer->losses();
   watch.lost();
-  if (!subscription) return true;
-  ++subscription->id;
-  subscription->received = acknowledged = 0;
-  renewed = {};
+  if (subscription) ask_anew();
   return true;
 }
 
@@ -260,24 +274,33 @@ Result<BrainModel> Client::model() {
       });
 }
 
-Status Client::subscribe(std::uint32_t window) {
+Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   if (window < 1 || window > Subscription::kMaxWindow) {
     return fail(ErrorCode::kInvalidArgument, "window = " + std::to_string(window) +
                                                  ": must be in [1, " +
                                                  std::to_string(Subscription::kMaxWindow) + "]");
   }
+  if (Status status = validate(choice); !status) return status;
   Impl& self = *impl_;
   self.notice_losses();
+  const std::optional<Subscription> before = self.subscription;
   const std::uint64_t id = self.subscription ? self.subscription->id + 1 : 1;
-  self.subscription = Subscription{id, window, 0};
+  self.subscription = Subscription{id, window, 0, choice};
+  self.assembly.begin(choice);
   self.acknowledged = 0;
   self.renewed = std::chrono::steady_clock::now();
   self.watch.asked(self.last_request_id + 1, self.renewed);
-  return self
-      .request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
-               MessageType::kSessionState, self.options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_session_state(payload); })
-      .map([](const SessionState&) {});
+  const auto state =
+      self.request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
+                   MessageType::kSessionState, self.options.request_timeout)
+          .and_then([](const std::string& payload) { return wire::decode_session_state(payload); });
+  if (state) return {};
+  // A daemon that refuses a choice goes on with the one before.
+  if (state.error().code != ErrorCode::kUnavailable) {
+    self.subscription = before;
+    self.assembly.begin(before ? before->choice : FieldChoice{});
+  }
+  return tl::unexpected(state.error());
 }
 
 Result<wire::ObservationReceipt> Client::submit(const Observation& observation) {

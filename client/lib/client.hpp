@@ -40,9 +40,21 @@
 // that the user can be told why; latest_usable() keeps the field before it. Draw that one. When it
 // is older than the newest message, say so: what is drawn is then the last that was usable.
 //
+// Parts. A viewer may choose a region, a spacing, changes beyond a tolerance, and no standard
+// deviations (common/values/session_state.hpp); the choices combine:
+//
+//   FieldChoice near{.region = TumourRegion{40.0}, .tolerance_mm = 0.1};   // mm
+//   if (auto ok = client->subscribe(1, near); !ok) return show(ok.error().message);
+//
+// Update::part then lists the nodes that the columns of the displacement are of; without it they
+// are all nodes of the mesh. Look at it before you draw: a part is no whole field. The library puts
+// changes into what it holds: with a tolerance t, every node that it hands out is within t of the
+// newest update that it received. Where it cannot, it asks for the whole choice again by itself.
+//
 // Conventions. Coordinates are patient RAS in millimetres. Points are 3 x n matrices, a column per
 // point. A displacement moves an undeformed point to its deformed place; its columns are in the
-// order of BrainModel::mesh.nodes. Estimate::sd_mm has one entry per node, mm, or none at all.
+// order of BrainModel::mesh.nodes, or of Update::part. Estimate::sd_mm has one entry per column,
+// mm, or none at all.
 //
 // Errors. Every call returns a value or an Error: a code to branch on and one sentence to show.
 //   kUnavailable    no daemon, no answer in time, a lost connection, or a daemon that is stopping
@@ -123,7 +135,9 @@ class Client {
   // window: updates that may be under way at once, 1 to Subscription::kMaxWindow. 1 is for a
   // viewer: it gets the newest update whenever it asks, and never one that the daemon knows to be
   // outdated. More is for one that wants every update, and reads at once.
-  Status subscribe(std::uint32_t window = 1);
+  // choice: what of every field (see Parts). kInvalidArgument names a length outside its range,
+  // kEmptySet a region without any node; the subscription before it goes on then.
+  Status subscribe(std::uint32_t window = 1, const FieldChoice& choice = {});
 
   // Hands an observation over. Returns when the daemon has accepted it, not when it has been
   // inverted. The receipt tells whether it replaced an older one of the same source that still

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -186,6 +187,17 @@ struct StageTimings {  // milliseconds, monotonic clock
   double journal_ms = 0.0;  // queueing the newest observation for the journal; 0 without a journal
 };
 
+// The nodes that the columns of an update's displacement, and its standard deviations, are of.
+struct FieldPart {
+  int mesh_nodes = 0;            // of the whole mesh
+  std::vector<NodeIndex> nodes;  // ascending; one per column
+  // 0: these are all nodes of the choice. Otherwise only those that changed since the update with
+  // this sequence, of the same session, which the receiver must hold.
+  std::uint64_t base_sequence = 0;
+
+  bool operator==(const FieldPart&) const = default;
+};
+
 struct Update {
   std::string case_id;
   std::string model_id;
@@ -198,6 +210,9 @@ struct Update {
   StageTimings timings;
   RigidTransform T_undeformed_deformed = RigidTransform::Identity();  // from ICP; identity without
   std::vector<Omission> left_out;
+  // Of a viewer that chose a part of every field: the nodes that the columns of the displacement
+  // are of. Empty: every node of the mesh, in order.
+  std::optional<FieldPart> part = std::nullopt;
 
   // Whether the field may be shown and kept: final, and judged good or with caution. Every other
   // update is for its reasons only, and the usable one before it stays the valid one.

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which session a message belongs to, and what a viewer may believe of the field that it shows.
+// Which session a message belongs to, what of every field a viewer wants, and what it may believe
+// of the field that it shows.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/types.hpp"
 
 namespace brainshift {
 
@@ -65,6 +71,66 @@ struct SessionState {
   bool operator==(const SessionState&) const = default;
 };
 
+// ---------- what of every field ----------
+//
+// Choices combine: the nodes of a region, thinned to a spacing, and of these only the ones that
+// changed by more than a tolerance since what the viewer holds. Regions are in the undeformed
+// brain, so that the nodes of a choice stay the same for as long as the model does.
+
+struct WholeBrain {
+  bool operator==(const WholeBrain&) const = default;
+};
+
+// Nodes whose undeformed place lies in the ball. Patient RAS, mm.
+struct BallRegion {
+  Vec3 centre_mm = Vec3::Zero();
+  double radius_mm = 0.0;
+
+  bool operator==(const BallRegion& other) const {
+    return (centre_mm.array() == other.centre_mm.array()).all() && radius_mm == other.radius_mm;
+  }
+};
+
+// Nodes inside the undeformed tumour, or within the margin of its surface.
+struct TumourRegion {
+  double margin_mm = 0.0;
+
+  bool operator==(const TumourRegion&) const = default;
+};
+
+using Region = std::variant<WholeBrain, BallRegion, TumourRegion>;
+
+struct FieldChoice {
+  // Largest coordinate, radius, margin and spacing: several heads.
+  static constexpr double kMaxLength_mm = 1000.0;
+  // Twice what the verdict on a field allows any node to move.
+  static constexpr double kMaxTolerance_mm = 100.0;
+
+  Region region = WholeBrain{};
+  // 0: every node of the region. Otherwise nodes that are at least this far apart, chosen so that
+  // every node of the region has one of them nearer than this; every boundary node a boundary node.
+  double spacing_mm = 0.0;
+  // 0: every chosen node of every update. Otherwise a node travels again when its displacement, or
+  // its standard deviation, differs by more than this from what the viewer holds.
+  double tolerance_mm = 0.0;
+  bool with_sd = true;  // a quarter of a field's bytes
+
+  bool operator==(const FieldChoice&) const = default;
+};
+
+// kInvalidArgument or kNotFinite; the sentence names the length, its value and what it must be.
+Status validate(const FieldChoice& choice);
+
+// A choice on one mesh.
+struct Selection {
+  FieldChoice choice;
+  int mesh_nodes = 0;            // of the whole mesh
+  std::vector<NodeIndex> nodes;  // chosen, ascending, at least one
+
+  bool every_node() const { return static_cast<int>(nodes.size()) == mesh_nodes; }
+};
+using SelectionPtr = std::shared_ptr<const Selection>;  // null: every node of every update
+
 // What a viewer asks for when it subscribes, and every time that it renews its subscription.
 struct Subscription {
   static constexpr std::uint32_t kMaxWindow = 256;
@@ -72,6 +138,7 @@ struct Subscription {
   std::uint64_t id = 0;        // chosen by the viewer; another number begins anew
   std::uint32_t window = 1;    // updates that may be under way to it at once; 1: the newest only
   std::uint64_t received = 0;  // updates received under this id
+  FieldChoice choice = {};     // what of every field; another choice begins anew too
 
   bool operator==(const Subscription&) const = default;
 };

@@ -88,6 +88,9 @@ struct UpdateMessage {
   Update update;
   std::optional<Error> error;  // set when the observation gave no estimate
   std::uint64_t boot_id = 0;   // of the daemon's process
+  // How it came, in a message that a client hands out: bytes of its payload, nodes in it.
+  std::size_t received_bytes = 0;
+  int received_nodes = 0;
 
   SessionKey key() const { return {boot_id, session_id, update.model_id}; }
 };

@@ -4,6 +4,7 @@
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/convert_choice.hpp"
 #include "common/wire/names.hpp"
 #include "common/wire/payload_scan.hpp"
 #include "common/wire/text.hpp"
@@ -124,6 +125,9 @@ std::string encode(const Subscription& subscription) {
   message.set_subscription(subscription.id);
   message.set_window(subscription.window);
   message.set_received(subscription.received);
+  if (subscription.choice != FieldChoice{}) {
+    set_choice(subscription.choice, *message.mutable_choice());
+  }
   return message.SerializeAsString();
 }
 
@@ -136,7 +140,10 @@ Result<Subscription> decode_subscription(std::string_view payload) {
                            std::to_string(Subscription::kMaxWindow))) {
     return tl::unexpected(checked.status().error());
   }
-  return Subscription{message.subscription(), std::max(message.window(), 1u), message.received()};
+  return get_choice(message.choice()).map([&](const FieldChoice& choice) {
+    return Subscription{message.subscription(), std::max(message.window(), 1u), message.received(),
+                        choice};
+  });
 }
 
 std::string encode(const SessionState& state) {

@@ -5,6 +5,7 @@
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/convert_choice.hpp"
 #include "common/wire/convert_verdict.hpp"
 #include "common/wire/names.hpp"
 #include "common/wire/payload_scan.hpp"
@@ -138,7 +139,9 @@ SourceSummary get_source(const pb::SourceSummary& message, Checked& checked) {
   return source;
 }
 
-Estimate get_estimate(const pb::Update& message, Checked& checked) {
+// part: that the columns are of; empty: every node.
+Estimate get_estimate(const pb::Update& message, const std::optional<FieldPart>& part,
+                      Checked& checked) {
   Estimate estimate;
   const auto status = estimate_status_from(message.status());
   checked.require(status.has_value(), "update.status", in_quotes(message.status()) + " is unknown");
@@ -147,11 +150,15 @@ Estimate get_estimate(const pb::Update& message, Checked& checked) {
   estimate.displacement =
       checked.points(message.displacement().xyz_mm(), "update.displacement.xyz_mm");
   const int nodes = static_cast<int>(estimate.displacement.cols());
+  const int listed = part ? static_cast<int>(part->nodes.size()) : nodes;
+  checked.require(
+      nodes == listed, "update.part.node_steps",
+      std::to_string(listed) + " nodes for " + std::to_string(nodes) + " displacements");
   estimate.sd_mm = checked.numbers(message.sd_mm(), "update.sd_mm");
   checked.require(message.sd_mm_size() == 0 || message.sd_mm_size() == nodes, "update.sd_mm",
                   std::to_string(message.sd_mm_size()) + " values, must be 0 or one per node (" +
                       std::to_string(nodes) + ")");
-  get_contact(message.contact(), nodes, estimate, checked);
+  get_contact(message.contact(), part ? part->mesh_nodes : nodes, estimate, checked);
   estimate.initial_misfit_mm = checked.mean_std(message.initial_misfit(), "update.initial_misfit");
   estimate.misfit_mm = checked.mean_std(message.misfit(), "update.misfit");
   estimate.history.reserve(static_cast<std::size_t>(message.history_size()));
@@ -222,6 +229,9 @@ pb::Update to_message(const UpdateMessage& message) {
     out.set_reason(to_utf8(message.error->message));
   } else {
     set_estimate(update.estimate, out);
+    // Without the numbers of a field that is not finite there are no nodes either.
+    const bool has_numbers = !update.estimate.quality.flags.has(QualityFlag::kNotFinite);
+    if (update.part && has_numbers) set_part(*update.part, *out.mutable_part());
   }
   if (update.T_undeformed_deformed.matrix() != RigidTransform::Identity().matrix()) {
     set(update.T_undeformed_deformed, out.mutable_t_undeformed_deformed());
@@ -273,11 +283,16 @@ Result<UpdateMessage> decode_update(std::string_view payload) {
                     "is present although status is \"failed\"");
     checked.require(message.quality() == pb::QUALITY_UNSPECIFIED, "update.quality",
                     "is present although status is \"failed\"");
+    checked.require(!message.has_part(), "update.part", "is present although status is \"failed\"");
     decoded.error = make_error(message.error_code(), message.reason());
   } else {
     checked.require(message.error_code().empty(), "update.error_code",
                     "is present although status is not \"failed\"");
-    decoded.update.estimate = get_estimate(message, checked);
+    std::optional<FieldPart>& part = decoded.update.part;
+    if (message.has_part()) part = get_part(message, checked);
+    decoded.update.estimate = get_estimate(message, part, checked);
+    checked.require(!part || part->base_sequence == 0 || decoded.update.usable(),
+                    "update.part.base_sequence", "is present although the update is not usable");
   }
   if (!checked.ok()) return tl::unexpected(checked.status().error());
   return decoded;

@@ -62,6 +62,7 @@ Service::Service(ServiceOptions options, Outbox& outbox)
     journal_ = std::make_unique<Journal>(std::move(journal));
   }
   if (options_.model) {
+    selections_.emplace(options_.model);
     SessionHooks hooks;
     hooks.make_model = options_.make_model;
     hooks.on_ready = [this](const auto& request, const auto& info) {
@@ -150,11 +151,15 @@ Reply Service::observe(const wire::Frame& frame) {
   return {MessageType::kObservationReply, wire::encode(*receipt)};
 }
 
-Reply Service::subscribe(const wire::Frame& frame) const {
+Reply Service::subscribe(const wire::Frame& frame) {
   const auto subscription = wire::decode_subscription(frame.payload);
   if (!subscription) return error_reply(subscription.error());
+  Result<SelectionPtr> selection;
+  if (selections_) selection = selections_->resolve(subscription->choice);
+  if (!selection) return error_reply(selection.error());
   const SessionState state = session_state();
-  return {MessageType::kSessionState, wire::encode(state), *subscription, state.session.session_id};
+  return {MessageType::kSessionState, wire::encode(state), *subscription, state.session.session_id,
+          *selection};
 }
 
 SessionState Service::session_state() const {

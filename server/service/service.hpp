@@ -7,7 +7,7 @@
 //   StartSessionRequest     StartSessionReply later, when the session is ready
 //   ModelRequest            ModelReply
 //   SubscribeRequest        SessionState, then updates and, when the session or its phase changes,
-//                           SessionState again
+//                           SessionState again. A choice that holds no node is an error.
 //   Observation             ObservationReply when accepted; updates follow
 //   anything else           ErrorReply (protocol)
 // Without a model everything but status and subscribe gets ErrorReply (model_not_ready).
@@ -41,6 +41,7 @@
 #include "common/values/brain_model.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
+#include "server/delivery/selections.hpp"
 #include "server/journal/journal.hpp"
 #include "server/session/session.hpp"
 #include "server/transport/outbox.hpp"
@@ -79,7 +80,7 @@ class Service final : public RequestHandler {
  private:
   std::optional<Reply> start_session(const std::string& peer, const wire::Frame& frame);
   Reply observe(const wire::Frame& frame);
-  Reply subscribe(const wire::Frame& frame) const;
+  Reply subscribe(const wire::Frame& frame);
   SessionState session_state() const;
   void push_state();
   wire::DaemonStatus status() const;
@@ -91,10 +92,11 @@ class Service final : public RequestHandler {
   Outbox& outbox_;
   std::mutex push_mutex_;
   const Stopwatch uptime_;
-  std::atomic<double> journal_ms_{0.0};  // the newest observation's way into the journal
-  std::string encoded_model_;            // made once, on the first request
-  std::unique_ptr<Journal> journal_;     // null without a journal folder
-  std::unique_ptr<Session> session_;     // null without a model; ends before the journal
+  std::atomic<double> journal_ms_{0.0};   // the newest observation's way into the journal
+  std::string encoded_model_;             // made once, on the first request
+  std::optional<Selections> selections_;  // empty without a model; of the transport thread
+  std::unique_ptr<Journal> journal_;      // null without a journal folder
+  std::unique_ptr<Session> session_;      // null without a model; ends before the journal
 };
 
 }  // namespace brainshift::server

@@ -6,12 +6,15 @@
 
 namespace brainshift::server {
 
-bool Viewer::renew(const Subscription& subscription) {
-  const bool anew = !begun_ || subscription.id != subscription_.id;
+bool Viewer::renew(const Subscription& subscription, SelectionPtr selection) {
+  const bool anew =
+      !begun_ || subscription.id != subscription_.id || subscription.choice != subscription_.choice;
   if (anew) {
     sent_ = 0;
+    held_.reset();
     owe_nothing();
   }
+  selection_ = std::move(selection);
   begun_ = true;
   const std::uint64_t acknowledged = anew ? 0 : subscription_.received;
   subscription_ = subscription;

@@ -9,19 +9,21 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/values/session_state.hpp"
 #include "server/transport/outbox.hpp"
+#include "server/transport/parcels.hpp"
 
 namespace brainshift::server {
 
-// A subscriber's credit and what it is owed.
+// A subscriber's credit, what it is owed, and what it chose and holds of it.
 class Viewer {
  public:
-  // Renews the subscription; true when it is a new one, which begins with full credit and is owed
-  // nothing.
-  bool renew(const Subscription& subscription);
+  // Renews the subscription; true when it is a new one, or has another choice: it then begins with
+  // full credit, is owed nothing and holds nothing. selection: its choice on the loaded model.
+  bool renew(const Subscription& subscription, SelectionPtr selection = nullptr);
 
   // From now on it is owed this usable field and nothing older.
   void owe_usable(Bytes bytes);
@@ -37,6 +39,11 @@ class Viewer {
   bool may_iterate() const;
   void iterate_sent() { ++sent_; }
 
+  const SelectionPtr& selection() const { return selection_; }  // null: every node of every update
+  // What it holds when everything sent has arrived; null: nothing, or its choice has no tolerance.
+  const Held& held() const { return held_; }
+  void hold(Held held) { held_ = std::move(held); }
+
  private:
   std::uint64_t under_way() const { return sent_ - subscription_.received; }
 
@@ -45,6 +52,8 @@ class Viewer {
   std::uint64_t sent_ = 0;  // updates in this subscription
   Bytes usable_;
   Bytes failure_;
+  SelectionPtr selection_;
+  Held held_;
 };
 
 struct Peer {

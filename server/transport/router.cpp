@@ -13,6 +13,7 @@
 
 #include "common/wire/convert.hpp"
 #include "server/transport/connection_monitor.hpp"
+#include "server/transport/parcels.hpp"
 #include "server/transport/peers.hpp"
 
 namespace brainshift::server {
@@ -138,6 +139,7 @@ struct Router::Impl {
   zmq::socket_t socket;
   ConnectionMonitor monitor;
   Peers peers;
+  Parcels parcels;
   std::string endpoint;
   // What a late subscriber of `session` gets: the last usable field, and the newest failure since.
   std::uint64_t session = 0;
@@ -175,14 +177,17 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
                              {nullptr, outbox.fd(), ZMQ_POLLIN, 0},
                              {nullptr, stop_fd, ZMQ_POLLIN, 0}};
   constexpr std::chrono::milliseconds kForever{-1};
+  constexpr std::chrono::milliseconds kNow{0};
   try {
     while (true) {
-      const auto timeout = self.peers.anything_owed() ? kRetryInterval : kForever;
+      auto timeout = self.peers.anything_owed() ? kRetryInterval : kForever;
+      if (self.parcels.spent()) timeout = kNow;
       if (zmq_poll(items, 4, timeout.count()) < 0) {
         if (zmq_errno() == EINTR) continue;
         throw zmq::error_t();
       }
       if (items[3].revents != 0) return {};
+      self.parcels.begin_turn();
       self.forget_closed();
       if (items[0].revents != 0) self.serve_requests();
       for (const Outgoing& message : outbox.take()) self.deliver(message);
@@ -241,7 +246,7 @@ void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer)
   Peer* peer = peers.find(routing_id);
   if (peer == nullptr) return;  // gone: the reply found no route
   if (!peer->viewer) peer->viewer.emplace();
-  const bool anew = peer->viewer->renew(*answer.subscription);
+  const bool anew = peer->viewer->renew(*answer.subscription, answer.selection);
   if (anew && answer.session == session) {
     if (last_final) peer->viewer->owe_usable(last_final);
     if (failure_since) peer->viewer->owe_failure(failure_since);
@@ -295,7 +300,9 @@ void Router::Impl::push(const std::string& routing_id, Viewer& viewer, const Out
   if (message.delivery == Delivery::kState) return reply(routing_id, message.bytes);
   if (message.delivery == Delivery::kIterate) {
     if (!viewer.may_iterate()) return;
-    const Sent sent = send(socket, routing_id, message.bytes);
+    const auto parcel = parcels.make(message.bytes, viewer.selection(), viewer.held());
+    if (!parcel) return;
+    const Sent sent = send(socket, routing_id, parcel->bytes);
     if (sent == Sent::kYes) viewer.iterate_sent();
     if (sent == Sent::kPeerGone) remove(routing_id);
     return;
@@ -320,11 +327,15 @@ void Router::Impl::pay(const std::string& routing_id) {
     peer->replies.pop_front();
   }
   if (!peer->viewer) return;
-  while (const Bytes next = peer->viewer->next()) {
-    const Sent sent = send(socket, routing_id, next);
+  Viewer& viewer = *peer->viewer;
+  while (const Bytes next = viewer.next()) {
+    const auto parcel = parcels.make(next, viewer.selection(), viewer.held());
+    if (!parcel) return;  // in the next turn
+    const Sent sent = send(socket, routing_id, parcel->bytes);
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return remove(routing_id);
-    peer->viewer->sent();
+    if (parcel->held) viewer.hold(parcel->held);
+    viewer.sent();
   }
 }
 

@@ -11,8 +11,11 @@
 // it has received, so that no queue on the way can age a picture. What does not fit is replaced by
 // what is newer: it is owed the newest usable field and the newest failure since, and nothing else.
 // That is also what a late subscriber receives. Nothing of a session is kept once the next one has
-// begun, and nobody gets a field of a session that has ended. ZeroMQ bounds the size of each part,
-// not their number within one message: expose the daemon to trusted networks only.
+// begun, and nobody gets a field of a session that has ended. One that chose a part of every field
+// gets it cut from these bytes when they are about to be sent (Parcels); a turn of the loop cuts a
+// bounded number, so that neither choices nor viewers that do not read delay anybody. ZeroMQ bounds
+// the size of each part, not their number within one message: expose the daemon to trusted networks
+// only.
 #pragma once
 
 #include <chrono>
@@ -44,6 +47,7 @@ struct Reply {
   std::optional<Subscription> subscription = std::nullopt;  // the peer's, from now on
   // With a subscription: the running session, whose last usable update the peer gets first.
   std::uint64_t session = 0;
+  SelectionPtr selection = nullptr;  // with a subscription: its choice on the loaded model
 };
 
 // Answers requests; called on the router's thread and must not block.

@@ -4,6 +4,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
 #include "common/wire/frame.hpp"
+#include "common/wire/published_update.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace brainshift::fuzz {
@@ -14,7 +15,10 @@ void decode_all(std::string_view payload) {
   (void)wire::decode_session_request(payload);
   (void)wire::decode_session_info(payload);
   (void)wire::decode_observation_receipt(payload);
-  (void)wire::decode_subscription(payload);
+  if (const auto subscription = wire::decode_subscription(payload)) {
+    require(wire::decode_subscription(wire::encode(*subscription)) == *subscription,
+            "a subscription that was decoded is the same when it is decoded again");
+  }
   (void)wire::decode_decision(payload);
   (void)wire::decode_error(payload);
   if (const auto observation = wire::decode_observation(payload)) {
@@ -28,6 +32,12 @@ void decode_all(std::string_view payload) {
   if (const auto update = wire::decode_update(payload)) {
     require(wire::decode_update(wire::encode(*update)).has_value(),
             "an update that was decoded can be decoded again");
+    if (const auto whole = wire::PublishedUpdate::open(payload)) {
+      std::optional<FieldPart> first;
+      if (whole->nodes() > 0) first = FieldPart{whole->nodes(), {0}, 0};
+      require(wire::decode_update(whole->cut(first, true)).has_value(),
+              "a part of an update that was decoded can be decoded");
+    }
   }
   if (const auto model = wire::decode_model(payload)) {
     require(wire::decode_model(wire::encode(*model)).has_value(),

@@ -30,7 +30,15 @@ SCHEMA = {
         "reason": (7, "text"), "preparing": (8, "int"), "recording": (9, "RecordingState")},
     "RecordingState": {"recording": (1, "int"), "reason": (2, "text"), "sources": (3, "*RecordedSource")},
     "RecordedSource": {"source": (1, "text"), "until": (2, "int"), "lost_until": (3, "int")},
-    "SubscribeRequest": {"subscription": (1, "int"), "window": (2, "int"), "received": (3, "int")},
+    "SubscribeRequest": {
+        "subscription": (1, "int"), "window": (2, "int"), "received": (3, "int"),
+        "choice": (4, "FieldChoice")},
+    "FieldChoice": {
+        "ball": (1, "BallRegion"), "tumour": (2, "TumourRegion"), "spacing_mm": (3, "double"),
+        "tolerance_mm": (4, "double"), "without_sd": (5, "int")},
+    "BallRegion": {"centre_mm": (1, "*double"), "radius_mm": (2, "double")},
+    "TumourRegion": {"margin_mm": (1, "double")},
+    "FieldPart": {"mesh_nodes": (1, "int"), "node_steps": (2, "*int"), "base_sequence": (3, "int")},
     "Observation": {
         "case_id": (1, "text"), "frame": (2, "text"), "source": (3, "text"), "sequence": (4, "int"),
         "acquired_ns": (5, "int"), "acquired_wall_ns": (6, "int"), "session": (7, "SessionKey"),
@@ -80,7 +88,7 @@ SCHEMA = {
         "quality_flags": (23, "*int"), "quality_reason": (24, "text"),
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
-        "boot_id": (31, "fixed")},
+        "boot_id": (31, "fixed"), "part": (32, "FieldPart")},
 }
 
 KEY = {"boot_id": 2**64 - 3, "session_id": 3, "model_id": "0123456789abcdef"}
@@ -122,6 +130,13 @@ MESSAGES = {
         "gravity_direction": [0.6, -0.8, 0.0], "fluid_plane_depth_mm": -1.5,
         "slave_plane_depth_mm": 18.5, "tet_labels": [2]}),
     "subscribe_request": (7, 4, "SubscribeRequest", {"subscription": 5, "window": 1, "received": 70000}),
+    "subscribe_ball": (7, 5, "SubscribeRequest", {
+        "subscription": 1, "window": 1, "received": 0, "choice": {
+            "ball": {"centre_mm": [-30.5, 1 / 3, 42.0], "radius_mm": 40.0}, "spacing_mm": 0.0,
+            "tolerance_mm": 0.1, "without_sd": 0}}),
+    "subscribe_tumour": (7, 6, "SubscribeRequest", {
+        "subscription": 2, "window": 256, "received": 1, "choice": {
+            "tumour": {"margin_mm": 0.0}, "spacing_mm": 10.0, "tolerance_mm": 0.0, "without_sd": 1}}),
     "session_state": (13, 4, "SessionState", {
         "session": KEY, "phase": 5, "newest_update": 12, "newest_usable": 9, "age_ms": 1250.5,
         "valid_ms": 1000, "reason": "observation 12: no point is inside the brain", "preparing": 1,
@@ -174,6 +189,21 @@ MESSAGES = {
         "left_out": [], "quality": 3, "quality_flags": [1, 17],
         "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
         "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7}),
+    "update_changes": (12, 0, "Update", UPDATE | {
+        "status": "converged", "reason": "contact holds", "quality": 1, "quality_flags": [],
+        "quality_reason": "", "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]},
+        "sd_mm": [],
+        "contact": {"active": 1, "penetrating": 0, "max_penetration_mm": 0.0, "iterations": 4,
+                    "active_slaves": [18474], "force_n": [0.03125], "decrement": 0.0,
+                    "max_violation_mm": -0.7},
+        "initial_misfit": {"mean_mm": 3.1, "std_mm": 0.9}, "misfit": {"mean_mm": 0.09, "std_mm": 0.04},
+        "history": [], "timings": TIMINGS,
+        "t_undeformed_deformed": {
+            "rotation_row_major": [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            "translation_mm": [0.5, -1.25, 3.3]},
+        "left_out": [], "min_volume_ratio": 0.9, "inverted_elements": 0, "misfit_ratio": 1.25,
+        "data_outside_region": 0,
+        "part": {"mesh_nodes": 18475, "node_steps": [0, 18474], "base_sequence": 7}}),
     "update_failed": (12, 0, "Update", UPDATE | {
         "status": "failed", "reason": "observation 2: no point is inside the brain",
         "timings": TIMINGS, "error_code": "empty_set"}),

@@ -125,11 +125,15 @@ Estimate estimate_from(const json& value) {
                                 entry["elapsed_ms"]});
   }
   if (!value.contains("quality")) return estimate;  // a daemon that gives no verdicts
-  EXPECT_EQ(value["quality"], 3);
-  EXPECT_EQ(value["quality_flags"], (json{1, 17}));
-  estimate.quality.quality = Quality::kUnusable;
-  estimate.quality.flags.set(QualityFlag::kMisfitUnexplained);
-  estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  if (value["quality"] == 1) {
+    estimate.quality.quality = Quality::kGood;
+  } else {
+    EXPECT_EQ(value["quality"], 3);
+    EXPECT_EQ(value["quality_flags"], (json{1, 17}));
+    estimate.quality.quality = Quality::kUnusable;
+    estimate.quality.flags.set(QualityFlag::kMisfitUnexplained);
+    estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  }
   estimate.quality.reason = value["quality_reason"];
   estimate.contact.decrement = contact["decrement"];
   estimate.contact.max_violation_mm = contact["max_violation_mm"];
@@ -171,6 +175,11 @@ UpdateMessage update_from(const json& value) {
   for (const json& entry : value["left_out"]) {
     update.left_out.push_back({entry["part"], entry["reason"], entry["estimated_error"]});
   }
+  if (value.contains("part")) {
+    const json& part = value["part"];
+    EXPECT_EQ(part["node_steps"], (json{0, 18474}));
+    update.part = FieldPart{part["mesh_nodes"], {0, 18474}, part["base_sequence"]};
+  }
   return message;
 }
 
@@ -190,6 +199,23 @@ SessionState session_state_from(const json& value) {
           value["reason"],
           value["preparing"] == 1,
           RecordingState{true, "", {{"ius", 12, 3}}}};
+}
+
+Subscription subscription_from(const json& value) {
+  Subscription subscription{value["subscription"], value["window"], value["received"]};
+  if (!value.contains("choice")) return subscription;
+  const json& chosen = value["choice"];
+  FieldChoice& choice = subscription.choice;
+  if (chosen.contains("ball")) {
+    choice.region =
+        BallRegion{vector_from(chosen["ball"]["centre_mm"]), chosen["ball"]["radius_mm"]};
+  } else {
+    choice.region = TumourRegion{chosen["tumour"]["margin_mm"]};
+  }
+  choice.spacing_mm = chosen["spacing_mm"];
+  choice.tolerance_mm = chosen["tolerance_mm"];
+  choice.with_sd = chosen["without_sd"] == 0;
+  return subscription;
 }
 
 SessionRequest session_request_from(const json& value) {
@@ -237,8 +263,7 @@ std::string check_message(const std::string& message, const json& value, std::st
   }
   if (message == "Update") return check(update_from(value), decode_update(payload));
   if (message == "SubscribeRequest") {
-    return check(Subscription{value["subscription"], value["window"], value["received"]},
-                 decode_subscription(payload));
+    return check(subscription_from(value), decode_subscription(payload));
   }
   if (message == "SessionState") {
     return check(session_state_from(value), decode_session_state(payload));
@@ -272,10 +297,11 @@ INSTANTIATE_TEST_SUITE_P(Frames, Golden,
                          ::testing::Values("status_request", "status_reply",
                                            "start_session_request", "start_session_reply",
                                            "model_request", "model_reply", "subscribe_request",
-                                           "session_state", "observation_tumour",
-                                           "observation_cortex", "observation_landmarks",
-                                           "observation_pose", "observation_reply", "error_reply",
-                                           "update", "update_unusable", "update_failed"));
+                                           "subscribe_ball", "subscribe_tumour", "session_state",
+                                           "observation_tumour", "observation_cortex",
+                                           "observation_landmarks", "observation_pose",
+                                           "observation_reply", "error_reply", "update",
+                                           "update_unusable", "update_changes", "update_failed"));
 
 }  // namespace
 }  // namespace brainshift::wire

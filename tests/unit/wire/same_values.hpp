@@ -187,6 +187,7 @@ inline void expect_same(const UpdateMessage& a, const UpdateMessage& b) {
   EXPECT_EQ(a.update.boundary, b.update.boundary);
   EXPECT_EQ(a.update.final, b.update.final);
   expect_same(a.update.estimate, b.update.estimate);
+  EXPECT_EQ(a.update.part, b.update.part);
   EXPECT_EQ(a.update.timings.register_ms, b.update.timings.register_ms);
   EXPECT_EQ(a.update.timings.invert_ms, b.update.timings.invert_ms);
   EXPECT_EQ(a.update.timings.rebuild_ms, b.update.timings.rebuild_ms);

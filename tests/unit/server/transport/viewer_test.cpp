@@ -81,6 +81,22 @@ TEST(Viewer, AnotherSubscriptionBeginsAnewAndIsOwedNothing) {
   EXPECT_THAT(sent_by(viewer), ElementsAre("3"));
 }
 
+TEST(Viewer, AnotherChoiceBeginsAnewAndHoldsNothing) {
+  const auto chosen = std::make_shared<const Selection>();
+  Viewer viewer;
+  const Subscription subscription{1, 1, 0, {.tolerance_mm = 0.1}};
+  EXPECT_TRUE(viewer.renew(subscription, chosen));
+  viewer.hold(std::make_shared<const HeldField>());
+  EXPECT_FALSE(viewer.renew(subscription, chosen));
+  EXPECT_EQ(viewer.selection(), chosen);
+  EXPECT_TRUE(viewer.held());
+  EXPECT_TRUE(viewer.renew({1, 1, 0, {.tolerance_mm = 0.2}}, chosen));
+  EXPECT_FALSE(viewer.held());
+  viewer.hold(std::make_shared<const HeldField>());
+  EXPECT_TRUE(viewer.renew({2, 1, 0, {.tolerance_mm = 0.2}}, chosen));
+  EXPECT_FALSE(viewer.held());
+}
+
 TEST(Viewer, CannotClaimMoreThanWasSentNorTakeBackWhatItReceived) {
   Viewer viewer = viewer_with(1);
   viewer.renew({1, 1, 1000});

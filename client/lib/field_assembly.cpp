@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/lib/field_assembly.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace brainshift::client {
+
+void FieldAssembly::begin(const FieldChoice& choice) {
+  holds_ = choice.tolerance_mm > 0.0;
+  waiting_ = false;
+  held_.reset();
+}
+
+void FieldAssembly::forget() {
+  held_.reset();
+  waiting_ = true;
+}
+
+FieldAssembly::Outcome FieldAssembly::complete(wire::UpdateMessage& message) {
+  Update& update = message.update;
+  if (update.part && update.part->base_sequence != 0) {
+    if (!apply(message)) {
+      const bool asked = waiting_;
+      forget();
+      return asked ? Outcome::kDropped : Outcome::kLost;
+    }
+    held_->sequence = update.sequence;
+    update.part = held_->part;
+    update.estimate.displacement = held_->displacement;
+    update.estimate.sd_mm = held_->sd_mm;
+    return Outcome::kWhole;
+  }
+  if (holds_ && !message.error && update.usable()) {
+    held_ = Held{message.key(), update.sequence, update.part, update.estimate.displacement,
+                 update.estimate.sd_mm};
+    waiting_ = false;
+  }
+  return Outcome::kWhole;
+}
+
+bool FieldAssembly::apply(const wire::UpdateMessage& message) {
+  const Estimate& changes = message.update.estimate;
+  const FieldPart& part = *message.update.part;
+  if (!held_ || held_->session != message.key() || held_->sequence != part.base_sequence) {
+    return false;
+  }
+  const int mesh_nodes =
+      held_->part ? held_->part->mesh_nodes : static_cast<int>(held_->displacement.cols());
+  const bool has_sd = changes.sd_mm.size() > 0;
+  if (part.mesh_nodes != mesh_nodes) return false;
+  if (!part.nodes.empty() && has_sd != (held_->sd_mm.size() > 0)) return false;
+  std::vector<Eigen::Index> columns;
+  columns.reserve(part.nodes.size());
+  for (const NodeIndex node : part.nodes) {
+    if (!held_->part) {
+      columns.push_back(node);
+      continue;
+    }
+    const auto& chosen = held_->part->nodes;
+    const auto at = std::lower_bound(chosen.begin(), chosen.end(), node);
+    if (at == chosen.end() || *at != node) return false;
+    columns.push_back(at - chosen.begin());
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto from = static_cast<Eigen::Index>(i);
+    held_->displacement.col(columns[i]) = changes.displacement.col(from);
+    if (has_sd) held_->sd_mm[columns[i]] = changes.sd_mm[from];
+  }
+  return true;
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Selections: which nodes of the loaded model the viewers' choices are. Each distinct choice is
+// worked out once and shared for as long as a viewer has it: equal choices are the same pointer.
+//
+// Made once for a model, with the distance of every node from the tumour; a choice then costs a
+// pass over the nodes, and thinning. Belongs to the transport thread.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/session_state.hpp"
+
+namespace brainshift::server {
+
+class Selections {
+ public:
+  explicit Selections(const std::shared_ptr<const BrainModel>& model);
+
+  // Null for the default choice: everything. kEmptySet: no node lies in the region, or the model
+  // has no tumour; the sentence names the region. Otherwise the errors of validate(FieldChoice).
+  Result<SelectionPtr> resolve(const FieldChoice& choice);
+
+ private:
+  Result<std::vector<NodeIndex>> nodes_of(const Region& region) const;
+
+  std::shared_ptr<const BrainModel> model_;
+  std::vector<bool> on_boundary_;           // one per node
+  std::vector<double> tumour_distance_mm_;  // one per node, negative inside; empty: no tumour
+  std::vector<std::weak_ptr<const Selection>> known_;  // that viewers have now
+};
+
+}  // namespace brainshift::server

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/wire/published_update.hpp"
+
+#include <gtest/gtest.h>
+
+#include "brainshift/v1/brainshift.pb.h"
+#include "tests/unit/wire/refusals.hpp"
+#include "tests/unit/wire/same_values.hpp"
+#include "tests/unit/wire/sample_values.hpp"
+
+namespace brainshift::wire {
+namespace {
+
+UpdateMessage usable_update() {
+  UpdateMessage message = sample_judged_update();
+  message.boot_id = 77;
+  message.update.estimate.quality = {};
+  message.update.estimate.quality.quality = Quality::kGood;
+  return message;
+}
+
+PublishedUpdate opened(const UpdateMessage& message) {
+  auto update = PublishedUpdate::open(encode(message));
+  EXPECT_TRUE(update) << update.error().message;
+  return update ? std::move(*update) : PublishedUpdate{};
+}
+
+TEST(PublishedUpdate, SaysWhoseItIsAndWhetherItIsUsable) {
+  const UpdateMessage message = usable_update();
+  const PublishedUpdate update = opened(message);
+  EXPECT_EQ(update.session(), message.key());
+  EXPECT_EQ(update.sequence(), message.update.sequence);
+  EXPECT_EQ(update.nodes(), 4);
+  EXPECT_TRUE(update.usable());
+  EXPECT_FALSE(opened(sample_judged_update()).usable()) << "unusable";
+  EXPECT_FALSE(opened(sample_update()).usable()) << "an iterate";
+  const PublishedUpdate failure = opened(sample_failure());
+  EXPECT_FALSE(failure.usable());
+  EXPECT_EQ(failure.nodes(), 0);
+}
+
+TEST(PublishedUpdate, APartHoldsItsColumnsAndEverythingElseOfTheUpdate) {
+  UpdateMessage expected = usable_update();
+  const PublishedUpdate update = opened(expected);
+  const Estimate whole = expected.update.estimate;
+  Estimate& part = expected.update.estimate;
+  expected.update.part = FieldPart{4, {0, 3}, 0};
+  part.displacement = whole.displacement(Eigen::all, std::vector<int>{0, 3});
+  part.sd_mm = whole.sd_mm(std::vector<int>{0, 3});
+  const auto received = decode_update(update.cut(expected.update.part, true));
+  ASSERT_TRUE(received) << received.error().message;
+  expect_same(*received, expected);
+
+  part.sd_mm.resize(0);
+  const auto without = decode_update(update.cut(expected.update.part, false));
+  ASSERT_TRUE(without) << without.error().message;
+  expect_same(*without, expected);
+}
+
+TEST(PublishedUpdate, TheWholeFieldWithoutDeviationsNamesNoNodes) {
+  UpdateMessage expected = usable_update();
+  const PublishedUpdate update = opened(expected);
+  expected.update.estimate.sd_mm.resize(0);
+  const auto received = decode_update(update.cut(std::nullopt, false));
+  ASSERT_TRUE(received) << received.error().message;
+  expect_same(*received, expected);
+}
+
+TEST(PublishedUpdate, IsNotOpenedWhenItIsAPartOrMalformed) {
+  UpdateMessage message = usable_update();
+  const std::string payload = encode(message);
+  expect_refused(PublishedUpdate::open(payload.substr(0, payload.size() - 3)), ErrorCode::kProtocol,
+                 "payload");
+  expect_refused(
+      PublishedUpdate::open(changed<v1::Update>(payload, [](auto& m) { m.add_sd_mm(1.0f); })),
+      ErrorCode::kProtocol, "12 displacement components, 5 standard deviations");
+  expect_refused(PublishedUpdate::open(changed<v1::Update>(
+                     payload, [](auto& m) { m.mutable_displacement()->add_xyz_mm(1.0f); })),
+                 ErrorCode::kProtocol, "13 displacement components");
+  message.update.part = FieldPart{9, {0, 1, 2, 8}, 0};
+  expect_refused(PublishedUpdate::open(encode(message)), ErrorCode::kProtocol, "update.part");
+}
+
+}  // namespace
+}  // namespace brainshift::wire
