@@ -56,13 +56,14 @@ std::vector<NodeIndex> nodes_where(int count, const Holds& holds) {
 Selections::Selections(const std::shared_ptr<const BrainModel>& model)
     : model_(model),
       on_boundary_(static_cast<std::size_t>(model->mesh.nodes.cols()), false),
-      tumour_distance_mm_(distances_from_tumour(*model)) {
+      distances_under_way_(
+          std::async(std::launch::async, [model] { return distances_from_tumour(*model); })) {
   for (const int node : model_->boundary_triangles.reshaped()) {
     on_boundary_[static_cast<std::size_t>(node)] = true;
   }
 }
 
-Result<std::vector<NodeIndex>> Selections::nodes_of(const Region& region) const {
+Result<std::vector<NodeIndex>> Selections::nodes_of(const Region& region) {
   const Points& places = model_->mesh.nodes;
   const int count = static_cast<int>(places.cols());
   std::vector<NodeIndex> nodes;
@@ -71,6 +72,7 @@ Result<std::vector<NodeIndex>> Selections::nodes_of(const Region& region) const 
       return (places.col(node) - ball->centre_mm).norm() <= ball->radius_mm;
     });
   } else if (const auto* tumour = std::get_if<TumourRegion>(&region)) {
+    if (distances_under_way_.valid()) tumour_distance_mm_ = distances_under_way_.get();
     if (tumour_distance_mm_.empty()) {
       return fail(ErrorCode::kEmptySet, "choice: the model has no tumour");
     }

@@ -2,10 +2,13 @@
 // Selections: which nodes of the loaded model the viewers' choices are. Each distinct choice is
 // worked out once and shared for as long as a viewer has it: equal choices are the same pointer.
 //
-// Made once for a model, with the distance of every node from the tumour; a choice then costs a
-// pass over the nodes, and thinning. Belongs to the transport thread.
+// Made once for a model. The distances of its nodes from the tumour take a head some tenths of a
+// second; they are worked out on a thread of their own, so that the daemon's start does not wait,
+// and the first choice of the tumour waits for the rest of it. After that a choice costs a pass
+// over the nodes, and thinning. Belongs to the transport thread.
 #pragma once
 
+#include <future>
 #include <memory>
 #include <vector>
 
@@ -24,12 +27,14 @@ class Selections {
   Result<SelectionPtr> resolve(const FieldChoice& choice);
 
  private:
-  Result<std::vector<NodeIndex>> nodes_of(const Region& region) const;
+  Result<std::vector<NodeIndex>> nodes_of(const Region& region);
 
   std::shared_ptr<const BrainModel> model_;
-  std::vector<bool> on_boundary_;           // one per node
-  std::vector<double> tumour_distance_mm_;  // one per node, negative inside; empty: no tumour
-  std::vector<std::weak_ptr<const Selection>> known_;  // that viewers have now
+  std::vector<bool> on_boundary_;  // one per node
+  // One per node, negative inside; empty: no tumour, or not asked for yet.
+  std::vector<double> tumour_distance_mm_;
+  std::future<std::vector<double>> distances_under_way_;  // until they are asked for
+  std::vector<std::weak_ptr<const Selection>> known_;     // that viewers have now
 };
 
 }  // namespace brainshift::server

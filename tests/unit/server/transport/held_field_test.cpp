@@ -80,6 +80,16 @@ class Surgery {
   std::map<std::pair<std::uint64_t, std::uint64_t>, Estimate> truth_;
 };
 
+// Of a message on its way: the client notices when it cannot read one, and nothing at all when one
+// never comes.
+enum class Fate { kArrives, kUnreadable, kUnnoticed };
+
+Fate fate(Random& random) {
+  const double drawn = random.uniform();
+  if (drawn < 0.02) return Fate::kUnreadable;
+  return drawn < 0.04 ? Fate::kUnnoticed : Fate::kArrives;
+}
+
 // One viewer of that surgery, and what the daemon knows of it.
 class Watched {
  public:
@@ -122,12 +132,13 @@ class Watched {
     ask_anew();
     renew();
   }
-  void receive_one(const Surgery& surgery, bool damaged) {
+  void receive_one(const Surgery& surgery, Fate fate) {
     if (under_way_.empty()) return;
     wire::UpdateMessage message = decoded(under_way_.front());
     under_way_.pop_front();
     ++subscription_.received;
-    if (damaged) return ask_anew();
+    if (fate == Fate::kUnreadable) return ask_anew();
+    if (fate == Fate::kUnnoticed) return;
     ++received_;
     changes_ += message.update.part && message.update.part->base_sequence != 0;
     const Outcome outcome = assembly_.complete(message);
@@ -201,7 +212,7 @@ TEST(HeldField, IsWithinTheToleranceOfTheNewestUpdateReceivedWhateverHappens) {
       for (Watched& viewer : viewers) viewer.publish(message, whole, parcels);
       for (Watched& viewer : viewers) {
         if (random.uniform() < 0.02) viewer.restart();
-        while (random.uniform() < 0.6) viewer.receive_one(surgery, random.uniform() < 0.02);
+        while (random.uniform() < 0.6) viewer.receive_one(surgery, fate(random));
         if (random.uniform() < 0.7) viewer.renew();
         viewer.pay(parcels);
       }
