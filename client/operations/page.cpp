@@ -174,7 +174,10 @@ class Page {
   void add_journal() {
     if (!now_.journal) return add("journal", "none is configured");
     const wire::JournalFigures& journal = *now_.journal;
-    const std::string file = journal.file.empty() ? "no file yet" : journal.file;
+    if (journal.file.empty() && now_.session.session.session_id == 0) {
+      return add("journal", "waits for a session");
+    }
+    const std::string file = journal.file.empty() ? "no file" : journal.file;
     add("journal", journal.recording ? "recording" : "NOT RECORDING: " + journal.reason,
         !journal.recording);
     add("",

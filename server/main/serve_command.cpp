@@ -170,8 +170,8 @@ Status serve(const ServeArguments& arguments) {
   auto status = router->run(service, outbox, signals->fd());
   spdlog::info("stopping");
   manager.stopping();
+  exporter->reset();
   service.stop();
-  exporter->reset();  // the web server takes up to 2 s for it
   return status;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// MetricsExporter: answers monitors over HTTP, on threads of its own, with the figures of a report
-// that is made when they ask.
+// MetricsExporter: answers monitors over HTTP, on one thread of its own, with the figures of a
+// report that is made when they ask.
 #pragma once
 
 #include <functional>
@@ -16,8 +16,9 @@ class MetricsExporter {
  public:
   using Ask = std::function<wire::DaemonReport()>;
 
-  // Serves http://HOST:PORT/metrics from here on; port 0 picks a free one. `ask` is called on the
-  // exporter's threads, one at a time. kInvalidArgument when nothing can listen there.
+  // Serves http://HOST:PORT/metrics from here on; HOST is an address in numbers or localhost, port
+  // 0 picks a free one. `ask` is called on the exporter's thread. kInvalidArgument when that is no
+  // address, or nothing can listen there.
   static Result<MetricsExporter> listen(const std::string& endpoint, Ask ask);
   MetricsExporter(MetricsExporter&&) noexcept;
   MetricsExporter& operator=(MetricsExporter&&) = delete;

@@ -62,6 +62,13 @@ TEST(Page, OfADaemonThatHasJustStartedIsReadable) {
   EXPECT_THAT(text, HasSubstr("none is configured"));
 }
 
+TEST(Page, AJournalWithoutASessionHasNothingToRecord) {
+  DaemonReport report = sample_report();
+  report.session = {};
+  report.journal = wire::JournalFigures();
+  EXPECT_FALSE(line_with({report, std::nullopt}, "journal   waits for a session").alarm);
+}
+
 // Each stands in words: nothing depends on colour.
 TEST(Page, WhatNeedsAttentionStandsInCapitalsAndAlarms) {
   const std::pair<const char*, std::function<void(DaemonReport&)>> kFaults[] = {

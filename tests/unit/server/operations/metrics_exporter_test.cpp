@@ -64,7 +64,7 @@ TEST(MetricsExporter, EveryScrapeMakesAReportAndIsReadable) {
   for (int scraped = 1; scraped <= 3; ++scraped) {
     const std::string answer = scrape(exporter->port());
     EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
-    EXPECT_THAT(answer, HasSubstr("text/plain"));
+    EXPECT_THAT(answer, HasSubstr("text/plain; version=0.0.4"));
     const Exposition read = read_exposition(body_of(answer));
     EXPECT_EQ(read.value("brainshift_uptime_seconds"), scraped);
   }
@@ -82,6 +82,14 @@ TEST(MetricsExporter, APortThatIsTakenIsNamedInOneLine) {
   EXPECT_EQ(second.error().message.find('\n'), std::string::npos);
 }
 
+TEST(MetricsExporter, WhatIsNoAddressIsRefused) {
+  for (const char* endpoint :
+       {"", "9464", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "host:1", "127.0.0.1:1x"}) {
+    EXPECT_FALSE(MetricsExporter::listen(endpoint, [] { return wire::DaemonReport(); }))
+        << endpoint;
+  }
+}
+
 TEST(MetricsExporter, OtherPathsAndGarbageAreNoReport) {
   std::atomic<int> asked = 0;
   auto exporter = MetricsExporter::listen("127.0.0.1:0", [&] {
@@ -89,9 +97,13 @@ TEST(MetricsExporter, OtherPathsAndGarbageAreNoReport) {
     return wire::DaemonReport();
   });
   ASSERT_TRUE(exporter) << exporter.error().message;
-  const std::string answer =
-      exchange(exporter->port(), "GET /etc/passwd HTTP/1.1\r\nConnection: close\r\n\r\n");
+  const std::string answer = exchange(
+      exporter->port(), "GET /etc/passwd HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(exchange(exporter->port(),
+                       "DELETE /metrics HTTP/1.1\r\nHost: x\r\nConnection: "
+                       "close\r\n\r\n"),
+              StartsWith("HTTP/1.1 405"));
   exchange(exporter->port(), std::string(5000, '\xff') + "\r\n\r\n");
   EXPECT_EQ(asked, 0);
   EXPECT_THAT(scrape(exporter->port()), StartsWith("HTTP/1.1 200"));
