@@ -26,6 +26,8 @@ void add_import(CLI::App& app, Status& status);
 void add_stereo(CLI::App& app, Status& status);
 void add_journal(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
+void add_status(CLI::App& app, Status& status);
+void add_top(CLI::App& app, Status& status);
 
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);

@@ -251,6 +251,13 @@ Result<wire::DaemonStatus> Client::status() {
       .and_then([](const std::string& payload) { return wire::decode_status(payload); });
 }
 
+Result<wire::DaemonReport> Client::report() {
+  return impl_
+      ->request(MessageType::kReportRequest, "", MessageType::kReportReply,
+                impl_->options.request_timeout)
+      .and_then([](const std::string& payload) { return wire::decode_report(payload); });
+}
+
 Result<wire::SessionInfo> Client::start_session(const wire::SessionRequest& request) {
   return impl_
       ->request(MessageType::kStartSessionRequest, wire::encode(request),

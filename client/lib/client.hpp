@@ -94,6 +94,7 @@
 #include "common/values/observation.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/report.hpp"
 
 namespace brainshift::client {
 
@@ -120,6 +121,10 @@ class Client {
 
   // Version, loaded case and model, and whether an inversion runs. The daemon always answers it.
   Result<wire::DaemonStatus> status();
+
+  // How the daemon fares, for people and monitors: session, counts, latencies, journal, memory. The
+  // daemon always answers it. What may be shown follows from field_status() alone.
+  Result<wire::DaemonReport> report();
 
   // Starts a session for all clients and ends the running one. Returns when the model is prepared,
   // with the sizes of the mesh and the times of the preparation. kInvalidArgument: the daemon

@@ -46,7 +46,7 @@ std::uint32_t crc_of(std::string_view header, std::string_view payload) {
 
 bool is_known(std::uint16_t type) {
   return type >= static_cast<std::uint16_t>(MessageType::kStatusRequest) &&
-         type <= static_cast<std::uint16_t>(MessageType::kSessionState) && type != kRetiredType;
+         type <= static_cast<std::uint16_t>(MessageType::kReportReply) && type != kRetiredType;
 }
 
 tl::unexpected<Error> refuse(const std::string& field, const std::string& detail) {

@@ -36,6 +36,8 @@ enum class MessageType : std::uint16_t {
   kErrorReply = 11,
   kUpdate = 12,
   kSessionState = 13,
+  kReportRequest = 14,
+  kReportReply = 15,
 };
 
 inline constexpr std::size_t kHeaderBytes = 24;

@@ -82,6 +82,8 @@ Log::Log(const LogOptions& options)
   spdlog::set_default_logger(logger_);
 }
 
+std::uint64_t Log::lost() const { return writer_->overrun_counter(); }
+
 Log::~Log() {
   logger_->set_level(spdlog::level::off);
   // The writer's destructor waits until every line is written. When the reader stalls, that thread

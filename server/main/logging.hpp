@@ -10,6 +10,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -40,6 +41,9 @@ class Log {
   // Writes the lines that wait, for at most drain_limit; the rest is lost. Later calls of spdlog
   // write nothing.
   ~Log();
+
+  // Lines that gave way so far. From any thread.
+  std::uint64_t lost() const;
 
  private:
   std::chrono::milliseconds drain_limit_;

@@ -16,6 +16,8 @@
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
 #include "server/main/stop_signals.hpp"
+#include "server/operations/metrics_exporter.hpp"
+#include "server/operations/service_manager.hpp"
 #include "server/service/service.hpp"
 #include "server/session/model_store.hpp"
 #include "server/transport/outbox.hpp"
@@ -23,6 +25,9 @@
 
 namespace brainshift::server {
 namespace {
+
+// How old the figures of viewers may be that a monitor gets from an idle daemon.
+constexpr std::chrono::milliseconds kFreshViewers{1000};
 
 Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
@@ -72,6 +77,52 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   return options;
 }
 
+// "tracking, session 3, not recording: disk full"
+std::string status_line(const Service& service) {
+  const SessionState state = service.session_state();
+  std::string line(to_string(state.phase));
+  if (state.session.session_id > 0) line += fmt::format(", session {}", state.session.session_id);
+  if (!state.reason.empty()) line += ": " + state.reason;
+  if (state.recording && !state.recording->recording) {
+    line += ", not recording: " + state.recording->reason;
+  }
+  return line;
+}
+
+// Tells the service manager on the transport thread how the daemon is; logs a hang once.
+class Reporter {
+ public:
+  explicit Reporter(ServiceManager& manager) : manager_(manager) {}
+  void watch(const Service& service) { service_ = &service; }
+  void turn() {
+    const auto now = std::chrono::steady_clock::now();
+    if (service_ == nullptr || !manager_.due(now)) return;
+    const WorkerHealth worker = service_->worker_health();
+    const bool well = manager_.turn(status_line(*service_), worker, now);
+    if (was_well_ && !well) {
+      spdlog::error("the worker hangs: busy for {:.1f} s, at most {:.1f} s", worker.working.count(),
+                    worker.limit.count());
+    }
+    was_well_ = well;
+  }
+
+ private:
+  ServiceManager& manager_;
+  const Service* service_ = nullptr;
+  bool was_well_ = true;
+};
+
+Result<std::optional<MetricsExporter>> metrics(const io::DaemonConfig& config,
+                                               const Service& service) {
+  const std::string& endpoint = config.metrics.endpoint;
+  if (endpoint.empty()) return std::nullopt;
+  auto exporter = MetricsExporter::listen(endpoint, [&service] { return service.report(); });
+  if (!exporter) return tl::unexpected(exporter.error());
+  spdlog::info("metrics on http://{}:{}/metrics", endpoint.substr(0, endpoint.rfind(':')),
+               exporter->port());
+  return std::optional<MetricsExporter>(std::move(*exporter));
+}
+
 Status serve(const ServeArguments& arguments) {
   auto signals = StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
@@ -87,6 +138,12 @@ Status serve(const ServeArguments& arguments) {
   router_options.endpoint = config->endpoint;
   router_options.max_clients = config->max_clients;
   router_options.max_message_mib = config->max_message_mib;
+  auto manager = ServiceManager::from_environment();
+  Reporter reporter(manager);
+  if (const auto interval = manager.interval()) router_options.longest_wait = *interval;
+  if (!config->metrics.endpoint.empty() && !manager.interval()) {
+    router_options.longest_wait = kFreshViewers;
+  }
   auto router = [&] {
     const OwnerOnly ipc_socket;  // no thread of ours creates files yet
     return Router::bind(router_options);
@@ -101,11 +158,19 @@ Status serve(const ServeArguments& arguments) {
   }
   if (!options->blas_kernel.empty()) spdlog::info("OpenBLAS kernel {}", options->blas_kernel);
   Outbox outbox;
+  options->log_lines_lost = [&log] { return log.lost(); };
+  options->on_turn = [&reporter] { reporter.turn(); };
   Service service(std::move(*options), outbox);
+  reporter.watch(service);
+  auto exporter = metrics(*config, service);
+  if (!exporter) return tl::unexpected(exporter.error());
   fmt::print("listening on {}\n", router->endpoint());
   std::fflush(stdout);
+  manager.ready();
   auto status = router->run(service, outbox, signals->fd());
   spdlog::info("stopping");
+  manager.stopping();
+  exporter->reset();
   service.stop();
   return status;
 }

@@ -17,7 +17,9 @@ using wire::MessageType;
 
 Reply error_reply(const Error& error) { return {MessageType::kErrorReply, wire::encode(error)}; }
 
-Reply model_not_ready() { return error_reply({ErrorCode::kModelNotReady, "no model is loaded"}); }
+Error no_model() { return {ErrorCode::kModelNotReady, "no model is loaded"}; }
+
+Reply model_not_ready() { return error_reply(no_model()); }
 
 io::SurgeryRecord record(io::RecordKind kind, std::uint64_t sequence, std::string payload) {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
@@ -69,7 +71,11 @@ Service::Service(ServiceOptions options, Outbox& outbox)
       begin_journal(request, info);
     };
     hooks.publish = [this](wire::UpdateMessage message) { publish(std::move(message)); };
-    hooks.decided = [this](const wire::Decision& decision) { record_decision(decision); };
+    hooks.published = [this](auto arrived, auto begun) { count_update(arrived, begun); };
+    hooks.decided = [this](const wire::Decision& decision) {
+      counters_.decided(decision);
+      record_decision(decision);
+    };
     hooks.on_change = [this] { push_state(); };
     session_ = std::make_unique<Session>(options_.model->case_id, std::move(hooks),
                                          options_.boot_id, options_.model->model_id);
@@ -90,6 +96,11 @@ std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame&
         return error_reply(empty.error());
       }
       return Reply{MessageType::kStatusReply, wire::encode(status())};
+    case MessageType::kReportRequest:
+      if (auto empty = wire::decode_empty(frame.payload, "ReportRequest"); !empty) {
+        return error_reply(empty.error());
+      }
+      return Reply{MessageType::kReportReply, wire::encode(report())};
     case MessageType::kSubscribeRequest: return subscribe(frame);
     case MessageType::kStartSessionRequest: return start_session(peer, frame);
     case MessageType::kModelRequest:
@@ -127,14 +138,22 @@ std::optional<Reply> Service::start_session(const std::string& peer, const wire:
 }
 
 Reply Service::observe(const wire::Frame& frame) {
-  if (!session_) return model_not_ready();
+  const auto arrived = std::chrono::steady_clock::now();
+  const auto refuse = [&](const std::string& source, const Error& error) {
+    counters_.refused(source, arrived);
+    return error_reply(error);
+  };
+  if (!session_) return refuse({}, no_model());
   auto observation = wire::decode_observation(frame.payload);
-  if (!observation) return error_reply(observation.error());
+  if (!observation) return refuse({}, observation.error());
   const std::uint64_t sequence = observation->sequence;
   const bool plain = observation->daemon_ns == 0;
   const std::string source = observation->source;
   // Queued before the worker can answer it, so that the journal holds cause before effect.
+  bool is_new = false;
   const auto receipt = session_->submit(std::move(*observation), [&](const Observation& accepted) {
+    is_new = true;
+    counters_.accepted(source, arrived);
     if (!journal_) return;
     const Stopwatch watch;
     // A client has no business with daemon_ns: what it put there is left out.
@@ -146,8 +165,9 @@ Reply Service::observe(const wire::Frame& frame) {
   if (!receipt) {
     spdlog::debug("observation refused sequence={} code={} reason=\"{}\"", sequence,
                   to_string(receipt.error().code), receipt.error().message);
-    return error_reply(receipt.error());
+    return refuse(source, receipt.error());
   }
+  if (!is_new) counters_.repeated(source, arrived);
   return {MessageType::kObservationReply, wire::encode(*receipt)};
 }
 
@@ -258,6 +278,12 @@ void Service::publish(wire::UpdateMessage message) {
                  update.estimate.quality.reason);
   }
   outbox_.post({delivery, {}, std::move(frame), message.session_id});
+  if (!update.final) {
+    counters_.iterate();
+  } else {
+    passage_.reset();
+    if (estimated) passage_ = Passage{{}, {}, {}, update.timings, update.usable()};
+  }
 }
 
 }  // namespace brainshift::server

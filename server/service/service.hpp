@@ -6,11 +6,12 @@
 //   StatusRequest           StatusReply, always
 //   StartSessionRequest     StartSessionReply later, when the session is ready
 //   ModelRequest            ModelReply
+//   ReportRequest           ReportReply, always
 //   SubscribeRequest        SessionState, then updates and, when the session or its phase changes,
 //                           SessionState again. A choice that holds no node is an error.
 //   Observation             ObservationReply when accepted; updates follow
 //   anything else           ErrorReply (protocol)
-// Without a model everything but status and subscribe gets ErrorReply (model_not_ready).
+// Without a model everything but status, report and subscribe gets ErrorReply (model_not_ready).
 //
 // What a SessionState says holds for kValidity after the viewer sent the request for it, by the
 // viewer's clock (common/values/session_state.hpp): three renewals may be lost.
@@ -35,14 +36,18 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
+#include "common/wire/report.hpp"
 #include "server/delivery/selections.hpp"
 #include "server/journal/journal.hpp"
+#include "server/operations/counters.hpp"
+#include "server/operations/service_manager.hpp"
 #include "server/session/session.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
@@ -60,7 +65,10 @@ struct ServiceOptions {
   std::string machine = {};
   std::string blas_kernel = {};
   OpenSink open_journal = open_surgery_file;
-  std::uint64_t boot_id = 0;  // 0: a random one
+  std::uint64_t boot_id = 0;                           // 0: a random one
+  std::function<std::uint64_t()> log_lines_lost = {};  // on any thread; may be empty
+  // On the transport thread, while that turns (RequestHandler::turned). May be empty.
+  std::function<void()> on_turn = {};
 };
 
 class Service final : public RequestHandler {
@@ -71,6 +79,12 @@ class Service final : public RequestHandler {
 
   std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) override;
   void left(const std::string& peer) override;
+  void turned(const Peers& peers) override;
+
+  // How the daemon fares, now. From any thread.
+  wire::DaemonReport report() const;
+  WorkerHealth worker_health() const;
+  SessionState session_state() const;
 
   static constexpr std::chrono::milliseconds kValidity{1000};
 
@@ -81,11 +95,12 @@ class Service final : public RequestHandler {
   std::optional<Reply> start_session(const std::string& peer, const wire::Frame& frame);
   Reply observe(const wire::Frame& frame);
   Reply subscribe(const wire::Frame& frame);
-  SessionState session_state() const;
   void push_state();
   wire::DaemonStatus status() const;
+  std::optional<wire::JournalFigures> journal_figures() const;
   void begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info);
   void publish(wire::UpdateMessage message);
+  void count_update(Passage::TimePoint arrived, Passage::TimePoint begun);
   void record_decision(const wire::Decision& decision);
 
   const ServiceOptions options_;  // boot_id is set
@@ -95,8 +110,14 @@ class Service final : public RequestHandler {
   std::atomic<double> journal_ms_{0.0};   // the newest observation's way into the journal
   std::string encoded_model_;             // made once, on the first request
   std::optional<Selections> selections_;  // empty without a model; of the transport thread
-  std::unique_ptr<Journal> journal_;      // null without a journal folder
-  std::unique_ptr<Session> session_;      // null without a model; ends before the journal
+  Counters counters_;
+  // Of the update that the worker published last; none when that had no estimate.
+  std::optional<Passage> passage_;  // worker only
+  mutable std::mutex viewers_mutex_;
+  std::vector<wire::ViewerFigures> viewers_;  // `peer` holds the routing id as it is
+  std::uint32_t clients_ = 0;
+  std::unique_ptr<Journal> journal_;  // null without a journal folder
+  std::unique_ptr<Session> session_;  // null without a model; ends before the journal
 };
 
 }  // namespace brainshift::server

@@ -121,8 +121,10 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const wire::SessionReques
       info.full_solve_ms = inversion::measure_full_solve_ms(**factor);
     }
   }
+  const bool ends_by_itself = request.method == Method::kCondensed;
   return std::make_unique<SessionModel>(
-      SessionModel{std::move(info), std::move(*pipeline), config_.sensing.max_age_s});
+      SessionModel{std::move(info), std::move(*pipeline), config_.sensing.max_age_s,
+                   ends_by_itself ? 1e-3 * config_.condensed.deadline_ms : kNoDeadline_s});
 }
 
 }  // namespace brainshift::server

@@ -27,6 +27,10 @@ std::int64_t monotonic_ns(std::chrono::steady_clock::time_point time) {
   return time.time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
+double seconds_since(std::chrono::steady_clock::time_point time) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - time).count();
+}
+
 }  // namespace
 
 Session::Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id,
@@ -178,9 +182,7 @@ SessionState Session::shared_state() const {
     state.newest_update = running_->newest_update;
     state.newest_usable = running_->newest_usable;
     if (running_->newest_usable > 0) {
-      state.age_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() -
-                                                               running_->usable_arrived)
-                         .count();
+      state.age_ms = 1e3 * seconds_since(running_->usable_arrived);
     }
   }
   return state;
@@ -192,6 +194,14 @@ Session::State Session::state() const {
   state.shared = shared_state();
   state.busy = working_ || pending_start_ || preparing_ || prepared_ || !boxes_.empty();
   state.updates = updates_;
+  if (working_) {
+    state.working_s = seconds_since(working_since_);
+    state.deadline_s = deadline_s_;
+  }
+  if (running_) {
+    state.owner = running_->owner;
+    state.max_age_s = running_->model->max_age_s;
+  }
   return state;
 }
 
@@ -294,6 +304,8 @@ void Session::work(const std::stop_token& stop) {
         boxes_.erase(oldest);
       }
       working_ = true;
+      working_since_ = std::chrono::steady_clock::now();
+      deadline_s_ = box && running_ ? running_->model->deadline_s : 0.0;
     }
     if (prepared) begin(std::move(*prepared));
     if (box) process(*box);
@@ -331,6 +343,7 @@ void Session::begin(Prepared prepared) {
 }
 
 void Session::process(const Box& box) {
+  const TimePoint begun = std::chrono::steady_clock::now();
   const Observation& observation = box.observation;
   SessionKey key;
   wire::SessionRequest request;
@@ -376,6 +389,7 @@ void Session::process(const Box& box) {
   const auto phase = state().shared.phase;
   if (!finish(box, message, options.stop)) return;
   hooks_.publish(std::move(message));
+  if (hooks_.published) hooks_.published(box.arrived, begun);
   if (state().shared.phase != phase) changed();
 }
 

@@ -43,12 +43,16 @@
 
 namespace brainshift::server {
 
+// Of the methods that compare and are not for surgery: their updates take minutes.
+inline constexpr double kNoDeadline_s = 3600.0;
+
 // All that a session of one method and boundary needs: what its clients are told, and the pipeline
 // with its state. The session keeps it for the next session of the same kind, and resets it then.
 struct SessionModel {
   wire::SessionInfo info;  // boot_id and session_id are filled in by the session
   Pipeline pipeline;
   double max_age_s = CaseConfig{}.sensing.max_age_s;  // older observations are not used
+  double deadline_s = kNoDeadline_s;                  // an inversion ends by itself then
 };
 // On the preparer's thread, one at a time. kUnavailable when stopped.
 using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
@@ -56,11 +60,16 @@ using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
 
 // Called one at a time, but for on_change and decided.
 struct SessionHooks {
+  using TimePoint = std::chrono::steady_clock::time_point;
+
   MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
   std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
   // An iterate, a final update, or the error that an observation ended in.
   std::function<void(wire::UpdateMessage)> publish;
+  // On the worker, after `publish` of a final update: when its observation arrived, and when the
+  // worker began with it. May be empty.
+  std::function<void(TimePoint arrived, TimePoint begun)> published;
   // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
   // thread, after the update that changed it. May be empty.
   std::function<void()> on_change;
@@ -78,6 +87,10 @@ class Session {
     SessionState shared;        // valid_ms is filled in by the service
     bool busy = false;          // making a session ready, or inverting
     std::uint64_t updates = 0;  // final updates of all sessions
+    std::string owner;          // of the running session; empty: nobody
+    double working_s = 0.0;     // since the worker began what it does now; 0: it waits
+    double deadline_s = 0.0;    // of that; 0: it waits, or begins a session
+    double max_age_s = 0.0;     // of the running session; 0 without one
   };
 
   // boot_id, model_id: of the daemon's process and of the loaded model.
@@ -176,6 +189,8 @@ class Session {
   std::uint64_t last_session_id_ = 0;
   std::uint64_t updates_ = 0;
   bool working_ = false;  // the worker
+  TimePoint working_since_ = {};
+  double deadline_s_ = 0.0;  // of what it works on
   bool stopped_ = false;
 
   std::jthread preparer_;  // the threads last: they use everything above

@@ -43,6 +43,10 @@ class Viewer {
   // What it holds when everything sent has arrived; null: nothing, or its choice has no tolerance.
   const Held& held() const { return held_; }
   void hold(Held held) { held_ = std::move(held); }
+  const Subscription& subscription() const { return subscription_; }
+  std::uint64_t updates_sent() const { return sent_; }  // in this subscription
+  // Updates that wait for its credit.
+  int owed() const { return (usable_ ? 1 : 0) + (failure_ ? 1 : 0); }
 
  private:
   std::uint64_t under_way() const { return sent_ - subscription_.received; }
@@ -82,6 +86,7 @@ class Peers {
   // A connection closed: the peers removed (none or one).
   std::vector<std::string> remove_connection(int connection_fd);
   std::map<std::string, Peer>& all() { return peers_; }
+  const std::map<std::string, Peer>& all() const { return peers_; }
   // Something that could go out now, if the peer's queue had room.
   bool anything_owed() const;
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <exception>
@@ -23,6 +24,8 @@ namespace {
 constexpr int kRequestsPerTurn = 64;
 // How often a full peer is tried again while it is owed a final update.
 constexpr std::chrono::milliseconds kRetryInterval{20};
+// How often the handler is told that the loop turns.
+constexpr std::chrono::milliseconds kTurnInterval{100};
 // Messages of one peer that may wait unread; large ones are bounded by their size.
 constexpr int kReceiveQueue = 8;
 
@@ -133,6 +136,8 @@ struct Router::Impl {
   void pay(const std::string& routing_id);
   void remove(const std::string& routing_id);
   void forget_closed();
+  void turned();
+  std::chrono::milliseconds longest_wait() const;
 
   RouterOptions options;
   zmq::context_t context;
@@ -145,7 +150,8 @@ struct Router::Impl {
   std::uint64_t session = 0;
   Bytes last_final;
   Bytes failure_since;
-  RequestHandler* handler = nullptr;  // of run()
+  RequestHandler* handler = nullptr;                     // of run()
+  std::chrono::steady_clock::time_point last_turn = {};  // that the handler was told of
 };
 
 Router::Router(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -176,13 +182,9 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
                              {self.monitor.socket().handle(), 0, ZMQ_POLLIN, 0},
                              {nullptr, outbox.fd(), ZMQ_POLLIN, 0},
                              {nullptr, stop_fd, ZMQ_POLLIN, 0}};
-  constexpr std::chrono::milliseconds kForever{-1};
-  constexpr std::chrono::milliseconds kNow{0};
   try {
     while (true) {
-      auto timeout = self.peers.anything_owed() ? kRetryInterval : kForever;
-      if (self.parcels.spent()) timeout = kNow;
-      if (zmq_poll(items, 4, timeout.count()) < 0) {
+      if (zmq_poll(items, 4, self.longest_wait().count()) < 0) {
         if (zmq_errno() == EINTR) continue;
         throw zmq::error_t();
       }
@@ -192,10 +194,23 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
       if (items[0].revents != 0) self.serve_requests();
       for (const Outgoing& message : outbox.take()) self.deliver(message);
       if (self.peers.anything_owed()) self.pay_owed();
+      if (std::chrono::steady_clock::now() - self.last_turn >= kTurnInterval) self.turned();
     }
   } catch (const zmq::error_t& error) {
     return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", self.endpoint, error.what()));
   }
+}
+
+std::chrono::milliseconds Router::Impl::longest_wait() const {
+  if (parcels.spent()) return std::chrono::milliseconds(0);
+  const auto idle = options.longest_wait;
+  if (!peers.anything_owed()) return idle;
+  return idle.count() < 0 ? kRetryInterval : std::min(idle, kRetryInterval);
+}
+
+void Router::Impl::turned() {
+  last_turn = std::chrono::steady_clock::now();
+  handler->turned(peers);
 }
 
 void Router::Impl::serve_requests() {
@@ -229,6 +244,7 @@ void Router::Impl::answer(const Incoming& incoming) {
   }
   std::optional<Reply> answer;
   try {
+    if (frame->type == wire::MessageType::kReportRequest) turned();
     answer = handler->handle(incoming.peer, *frame);
   } catch (const std::exception& exception) {
     spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),

@@ -39,7 +39,11 @@ struct RouterOptions {
   std::chrono::milliseconds heartbeat_interval{1000};
   std::chrono::milliseconds heartbeat_timeout{5000};
   std::chrono::milliseconds handshake_limit{2000};
+  // How long the loop may wait before it calls RequestHandler::turned() again; -1: for ever.
+  std::chrono::milliseconds longest_wait{-1};
 };
+
+class Peers;
 
 struct Reply {
   wire::MessageType type = wire::MessageType::kErrorReply;
@@ -58,6 +62,9 @@ class RequestHandler {
   virtual std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) = 0;
   // The peer's connection has closed. Peers that come back have another name.
   virtual void left(const std::string& peer) = 0;
+  // How the peers stand: before every ReportRequest, and while the router's loop turns, at most
+  // every 100 ms.
+  virtual void turned(const Peers&) {}
 };
 
 class Router {

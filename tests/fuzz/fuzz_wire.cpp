@@ -5,6 +5,7 @@
 #include "common/wire/decision.hpp"
 #include "common/wire/frame.hpp"
 #include "common/wire/published_update.hpp"
+#include "common/wire/report.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace brainshift::fuzz {
@@ -24,6 +25,10 @@ void decode_all(std::string_view payload) {
   if (const auto observation = wire::decode_observation(payload)) {
     require(wire::decode_observation(wire::encode(*observation)).has_value(),
             "an observation that was decoded can be decoded again");
+  }
+  if (const auto report = wire::decode_report(payload)) {
+    require(wire::decode_report(wire::encode(*report)).has_value(),
+            "a report that was decoded can be decoded again");
   }
   if (const auto state = wire::decode_session_state(payload)) {
     require(wire::decode_session_state(wire::encode(*state)).has_value(),

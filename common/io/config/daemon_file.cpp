@@ -4,6 +4,8 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 
+#include <charconv>
+
 #include "common/io/config/key_reader.hpp"
 #include "common/io/files/file_access.hpp"
 
@@ -42,6 +44,14 @@ void visit(A& a, V& v) {
      "update for 18 thousand nodes "
      "0.6 MiB."},
     v.max_message_mib, between(1, 1024));
+  a.section({"metrics", "", "Figures for monitors, over HTTP in the format of Prometheus", "",
+             "The path is /metrics; docs/operations.md lists the figures."},
+            Need::kOptional, [&] {
+              a({"endpoint", "", "Where monitors ask: HOST:PORT", "",
+                 "HOST is an address in numbers. Other addresses than those of this machine need "
+                 "allow_remote."},
+                v.metrics.endpoint);
+            });
 }
 
 // HOST of tcp://HOST:PORT, without the brackets of IPv6; empty when that is not the form.
@@ -67,11 +77,22 @@ bool is_loopback(const std::string& host) {
   return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
+bool is_address(const std::string& host) {
+  in_addr v4{};
+  in6_addr v6{};
+  return host == "localhost" || inet_pton(AF_INET, host.c_str(), &v4) == 1 ||
+         inet_pton(AF_INET6, host.c_str(), &v6) == 1;
+}
+
 Status validate(const DaemonConfig& config) {
   KeyChecker checker;
   visit(checker, config);
-  return checker.status().and_then(
-      [&] { return check_endpoint(config.endpoint, config.allow_remote); });
+  return checker.status()
+      .and_then([&] { return check_endpoint(config.endpoint, config.allow_remote); })
+      .and_then([&] {
+        const std::string& metrics = config.metrics.endpoint;
+        return metrics.empty() ? Status() : check_metrics_endpoint(metrics, config.allow_remote);
+      });
 }
 
 }  // namespace
@@ -92,6 +113,25 @@ Status check_endpoint(const std::string& endpoint, bool allow_remote) {
   return refuse(
       "other machines may reach it, and there is no authentication: must be an address of this "
       "machine alone, such as 127.0.0.1, unless allow_remote is true");
+}
+
+Status check_metrics_endpoint(const std::string& endpoint, bool allow_remote) {
+  const auto refuse = [&](const std::string& reason) {
+    return fail(ErrorCode::kInvalidArgument, "metrics.endpoint = " + endpoint + ": " + reason);
+  };
+  const std::string host = tcp_host("tcp://" + endpoint);
+  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
+  unsigned number = 0;
+  const char* const end = port.data() + port.size();
+  const auto [stop, error] = std::from_chars(port.data(), end, number);
+  const bool is_port = error == std::errc() && stop == end && number <= 65535;
+  if (host.empty() || !is_address(host) || !is_port) {
+    return refuse("must be HOST:PORT, such as 127.0.0.1:9464, with an address in numbers");
+  }
+  if (allow_remote || is_loopback(host)) return {};
+  return refuse(
+      "other machines may reach it: must be an address of this machine alone, such as 127.0.0.1, "
+      "unless allow_remote is true");
 }
 
 Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path) {

@@ -12,6 +12,11 @@
 
 namespace brainshift::io {
 
+// Where monitors scrape (docs/operations.md).
+struct MetricsConfig {
+  std::string endpoint;  // HOST:PORT; empty: nowhere
+};
+
 // What a daemon file says (config/daemon.yaml documents every key; the table is in the .cpp).
 struct DaemonConfig {
   std::string endpoint = "tcp://127.0.0.1:5555";  // tcp://HOST:PORT or ipc://PATH
@@ -22,6 +27,7 @@ struct DaemonConfig {
   std::string log_level = "info";
   int max_clients = 32;
   int max_message_mib = 64;
+  MetricsConfig metrics;
 };
 
 // Reads and validates; relative paths are taken from the file's folder.
@@ -31,6 +37,10 @@ Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path);
 // ::1, localhost, lo) or allow_remote is true. kInvalidArgument: "endpoint = ...: reason". Every
 // other transport of ZeroMQ is refused.
 Status check_endpoint(const std::string& endpoint, bool allow_remote);
+
+// Ok for HOST:PORT where HOST is surely this machine alone or allow_remote is true, as above; HOST
+// in numbers, or localhost. kInvalidArgument: "metrics.endpoint = ...: reason".
+Status check_metrics_endpoint(const std::string& endpoint, bool allow_remote);
 
 // The documentation of every key.
 std::vector<KeyDocument> daemon_key_documents();

@@ -89,6 +89,35 @@ SCHEMA = {
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
         "boot_id": (31, "fixed"), "part": (32, "FieldPart")},
+    "LatencyFigures": {
+        "count": (1, "int"), "p50_ms": (2, "double"), "p95_ms": (3, "double"), "p99_ms": (4, "double"),
+        "max_ms": (5, "double")},
+    "StageLatency": {
+        "stage": (1, "text"), "recent": (2, "LatencyFigures"), "all": (3, "LatencyFigures"),
+        "sum_ms": (4, "double"), "bucket_counts": (5, "*int")},
+    "SourceCounts": {
+        "source": (1, "text"), "received": (2, "int"), "answered": (3, "int"), "failed": (4, "int"),
+        "replaced": (5, "int"), "skipped": (6, "int"), "refused": (7, "int"), "repeated": (8, "int"),
+        "waiting": (9, "int"), "age_ms": (10, "double")},
+    "ViewerFigures": {
+        "peer": (1, "text"), "window": (2, "int"), "sent": (3, "int"), "received": (4, "int"),
+        "owed": (5, "int"), "replies_waiting": (6, "int")},
+    "JournalFigures": {
+        "recording": (1, "int"), "reason": (2, "text"), "file": (3, "text"), "bytes": (4, "int"),
+        "records": (5, "int"), "lost": (6, "int")},
+    "ProcessFigures": {
+        "resident_bytes": (1, "int"), "peak_bytes": (2, "int"), "descriptors": (3, "int"),
+        "descriptor_limit": (4, "int"), "threads": (5, "int")},
+    "DaemonReport": {
+        "version": (1, "text"), "build": (2, "text"), "machine": (3, "text"), "blas_kernel": (4, "text"),
+        "uptime_ms": (5, "int"), "model_ready": (6, "int"), "case_id": (7, "text"),
+        "session": (8, "SessionState"), "owner": (9, "text"), "max_age_s": (10, "double"),
+        "working_ms": (11, "double"), "limit_ms": (12, "double"), "usable": (13, "int"),
+        "unusable": (14, "int"), "failures": (15, "int"), "iterates": (16, "int"),
+        "sources": (17, "*SourceCounts"), "clients": (18, "int"), "viewers": (19, "*ViewerFigures"),
+        "recent_updates": (20, "int"), "bounds_ms": (21, "*double"), "stages": (22, "*StageLatency"),
+        "journal": (23, "JournalFigures"), "log_lines_lost": (24, "int"),
+        "process": (25, "ProcessFigures")},
 }
 
 KEY = {"boot_id": 2**64 - 3, "session_id": 3, "model_id": "0123456789abcdef"}
@@ -207,6 +236,35 @@ MESSAGES = {
     "update_failed": (12, 0, "Update", UPDATE | {
         "status": "failed", "reason": "observation 2: no point is inside the brain",
         "timings": TIMINGS, "error_code": "empty_set"}),
+    "report_request": (14, 10, "Empty", {}),
+    "report_reply": (15, 10, "DaemonReport", {
+        "version": "0.1.0", "build": "0.1.0 1a2b3c", "machine": "Fall Köln", "blas_kernel": "Haswell",
+        "uptime_ms": 86400001, "model_ready": 1, "case_id": "colin27",
+        "session": {"session": KEY, "phase": 5, "newest_update": 12, "newest_usable": 9,
+                    "age_ms": 1250.5, "valid_ms": 1000, "reason": "no point is inside the brain",
+                    "preparing": 1, "recording": {"recording": 1, "reason": "", "sources": [
+                        {"source": "ius", "until": 12, "lost_until": 3}]}},
+        "owner": "00ab12cd34", "max_age_s": 600.0, "working_ms": 12.25, "limit_ms": 13000.0,
+        "usable": 2**40, "unusable": 3, "failures": 2, "iterates": 7,
+        "sources": [
+            {"source": "", "received": 2, "answered": 0, "failed": 0, "replaced": 0, "skipped": 0,
+             "refused": 2, "repeated": 0, "waiting": 0, "age_ms": 0.1},
+            {"source": "ius", "received": 21, "answered": 6, "failed": 5, "replaced": 4, "skipped": 3,
+             "refused": 1, "repeated": 1, "waiting": 1, "age_ms": 33.3}],
+        "clients": 3, "viewers": [
+            {"peer": "00ab12cd34", "window": 1, "sent": 70001, "received": 70000, "owed": 2,
+             "replies_waiting": 4}],
+        "recent_updates": 2048, "bounds_ms": [0.1, 10.0, 1000.0],
+        "stages": [
+            {"stage": "total",
+             "recent": {"count": 2, "p50_ms": 1.5, "p95_ms": 2.9, "p99_ms": 3.0, "max_ms": 3.1},
+             "all": {"count": 3, "p50_ms": 1.6, "p95_ms": 8.0, "p99_ms": 9.0, "max_ms": 10.5},
+             "sum_ms": 15.1, "bucket_counts": [0, 2, 1, 0]}],
+        "journal": {"recording": 1, "reason": "", "file": "/j/colin27-1.surgery", "bytes": 2**33,
+                    "records": 41, "lost": 1},
+        "log_lines_lost": 303,
+        "process": {"resident_bytes": 2**32 + 1, "peak_bytes": 2**33 + 1, "descriptors": 31,
+                    "descriptor_limit": 1024, "threads": 9}}),
 }
 
 

@@ -236,6 +236,47 @@ SessionInfo session_info_from(const json& value) {
           value["factor_s"],   value["boot_id"]};
 }
 
+LatencyFigures latency_from(const json& value) {
+  return {value["count"], value["p50_ms"], value["p95_ms"], value["p99_ms"], value["max_ms"]};
+}
+
+DaemonReport report_from(const json& value) {
+  DaemonReport report{value["version"],    value["build"],
+                      value["machine"],    value["blas_kernel"],
+                      value["uptime_ms"],  value["model_ready"] == 1,
+                      value["case_id"],    session_state_from(value["session"]),
+                      value["owner"],      value["max_age_s"],
+                      value["working_ms"], value["limit_ms"],
+                      value["usable"],     value["unusable"],
+                      value["failures"],   value["iterates"]};
+  for (const json& counts : value["sources"]) {
+    report.sources.push_back({counts["source"], counts["received"], counts["answered"],
+                              counts["failed"], counts["replaced"], counts["skipped"],
+                              counts["refused"], counts["repeated"], counts["waiting"],
+                              counts["age_ms"]});
+  }
+  report.clients = value["clients"];
+  for (const json& viewer : value["viewers"]) {
+    report.viewers.push_back({viewer["peer"], viewer["window"], viewer["sent"], viewer["received"],
+                              viewer["owed"], viewer["replies_waiting"]});
+  }
+  report.recent_updates = value["recent_updates"];
+  report.bounds_ms = value["bounds_ms"].get<std::vector<double>>();
+  for (const json& stage : value["stages"]) {
+    report.stages.push_back({stage["stage"], latency_from(stage["recent"]),
+                             latency_from(stage["all"]), stage["sum_ms"],
+                             stage["bucket_counts"].get<std::vector<std::uint64_t>>()});
+  }
+  const json& journal = value["journal"];
+  report.journal = JournalFigures{journal["recording"] == 1, journal["reason"],  journal["file"],
+                                  journal["bytes"],          journal["records"], journal["lost"]};
+  report.log_lines_lost = value["log_lines_lost"];
+  const json& process = value["process"];
+  report.process = {process["resident_bytes"], process["peak_bytes"], process["descriptors"],
+                    process["descriptor_limit"], process["threads"]};
+  return report;
+}
+
 // ---------- the check ----------
 
 template <typename T>
@@ -268,6 +309,7 @@ std::string check_message(const std::string& message, const json& value, std::st
   if (message == "SessionState") {
     return check(session_state_from(value), decode_session_state(payload));
   }
+  if (message == "DaemonReport") return check(report_from(value), decode_report(payload));
   if (message == "ErrorReply") {
     EXPECT_EQ(value["code"], "model_not_ready");
     const Error described{ErrorCode::kModelNotReady, value["message"]};
@@ -301,7 +343,8 @@ INSTANTIATE_TEST_SUITE_P(Frames, Golden,
                                            "observation_tumour", "observation_cortex",
                                            "observation_landmarks", "observation_pose",
                                            "observation_reply", "error_reply", "update",
-                                           "update_unusable", "update_changes", "update_failed"));
+                                           "update_unusable", "update_changes", "update_failed",
+                                           "report_request", "report_reply"));
 
 }  // namespace
 }  // namespace brainshift::wire

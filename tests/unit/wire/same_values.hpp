@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/wire/convert.hpp"
+#include "common/wire/report.hpp"
 
 namespace brainshift::wire {
 
@@ -76,6 +77,8 @@ inline void expect_same(const BrainModel& a, const BrainModel& b) {
   EXPECT_EQ(a.fluid_plane_depth_mm, b.fluid_plane_depth_mm);
   EXPECT_EQ(a.slave_plane_depth_mm, b.slave_plane_depth_mm);
 }
+
+inline void expect_same(const DaemonReport& a, const DaemonReport& b) { EXPECT_EQ(a, b); }
 
 inline void expect_same(const DaemonStatus& a, const DaemonStatus& b) {
   EXPECT_EQ(a.version, b.version);

@@ -26,6 +26,7 @@ TEST(DaemonFile, ShippedFileHasTheDefaults) {
   EXPECT_EQ(read->log_level, defaults.log_level);
   EXPECT_EQ(read->max_clients, defaults.max_clients);
   EXPECT_EQ(read->max_message_mib, defaults.max_message_mib);
+  EXPECT_EQ(read->metrics.endpoint, defaults.metrics.endpoint);
 }
 
 TEST(DaemonFile, ShippedFileDocumentsEveryKeyAsTheTableDoes) {
@@ -44,7 +45,7 @@ class DaemonFileKeys : public testing::Test {
 TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   const auto config = read(
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
-      "max_message_mib: 5\nallow_remote: true\n");
+      "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n");
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
   EXPECT_TRUE(config->allow_remote);
@@ -53,6 +54,7 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   EXPECT_EQ(config->log_level, "debug");
   EXPECT_EQ(config->max_clients, 3);
   EXPECT_EQ(config->max_message_mib, 5);
+  EXPECT_EQ(config->metrics.endpoint, "127.0.0.2:80");
 }
 
 TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
@@ -76,6 +78,9 @@ TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
       {"endpoint: 'ipc://*'", "must name the path of a socket"},
       {"endpoint: 'tcp://0.0.0.0:5555'", "d.yaml:1: endpoint = tcp://0.0.0.0:5555: other machines"},
       {"allow_remote: maybe", "d.yaml:1: allow_remote = maybe: must be one of true, false"},
+      {"metrics: {port: 5}", "d.yaml:1: metrics.port: unknown key"},
+      {"metrics:\n  endpoint: 0.0.0.0:80",
+       "d.yaml:2: metrics.endpoint = 0.0.0.0:80: other machines"},
       {"model: [a]", "d.yaml:1: model = [a]: must be text"},
   };
   for (const auto& [text, message] : kBad) {
@@ -105,6 +110,25 @@ TEST_F(DaemonFileKeys, WithoutAllowRemoteTheEndpointIsOnThisMachineAlone) {
   }
   EXPECT_FALSE(check_endpoint("inproc://x", true));
   EXPECT_TRUE(read("endpoint: tcp://0.0.0.0:5555\nallow_remote: true\n"));
+}
+
+TEST_F(DaemonFileKeys, MetricsAreForThisMachineUnlessAllowRemote) {
+  for (const char* local : {"127.0.0.1:9464", "[::1]:0", "localhost:65535"}) {
+    EXPECT_TRUE(check_metrics_endpoint(local, false)) << local;
+  }
+  for (const char* remote : {"0.0.0.0:9464", "10.0.0.1:80", "[::]:9464"}) {
+    const Status status = check_metrics_endpoint(remote, false);
+    ASSERT_FALSE(status) << remote;
+    EXPECT_THAT(status.error().message, AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
+    EXPECT_TRUE(check_metrics_endpoint(remote, true)) << remote;
+  }
+  for (const char* bad :
+       {"9464", ":9464", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:443s",
+        "127.0.0.1:80,0.0.0.0:81", "host:80", "+80", "127.0.0.1:-1", "http://127.0.0.1:80"}) {
+    const Status status = check_metrics_endpoint(bad, true);
+    ASSERT_FALSE(status) << bad;
+    EXPECT_THAT(status.error().message, HasSubstr("must be HOST:PORT")) << bad;
+  }
 }
 
 TEST_F(DaemonFileKeys, TheImagesFileIsRead) {

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `brainshift top`: asks a daemon again and again, and shows its report.
+//
+// On a terminal the page is drawn in place, on the alternate screen, until q or Ctrl-C. Lines that
+// need attention are red as well. On anything else one line is printed each time. While the daemon
+// does not answer, the last page stays, and the first line says for how long: STALE.
+#pragma once
+
+#include <unistd.h>
+
+#include <chrono>
+#include <string>
+
+#include "common/core/error.hpp"
+
+namespace brainshift::client {
+
+struct WatchOptions {
+  std::string endpoint;
+  std::chrono::milliseconds interval{1000};
+  bool once = false;  // one whole page with the rates of one interval, wherever it goes
+  int input = STDIN_FILENO;
+  int output = STDOUT_FILENO;
+};
+
+// Returns when it is told to end (q, SIGINT, SIGTERM), or when the output takes no more. Catches
+// both signals meanwhile. Errors: as Client::connect; with `once` also as Client::report.
+Status watch(const WatchOptions& options);
+
+}  // namespace brainshift::client

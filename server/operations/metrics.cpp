@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/operations/metrics.hpp"
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace brainshift::server {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using Labels = std::vector<ClientMetric::Label>;
+
+MetricFamily family(MetricType type, std::string_view name, std::string_view help) {
+  MetricFamily result;
+  result.name = "brainshift_" + std::string(name);
+  result.help = help;
+  result.type = type;
+  return result;
+}
+
+void add(MetricFamily& family, double value, Labels labels = {}) {
+  ClientMetric& metric = family.metric.emplace_back();
+  metric.label = std::move(labels);
+  (family.type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
+}
+
+double number(std::uint64_t count) { return static_cast<double>(count); }
+
+// All families of one report.
+class Families {
+ public:
+  void gauge(std::string_view name, double value, std::string_view help) {
+    add(open(MetricType::Gauge, name, help), value);
+  }
+  void counter(std::string_view name, double value, std::string_view help) {
+    add(open(MetricType::Counter, name, help), value);
+  }
+  MetricFamily& open(MetricType type, std::string_view name, std::string_view help) {
+    return families_.emplace_back(family(type, name, help));
+  }
+  void put(MetricFamily family) { families_.push_back(std::move(family)); }
+  std::vector<MetricFamily> take() { return std::move(families_); }
+
+ private:
+  std::vector<MetricFamily> families_;
+};
+
+void add_daemon(Families& out, const wire::DaemonReport& report) {
+  add(out.open(MetricType::Gauge, "build_info", "Always 1; what runs stands in the labels."), 1.0,
+      {{"version", report.version}, {"build", report.build}, {"machine", report.machine}});
+  out.gauge("uptime_seconds", 1e-3 * number(report.uptime_ms), "Since the daemon started.");
+  out.gauge("model_ready", report.model_ready, "1: a model is loaded.");
+  out.gauge("worker_busy_seconds", 1e-3 * report.working_ms,
+            "Since the worker began what it does now; 0: it waits.");
+  out.gauge("worker_hangs", report.worker_hangs(), "1: it is busy for longer than it may.");
+  out.counter("log_lines_lost_total", number(report.log_lines_lost),
+              "Lines that gave way because the reader of the log did not keep up.");
+}
+
+void add_session(Families& out, const wire::DaemonReport& report) {
+  MetricFamily& phase = out.open(MetricType::Gauge, "session_phase", "1 for the phase that holds.");
+  for (int i = 0; i <= static_cast<int>(SessionPhase::kClosed); ++i) {
+    const auto candidate = static_cast<SessionPhase>(i);
+    add(phase, candidate == report.session.phase, {{"phase", std::string(to_string(candidate))}});
+  }
+  if (report.session.newest_usable > 0) {
+    out.gauge("field_age_seconds", 1e-3 * report.session.age_ms,
+              "Since the observation that the newest usable field answers arrived.");
+  }
+  MetricFamily& updates =
+      out.open(MetricType::Counter, "updates_total", "Final updates, by what they are.");
+  add(updates, number(report.usable), {{"result", "usable"}});
+  add(updates, number(report.unusable), {{"result", "unusable"}});
+  add(updates, number(report.failures), {{"result", "failed"}});
+  out.counter("iterates_total", number(report.iterates), "Intermediate iterates published.");
+}
+
+void add_sources(Families& out, const wire::DaemonReport& report) {
+  MetricFamily received = family(MetricType::Counter, "observations_received_total",
+                                 "Observation messages, by source; empty: not known.");
+  MetricFamily outcome = family(MetricType::Counter, "observations_total",
+                                "What became of them, by source and outcome.");
+  MetricFamily waiting = family(MetricType::Gauge, "observations_waiting",
+                                "Accepted and not yet answered, replaced or skipped.");
+  MetricFamily age = family(MetricType::Gauge, "observation_age_seconds",
+                            "Since the source's last observation arrived.");
+  for (const wire::SourceCounts& counts : report.sources) {
+    const ClientMetric::Label source{"source", counts.source};
+    add(received, number(counts.received), {source});
+    const std::pair<const char*, std::uint64_t> outcomes[] = {
+        {"answered", counts.answered}, {"failed", counts.failed},   {"replaced", counts.replaced},
+        {"skipped", counts.skipped},   {"refused", counts.refused}, {"repeated", counts.repeated}};
+    for (const auto& [name, count] : outcomes) {
+      add(outcome, number(count), {source, {"outcome", name}});
+    }
+    add(waiting, number(counts.waiting), {source});
+    add(age, 1e-3 * counts.age_ms, {source});
+  }
+  for (MetricFamily* filled : {&received, &outcome, &waiting, &age}) {
+    if (!filled->metric.empty()) out.put(std::move(*filled));
+  }
+}
+
+void add_viewers(Families& out, const wire::DaemonReport& report) {
+  out.gauge("clients", report.clients, "Connected, viewers among them.");
+  out.gauge("viewers", number(report.viewers.size()), "Subscribers.");
+  std::uint64_t behind = 0;
+  for (const wire::ViewerFigures& viewer : report.viewers) behind += viewer.owed > 0 ? 1 : 0;
+  out.gauge("viewers_behind", number(behind), "Subscribers to whom an update is owed.");
+}
+
+// The buckets are cumulative here.
+ClientMetric::Histogram histogram_of(const wire::StageLatency& stage,
+                                     const std::vector<double>& bounds_ms) {
+  ClientMetric::Histogram histogram;
+  histogram.sample_count = stage.all.count;
+  histogram.sample_sum = 1e-3 * stage.sum_ms;
+  std::uint64_t cumulative = 0;
+  for (std::size_t i = 0; i < stage.bucket_counts.size(); ++i) {
+    cumulative += stage.bucket_counts[i];
+    const bool bounded = i < bounds_ms.size();
+    const double bound_s = bounded ? bounds_ms[i] / 1e3 : std::numeric_limits<double>::infinity();
+    histogram.bucket.push_back({cumulative, bound_s});
+  }
+  return histogram;
+}
+
+void add_stages(Families& out, const wire::DaemonReport& report) {
+  MetricFamily all = family(MetricType::Histogram, "stage_seconds",
+                            "Stages of the updates with an estimate; total: from the arrival of "
+                            "the observation to publication.");
+  MetricFamily recent = family(MetricType::Gauge, "stage_recent_seconds",
+                               "The same over the last updates: exact percentiles and maximum.");
+  for (const wire::StageLatency& stage : report.stages) {
+    ClientMetric& metric = all.metric.emplace_back();
+    metric.label = {{"stage", stage.stage}};
+    metric.histogram = histogram_of(stage, report.bounds_ms);
+    if (stage.recent.count == 0) continue;
+    const std::pair<const char*, double> figures[] = {{"p50", stage.recent.p50_ms},
+                                                      {"p95", stage.recent.p95_ms},
+                                                      {"p99", stage.recent.p99_ms},
+                                                      {"max", stage.recent.max_ms}};
+    for (const auto& [name, milliseconds] : figures) {
+      add(recent, 1e-3 * milliseconds, {{"stage", stage.stage}, {"figure", name}});
+    }
+  }
+  out.put(std::move(all));
+  if (!recent.metric.empty()) out.put(std::move(recent));
+}
+
+void add_journal(Families& out, const wire::DaemonReport& report) {
+  out.gauge("journal_configured", report.journal.has_value(), "1: the daemon keeps a journal.");
+  if (!report.journal) return;
+  out.gauge("journal_recording", report.journal->recording, "1: what is accepted will be written.");
+  out.gauge("journal_bytes", number(report.journal->bytes), "The file and its write-ahead log.");
+  out.gauge("journal_records", number(report.journal->records), "Of the session, on the disk.");
+  out.gauge("journal_lost_records", number(report.journal->lost),
+            "Observations and updates of the session that no file holds.");
+}
+
+void add_process(Families& out, const wire::ProcessFigures& process) {
+  out.gauge("resident_memory_bytes", number(process.resident_bytes), "Resident memory.");
+  out.gauge("peak_memory_bytes", number(process.peak_bytes), "Greatest resident memory so far.");
+  out.gauge("open_descriptors", number(process.descriptors), "Open file descriptors.");
+  out.gauge("max_descriptors", number(process.descriptor_limit), "Limit of open descriptors.");
+  out.gauge("threads", number(process.threads), "Threads.");
+}
+
+}  // namespace
+
+std::vector<MetricFamily> metric_families(const wire::DaemonReport& report) {
+  Families out;
+  add_daemon(out, report);
+  add_session(out, report);
+  add_sources(out, report);
+  add_viewers(out, report);
+  add_stages(out, report);
+  add_journal(out, report);
+  add_process(out, report.process);
+  return out.take();
+}
+
+}  // namespace brainshift::server
