@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior fuzz format format-check tidy image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior faults fuzz format format-check tidy image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -56,6 +56,12 @@ surgeries: configure ## many different simulated surgeries on two heads, scored,
 prior: configure ## brains drawn from the prior against published brain shift, into out/prior; QUICK=1 for a short run
 	cmake --build --preset $(PRESET) -j $(JOBS) --target prior_programs
 	cmake/scripts/prior.sh $(BUILD)
+
+faults: setup ## the daemon through kills, bad peers, stalls, loads; into out/faults; TOPICS="kills rate", BRIEF=1
+	@docker/install-packages.sh docker/packages-faults.txt
+	@cmake --preset $(PRESET) --log-level=WARNING
+	cmake --build --preset $(PRESET) -j $(JOBS) --target fault_programs
+	cmake/scripts/faults.sh $(BUILD) out/faults $(TOPICS)
 
 fuzz: setup ## random inputs for every reader and decoder, SECONDS=60 each, into out/fuzz
 	@docker/install-packages.sh docker/packages-fuzz.txt

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A network that swallows everything without closing: the viewer's field stops being current within
+// a second, and becomes current again when the network does. The same for a cut connection.
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "tests/faults/daemon_process.hpp"
+#include "tests/faults/feed.hpp"
+#include "tests/faults/need.hpp"
+#include "tests/faults/raw_peer.hpp"
+#include "tests/faults/settings.hpp"
+#include "tests/faults/tcp_proxy.hpp"
+
+namespace brainshift::faults {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using client::Currency;
+using std::chrono::milliseconds;
+
+// s until the field's currency is (or is no longer) kCurrent; `most_s` when it never is.
+double seconds_until(client::Client& viewer, bool current, double most_s) {
+  const auto begin = Clock::now();
+  const auto passed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  while ((viewer.field_status().currency == Currency::kCurrent) != current && passed() < most_s) {
+    const auto asked = Clock::now();
+    static_cast<void>(viewer.next_update(milliseconds(10)));
+    // After a loss the call returns at once.
+    std::this_thread::sleep_until(asked + milliseconds(5));
+  }
+  return passed();
+}
+
+}  // namespace
+
+void run_half_open(const Settings& settings, Tally& tally) {
+  const Feed feed(settings.surgery);
+  const DaemonProcess daemon({.model = settings.model, .folder = settings.work});
+  Opened opened = open_session(daemon.endpoint(), feed, false);
+  need(opened.client.subscribe(), "subscribe");
+  answer_to(opened.client, feed.live(0));
+
+  TcpProxy proxy(port_of(daemon.endpoint()));
+  auto viewer = need(client::Client::connect(proxy.endpoint()), "connect");
+  need(viewer.subscribe(), "subscribe");
+  double noticed_s = 0.0, healed_s = 0.0, cut_s = 0.0, delayed_s = 0.0;
+  int unreasoned = 0;
+  Rows rows(settings.work / "half-open.csv", "run,stall_noticed_s,healed_s,cut_healed_s");
+  if (seconds_until(viewer, true, 10.0) >= 10.0) throw std::runtime_error("no current field");
+  for (int run = 0; run < settings.count; ++run) {
+    // Not at the same phase of the renewals each time.
+    std::this_thread::sleep_for(milliseconds(37 * run % 250));
+    proxy.stall(true);
+    const double noticed = seconds_until(viewer, false, 10.0);
+    unreasoned += viewer.field_status().reason.empty() ? 1 : 0;
+    proxy.stall(false);
+    const double healed = seconds_until(viewer, true, 30.0);
+    proxy.cut();
+    std::this_thread::sleep_for(milliseconds(20));
+    static_cast<void>(viewer.next_update(milliseconds(1)));
+    const double after_cut = seconds_until(viewer, true, 30.0);
+    rows.add({double(run), noticed, healed, after_cut});
+    noticed_s = std::max(noticed_s, noticed);
+    healed_s = std::max(healed_s, healed);
+    cut_s = std::max(cut_s, after_cut);
+    show_progress("half-open", run + 1, settings.count);
+  }
+  proxy.delay(milliseconds(100));
+  static_cast<void>(seconds_until(viewer, false, 2.0));  // two seconds when it stays current
+  delayed_s = seconds_until(viewer, true, 10.0);
+  tally.shown("half-open connections", settings.count);
+  // The lease runs for a second from the last question; the check adds its own 10 ms.
+  tally.time_at_most("slowest notice of a half-open daemon s", noticed_s, 1.02);
+  tally.equals("without a reason to show", unreasoned, 0);
+  tally.shown("slowest return to current after it s", healed_s);
+  tally.shown("slowest return to current after a cut s", cut_s);
+  tally.at_most("return to current with a delay of 100 ms each way s", delayed_s, 2.0);
+}
+
+}  // namespace brainshift::faults

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// kill -9 at random moments of a replay, flooded and paced in turns. Checked after each: every
+// observation that the daemon called recorded is in the journal; the next daemon is ready in time;
+// `brainshift replay --resume` goes on to the same final field.
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <random>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "client/replay/resume.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/wire/convert.hpp"
+#include "tests/faults/daemon_process.hpp"
+#include "tests/faults/feed.hpp"
+#include "tests/faults/need.hpp"
+#include "tests/faults/settings.hpp"
+#include "tests/integration/process.hpp"
+#include "tests/integration/workspace.hpp"
+
+namespace brainshift::faults {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+constexpr std::size_t kObservations = 90;
+constexpr int kFloodedLast_ms = 120;  // the last moment of a kill after a session's start
+constexpr int kPacedLast_ms = 450;
+constexpr milliseconds kPace{4};
+
+std::string content(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// By source: what the daemon said is on its disk.
+struct Claims {
+  std::map<std::string, RecordedSource> sources;
+
+  void take(const std::optional<SessionState>& state, std::uint64_t session) {
+    if (!state || state->session.session_id != session || !state->recording) return;
+    for (const RecordedSource& each : state->recording->sources) {
+      RecordedSource& known = sources[each.source];
+      if (each.until >= known.until) known = each;
+    }
+  }
+};
+
+// The final field of the whole surgery by the command line: the bytes of the field file.
+class Replay {
+ public:
+  Replay(fs::path surgery, fs::path folder)
+      : surgery_(std::move(surgery)), report_(folder / "report.json") {}
+
+  std::string final_field(const std::string& endpoint, const fs::path& resume) const {
+    fs::remove(field());
+    std::vector<std::string> command = {integration::brainshift(),
+                                        "replay",
+                                        surgery_,
+                                        "--endpoint",
+                                        endpoint,
+                                        "--boundary",
+                                        "contact",
+                                        "--report",
+                                        report_};
+    if (!resume.empty()) command.insert(command.end(), {"--resume", resume});
+    const auto done = integration::run(command);
+    if (done.exit_status != 0) throw std::runtime_error("brainshift replay: " + done.err);
+    return content(field());
+  }
+
+ private:
+  fs::path field() const { return report_.parent_path() / "report-faults-contact.vtu"; }
+
+  fs::path surgery_;
+  fs::path report_;
+};
+
+// Plays until the daemon is gone; what it claimed until then.
+Claims play_into(client::Client& client, const wire::SessionInfo& info, const Feed& feed,
+                 bool paced) {
+  Claims claims;
+  need(client.subscribe(Subscription::kMaxWindow), "subscribe");
+  const auto begin = std::chrono::steady_clock::now();
+  const auto gone = [&](std::chrono::steady_clock::time_point until) {
+    do {
+      const auto asked = std::chrono::steady_clock::now();
+      const auto wait = std::max(milliseconds(1), std::chrono::ceil<milliseconds>(until - asked));
+      const auto message = client.next_update(wait);
+      claims.take(client.session_state(), info.session_id);
+      // A call that ends before its time without an update has lost the connection.
+      const auto took = std::chrono::steady_clock::now() - asked;
+      if (!message && took < wait - std::chrono::microseconds(500)) return true;
+    } while (std::chrono::steady_clock::now() < until);
+    return false;
+  };
+  for (std::size_t i = 0; i < kObservations; ++i) {
+    if (paced && gone(begin + i * kPace)) return claims;
+    if (!client.submit(feed.recorded(i))) return claims;
+    claims.take(client.session_state(), info.session_id);
+    if (!paced && i % 8 == 7 && gone(std::chrono::steady_clock::now())) return claims;
+  }
+  gone(begin + std::chrono::seconds(5));
+  return claims;
+}
+
+// Sequences in the valid prefix of the journals, by source.
+std::map<std::string, std::set<std::uint64_t>> held_by(const std::vector<fs::path>& journals) {
+  std::map<std::string, std::set<std::uint64_t>> held;
+  for (const fs::path& journal : journals) {
+    const auto file = io::SurgeryFile::open_damaged(journal);
+    if (!file) continue;
+    static_cast<void>(file->visit([&](const io::SurgeryRecord& record) -> Status {
+      if (record.kind != io::RecordKind::kObservation) return {};
+      const auto observation = wire::decode_observation(record.payload);
+      if (observation) held[observation->source].insert(record.sequence);
+      return {};
+    }));
+  }
+  return held;
+}
+
+struct Lost {
+  int claimed = 0;
+  int lost = 0;
+};
+Lost compare(const Claims& claims, const Feed& feed, const std::vector<fs::path>& journals) {
+  auto held = held_by(journals);
+  Lost result;
+  for (std::size_t i = 0; i < kObservations; ++i) {
+    const Observation sent = feed.recorded(i);
+    const auto claim = claims.sources.find(sent.source);
+    if (claim == claims.sources.end() || sent.sequence > claim->second.until) continue;
+    if (sent.sequence <= claim->second.lost_until) continue;
+    ++result.claimed;
+    result.lost += held[sent.source].contains(sent.sequence) ? 0 : 1;
+  }
+  return result;
+}
+
+struct Killed {
+  Claims claims;
+  std::vector<fs::path> journals;
+};
+Killed kill_during_replay(const DaemonOptions& options, const Feed& feed, bool paced,
+                          int after_ms) {
+  DaemonProcess daemon(options);
+  Opened opened = open_session(daemon.endpoint(), feed, true);
+  Killed killed;
+  {
+    // Only sends the signal: the main thread waits for the end.
+    const std::jthread killer([pid = daemon.pid(), after_ms] {
+      std::this_thread::sleep_for(milliseconds(after_ms));
+      kill(pid, SIGKILL);
+    });
+    killed.claims = play_into(opened.client, opened.info, feed, paced);
+  }
+  daemon.end(SIGKILL);
+  killed.journals = journals_in(daemon.journal());
+  return killed;
+}
+
+}  // namespace
+
+void run_kills(const Settings& settings, Tally& tally) {
+  const Feed feed(settings.surgery);
+  const fs::path surgery = settings.work / "kills.surgery";
+  fs::remove(surgery);
+  feed.write(surgery, kObservations);
+  const Replay replay(surgery, settings.work);
+  DaemonOptions options;
+  options.model = settings.model;
+  options.folder = settings.work;
+  options.log = false;
+
+  std::string expected;
+  double load_s = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const DaemonProcess daemon(options);
+    load_s = std::max(load_s, daemon.listening_after_s());
+    if (i == 0) expected = replay.final_field(daemon.endpoint(), {});
+  }
+  if (expected.empty()) throw std::runtime_error("the replay wrote no field");
+
+  Rows rows(settings.work / "kills.csv",
+            "run,paced,kill_ms,called_recorded,lost,ready_s,same_field");
+  std::mt19937 random(settings.seed);
+  int claimed = 0, lost = 0, differ = 0, late = 0, with_claims = 0;
+  double slowest_s = 0.0;
+  options.journal = true;
+  for (int run = 0; run < settings.count; ++run) {
+    const bool paced = run % 2 == 1;
+    const int after_ms =
+        static_cast<int>(random() % static_cast<unsigned>(paced ? kPacedLast_ms : kFloodedLast_ms));
+    fs::remove_all(settings.work / "journal");
+    const Killed killed = kill_during_replay(options, feed, paced, after_ms);
+    const Lost found = compare(killed.claims, feed, killed.journals);
+    // The journal is set aside: the next daemon keeps its own.
+    fs::path resume;
+    for (const fs::path& journal : killed.journals) {
+      if (client::read_resume_point(journal)) resume = journal;
+    }
+    const DaemonProcess daemon(options);
+    const double ready_s = daemon.listening_after_s() + answered_within_s(daemon.endpoint());
+    const bool same = replay.final_field(daemon.endpoint(), resume) == expected;
+    claimed += found.claimed;
+    with_claims += found.claimed > 0 ? 1 : 0;
+    lost += found.lost;
+    differ += same ? 0 : 1;
+    late += ready_s > load_s + 2.0 ? 1 : 0;
+    slowest_s = std::max(slowest_s, ready_s);
+    rows.add({double(run), double(paced), double(after_ms), double(found.claimed),
+              double(found.lost), ready_s, double(same)});
+    show_progress("kills", run + 1, settings.count);
+  }
+  tally.shown("kills", settings.count);
+  tally.shown("load and start without a kill s", load_s);
+  tally.shown("observations called recorded before a kill", claimed);
+  tally.at_least("share of kills after something was called recorded %",
+                 100.0 * with_claims / std::max(1, settings.count), 50.0);
+  tally.equals("observations called recorded and lost", lost, 0);
+  tally.at_most("slowest start after a kill beyond the load s", slowest_s - load_s, 2.0);
+  tally.equals("starts after a kill that took longer", late, 0);
+  tally.equals("resumed replays with another final field", differ, 0);
+}
+
+}  // namespace brainshift::faults
