@@ -124,7 +124,15 @@ std::optional<Result<std::string>> Client::Impl::answer(const std::string& messa
     take_state(frame->request_id, frame->payload);
     if (frame->request_id != id) return std::nullopt;
   }
-  if (frame->request_id != 0 && frame->request_id < id) return std::nullopt;  // timed out before
+  if (frame->request_id != 0 && frame->request_id < id) {
+    // A renewal that is refused: after a restart the choice may hold no node of another model.
+    const bool waiting_for_push = reply_type == MessageType::kUpdate;
+    if (frame->type == MessageType::kErrorReply && waiting_for_push &&
+        watch.refused(frame->request_id)) {
+      return tl::unexpected(wire::decode_error(frame->payload));
+    }
+    return std::nullopt;  // timed out before
+  }
   // A daemon that could not read a request's id complains with id 0.
   const bool complaint = frame->request_id == 0 && frame->type == MessageType::kErrorReply;
   if (frame->request_id != id && !complaint) {

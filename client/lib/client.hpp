@@ -154,6 +154,8 @@ class Client {
   // quality, or the error that an observation ended in. Only Update::usable() ones may be shown.
   // With a window of 1, one that had to wait here is first confirmed to be the newest.
   // kUnavailable when none arrives within the timeout, and at once when the connection is lost.
+  // The daemon's own error when it refuses to renew the subscription: after a restart with another
+  // model the choice may hold no node.
   Result<wire::UpdateMessage> next_update(std::chrono::milliseconds timeout);
 
   // The newest usable update of the running session among those that next_update() has returned.

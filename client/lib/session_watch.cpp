@@ -34,6 +34,10 @@ void SessionWatch::answered(std::uint64_t request_id, const SessionState& state)
   asked_.erase(asked_.begin(), request + 1);  // answers come in the order of their requests
 }
 
+bool SessionWatch::refused(std::uint64_t request_id) {
+  return std::erase_if(asked_, [&](const auto& entry) { return entry.first == request_id; }) > 0;
+}
+
 bool SessionWatch::model_fits(const std::string& model_id) const {
   return model_id_.empty() || model_id == model_id_;
 }

@@ -23,6 +23,8 @@ class SessionWatch {
   void asked(std::uint64_t request_id, TimePoint now);
   // The answer to that request; nothing is proven when the request is not known.
   void answered(std::uint64_t request_id, const SessionState& state);
+  // The daemon refused that request, of which nothing more will come; true when it is known.
+  bool refused(std::uint64_t request_id);
   // A state that nobody asked for: news, but no proof of time.
   void told(const SessionState& state) { state_ = state; }
   // The connection is gone; requests that are under way get no answer.

@@ -49,6 +49,8 @@ class Parcels {
   static constexpr std::size_t kUpdatesKept = 3;
 
   void begin_turn() { made_ = 0; }
+  // Of a session that has ended nothing is kept.
+  void forget_session() { entries_.clear(); }
   // Whether something was left to the next turn.
   bool spent() const { return made_ >= kMakesPerTurn; }
 

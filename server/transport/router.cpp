@@ -307,6 +307,7 @@ void Router::Impl::deliver(const Outgoing& message) {
 void Router::Impl::forget_session() {
   last_final.reset();
   failure_since.reset();
+  parcels.forget_session();
   for (auto& [routing_id, peer] : peers.all()) {
     if (peer.viewer) peer.viewer->owe_nothing();
   }

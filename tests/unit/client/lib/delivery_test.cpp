@@ -3,6 +3,7 @@
 // it cannot apply.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <functional>
 #include <mutex>
 #include <vector>
@@ -142,6 +143,27 @@ TEST(ClientDelivery, AMalformedUpdateIsReportedAndAskedForAnew) {
   ASSERT_FALSE(malformed);
   EXPECT_EQ(malformed.error().code, ErrorCode::kProtocol);
   EXPECT_EQ(x_of(viewing.client.next_update(kPatient)), Eigen::RowVector2d(2, 2));
+}
+
+// The daemon was restarted with another patient's model, of which no node lies in the region.
+TEST(ClientDelivery, AChoiceThatIsRefusedLaterIsReported) {
+  std::atomic<int> asked = 0;
+  FakeDaemon daemon([&](const Frame& request) -> Answers {
+    if (asked++ == 0) {
+      SessionState state;
+      state.phase = SessionPhase::kEmpty;
+      return {encode_frame(MessageType::kSessionState, request.request_id, wire::encode(state))};
+    }
+    const Error refused{ErrorCode::kEmptySet, "choice: no node lies in the ball"};
+    return {encode_frame(MessageType::kErrorReply, request.request_id, wire::encode(refused))};
+  });
+  auto client = Client::connect(daemon.endpoint(), {.renewal_interval = milliseconds(20)});
+  ASSERT_TRUE(client);
+  ASSERT_TRUE(client->subscribe(1, kChoice));
+  const auto update = client->next_update(kPatient);
+  ASSERT_FALSE(update);
+  EXPECT_EQ(update.error().code, ErrorCode::kEmptySet);
+  EXPECT_EQ(update.error().message, "choice: no node lies in the ball");
 }
 
 TEST(ClientDelivery, ABadChoiceIsRefusedBeforeItIsSent) {
