@@ -11,7 +11,7 @@ known=$(
   grep -rhoPz 'TEST(_F|_P)?\(\s*\w+,\s*\w+\s*\)' tests --include=*.cpp | tr -d ' \n' | tr '\0' '\n' |
     sed -E 's/TEST(_F|_P)?\(//; s/,/./; s/\)//'
   sed -n 's/^brainshift_fuzz(\([a-z]*\) .*/fuzz.\1/p' tests/fuzz/CMakeLists.txt
-  sed -n 's/^faults_test(\([a-z-]*\))/faults.\1/p' tests/faults/CMakeLists.txt
+  sed -n 's/^faults_test(\([a-z-]*\).*/faults.\1/p' tests/faults/CMakeLists.txt
 )
 mapfile -t named < <(grep -oE '`([A-Z][A-Za-z]+\.[A-Z][A-Za-z0-9]+|fuzz\.[a-z]+|faults\.[a-z-]+)`' docs/hazards.md |
   tr -d '`' | sort -u)

@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # faults-inputs.sh BIN_DIR OUT_DIR [CASE...]: what the fault suite serves and sends. For each CASE:
-#   coarse  coarse.h5, coarse.surgery, and other.h5: another patient's, with another mesh and tumour
-#   head    head.h5, head.surgery: the default case
+#   coarse  coarse.h5, its surgeries, and other.h5: another patient's, with another mesh and tumour
+#   head    head.h5, its surgeries: the default case
+# Surgeries of NAME: NAME-joint.surgery (ultrasound, a stereo camera, vessel forks), NAME-boundary.surgery
+# (the tumour's boundary alone), NAME-landmarks.surgery (its points with displacements).
 # A case whose files are there and newer than the programs is left as it is.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -19,11 +21,16 @@ patient() {
   rm -f "$out/$1.h5.partial"
   "$bin/brainshiftd" prepare --case "$2" --out "$out/$1.h5" >"$out/$1.txt"
 }
-# surgery NAME CASE_FILE: seen by ultrasound, a stereo camera and vessel forks
+# surgery NAME CASE_FILE SCENARIO
 surgery() {
   if [ "$out/$1.surgery" -nt "$bin/brainshift" ]; then return; fi
   rm -f "$out/$1.surgery"
-  "$bin/brainshift" simulate --case "$2" --scenario joint-sag --seed 1 --out "$out/$1.surgery"
+  "$bin/brainshift" simulate --case "$2" --scenario "$3" --seed 1 --out "$out/$1.surgery"
+}
+surgeries() {
+  surgery "$1-joint" "$2" joint-sag
+  surgery "$1-boundary" "$2" paper-icp
+  surgery "$1-landmarks" "$2" paper
 }
 
 for one in "$@"; do
@@ -33,11 +40,11 @@ for one in "$@"; do
         -e 's/^case_id: .*/case_id: other-patient/' config/cases/colin27-coarse.yaml >"$out/other.yaml"
       patient coarse config/cases/colin27-coarse.yaml
       patient other "$out/other.yaml"
-      surgery coarse config/cases/colin27-coarse.yaml
+      surgeries coarse config/cases/colin27-coarse.yaml
       ;;
     head)
       patient head config/cases/colin27.yaml
-      surgery head config/cases/colin27.yaml
+      surgeries head config/cases/colin27.yaml
       ;;
     *) echo "faults-inputs: no case $one" >&2; exit 2 ;;
   esac

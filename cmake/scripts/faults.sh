@@ -31,6 +31,14 @@ model_of() {
   esac
 }
 
+surgery_of() {
+  case $1 in
+    kills) echo landmarks ;;
+    stalled | viewers | rate | cost) echo boundary ;;
+    *) echo joint ;;
+  esac
+}
+
 empty_study "$out"
 BRAINSHIFT_STUDY_DIR=$(realpath "$out")
 export BRAINSHIFT_STUDY_DIR
@@ -43,7 +51,7 @@ for topic in "${topics[@]}"; do
   model=$(model_of "$topic")
   cmake/scripts/faults-inputs.sh "$bin" "$inputs" "$model"
   step "$topic" "$bin/faults" "$topic" --work "$out/$topic" --model "$inputs/$model.h5" \
-    --surgery "$inputs/$model.surgery" --other-model "$inputs/other.h5" "${brief[@]}" || status=1
+    --surgery "$inputs/$model-$(surgery_of "$topic").surgery" --other-model "$inputs/other.h5" "${brief[@]}" || status=1
 done
 current=summary
 "$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make faults" --title Faults || status=1

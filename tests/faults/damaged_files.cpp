@@ -170,7 +170,8 @@ void run_damaged_files(const Settings& settings, Tally& tally) {
   tally.equals("surgery files: changed and taken for good", journal.taken_for_good, 0);
   tally.shown("surgery files: flips of bytes that mean nothing", journal.harmless);
   // A cut at a random place keeps half of the file in the mean.
-  tally.at_least("surgery files: records recovered of a cut file, mean %", journal.kept_pct, 40.0);
+  tally.at_least("surgery files: mean share of records recovered of a cut file %", journal.kept_pct,
+                 40.0);
 
   const fs::path model = settings.work / "damaged.h5";
   fs::copy_file(settings.model, model, fs::copy_options::overwrite_existing);

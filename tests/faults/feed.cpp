@@ -48,7 +48,8 @@ std::int64_t monotonic_ns() {
       .count();
 }
 
-Feed::Feed(const std::filesystem::path& surgery) : surgery_(surgery) {
+Feed::Feed(const std::filesystem::path& surgery, std::size_t split)
+    : surgery_(surgery), split_(split) {
   const auto file = need(io::SurgeryFile::open(surgery), "surgery");
   case_id_ = file.meta().case_id;
   for (const auto& record : need(file.records(io::RecordKind::kObservation), surgery.string())) {
@@ -60,6 +61,10 @@ Feed::Feed(const std::filesystem::path& surgery) : surgery_(surgery) {
 Observation Feed::recorded(std::size_t i) const {
   Observation observation = observations_[i % observations_.size()];
   shift(observation, 0.002 * static_cast<double>(i % 200));
+  if (split_ > 1) {
+    observation.source += '-';
+    observation.source += std::to_string(1 + i / observations_.size() % split_);
+  }
   observation.sequence = i + 1;
   observation.acquired_ns = static_cast<std::int64_t>(i + 1) * kStep_ns;
   return observation;

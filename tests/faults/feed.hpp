@@ -16,7 +16,8 @@ namespace brainshift::faults {
 // 0.002 mm more than those of the one before (anew after 200): a field tells what it answers.
 class Feed {
  public:
-  explicit Feed(const std::filesystem::path& surgery);
+  // split: the recording as seen by so many sources in turns, SOURCE-1, SOURCE-2, ...; 1: as it is.
+  explicit Feed(const std::filesystem::path& surgery, std::size_t split = 1);
 
   // The i-th, from 0, with sequence i + 1 and times 10 ms apart, as a recording has them.
   Observation recorded(std::size_t i) const;
@@ -24,7 +25,8 @@ class Feed {
   Observation live(std::size_t i) const;
 
   const std::string& case_id() const { return case_id_; }
-  std::size_t sources() const { return observations_.size(); }
+  // Observations until every source has had its turn.
+  std::size_t sources() const { return observations_.size() * split_; }
 
   // The first `count` as a surgery file of the same case and model.
   void write(const std::filesystem::path& file, std::size_t count) const;
@@ -33,6 +35,7 @@ class Feed {
   std::filesystem::path surgery_;
   std::string case_id_;
   std::vector<Observation> observations_;
+  std::size_t split_;
 };
 
 std::int64_t monotonic_ns();

@@ -29,9 +29,10 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
-constexpr std::size_t kObservations = 90;
+constexpr std::size_t kObservations = 60;
+constexpr std::size_t kSources = 3;
 constexpr int kFloodedLast_ms = 120;  // the last moment of a kill after a session's start
-constexpr int kPacedLast_ms = 450;
+constexpr int kPacedLast_ms = 300;
 constexpr milliseconds kPace{4};
 
 std::string content(const fs::path& file) {
@@ -82,31 +83,26 @@ class Replay {
   fs::path report_;
 };
 
-// Plays until the daemon is gone; what it claimed until then.
+// Plays until the daemon is gone; what it claimed until then. Every answer to subscribe() says what
+// is on the disk at that moment.
 Claims play_into(client::Client& client, const wire::SessionInfo& info, const Feed& feed,
                  bool paced) {
+  using Clock = std::chrono::steady_clock;
   Claims claims;
-  need(client.subscribe(Subscription::kMaxWindow), "subscribe");
-  const auto begin = std::chrono::steady_clock::now();
-  const auto gone = [&](std::chrono::steady_clock::time_point until) {
-    do {
-      const auto asked = std::chrono::steady_clock::now();
-      const auto wait = std::max(milliseconds(1), std::chrono::ceil<milliseconds>(until - asked));
-      const auto message = client.next_update(wait);
-      claims.take(client.session_state(), info.session_id);
-      // A call that ends before its time without an update has lost the connection.
-      const auto took = std::chrono::steady_clock::now() - asked;
-      if (!message && took < wait - std::chrono::microseconds(500)) return true;
-    } while (std::chrono::steady_clock::now() < until);
+  const auto gone = [&] {
+    if (!client.subscribe()) return true;
+    claims.take(client.session_state(), info.session_id);
     return false;
   };
+  const auto begin = Clock::now();
   for (std::size_t i = 0; i < kObservations; ++i) {
-    if (paced && gone(begin + i * kPace)) return claims;
+    if (paced) std::this_thread::sleep_until(begin + i * kPace);
     if (!client.submit(feed.recorded(i))) return claims;
-    claims.take(client.session_state(), info.session_id);
-    if (!paced && i % 8 == 7 && gone(std::chrono::steady_clock::now())) return claims;
+    if ((paced || i % 4 == 3) && gone()) return claims;
   }
-  gone(begin + std::chrono::seconds(5));
+  while (!gone() && Clock::now() < begin + std::chrono::seconds(5)) {
+    static_cast<void>(client.next_update(milliseconds(2)));
+  }
   return claims;
 }
 
@@ -169,7 +165,7 @@ Killed kill_during_replay(const DaemonOptions& options, const Feed& feed, bool p
 }  // namespace
 
 void run_kills(const Settings& settings, Tally& tally) {
-  const Feed feed(settings.surgery);
+  const Feed feed(settings.surgery, kSources);
   const fs::path surgery = settings.work / "kills.surgery";
   fs::remove(surgery);
   feed.write(surgery, kObservations);

@@ -23,7 +23,7 @@ struct Topic {
 };
 
 const std::map<std::string, Topic> kTopics = {
-    {"kills", {run_kills, "kill -9 during replays, COUNT times", 300, 6, 0, 0}},
+    {"kills", {run_kills, "kill -9 during replays, COUNT times", 300, 4, 0, 0}},
     {"files", {run_damaged_files, "files cut or flipped at COUNT places", 1000, 60, 0, 0}},
     {"messages", {run_bad_messages, "COUNT bad messages", 1000000, 20000, 0, 0}},
     {"unfinished", {run_unfinished_messages, "COUNT MiB of unfinished messages", 1024, 160, 0, 0}},

@@ -98,6 +98,8 @@ bool RawPeer::shake_hands() {
          receive_bytes(2);
 }
 
+bool RawPeer::greet() { return send_bytes(greeting() + ready_command()); }
+
 bool RawPeer::send_part(std::string_view body, bool more) {
   std::string bytes(1, static_cast<char>((more ? kMore : 0) | (body.size() > 255 ? kLong : 0)));
   bytes += big_endian(body.size(), body.size() > 255 ? 8 : 1);

@@ -24,6 +24,8 @@ class RawPeer {
   bool connected() const { return fd_ >= 0; }
   // Greets as a DEALER without security, until the daemon has done the same.
   bool shake_hands();
+  // Says the same without waiting for the daemon, which may have no room for it yet.
+  bool greet();
   // One part of a message; `more`: another part is announced.
   bool send_part(std::string_view body, bool more);
   // The head of a part that claims this size; no body follows.

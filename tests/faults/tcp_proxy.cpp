@@ -94,6 +94,11 @@ TcpProxy::~TcpProxy() {
   close(listener_);
 }
 
+void TcpProxy::stall(bool stalled) {
+  stalled_ = stalled;
+  while (passes_ == stalled) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
 void TcpProxy::accept_one() {
   const int client = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
   if (client < 0) return;
@@ -110,6 +115,7 @@ void TcpProxy::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     std::vector<pollfd> watched = {{listener_, POLLIN, 0}};
     const bool passes = !stalled_;
+    passes_ = passes;
     for (const auto& pair : pairs_) {
       if (!passes) break;
       watched.push_back({pair->client, POLLIN, 0});

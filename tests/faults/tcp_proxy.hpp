@@ -22,8 +22,8 @@ class TcpProxy {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // Half-open: from now on nothing passes, and nothing is closed. False: it passes again.
-  void stall(bool stalled) { stalled_ = stalled; }
+  // Half-open: once this returns nothing passes, and nothing is closed. False: it passes again.
+  void stall(bool stalled);
   // Closes every connection there is. New ones are taken.
   void cut() { cut_ = true; }
   // Every byte arrives this much later.
@@ -38,6 +38,7 @@ class TcpProxy {
   int listener_ = -1;
   std::string endpoint_;
   std::atomic<bool> stalled_ = false;
+  std::atomic<bool> passes_ = true;  // as the thread has taken note of it
   std::atomic<bool> cut_ = false;
   std::atomic<int> delay_ms_ = 0;
   std::vector<std::unique_ptr<Pair>> pairs_;
