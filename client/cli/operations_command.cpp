@@ -10,7 +10,7 @@
 #include "client/lib/client.hpp"
 #include "client/operations/page.hpp"
 #include "client/operations/report_json.hpp"
-#include "client/operations/watch.hpp"
+#include "client/operations/top.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -50,11 +50,11 @@ Status show_top(const TopArguments& arguments) {
   if (!std::isfinite(arguments.interval_s)) {  // CLI::Range lets NaN pass
     return fail(ErrorCode::kInvalidArgument, "--interval must be a number of seconds");
   }
-  WatchOptions options;
+  TopOptions options;
   options.endpoint = arguments.endpoint;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
   options.once = arguments.once;
-  return watch(options);
+  return top(options);
 }
 
 }  // namespace

@@ -84,11 +84,12 @@ TEST_F(ReportTest, NamesSessionOwnerViewersAndTheirCredit) {
   RawPeer viewer(endpoint_);
   start_session(owner);
   subscribe(viewer, 1);
-  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
-    owner.ask(MessageType::kObservation, wire::encode(landmarks(sequence)));
-  }
+  // The first goes out on the viewer's credit; the second has to wait for it.
+  owner.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  report_when(owner, [](const DaemonReport& told) { return told.usable == 1; });
+  owner.ask(MessageType::kObservation, wire::encode(landmarks(2)));
   const DaemonReport report = report_when(owner, [](const DaemonReport& told) {
-    return told.usable >= 1 && nothing_waits(told) && !told.viewers.empty();
+    return told.usable == 2 && nothing_waits(told) && told.viewers.at(0).owed == 1;
   });
   EXPECT_EQ(report.session.session, (SessionKey{kBootId, 1, kModelId}));
   EXPECT_EQ(report.session.phase, SessionPhase::kTracking);
@@ -101,7 +102,6 @@ TEST_F(ReportTest, NamesSessionOwnerViewersAndTheirCredit) {
   EXPECT_EQ(report.viewers[0].window, 1u);
   EXPECT_EQ(report.viewers[0].sent, 1u);
   EXPECT_EQ(report.viewers[0].received, 0u);
-  EXPECT_EQ(report.viewers[0].owed, report.usable > 1 ? 1u : 0u);
 }
 
 // The stages are parts of the way: their sum is no more than the whole.
@@ -198,6 +198,31 @@ TEST_F(ReportTest, WhatTheWorkerIsAtIsSeenWhileItIsAtIt) {
   leave.set_value();
   const DaemonReport idle = report_when(watcher, nothing_waits);
   EXPECT_EQ(idle.limit_ms, 1e3 * ServiceManager::kGrace.count());
+}
+
+TEST_F(ReportTest, AWorkerThatIsBusyForLongerThanItMayHangsUntilItIsDone) {
+  std::promise<void> entered, leave;
+  ServiceOptions options = with_inverter([&](int, const SparseData& data, const auto&, auto& out) {
+    entered.set_value();
+    leave.get_future().wait();
+    return follow_the_data(data, out, 4);
+  });
+  const auto make = options.make_model;
+  options.make_model = [make](const wire::SessionRequest& request, const std::stop_token& stop) {
+    auto model = make(request, stop);
+    // With the time that is allowed beside it: none at all.
+    (*model)->deadline_s = -static_cast<double>(ServiceManager::kGrace.count());
+    return model;
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  EXPECT_FALSE(report_of(peer).worker_hangs());
+  peer.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  entered.get_future().wait();
+  EXPECT_TRUE(report_of(peer).worker_hangs());
+  leave.set_value();
+  EXPECT_FALSE(report_when(peer, nothing_waits).worker_hangs());
 }
 
 // What clients have sent and been told, against the counts, whatever happens to their observations.

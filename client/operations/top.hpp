@@ -15,7 +15,7 @@
 
 namespace brainshift::client {
 
-struct WatchOptions {
+struct TopOptions {
   std::string endpoint;
   std::chrono::milliseconds interval{1000};
   bool once = false;  // one whole page with the rates of one interval, wherever it goes
@@ -25,6 +25,6 @@ struct WatchOptions {
 
 // Returns when it is told to end (q, SIGINT, SIGTERM), or when the output takes no more. Catches
 // both signals meanwhile. Errors: as Client::connect; with `once` also as Client::report.
-Status watch(const WatchOptions& options);
+Status top(const TopOptions& options);
 
 }  // namespace brainshift::client

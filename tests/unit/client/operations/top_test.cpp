@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `brainshift top` on a terminal of the test, and on a pipe.
-#include "client/operations/watch.hpp"
+#include "client/operations/top.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-class WatchTest : public testing::Test {
+class TopTest : public testing::Test {
  protected:
   static FakeDaemon::Handler answering(std::atomic<int>& asked) {
     return [&asked](const wire::Frame& request) {
@@ -50,8 +50,8 @@ class WatchTest : public testing::Test {
     EXPECT_THAT(got, HasSubstr(text));
     return got;
   }
-  static WatchOptions options_for(const FakeDaemon& daemon) {
-    WatchOptions options;
+  static TopOptions options_for(const FakeDaemon& daemon) {
+    TopOptions options;
     options.endpoint = daemon.endpoint();
     options.interval = std::chrono::milliseconds(100);
     return options;
@@ -81,12 +81,12 @@ class Terminal {
   int slave = -1;
 };
 
-TEST_F(WatchTest, DrawsInPlaceUntilQAndLeavesTheTerminalAsItWas) {
+TEST_F(TopTest, DrawsInPlaceUntilQAndLeavesTheTerminalAsItWas) {
   const FakeDaemon daemon(answering(asked_));
   const Terminal terminal;
-  WatchOptions options = options_for(daemon);
+  TopOptions options = options_for(daemon);
   options.input = options.output = terminal.slave;
-  auto ended = std::async(std::launch::async, [&] { return watch(options); });
+  auto ended = std::async(std::launch::async, [&] { return top(options); });
   const std::string begun = read_to(terminal.master, "verdict   well");
   EXPECT_THAT(begun, HasSubstr("\033[?1049h"));
   EXPECT_THAT(read_to(terminal.master, "/s"), HasSubstr("\033[H")) << "again, with rates";
@@ -98,12 +98,12 @@ TEST_F(WatchTest, DrawsInPlaceUntilQAndLeavesTheTerminalAsItWas) {
   EXPECT_TRUE(terminal.echoes());
 }
 
-TEST_F(WatchTest, LinesAreCutToTheTerminal) {
+TEST_F(TopTest, LinesAreCutToTheTerminal) {
   const FakeDaemon daemon(answering(asked_));
   const Terminal terminal;
-  WatchOptions options = options_for(daemon);
+  TopOptions options = options_for(daemon);
   options.input = options.output = terminal.slave;
-  auto ended = std::async(std::launch::async, [&] { return watch(options); });
+  auto ended = std::async(std::launch::async, [&] { return top(options); });
   const std::string drawn = read_to(terminal.master, "\033[J");
   ASSERT_EQ(write(terminal.master, "q", 1), 1);
   EXPECT_TRUE(ended.get().has_value());
@@ -114,12 +114,12 @@ TEST_F(WatchTest, LinesAreCutToTheTerminal) {
   }
 }
 
-TEST_F(WatchTest, SigintEndsItCleanly) {
+TEST_F(TopTest, SigintEndsItCleanly) {
   const FakeDaemon daemon(answering(asked_));
   const Terminal terminal;
-  WatchOptions options = options_for(daemon);
+  TopOptions options = options_for(daemon);
   options.input = options.output = terminal.slave;
-  auto ended = std::async(std::launch::async, [&] { return watch(options); });
+  auto ended = std::async(std::launch::async, [&] { return top(options); });
   read_to(terminal.master, "verdict");
   ASSERT_EQ(kill(getpid(), SIGINT), 0);
   read_to(terminal.master, "\033[?1049l");
@@ -127,13 +127,13 @@ TEST_F(WatchTest, SigintEndsItCleanly) {
   EXPECT_TRUE(terminal.echoes());
 }
 
-TEST_F(WatchTest, OnAPipeEveryLookIsALine) {
+TEST_F(TopTest, OnAPipeEveryLookIsALine) {
   const FakeDaemon daemon(answering(asked_));
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
-  WatchOptions options = options_for(daemon);
+  TopOptions options = options_for(daemon);
   options.output = ends[1];
-  auto ended = std::async(std::launch::async, [&] { return watch(options); });
+  auto ended = std::async(std::launch::async, [&] { return top(options); });
   const std::string lines = read_to(ends[0], "updates/s");
   EXPECT_THAT(lines, HasSubstr("tracking, field 0.2 s old"));
   EXPECT_THAT(lines, Not(HasSubstr("\033")));
@@ -142,14 +142,14 @@ TEST_F(WatchTest, OnAPipeEveryLookIsALine) {
   for (const int fd : ends) close(fd);
 }
 
-TEST_F(WatchTest, OnceIsAPageWithTheRatesOfOneInterval) {
+TEST_F(TopTest, OnceIsAPageWithTheRatesOfOneInterval) {
   const FakeDaemon daemon(answering(asked_));
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
-  WatchOptions options = options_for(daemon);
+  TopOptions options = options_for(daemon);
   options.output = ends[1];
   options.once = true;
-  ASSERT_TRUE(watch(options));
+  ASSERT_TRUE(top(options));
   close(ends[1]);
   const std::string text = read_to(ends[0], "descriptors");
   EXPECT_THAT(text, HasSubstr("30.0/s")) << "3 updates in 0.1 s of the daemon";
@@ -157,12 +157,12 @@ TEST_F(WatchTest, OnceIsAPageWithTheRatesOfOneInterval) {
   close(ends[0]);
 }
 
-TEST_F(WatchTest, ADaemonThatNoLongerAnswersIsCalledStale) {
+TEST_F(TopTest, ADaemonThatNoLongerAnswersIsCalledStale) {
   auto daemon = std::make_unique<FakeDaemon>(answering(asked_));
   const Terminal terminal;
-  WatchOptions options = options_for(*daemon);
+  TopOptions options = options_for(*daemon);
   options.input = options.output = terminal.slave;
-  auto ended = std::async(std::launch::async, [&] { return watch(options); });
+  auto ended = std::async(std::launch::async, [&] { return top(options); });
   read_to(terminal.master, "verdict   well");
   daemon.reset();
   const std::string after = read_to(terminal.master, "STALE: no answer for");
@@ -172,16 +172,16 @@ TEST_F(WatchTest, ADaemonThatNoLongerAnswersIsCalledStale) {
   EXPECT_TRUE(ended.get().has_value());
 }
 
-TEST_F(WatchTest, WithoutADaemonOnceFails) {
+TEST_F(TopTest, WithoutADaemonOnceFails) {
   std::string endpoint;
   {
     const FakeDaemon daemon(answering(asked_));
     endpoint = daemon.endpoint();
   }
-  WatchOptions options;
+  TopOptions options;
   options.endpoint = endpoint;
   options.once = true;
-  const Status status = watch(options);
+  const Status status = top(options);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kUnavailable);
 }

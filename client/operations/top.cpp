@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/operations/watch.hpp"
+#include "client/operations/top.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -123,9 +123,9 @@ bool quits(int input, bool keys, Clock::time_point until) {
   return true;
 }
 
-class Watcher {
+class TopView {
  public:
-  Watcher(Client client, const WatchOptions& options)
+  TopView(Client client, const TopOptions& options)
       : client_(std::move(client)), options_(options) {}
 
   // Asks once more.
@@ -161,41 +161,41 @@ class Watcher {
   }
 
   Client client_;
-  const WatchOptions& options_;
+  const TopOptions& options_;
   Reports reports_;
   bool has_report_ = false;
   std::string failure_;  // of the last question; empty: it was answered
   Clock::time_point answered_ = {};
 };
 
-Status print_once(Watcher& watcher, const WatchOptions& options) {
-  if (Status ok = watcher.ask(); !ok) return ok;
+Status print_once(TopView& view, const TopOptions& options) {
+  if (Status ok = view.ask(); !ok) return ok;
   if (quits(options.input, false, Clock::now() + options.interval)) return {};
-  if (Status ok = watcher.ask(); !ok) return ok;
+  if (Status ok = view.ask(); !ok) return ok;
   std::string text;
-  for (const Line& line : watcher.lines()) text += line.text + "\n";
+  for (const Line& line : view.lines()) text += line.text + "\n";
   write_all(options.output, text);
   return {};
 }
 
 }  // namespace
 
-Status watch(const WatchOptions& options) {
+Status top(const TopOptions& options) {
   ClientOptions client_options;
   client_options.request_timeout = std::chrono::milliseconds(1000);
   auto client = Client::connect(options.endpoint, client_options);
   if (!client) return tl::unexpected(client.error());
   const StopSignals signals;
-  Watcher watcher(std::move(*client), options);
-  if (options.once) return print_once(watcher, options);
+  TopView view(std::move(*client), options);
+  if (options.once) return print_once(view, options);
   std::optional<Screen> screen;
   if (isatty(options.output) != 0) screen.emplace(options.input, options.output);
   while (true) {
     const Clock::time_point begun = Clock::now();
-    static_cast<void>(watcher.ask());  // what is wrong is shown
+    static_cast<void>(view.ask());  // what is wrong is shown
     if (stop_asked != 0) return {};
     const bool shown =
-        screen ? screen->draw(watcher.lines()) : write_all(options.output, watcher.line() + "\n");
+        screen ? screen->draw(view.lines()) : write_all(options.output, view.line() + "\n");
     if (!shown) return {};
     if (quits(options.input, screen && screen->keys(), begun + options.interval)) return {};
   }
