@@ -18,6 +18,7 @@ std::string_view to_string(ErrorCode code) {
     case ErrorCode::kModelNotReady: return "model_not_ready";
     case ErrorCode::kProtocol: return "protocol";
     case ErrorCode::kUnavailable: return "unavailable";
+    case ErrorCode::kNotAllowed: return "not_allowed";
     case ErrorCode::kInternal: return "internal";
   }
   return "internal";

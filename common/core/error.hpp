@@ -27,7 +27,8 @@ enum class ErrorCode {
   kNotConverged,     // iteration limit reached
   kModelNotReady,    // asked before a model is loaded
   kProtocol,         // malformed, truncated, oversized or unknown message
-  kUnavailable,      // peer not reachable or timed out
+  kUnavailable,      // peer not reachable or timed out, or a limit for now: try again later
+  kNotAllowed,       // the caller's role does not include it
   kInternal,         // an error of this program
 };
 

@@ -27,6 +27,7 @@ constexpr int exit_status(ErrorCode code) {
     case ErrorCode::kModelNotReady:
     case ErrorCode::kProtocol:
     case ErrorCode::kUnavailable:
+    case ErrorCode::kNotAllowed:
     case ErrorCode::kInternal: return kExitFailure;
   }
   return kExitFailure;

@@ -15,7 +15,7 @@ constexpr ErrorCode kCodes[] = {
     ErrorCode::kWriteFailed,     ErrorCode::kDegenerateMesh, ErrorCode::kEmptySet,
     ErrorCode::kFloatingBody,    ErrorCode::kSingularMatrix, ErrorCode::kNotFinite,
     ErrorCode::kNotConverged,    ErrorCode::kModelNotReady,  ErrorCode::kProtocol,
-    ErrorCode::kUnavailable,     ErrorCode::kInternal};
+    ErrorCode::kUnavailable,     ErrorCode::kNotAllowed,     ErrorCode::kInternal};
 
 TEST(ErrorCodeNames, AreDistinctLowerCaseWords) {
   std::set<std::string> names;
@@ -30,6 +30,7 @@ TEST(ErrorCodeNames, AreDistinctLowerCaseWords) {
 TEST(ErrorCodeNames, AreStable) {
   EXPECT_EQ(to_string(ErrorCode::kInvalidArgument), "invalid_argument");
   EXPECT_EQ(to_string(ErrorCode::kModelNotReady), "model_not_ready");
+  EXPECT_EQ(to_string(ErrorCode::kNotAllowed), "not_allowed");
   EXPECT_EQ(to_string(ErrorCode::kInternal), "internal");
 }
 

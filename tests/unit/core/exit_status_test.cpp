@@ -18,7 +18,7 @@ TEST(ExitStatus, IsTwoForWhatTheUserCanMendAndOneOtherwise) {
   for (const ErrorCode code :
        {ErrorCode::kWriteFailed, ErrorCode::kSingularMatrix, ErrorCode::kNotConverged,
         ErrorCode::kModelNotReady, ErrorCode::kProtocol, ErrorCode::kUnavailable,
-        ErrorCode::kInternal}) {
+        ErrorCode::kNotAllowed, ErrorCode::kInternal}) {
     EXPECT_EQ(exit_status(code), 1) << to_string(code);
   }
 }
