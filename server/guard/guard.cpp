@@ -240,7 +240,8 @@ void Guard::Impl::listen_again(bool wanted) {
   watch(listener.fd(), wanted ? static_cast<std::uint32_t>(EPOLLIN) : 0u, EPOLL_CTL_MOD);
 }
 
-// Whether one more connection may be had.
+// Whether one more connection may be had. A newcomer has a tick to say something, and libzmq that
+// time to close what it had of the one that makes room: its descriptors must not pile up.
 bool Guard::Impl::make_room() {
   if (connections.size() < static_cast<std::size_t>(options.max_connections)) return true;
   Connection* oldest = nullptr;
@@ -248,7 +249,7 @@ bool Guard::Impl::make_room() {
     if (connection->account->served) continue;
     if (oldest == nullptr || connection->opened < oldest->opened) oldest = connection.get();
   }
-  if (oldest == nullptr) return false;
+  if (oldest == nullptr || Clock::now() - oldest->opened < kTick) return false;
   end(*oldest, &counts.closed_for_room, "room is needed");
   return true;
 }

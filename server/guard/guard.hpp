@@ -11,8 +11,8 @@
 //   a connection    is not read while libzmq holds more of it than one message and a MiB; closed
 //                   when nothing of it was delivered for `patience`
 //   all of them     held_bytes; beyond that the one whose bytes have waited longest is closed
-//   connections     max_connections; the oldest that was never served makes room, or nobody is
-//                   accepted until one leaves
+//   connections     max_connections; the oldest that was never served makes room once it is 100 ms
+//                   old, or nobody is accepted until one leaves
 //
 // What libzmq holds is the cost of what was passed on (ZmtpStream::cost) less what delivered() says
 // the daemon has taken. With CURVE the parts of a message cannot be told from messages, and
