@@ -3,11 +3,18 @@
 
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <string>
 
 namespace brainshift::client {
+
+void add_key_options(CLI::App& command, KeyOptions& options) {
+  command.add_option("--server-key", options.server_key,
+                     "the daemon's public key, a file; for daemons that ask for keys");
+  command.add_option("--key", options.key, "own secret key, a file (see brainshift keys --help)");
+}
 
 void print_error(std::string_view sentence) {
   std::string line(sentence);

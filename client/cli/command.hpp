@@ -5,6 +5,7 @@
 // (common/core/exit_status.hpp).
 #pragma once
 
+#include <filesystem>
 #include <string_view>
 
 #include "common/core/error.hpp"
@@ -28,6 +29,14 @@ void add_journal(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
 void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);
+void add_keys(CLI::App& app, Status& status);
+
+// Keys of a command that talks to a daemon: files, both or none (client_keys() of client/keys).
+struct KeyOptions {
+  std::filesystem::path server_key;
+  std::filesystem::path key;
+};
+void add_key_options(CLI::App& command, KeyOptions& options);
 
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);

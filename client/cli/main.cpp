@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
       "report how "
       "well the deformation was recovered; solve single forward problems on any mesh; import "
       "recordings "
-      "of tracked ultrasound; check, export and mend journals; watch a running brainshiftd.\n"
+      "of tracked ultrasound; check, export and mend journals; watch a running brainshiftd; make "
+      "keys.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
   app.set_version_flag("--version", "brainshift " BRAINSHIFT_VERSION);
@@ -42,13 +43,14 @@ int main(int argc, char** argv) {
   client::add_watch(app, status);
   client::add_status(app, status);
   client::add_top(app, status);
+  client::add_keys(app, status);
   // CLI11 would only say that a subcommand is required.
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
     client::print_error("unknown command \"" + std::string(argv[1]) +
                         "\": must be simulate, replay, report, solve, import, stereo, journal, "
-                        "watch, status or top (see brainshift --help)");
+                        "watch, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {

@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/cli/command.hpp"
+#include "client/keys/keys.hpp"
 #include "client/lib/client.hpp"
 #include "client/operations/page.hpp"
 #include "client/operations/report_json.hpp"
@@ -19,17 +21,23 @@ constexpr const char* kEndpoint = "tcp://127.0.0.1:5555";
 
 struct StatusArguments {
   std::string endpoint = kEndpoint;
+  KeyOptions keys;
   bool json = false;
 };
 
 struct TopArguments {
   std::string endpoint = kEndpoint;
+  KeyOptions keys;
   double interval_s = 1.0;
   bool once = false;
 };
 
 Status show_status(const StatusArguments& arguments) {
-  auto client = Client::connect(arguments.endpoint);
+  ClientOptions options;
+  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
+  if (!keys) return tl::unexpected(keys.error());
+  options.keys = std::move(*keys);
+  auto client = Client::connect(arguments.endpoint, options);
   if (!client) return tl::unexpected(client.error());
   auto report = client->report();
   if (!report) return tl::unexpected(report.error());
@@ -54,6 +62,9 @@ Status show_top(const TopArguments& arguments) {
   options.endpoint = arguments.endpoint;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
   options.once = arguments.once;
+  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
+  if (!keys) return tl::unexpected(keys.error());
+  options.keys = std::move(*keys);
   return top(options);
 }
 
@@ -64,6 +75,7 @@ void add_status(CLI::App& app, Status& status) {
   CLI::App* command = app.add_subcommand("status", "Say how a running daemon fares, on one page.");
   command->add_option("--endpoint", arguments->endpoint, "where brainshiftd listens")
       ->capture_default_str();
+  add_key_options(*command, arguments->keys);
   command->add_flag("--json", arguments->json, "print JSON instead (docs/operations.md)");
   command->footer(
       "Exit status\n"
@@ -83,6 +95,7 @@ void add_top(CLI::App& app, Status& status) {
       "top", "Watch a running daemon: rates, latencies, sources, viewers, journal.");
   command->add_option("--endpoint", arguments->endpoint, "where brainshiftd listens")
       ->capture_default_str();
+  add_key_options(*command, arguments->keys);
   command->add_option("--interval", arguments->interval_s, "between two looks, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();

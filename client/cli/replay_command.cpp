@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/cli/command.hpp"
+#include "client/keys/keys.hpp"
 #include "client/replay/replay.hpp"
 #include "client/replay/verify.hpp"
 #include "common/io/files/output_path.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 struct Arguments {
   ReplayOptions options;
+  KeyOptions keys;
   std::string speed = "max";
   std::string boundary = "both";
   std::string method;
@@ -31,7 +33,8 @@ std::vector<std::string> method_names() {
 
 Status verify(const ReplayOptions& options) {
   const auto verification = verify_journal(
-      {options.surgery, options.endpoint, options.timeout, options.takeover}, terminal_progress());
+      {options.surgery, options.endpoint, options.timeout, options.takeover, options.keys},
+      terminal_progress());
   if (!verification) return tl::unexpected(verification.error());
   for (const std::string& line : report_lines(*verification)) std::puts(line.c_str());
   if (verification->differences.empty()) return {};
@@ -53,6 +56,9 @@ Status run(Arguments arguments) {
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
+  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
+  if (!keys) return tl::unexpected(keys.error());
+  options.keys = std::move(*keys);
   if (arguments.verify) return verify(options);
   if (options.report.empty()) {
     return fail(ErrorCode::kInvalidArgument, "--report is required (see brainshift replay --help)");
@@ -78,6 +84,7 @@ void add_replay(CLI::App& app, Status& status) {
   command->add_option("surgery", options.surgery, "surgery file (.surgery)")->required();
   command->add_option("--endpoint", options.endpoint, "where brainshiftd listens")
       ->capture_default_str();
+  add_key_options(*command, arguments->keys);
   CLI::Option* report =
       command->add_option("--report", options.report,
                           "report.json to write; fields go beside it as .vtu; required "

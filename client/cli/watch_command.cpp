@@ -2,8 +2,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <utility>
 
 #include "client/cli/command.hpp"
+#include "client/keys/keys.hpp"
 #include "client/watch/choice_text.hpp"
 #include "client/watch/watch.hpp"
 
@@ -13,6 +15,7 @@ namespace {
 struct Arguments {
   WatchOptions options;
   ChoiceText choice;
+  KeyOptions keys;
 };
 
 Status run(const Arguments& arguments) {
@@ -20,6 +23,9 @@ Status run(const Arguments& arguments) {
   if (!choice) return tl::unexpected(choice.error());
   WatchOptions options = arguments.options;
   options.choice = *choice;
+  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
+  if (!keys) return tl::unexpected(keys.error());
+  options.keys = std::move(*keys);
   return watch(options, [](const std::string& line) {
     std::puts(line.c_str());
     std::fflush(stdout);
@@ -38,6 +44,7 @@ void add_watch(CLI::App& app, Status& status) {
       "is current.");
   command->add_option("--endpoint", options.endpoint, "where the daemon listens")
       ->capture_default_str();
+  add_key_options(*command, arguments->keys);
   command
       ->add_option("--region", choice.region,
                    "nodes to receive: brain, tumour:MARGIN, or a ball X,Y,Z:RADIUS (patient RAS, "

@@ -244,7 +244,7 @@ Client::~Client() = default;
 
 Result<Client> Client::connect(const std::string& endpoint, const ClientOptions& options) {
   if (Status status = validate(options); !status) return tl::unexpected(status.error());
-  auto dealer = Dealer::connect(endpoint, options.heartbeat_interval);
+  auto dealer = Dealer::connect(endpoint, options.heartbeat_interval, options.keys);
   if (!dealer) return tl::unexpected(dealer.error());
   auto impl = std::make_unique<Impl>();
   impl->options = options;

@@ -59,6 +59,7 @@
 // Errors. Every call returns a value or an Error: a code to branch on and one sentence to show.
 //   kUnavailable    no daemon, no answer in time, a lost connection, or a daemon that is stopping
 //   kProtocol       the answer could not be understood
+//   kNotAllowed     the role of this client's key does not include the request
 //   any other code  the daemon's own answer, e.g. kModelNotReady, kInvalidArgument
 // An observation from which no estimate could be made is not an error of next_update(): its
 // message arrives with UpdateMessage::error set. The usable estimate before it stays the valid one.
@@ -88,6 +89,7 @@
 #include <optional>
 #include <string>
 
+#include "client/lib/client_keys.hpp"
 #include "client/lib/field_status.hpp"
 #include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
@@ -98,7 +100,7 @@
 
 namespace brainshift::client {
 
-// Each must be at least 1 ms and at most 6 days.
+// Each time must be at least 1 ms and at most 6 days.
 struct ClientOptions {
   // For every request but start_session.
   std::chrono::milliseconds request_timeout{5000};
@@ -108,6 +110,8 @@ struct ClientOptions {
   std::chrono::milliseconds heartbeat_interval{1000};
   // How often next_update() asks what is current while it waits.
   std::chrono::milliseconds renewal_interval{250};
+  // Without keys nothing is encrypted, and a daemon that asks for keys does not answer.
+  std::optional<ClientKeys> keys = std::nullopt;
 };
 
 class Client {

@@ -23,6 +23,10 @@ constexpr int kReconnectMs = 50;
 constexpr int kReconnectMaxMs = 1000;
 constexpr int kHandshakeMs = 5000;
 constexpr int kMissedHeartbeats = 3;
+constexpr std::size_t kKeyCharacters = 40;
+constexpr int kHandshakeFailed = ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
+                                 ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL |
+                                 ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
 long remaining_ms(Deadline deadline) {
   const auto left =
@@ -82,20 +86,25 @@ void drain_parts(void* socket) {
 }  // namespace
 
 Result<std::unique_ptr<Dealer>> Dealer::connect(const std::string& endpoint,
-                                                std::chrono::milliseconds heartbeat_interval) {
+                                                std::chrono::milliseconds heartbeat_interval,
+                                                const std::optional<ClientKeys>& keys) {
   std::unique_ptr<Dealer> dealer(new Dealer());
-  if (Status status = dealer->open(endpoint, heartbeat_interval); !status) {
+  if (Status status = dealer->open(endpoint, heartbeat_interval, keys); !status) {
     return tl::unexpected(status.error());
   }
   return dealer;
 }
 
-Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval) {
+Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval,
+                    const std::optional<ClientKeys>& keys) {
   endpoint_ = endpoint;
   context_ = zmq_ctx_new();
   if (context_ != nullptr) socket_ = zmq_socket(context_, ZMQ_DEALER);
   if (socket_ == nullptr || !set_options(socket_, static_cast<int>(heartbeat_interval.count()))) {
     return fail(ErrorCode::kInternal, endpoint + ": cannot open a socket: " + zmq_strerror(errno));
+  }
+  if (keys) {
+    if (Status status = set_keys(*keys); !status) return status;
   }
   if (Status status = open_monitor(); !status) return status;
   if (zmq_connect(socket_, endpoint.c_str()) != 0) {
@@ -105,11 +114,46 @@ Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heart
   return {};
 }
 
+Status Dealer::set_keys(const ClientKeys& keys) {
+  const std::pair<int, std::pair<const char*, const std::string*>> options[] = {
+      {ZMQ_CURVE_SERVERKEY, {"keys.server_public_key", &keys.server_public_key}},
+      {ZMQ_CURVE_PUBLICKEY, {"keys.public_key", &keys.public_key}},
+      {ZMQ_CURVE_SECRETKEY, {"keys.secret_key", &keys.secret_key}}};
+  for (const auto& [option, named] : options) {
+    const auto& [name, key] = named;
+    // ZeroMQ takes 40 characters with the zero behind them.
+    if (key->size() != kKeyCharacters ||
+        zmq_setsockopt(socket_, option, key->c_str(), kKeyCharacters + 1) != 0) {
+      return fail(ErrorCode::kInvalidArgument,
+                  std::string(name) + ": must be a key of 40 characters in Z85");
+    }
+  }
+  keys_ = true;
+  return {};
+}
+
+// Which of the two ends has the wrong key shows only in part: a daemon does not say why it hangs up
+// on a stranger.
+std::string Dealer::no_daemon() const {
+  std::string sentence = "no daemon at " + endpoint_;
+  if (handshake_failure_ == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH) {
+    return "the daemon at " + endpoint_ +
+           " does not admit this client's key: is it in its allow-list?";
+  }
+  if (handshake_failure_ != 0 && keys_) {
+    return sentence + " that accepts these keys: its own key may be another one, or it uses none";
+  }
+  if (handshake_failure_ != 0) return sentence + " that talks without keys: it may ask for keys";
+  if (keys_) sentence += ", or its key is not the one that was given";
+  return sentence;
+}
+
 Status Dealer::open_monitor() {
   monitor_ = zmq_socket(context_, ZMQ_PAIR);
   if (monitor_ == nullptr || !set_option(monitor_, ZMQ_LINGER, 0) ||
-      zmq_socket_monitor(socket_, kMonitorAddress,
-                         ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED) != 0 ||
+      zmq_socket_monitor(
+          socket_, kMonitorAddress,
+          ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | kHandshakeFailed) != 0 ||
       zmq_connect(monitor_, kMonitorAddress) != 0) {
     return fail(ErrorCode::kInternal,
                 endpoint_ + ": cannot watch the connection: " + zmq_strerror(errno));
@@ -132,6 +176,8 @@ bool Dealer::read_monitor() {
     const std::string bytes = event.bytes();
     std::uint16_t number = 0;
     if (bytes.size() >= sizeof number) std::memcpy(&number, bytes.data(), sizeof number);
+    if ((number & kHandshakeFailed) != 0) handshake_failure_ = number;
+    if (number == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) handshake_failure_ = 0;
     connected_ = number == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
     if (number != ZMQ_EVENT_DISCONNECTED) continue;
     lost = true;
@@ -155,7 +201,7 @@ Status Dealer::send(std::string_view message, Deadline deadline) {
       return fail(ErrorCode::kUnavailable, endpoint_ + ": cannot send: " + zmq_strerror(errno));
     }
   } while (remaining_ms(deadline) > 0);
-  return fail(ErrorCode::kUnavailable, "no daemon at " + endpoint_);
+  return fail(ErrorCode::kUnavailable, no_daemon());
 }
 
 bool Dealer::readable() const {

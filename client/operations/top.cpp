@@ -182,6 +182,7 @@ Status print_once(TopView& view, const TopOptions& options) {
 
 Status top(const TopOptions& options) {
   ClientOptions client_options;
+  client_options.keys = options.keys;
   client_options.request_timeout = std::chrono::milliseconds(1000);
   auto client = Client::connect(options.endpoint, client_options);
   if (!client) return tl::unexpected(client.error());

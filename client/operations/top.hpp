@@ -9,8 +9,10 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <optional>
 #include <string>
 
+#include "client/lib/client_keys.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {
@@ -21,6 +23,7 @@ struct TopOptions {
   bool once = false;  // one whole page with the rates of one interval, wherever it goes
   int input = STDIN_FILENO;
   int output = STDOUT_FILENO;
+  std::optional<ClientKeys> keys = std::nullopt;  // for a daemon that asks for keys
 };
 
 // Returns when it is told to end (q, SIGINT, SIGTERM), or when the output takes no more. Catches

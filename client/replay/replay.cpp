@@ -150,7 +150,7 @@ struct Session {
 // A client of its own per boundary: nothing of an earlier session can still be queued in it.
 Result<Session> start_session(const Surgery& surgery, const ReplayOptions& options,
                               Boundary boundary) {
-  auto client = Client::connect(options.endpoint);
+  auto client = Client::connect(options.endpoint, {.keys = options.keys});
   if (!client) return tl::unexpected<Error>(client.error());
   if (Status ok = check_daemon(*client, surgery, options); !ok) {
     return tl::unexpected<Error>(ok.error());

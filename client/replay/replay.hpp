@@ -6,9 +6,11 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "client/lib/client.hpp"
 #include "client/replay/play.hpp"
 #include "client/replay/run_report.hpp"
 #include "common/core/error.hpp"
@@ -34,7 +36,8 @@ struct ReplayOptions {
   // How often the recording is played; more than 1 at Speed::kMax only. Iterates are requested
   // only when it is 1: they would add to the latencies that repeating is there to measure.
   int repeat = 1;
-  bool takeover = false;  // ends another client's session
+  bool takeover = false;                          // ends another client's session
+  std::optional<ClientKeys> keys = std::nullopt;  // for a daemon that asks for them
   // Written when not empty: one row per observation sent, see latency_csv(). With several
   // boundaries there is one file for each, with "-<boundary>" before the extension.
   std::filesystem::path latency_csv;

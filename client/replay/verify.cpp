@@ -246,7 +246,7 @@ Result<Verification> verify_journal(const VerifyOptions& options, const Progress
   const io::SurgeryMeta& meta = file->meta();
   const auto request = request_of(meta, options.journal);
   if (!request) return tl::unexpected(request.error());
-  auto client = Client::connect(options.endpoint);
+  auto client = Client::connect(options.endpoint, {.keys = options.keys});
   if (!client) return tl::unexpected(client.error());
   const auto status = client->status();
   if (!status) return tl::unexpected(status.error());

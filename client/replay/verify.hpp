@@ -12,9 +12,11 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "client/lib/client.hpp"
 #include "client/replay/compare_updates.hpp"
 #include "client/replay/play.hpp"
 #include "common/core/error.hpp"
@@ -37,8 +39,9 @@ std::vector<std::string> report_lines(const Verification& verification);
 struct VerifyOptions {
   std::filesystem::path journal;
   std::string endpoint = "tcp://127.0.0.1:5555";
-  std::chrono::milliseconds timeout{600000};  // longest wait for one answer
-  bool takeover = false;                      // ends another client's session
+  std::chrono::milliseconds timeout{600000};      // longest wait for one answer
+  bool takeover = false;                          // ends another client's session
+  std::optional<ClientKeys> keys = std::nullopt;  // for a daemon that asks for them
 };
 
 // Starts a session of the journal's method and boundary. kInvalidArgument: the daemon serves

@@ -185,7 +185,9 @@ std::string watch_line(const WatchedUpdate& update, bool json) {
 }
 
 Status watch(const WatchOptions& options, const std::function<void(const std::string&)>& tell) {
-  auto client = Client::connect(options.endpoint);
+  ClientOptions client_options;
+  client_options.keys = options.keys;
+  auto client = Client::connect(options.endpoint, client_options);
   if (!client) return tl::unexpected(client.error());
   return Watcher(std::move(*client), options, tell).run();
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "client/lib/client_keys.hpp"
 #include "client/lib/field_status.hpp"
 #include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
@@ -21,8 +22,9 @@ namespace brainshift::client {
 struct WatchOptions {
   std::string endpoint = "tcp://127.0.0.1:5555";
   FieldChoice choice = {};
-  std::uint64_t count = 0;  // updates to tell, failures too; 0: for ever
-  bool json = false;        // a line is an object
+  std::uint64_t count = 0;                        // updates to tell, failures too; 0: for ever
+  bool json = false;                              // a line is an object
+  std::optional<ClientKeys> keys = std::nullopt;  // for a daemon that asks for keys
 };
 
 // What a line tells of an update.

@@ -129,7 +129,7 @@ void Journal::work(const std::stop_token& stop) {
     supervise();
   }
   lose(unwritten_.ranges());
-  close_sink();
+  end_session();
 }
 
 bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening) {
@@ -142,6 +142,11 @@ bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Open
     wake_.wait_until(lock, stop, Clock::now() + options_.commit_interval, [&] {
       return openings_ > 0 || overrun_ || queue_.size() > options_.max_queued / 2;
     });
+  }
+  // A session in front of another one, without a record: nothing is to be written of it.
+  while (queue_.size() > 1 && queue_[0].opening && queue_[1].opening) {
+    queue_.pop_front();
+    --openings_;
   }
   if (queue_.front().opening) {
     opening = std::move(queue_.front().opening);
@@ -159,8 +164,17 @@ bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Open
   return true;
 }
 
-void Journal::begin_file(const Opening& opening) {
+// A file in which nothing was observed tells nobody anything, and starts alone must not fill the
+// folder. One that goes on after a failure stays: its meta says what is missing.
+void Journal::end_session() {
+  const bool empty = sink_ && contents_.empty() && path_ == current_.path &&
+                     writing([&] { return sink_->check(); }).has_value();
   close_sink();
+  if (empty) io::discard_surgery(path_);
+}
+
+void Journal::begin_file(const Opening& opening) {
+  end_session();
   unwritten_ = {};
   contents_ = {};
   current_ = opening;

@@ -3,6 +3,9 @@
 // file by a thread of its own, so that no commit lies on the latency path. One file per session,
 // and one more after every failure; they can be replayed.
 //
+// A session in which nothing was observed leaves no file: it is removed when the next one begins,
+// and at stop().
+//
 // append() only queues. The thread writes what came within `commit_interval` in one transaction
 // with one sync. What recorded() then says is on the disk stays there through a crash and a power
 // cut. An observation thus has two acknowledgements: *accepted* when it is queued, *recorded* when
@@ -116,6 +119,7 @@ class Journal {
   // Waits for records, a session, or the time of the next check. False at the end.
   bool take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening);
   void begin_file(const Opening& opening);
+  void end_session();
   void write(Group group);
   Status commit(const Group& group);
   void supervise();

@@ -10,6 +10,7 @@
 
 #include "client/lib/client.hpp"
 #include "common/io/config/daemon_file.hpp"
+#include "common/io/config/key_file.hpp"
 #include "server/main/exit_status.hpp"
 
 namespace brainshift::server {
@@ -22,6 +23,11 @@ Result<wire::DaemonStatus> ask(const HealthArguments& arguments) {
   if (!endpoint) return tl::unexpected(endpoint.error());
   client::ClientOptions options;
   options.request_timeout = std::chrono::seconds(3);
+  if (config->security.on()) {
+    auto own = io::read_secret_key(config->security.secret_key);
+    if (!own) return tl::unexpected(own.error());
+    options.keys = client::ClientKeys{own->public_key, own->public_key, own->secret_key};
+  }
   auto connected = client::Client::connect(*endpoint, options);
   if (!connected) return tl::unexpected(connected.error());
   return connected->status();

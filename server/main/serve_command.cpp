@@ -4,13 +4,17 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <utility>
 
 #include "common/io/config/daemon_file.hpp"
+#include "common/io/config/key_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
+#include "server/guard/file_limit.hpp"
+#include "server/guard/memory.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
@@ -35,9 +39,10 @@ Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   if (arguments.model) config->model = *arguments.model;
   if (arguments.endpoint) {
     config->endpoint = *arguments.endpoint;
-    if (auto ok = io::check_endpoint(config->endpoint, config->allow_remote); !ok) {
-      return tl::unexpected(ok.error());
-    }
+    auto ok = io::check_endpoint(config->endpoint, config->allow_remote).and_then([&] {
+      return io::check_security(*config);
+    });
+    if (!ok) return tl::unexpected(ok.error());
   }
   if (auto ok = check_ipc_path(config->endpoint); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
@@ -123,7 +128,43 @@ Result<std::optional<MetricsExporter>> metrics(const io::DaemonConfig& config,
   return std::optional<MetricsExporter>(std::move(*exporter));
 }
 
+// nullopt without keys.
+Result<std::optional<ServerKeys>> server_keys(const io::SecurityConfig& security) {
+  if (!security.on()) return std::nullopt;
+  auto own = io::read_secret_key(security.secret_key);
+  if (!own) return tl::unexpected(own.error());
+  const auto allowed = io::read_allow_list(security.allow_list);
+  if (!allowed) return tl::unexpected(allowed.error());
+  ServerKeys keys;
+  // `brainshiftd health` asks with the daemon's own key. No listed name has brackets.
+  static constexpr const char* kItself = "(daemon)";
+  keys.names.emplace(own->public_key, kItself);
+  keys.roles.emplace(kItself, Role::kViewer);
+  keys.secret_key = std::move(own->secret_key);
+  for (const io::AllowedKey& key : *allowed) {
+    keys.names.emplace(key.public_key, key.name);
+    keys.roles.emplace(key.name, key.role);
+  }
+  return keys;
+}
+
+Result<RouterOptions> router_options(const io::DaemonConfig& config, long file_limit) {
+  auto keys = server_keys(config.security);
+  if (!keys) return tl::unexpected(keys.error());
+  RouterOptions options;
+  options.endpoint = config.endpoint;
+  options.max_clients = config.max_clients;
+  options.max_message_mib = config.max_message_mib;
+  options.max_connections = std::min(connections_within(file_limit),
+                                     std::max(options.max_connections, 2 * config.max_clients));
+  options.keys = std::move(*keys);
+  options.limits = {config.limits.connections, config.limits.observations_per_s,
+                    config.limits.session_starts_per_min};
+  return options;
+}
+
 Status serve(const ServeArguments& arguments) {
+  return_large_blocks();
   auto signals = StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
   const auto config = configuration(arguments);
@@ -134,19 +175,19 @@ Status serve(const ServeArguments& arguments) {
   auto options = service_options(*config);
   if (!options) return tl::unexpected(options.error());
 
-  RouterOptions router_options;
-  router_options.endpoint = config->endpoint;
-  router_options.max_clients = config->max_clients;
-  router_options.max_message_mib = config->max_message_mib;
+  const long file_limit = raise_file_limit();
+  auto routing = router_options(*config, file_limit);
+  if (!routing) return tl::unexpected(routing.error());
+  spdlog::info("descriptors {}: at most {} connections", file_limit, routing->max_connections);
   auto manager = ServiceManager::from_environment();
   Reporter reporter(manager);
-  if (const auto interval = manager.interval()) router_options.longest_wait = *interval;
+  if (const auto interval = manager.interval()) routing->longest_wait = *interval;
   if (!config->metrics.endpoint.empty() && !manager.interval()) {
-    router_options.longest_wait = kFreshViewers;
+    routing->longest_wait = kFreshViewers;
   }
   auto router = [&] {
     const OwnerOnly ipc_socket;  // no thread of ours creates files yet
-    return Router::bind(router_options);
+    return Router::bind(*routing);
   }();
   if (!router) return tl::unexpected(router.error());
 
@@ -157,6 +198,11 @@ Status serve(const ServeArguments& arguments) {
     spdlog::warn("no model is loaded: clients get model_not_ready");
   }
   if (!options->blas_kernel.empty()) spdlog::info("OpenBLAS kernel {}", options->blas_kernel);
+  if (routing->keys) {
+    spdlog::info("keys are asked for; {} are known", routing->keys->names.size());
+  } else {
+    spdlog::info("no keys are asked for: everybody who reaches the endpoint may do everything");
+  }
   Outbox outbox;
   options->log_lines_lost = [&log] { return log.lost(); };
   options->on_turn = [&reporter] { reporter.turn(); };

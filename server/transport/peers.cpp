@@ -64,6 +64,12 @@ Peer* Peers::find(const std::string& routing_id) {
   return found == peers_.end() ? nullptr : &found->second;
 }
 
+std::size_t Peers::connections_of(const std::string& caller) const {
+  return static_cast<std::size_t>(
+      std::count_if(peers_.begin(), peers_.end(),
+                    [&](const auto& entry) { return entry.second.caller == caller; }));
+}
+
 std::vector<std::string> Peers::remove_connection(int connection_fd) {
   std::vector<std::string> removed;
   for (auto next = peers_.begin(); next != peers_.end();) {

@@ -61,6 +61,7 @@ class Viewer {
 };
 
 struct Peer {
+  std::string caller;            // under which it counts (server/security/gate.hpp)
   int connection_fd = -1;        // the daemon's descriptor of the connection, until it closes
   std::optional<Viewer> viewer;  // of a subscriber
   std::deque<Bytes> replies;     // that did not fit into the peer's queue, oldest first
@@ -82,6 +83,7 @@ class Peers {
   // The peer, added when it is new; null when max_peers others are connected.
   Peer* admit(const std::string& routing_id, int connection_fd);
   Peer* find(const std::string& routing_id);
+  std::size_t connections_of(const std::string& caller) const;
   void remove(const std::string& routing_id) { peers_.erase(routing_id); }
   // A connection closed: the peers removed (none or one).
   std::vector<std::string> remove_connection(int connection_fd);

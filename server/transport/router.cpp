@@ -3,19 +3,21 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <exception>
-#include <system_error>
+#include <random>
 #include <utility>
 #include <zmq.hpp>
 
 #include "common/wire/convert.hpp"
+#include "server/guard/zmtp_stream.hpp"
 #include "server/transport/connection_monitor.hpp"
 #include "server/transport/parcels.hpp"
 #include "server/transport/peers.hpp"
+#include "server/transport/zap_handler.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -34,8 +36,10 @@ enum class Sent { kYes, kQueueFull, kPeerGone };
 struct Incoming {
   std::string peer;
   int connection_fd = -1;
+  std::string user_id;  // the key's name; empty without keys
   zmq::message_t payload;
-  int parts = 0;  // after the routing id
+  std::size_t parts = 0;  // after the routing id
+  std::size_t bytes = 0;  // of these
 };
 
 // Shares the bytes with the socket, which drops its reference after sending.
@@ -73,8 +77,10 @@ std::optional<Incoming> receive(zmq::socket_t& socket) {
     zmq::message_t part;
     static_cast<void>(socket.recv(part));  // the rest of a message is always there
     more = part.more();
+    incoming.bytes += part.size();
     if (incoming.parts++ == 0) {
       incoming.connection_fd = zmq_msg_get(part.handle(), ZMQ_SRCFD);
+      if (const char* user = zmq_msg_gets(part.handle(), "User-Id")) incoming.user_id = user;
       incoming.payload = std::move(part);
     }
   }
@@ -86,46 +92,72 @@ Bytes error_frame(std::uint64_t request_id, const Error& error) {
       wire::encode_frame(wire::MessageType::kErrorReply, request_id, wire::encode(error)));
 }
 
-// libzmq takes the remainder of a port number above 65535 and listens there.
-bool has_valid_port(const std::string& endpoint) {
-  if (endpoint.rfind("tcp://", 0) != 0) return true;  // libzmq judges the rest
-  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
-  if (port == "*") return true;
-  unsigned number = 0;
-  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
-  return error == std::errc() && end == port.data() + port.size() && number <= 65535;
+// Where libzmq listens: a name that no other process may connect to, but for this one's guard.
+std::string inner_name() {
+  std::random_device entropy;
+  return fmt::format("brainshiftd-{}-{:08x}{:08x}", getpid(), entropy(), entropy());
 }
 
 int milliseconds(std::chrono::milliseconds duration) { return static_cast<int>(duration.count()); }
 
+// What CURVE adds to a message.
+constexpr std::size_t kEncryption = 64;
+
+std::size_t max_message_bytes(const RouterOptions& options) {
+  return (static_cast<std::size_t>(options.max_message_mib) << 20) + wire::kHeaderBytes;
+}
+
 void configure(zmq::socket_t& socket, const RouterOptions& options) {
   socket.set(zmq::sockopt::router_mandatory, true);
+  const pid_t own = getpid();
+  if (zmq_setsockopt(socket.handle(), ZMQ_IPC_FILTER_PID, &own, sizeof own) != 0) {
+    throw zmq::error_t();
+  }
   socket.set(zmq::sockopt::linger, 0);
-  socket.set(zmq::sockopt::maxmsgsize, (std::int64_t{options.max_message_mib} << 20) +
-                                           static_cast<std::int64_t>(wire::kHeaderBytes));
+  socket.set(zmq::sockopt::maxmsgsize,
+             static_cast<std::int64_t>(max_message_bytes(options) + kEncryption));
   socket.set(zmq::sockopt::rcvhwm, kReceiveQueue);
   socket.set(zmq::sockopt::sndhwm, options.send_queue);
   socket.set(zmq::sockopt::handshake_ivl, milliseconds(options.handshake_limit));
   socket.set(zmq::sockopt::heartbeat_ivl, milliseconds(options.heartbeat_interval));
   socket.set(zmq::sockopt::heartbeat_timeout, milliseconds(options.heartbeat_timeout));
   socket.set(zmq::sockopt::heartbeat_ttl, milliseconds(options.heartbeat_timeout));
+  if (!options.keys) return;
+  socket.set(zmq::sockopt::curve_server, true);
+  socket.set(zmq::sockopt::curve_secretkey, options.keys->secret_key);
+  socket.set(zmq::sockopt::zap_domain, std::string("brainshiftd"));
+}
+
+Roles roles_of(const RouterOptions& options) {
+  if (!options.keys) return std::nullopt;
+  return options.keys->roles;
 }
 
 }  // namespace
 
 struct Router::Impl {
-  explicit Impl(const RouterOptions& given)
+  Impl(const RouterOptions& given, Listener listener)
       : options(given),
         socket(context, zmq::socket_type::router),
         monitor(context, socket),
+        gate(roles_of(given), given.limits),
         peers(static_cast<std::size_t>(given.max_clients)) {
+    if (options.keys) zap.emplace(context, options.keys->names);
     configure(socket, options);
-    socket.bind(options.endpoint);
-    endpoint = socket.get(zmq::sockopt::last_endpoint);
+    const std::string inner = inner_name();
+    socket.bind("ipc://@" + inner);
+    GuardOptions guarding;
+    guarding.max_message_bytes = max_message_bytes(options);
+    guarding.held_bytes = options.held_bytes;
+    guarding.max_connections = options.max_connections;
+    guarding.patience = options.patience;
+    guard.emplace(std::move(listener), inner, guarding);
   }
 
   void serve_requests();
   void answer(const Incoming& incoming);
+  Status admit(const Incoming& incoming);
+  std::optional<Reply> ask_handler(const std::string& peer, const wire::Frame& frame);
   void complain(const Incoming& incoming, const Error& error);
   void subscribe(const std::string& routing_id, const Reply& answer);
   void reply(const std::string& peer, const Bytes& bytes);
@@ -141,17 +173,19 @@ struct Router::Impl {
 
   RouterOptions options;
   zmq::context_t context;
+  std::optional<ZapHandler> zap;  // with keys
   zmq::socket_t socket;
   ConnectionMonitor monitor;
+  Gate gate;
   Peers peers;
   Parcels parcels;
-  std::string endpoint;
   // What a late subscriber of `session` gets: the last usable field, and the newest failure since.
   std::uint64_t session = 0;
   Bytes last_final;
   Bytes failure_since;
   RequestHandler* handler = nullptr;                     // of run()
   std::chrono::steady_clock::time_point last_turn = {};  // that the handler was told of
+  std::optional<Guard> guard;                            // the last: peers go before the socket
 };
 
 Router::Router(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -159,18 +193,16 @@ Router::Router(Router&&) noexcept = default;
 Router& Router::operator=(Router&&) noexcept = default;
 Router::~Router() = default;
 
-const std::string& Router::endpoint() const { return impl_->endpoint; }
+const std::string& Router::endpoint() const { return impl_->guard->endpoint(); }
+GuardCounts Router::guard_counts() const { return impl_->guard->counts(); }
 
 Result<Router> Router::bind(const RouterOptions& options) {
-  if (!has_valid_port(options.endpoint)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("endpoint {}: the port must be * or 0 to 65535", options.endpoint));
-  }
+  auto listener = Listener::open(options.endpoint);
+  if (!listener) return tl::unexpected(listener.error());
   try {
-    return Router(std::make_unique<Impl>(options));
-  } catch (const zmq::error_t& error) {
-    const bool malformed = error.num() == EINVAL || error.num() == EPROTONOSUPPORT;
-    return fail(malformed ? ErrorCode::kInvalidArgument : ErrorCode::kUnavailable,
+    return Router(std::make_unique<Impl>(options, std::move(*listener)));
+  } catch (const std::exception& error) {  // zmq::error_t, std::system_error
+    return fail(ErrorCode::kUnavailable,
                 fmt::format("endpoint {}: {}", options.endpoint, error.what()));
   }
 }
@@ -197,7 +229,7 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
       if (std::chrono::steady_clock::now() - self.last_turn >= kTurnInterval) self.turned();
     }
   } catch (const zmq::error_t& error) {
-    return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", self.endpoint, error.what()));
+    return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", endpoint(), error.what()));
   }
 }
 
@@ -217,8 +249,11 @@ void Router::Impl::serve_requests() {
   for (int served = 0; served < kRequestsPerTurn; ++served) {
     const auto incoming = receive(socket);
     if (!incoming) return;
+    guard->delivered(incoming->connection_fd, incoming->bytes, incoming->parts);
     forget_closed();  // before the peer is looked up, see ConnectionMonitor
     answer(*incoming);
+    // With CURVE the guard cannot count the parts before.
+    if (incoming->parts > ZmtpStream::Bounds{}.parts) guard->close(incoming->connection_fd);
   }
 }
 
@@ -237,25 +272,46 @@ void Router::Impl::answer(const Incoming& incoming) {
     spdlog::debug("malformed frame: {}", frame.error().message);
     return complain(incoming, frame.error());
   }
-  if (peers.admit(incoming.peer, incoming.connection_fd) == nullptr) {
-    return complain(incoming, {ErrorCode::kUnavailable, fmt::format("{} clients are connected "
-                                                                    "already",
-                                                                    options.max_clients)});
-  }
+  if (Status peer = admit(incoming); !peer) return complain(incoming, peer.error());
+  const std::string caller = gate.caller(incoming.user_id, incoming.peer);
   std::optional<Reply> answer;
-  try {
-    if (frame->type == wire::MessageType::kReportRequest) turned();
-    answer = handler->handle(incoming.peer, *frame);
-  } catch (const std::exception& exception) {
-    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
-                  exception.what());
-    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
-    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
+  if (Status may = gate.admit(caller, *frame, std::chrono::steady_clock::now()); may) {
+    answer = ask_handler(incoming.peer, *frame);
+  } else {
+    answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
   }
   if (!answer) return;
   reply(incoming.peer, std::make_shared<const std::string>(
                            wire::encode_frame(answer->type, frame->request_id, answer->payload)));
   if (answer->subscription) subscribe(incoming.peer, *answer);
+}
+
+// The peer of a message that is well-formed, added when it is new.
+Status Router::Impl::admit(const Incoming& incoming) {
+  const std::string caller = gate.caller(incoming.user_id, incoming.peer);
+  if (peers.find(incoming.peer) == nullptr) {
+    if (Status more = gate.enter(caller, peers.connections_of(caller)); !more) return more;
+  }
+  Peer* peer = peers.admit(incoming.peer, incoming.connection_fd);
+  if (peer == nullptr) {
+    return fail(ErrorCode::kUnavailable,
+                fmt::format("{} clients are connected already", options.max_clients));
+  }
+  peer->caller = caller;
+  guard->served(incoming.connection_fd);
+  return {};
+}
+
+std::optional<Reply> Router::Impl::ask_handler(const std::string& peer, const wire::Frame& frame) {
+  try {
+    if (frame.type == wire::MessageType::kReportRequest) turned();
+    return handler->handle(peer, frame);
+  } catch (const std::exception& exception) {
+    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame.type),
+                  exception.what());
+    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
+    return Reply{wire::MessageType::kErrorReply, wire::encode(error)};
+  }
 }
 
 void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer) {
@@ -367,6 +423,7 @@ void Router::Impl::remove(const std::string& routing_id) {
   const std::string name = routing_id;
   if (peers.find(name) == nullptr) return;
   peers.remove(name);
+  gate.left(name);
   handler->left(name);
 }
 
@@ -374,6 +431,7 @@ void Router::Impl::forget_closed() {
   for (const int descriptor : monitor.closed()) {
     for (const std::string& name : peers.remove_connection(descriptor)) {
       spdlog::debug("peer left");
+      gate.left(name);
       handler->left(name);
     }
   }

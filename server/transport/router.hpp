@@ -13,9 +13,11 @@
 // That is also what a late subscriber receives. Nothing of a session is kept once the next one has
 // begun, and nobody gets a field of a session that has ended. One that chose a part of every field
 // gets it cut from these bytes when they are about to be sent (Parcels); a turn of the loop cuts a
-// bounded number, so that neither choices nor viewers that do not read delay anybody. ZeroMQ bounds
-// the size of each part, not their number within one message: expose the daemon to trusted networks
-// only.
+// bounded number, so that neither choices nor viewers that do not read delay anybody.
+//
+// Peers do not reach libzmq's socket: the guard passes their bytes on to it, and bounds what they
+// make it keep (server/guard/guard.hpp). With keys libzmq asks the ZAP handler whom to admit, and
+// the gate asks every request whether its key may (server/security).
 #pragma once
 
 #include <chrono>
@@ -27,6 +29,9 @@
 #include "common/core/error.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/frame.hpp"
+#include "server/guard/guard.hpp"
+#include "server/security/gate.hpp"
+#include "server/security/server_keys.hpp"
 #include "server/transport/outbox.hpp"
 
 namespace brainshift::server {
@@ -34,13 +39,18 @@ namespace brainshift::server {
 struct RouterOptions {
   std::string endpoint = "tcp://127.0.0.1:*";
   int max_clients = 32;
-  int max_message_mib = 64;
-  int send_queue = 16;  // messages that may wait per peer
+  int max_message_mib = 16;
+  int max_connections = 256;           // more than clients: who says nothing useful takes one too
+  std::size_t held_bytes = 48u << 20;  // of messages that are not complete or not taken yet
+  std::chrono::milliseconds patience{30000};  // with a peer of which nothing can be delivered
+  int send_queue = 16;                        // messages that may wait per peer
   std::chrono::milliseconds heartbeat_interval{1000};
   std::chrono::milliseconds heartbeat_timeout{5000};
   std::chrono::milliseconds handshake_limit{2000};
   // How long the loop may wait before it calls RequestHandler::turned() again; -1: for ever.
   std::chrono::milliseconds longest_wait{-1};
+  std::optional<ServerKeys> keys;  // nullopt: everybody who reaches the endpoint is an admin
+  Limits limits;
 };
 
 class Peers;
@@ -78,6 +88,7 @@ class Router {
 
   // Where it listens; the actual port when the options asked for any.
   const std::string& endpoint() const;
+  GuardCounts guard_counts() const;
 
   // Serves until `stop_fd` is readable.
   Status run(RequestHandler& handler, Outbox& outbox, int stop_fd);

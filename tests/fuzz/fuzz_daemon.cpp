@@ -11,6 +11,8 @@ void run(std::string_view bytes) {
   if (!config) return;
   require(io::check_endpoint(config->endpoint, config->allow_remote).has_value(),
           "an endpoint that was read may be served");
+  require(io::check_security(*config).has_value(),
+          "a daemon that was read is this machine's alone, or has keys");
 }
 
 }  // namespace brainshift::fuzz

@@ -275,6 +275,8 @@ TEST(BadUsage, EndpointsThatMayNotServeAreRefusedInOneLine) {
   const Workspace files;
   const auto config = files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n");
   const auto open = files.write("open.yaml", "endpoint: tcp://0.0.0.0:*\n");
+  const auto keyless =
+      files.write("keyless.yaml", "endpoint: tcp://0.0.0.0:*\nallow_remote: true\n");
   const auto patient = files.write("patient.h5", "model");
   const std::vector<std::pair<std::vector<std::string>, std::string>> table = {
       {{"--config", config, "--endpoint", "inproc://x"}, "inproc://x"},
@@ -283,6 +285,7 @@ TEST(BadUsage, EndpointsThatMayNotServeAreRefusedInOneLine) {
       {{"--config", config, "--endpoint", "ipc://@x"}, "ipc://@x"},
       {{"--config", config, "--endpoint", "ipc://" + patient}, "no socket"},
       {{"--config", config, "--endpoint", "ipc://" + files.path("no/s")}, "does not exist"},
+      {{"--config", keyless}, "security.secret_key is missing"},
       {{"--config", open}, "open.yaml"}};
   for (const auto& [arguments, says] : table) {
     std::vector<std::string> argv = {brainshiftd(), "serve"};
@@ -291,6 +294,31 @@ TEST(BadUsage, EndpointsThatMayNotServeAreRefusedInOneLine) {
     expect_refused(run(argv, 30.0), "brainshiftd", {says});
   }
   EXPECT_TRUE(std::filesystem::is_regular_file(patient));
+}
+
+TEST(BadUsage, KeysThatOthersMayUseAreRefusedInOneLine) {
+  const Workspace files;
+  const std::string folder = files.folder().string();
+  EXPECT_EQ(run({brainshift(), "keys", "make", "daemon", "--dir", folder}).exit_status, 0);
+  EXPECT_EQ(run({brainshift(), "keys", "add", "--allow", files.path("list"), "--role", "owner",
+                 files.path("daemon.public")})
+                .exit_status,
+            0);
+  const auto config = files.write("daemon.yaml",
+                                  "endpoint: tcp://127.0.0.1:*\nsecurity:\n"
+                                  "  secret_key: daemon.secret\n  allow_list: list\n");
+  {
+    Background daemon({brainshiftd(), "serve", "--config", config}, files.path("log"));
+    EXPECT_THAT(daemon.first_line(), StartsWith("listening on tcp://"));
+    EXPECT_EQ(daemon.end(SIGTERM), 0);
+  }
+  std::filesystem::permissions(files.path("daemon.secret"), std::filesystem::perms(0644));
+  expect_refused(run({brainshiftd(), "serve", "--config", config}, 30.0), "brainshiftd",
+                 {"daemon.secret", "mode 644", "chmod 600"});
+  expect_refused(run({brainshift(), "keys", "check", files.path("daemon.secret")}), "brainshift",
+                 {"daemon.secret", "mode 644"});
+  expect_refused(run({brainshift(), "keys", "make", "daemon", "--dir", folder}), "brainshift",
+                 {"daemon.secret", "never overwritten"});
 }
 
 TEST(GoodUsage, TheSocketOfAnIpcEndpointIsForTheOwnerAlone) {

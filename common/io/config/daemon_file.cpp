@@ -25,9 +25,19 @@ void visit(A& a, V& v) {
      "this machine need allow_remote."},
     v.endpoint);
   a({"allow_remote", "", "Whether the endpoint may be an address that other machines reach", "",
-     "There is no authentication and no encryption: say true only where everybody on the network "
-     "is trusted."},
+     "It takes the keys of `security` as well."},
     v.allow_remote, kTruthWords);
+  a.section({"security"}, Need::kOptional, [&] {
+    a({"secret_key", "", "The daemon's secret key, made by `brainshift keys make`", "",
+       "A file that its owner alone may read. With both keys everything is encrypted, and only "
+       "those in allow_list are served. Without them everybody who reaches the endpoint may do "
+       "everything."},
+      v.security.secret_key);
+    a({"allow_list", "",
+       "Who is served: a line ROLE NAME PUBLICKEY for each, made by `brainshift keys add`", "",
+       "Roles: viewer, source, owner, admin. Read when the daemon starts."},
+      v.security.allow_list);
+  });
   a({"model", "", "Model file made by `brainshiftd prepare`", "",
      "Clients are told model_not_ready until one is loaded. The command line's --model takes "
      "precedence."},
@@ -43,7 +53,20 @@ void visit(A& a, V& v) {
      "Larger ones are refused unread. An observation with 100 thousand points takes 2.4 MiB, an "
      "update for 18 thousand nodes "
      "0.6 MiB."},
-    v.max_message_mib, between(1, 1024));
+    v.max_message_mib, between(1, 64));
+  a.section({"limits"}, Need::kOptional, [&] {
+    a({"connections", "", "Connections of one key at once", "",
+       "More are refused. A program has one, a viewer beside a source two."},
+      v.limits.connections, between(1, 1024));
+    a({"observations_per_s", "", "Observations of one key in a second", "",
+       "The rest is refused and counted. Five sources of 60 Hz have 300; a replay at full speed "
+       "has "
+       "more."},
+      v.limits.observations_per_s, between(1, 10000));
+    a({"session_starts_per_min", "", "Sessions that one key may start in a minute", "",
+       "The rest is refused and counted."},
+      v.limits.session_starts_per_min, between(1, 10000));
+  });
   a.section({"metrics", "", "Figures for monitors, over HTTP in the format of Prometheus", "",
              "The path is /metrics; docs/operations.md lists the figures."},
             Need::kOptional, [&] {
@@ -92,7 +115,8 @@ Status validate(const DaemonConfig& config) {
       .and_then([&] {
         const std::string& metrics = config.metrics.endpoint;
         return metrics.empty() ? Status() : check_metrics_endpoint(metrics, config.allow_remote);
-      });
+      })
+      .and_then([&] { return check_security(config); });
 }
 
 }  // namespace
@@ -111,8 +135,26 @@ Status check_endpoint(const std::string& endpoint, bool allow_remote) {
   if (host.empty()) return refuse("must be tcp://HOST:PORT or ipc://PATH");
   if (allow_remote || is_loopback(host)) return {};
   return refuse(
-      "other machines may reach it, and there is no authentication: must be an address of this "
-      "machine alone, such as 127.0.0.1, unless allow_remote is true");
+      "other machines may reach it: must be an address of this machine alone, such as 127.0.0.1, "
+      "unless allow_remote is true and security names keys");
+}
+
+Status check_security(const DaemonConfig& config) {
+  const auto missing = [](const std::string& key, const std::string& why) {
+    return fail(ErrorCode::kInvalidArgument, "security." + key + " is missing: " + why);
+  };
+  const SecurityConfig& security = config.security;
+  if (security.on()) return {};
+  if (!security.secret_key.empty()) {
+    return missing("allow_list", "a secret key serves nobody without it (brainshift keys add)");
+  }
+  if (!security.allow_list.empty()) {
+    return missing("secret_key", "an allow-list counts only with it (brainshift keys make)");
+  }
+  if (check_endpoint(config.endpoint, false)) return {};
+  return missing("secret_key", "other machines may reach endpoint = " + config.endpoint +
+                                   ", so it takes keys and an allow-list (see brainshift keys "
+                                   "--help), or an address of this machine alone");
 }
 
 Status check_metrics_endpoint(const std::string& endpoint, bool allow_remote) {

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -37,8 +38,11 @@ struct Received {
 // A peer that sends whatever bytes it is given.
 class RawPeer {
  public:
-  explicit RawPeer(const std::string& endpoint, int receive_queue = 1000)
+  // prepare: what else to set before it connects, such as keys.
+  explicit RawPeer(const std::string& endpoint, int receive_queue = 1000,
+                   const std::function<void(zmq::socket_t&)>& prepare = {})
       : socket_(context_, zmq::socket_type::dealer) {
+    if (prepare) prepare(socket_);
     socket_.set(zmq::sockopt::linger, 0);
     socket_.set(zmq::sockopt::rcvhwm, receive_queue);
     socket_.set(zmq::sockopt::rcvtimeo, 10000);
@@ -96,10 +100,9 @@ class TransportTest : public testing::Test {
     auto router = Router::bind(router_options);
     ASSERT_TRUE(router.has_value()) << router.error().message;
     endpoint_ = router->endpoint();
+    router_ = std::make_shared<Router>(std::move(*router));
     service_ = std::make_unique<Service>(std::move(service_options), outbox_);
-    thread_ = std::thread([this, router = std::make_shared<Router>(std::move(*router))] {
-      run_status_ = router->run(*service_, outbox_, stop_fd_);
-    });
+    thread_ = std::thread([this] { run_status_ = router_->run(*service_, outbox_, stop_fd_); });
   }
 
   void stop() {
@@ -177,6 +180,7 @@ class TransportTest : public testing::Test {
   }
 
   std::string endpoint_;
+  std::shared_ptr<Router> router_;
 
  private:
   int stop_fd_ = eventfd(0, EFD_CLOEXEC);

@@ -27,6 +27,10 @@ TEST(DaemonFile, ShippedFileHasTheDefaults) {
   EXPECT_EQ(read->max_clients, defaults.max_clients);
   EXPECT_EQ(read->max_message_mib, defaults.max_message_mib);
   EXPECT_EQ(read->metrics.endpoint, defaults.metrics.endpoint);
+  EXPECT_FALSE(read->security.on());
+  EXPECT_EQ(read->limits.connections, defaults.limits.connections);
+  EXPECT_EQ(read->limits.observations_per_s, defaults.limits.observations_per_s);
+  EXPECT_EQ(read->limits.session_starts_per_min, defaults.limits.session_starts_per_min);
 }
 
 TEST(DaemonFile, ShippedFileDocumentsEveryKeyAsTheTableDoes) {
@@ -45,7 +49,9 @@ class DaemonFileKeys : public testing::Test {
 TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   const auto config = read(
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
-      "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n");
+      "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n"
+      "security:\n  secret_key: k\n  allow_list: a\n"
+      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n");
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
   EXPECT_TRUE(config->allow_remote);
@@ -55,6 +61,11 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   EXPECT_EQ(config->max_clients, 3);
   EXPECT_EQ(config->max_message_mib, 5);
   EXPECT_EQ(config->metrics.endpoint, "127.0.0.2:80");
+  EXPECT_EQ(config->security.secret_key, folder_ / "k");
+  EXPECT_EQ(config->security.allow_list, folder_ / "a");
+  EXPECT_EQ(config->limits.connections, 4);
+  EXPECT_EQ(config->limits.observations_per_s, 6);
+  EXPECT_EQ(config->limits.session_starts_per_min, 7);
 }
 
 TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
@@ -63,8 +74,8 @@ TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
       {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
       {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
       {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
-      {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 1024"},
-      {"max_message_mib: 1025", "d.yaml:1: max_message_mib = 1025: must be"},
+      {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 64"},
+      {"max_message_mib: 65", "d.yaml:1: max_message_mib = 65: must be"},
       {"log_level: loud",
        "d.yaml:1: log_level = loud: must be one of trace, debug, info, warn, error"},
       {"endpoint: 5555", "d.yaml:1: endpoint = 5555: must be tcp://HOST:PORT"},
@@ -109,7 +120,29 @@ TEST_F(DaemonFileKeys, WithoutAllowRemoteTheEndpointIsOnThisMachineAlone) {
     EXPECT_TRUE(check_endpoint(remote, true)) << remote;
   }
   EXPECT_FALSE(check_endpoint("inproc://x", true));
-  EXPECT_TRUE(read("endpoint: tcp://0.0.0.0:5555\nallow_remote: true\n"));
+}
+
+TEST_F(DaemonFileKeys, OffThisMachineADaemonTakesKeysAndAnAllowList) {
+  const std::string remote = "endpoint: tcp://0.0.0.0:5555\nallow_remote: true\n";
+  const std::string local = "endpoint: tcp://127.0.0.1:5555\n";
+  const std::string secret = "security:\n  secret_key: k\n";
+  const std::string list = "security:\n  allow_list: a\n";
+  const std::string both = secret + "  allow_list: a\n";
+  EXPECT_TRUE(read(remote + both));
+  EXPECT_TRUE(read(local + both));
+  EXPECT_TRUE(read(local));
+  const std::pair<std::string, const char*> kBad[] = {
+      {remote, "security.secret_key is missing: other machines may reach"},
+      {remote + secret, "security.allow_list is missing"},
+      {remote + list, "security.secret_key is missing"},
+      {local + secret, "security.allow_list is missing"},
+      {local + list, "security.secret_key is missing"}};
+  for (const auto& [text, message] : kBad) {
+    const auto config = read(text);
+    ASSERT_FALSE(config) << text;
+    EXPECT_EQ(config.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(config.error().message, AllOf(HasSubstr("d.yaml"), HasSubstr(message)));
+  }
 }
 
 TEST_F(DaemonFileKeys, MetricsAreForThisMachineUnlessAllowRemote) {

@@ -84,6 +84,21 @@ TEST_F(JournalOnDisk, ADeletedFileIsReportedWithinASecondAndRecordingGoesOnInANe
   EXPECT_FALSE(fs::exists(path));
 }
 
+TEST_F(JournalOnDisk, SessionsInWhichNothingWasObservedLeaveNoFile) {
+  Journal journal(options());
+  constexpr int kStarts = 200;
+  for (int i = 0; i < kStarts; ++i) {
+    journal.begin(folder / ("s" + std::to_string(i) + ".surgery"), {});
+  }
+  journal.begin(path, {});
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(sees_recorded(1));
+  journal.begin(folder / "last.surgery", {});
+  journal.stop();
+  EXPECT_EQ(folder.entries(), 1u);
+  EXPECT_THAT(sequences_in(path), ElementsAre(1));
+}
+
 TEST_F(JournalOnDisk, AFileInThePlaceOfTheJournalIsLeftAlone) {
   Journal journal(options());
   journal.begin(path, {});

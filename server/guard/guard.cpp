@@ -1,0 +1,482 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/guard/guard.hpp"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/guard/zmtp_stream.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kLaneBytes = 16u << 10;
+// Reads of one connection before the others get their turn.
+constexpr int kReadsPerTurn = 16;
+constexpr std::chrono::milliseconds kTick{100};
+// Two heartbeats a second with CURVE, which nobody sees delivered: 45 bytes and the part's cost.
+constexpr double kForgivenPerSecond = 512.0;
+// Headers and encryption of a part that was delivered: at most this much was counted for it.
+constexpr std::size_t kWrapping = 48;
+// Beyond one message; what a busy client has under way.
+constexpr std::size_t kSlack = 1u << 20;
+
+// Bytes on their way in one direction.
+struct Lane {
+  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(kLaneBytes);
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  bool empty() const { return begin == end; }
+};
+
+// What both threads know of a connection.
+struct Account {
+  std::atomic<std::uint64_t> delivered{0};
+  std::atomic<std::uint64_t> messages{0};
+  std::atomic<bool> served{false};
+  std::atomic<bool> to_close{false};
+  std::atomic<bool> throttled{false};  // it is not read until more is delivered
+};
+
+struct Connection {
+  explicit Connection(const ZmtpStream::Bounds& bounds) : stream(bounds) {}
+  ~Connection() {
+    if (peer >= 0) ::close(peer);
+    if (inner >= 0) ::close(inner);
+  }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  int peer = -1;
+  int inner = -1;
+  std::string name;  // of the inner socket
+  Lane up, down;     // to libzmq, to the peer
+  ZmtpStream stream;
+  std::shared_ptr<Account> account = std::make_shared<Account>();
+  std::uint64_t settled = 0;   // of the stream's cost
+  std::uint64_t seen = 0;      // of account->delivered
+  std::uint64_t messages = 0;  // of account->messages
+  std::uint64_t held = 0;
+  Clock::time_point opened = Clock::now();
+  Clock::time_point forgiven = opened;
+  Clock::time_point moved = opened;  // something was delivered, or nothing was held
+
+  bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
+};
+
+// The abstract name of a socket, its own or its peer's; empty when it has none.
+std::string socket_name(int fd, decltype(&getsockname) ask) {
+  sockaddr_un address{};
+  socklen_t size = sizeof address;
+  if (ask(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  if (size <= offsetof(sockaddr_un, sun_path)) return {};
+  return {address.sun_path, size - offsetof(sockaddr_un, sun_path)};
+}
+
+// A connection to libzmq's socket, under a name of its own; -1 when there is none to be had.
+int connect_inner(const std::string& inner) {
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd < 0) return -1;
+  sockaddr_un own{};
+  own.sun_family = AF_UNIX;
+  sockaddr_un other{};
+  other.sun_family = AF_UNIX;
+  inner.copy(other.sun_path + 1, sizeof other.sun_path - 1);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + inner.size());
+  if (bind(fd, reinterpret_cast<const sockaddr*>(&own), sizeof own.sun_family) == 0 &&
+      connect(fd, reinterpret_cast<const sockaddr*>(&other), size) == 0) {
+    return fd;
+  }
+  ::close(fd);
+  return -1;
+}
+
+enum class Flow { kGoesOn, kEnded };
+
+// Writes out what the lane holds.
+Flow drain(Lane& lane, int to) {
+  while (!lane.empty()) {
+    const auto sent = send(to, lane.bytes.data() + lane.begin, lane.end - lane.begin, MSG_NOSIGNAL);
+    if (sent < 0 && errno == EINTR) continue;
+    if (sent < 0) return errno == EAGAIN ? Flow::kGoesOn : Flow::kEnded;
+    lane.begin += static_cast<std::size_t>(sent);
+  }
+  lane.begin = lane.end = 0;
+  return Flow::kGoesOn;
+}
+
+// Reads into the empty lane. What came: 0 nothing yet, -1 the end.
+int fill(Lane& lane, int from) {
+  const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
+  if (got < 0) return errno == EAGAIN || errno == EINTR ? 0 : -1;
+  if (got == 0) return -1;
+  lane.begin = 0;
+  lane.end = static_cast<std::size_t>(got);
+  return static_cast<int>(got);
+}
+
+}  // namespace
+
+struct Guard::Impl {
+  Impl(Listener given, std::string inner_name, const GuardOptions& given_options)
+      : listener(std::move(given)), inner(std::move(inner_name)), options(given_options) {
+    options.held_bytes = std::max(options.held_bytes, 2 * options.max_message_bytes + 2 * kSlack);
+    epoll = epoll_create1(EPOLL_CLOEXEC);
+    wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (epoll < 0 || wake < 0) throw std::system_error(errno, std::generic_category(), "epoll");
+    watch(wake, EPOLLIN, EPOLL_CTL_ADD);
+    watch(listener.fd(), EPOLLIN, EPOLL_CTL_ADD);
+  }
+  ~Impl() {
+    connections.clear();
+    ::close(epoll);
+    ::close(wake);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void watch(int fd, std::uint32_t events, int operation) const;
+  void work();
+  void nudge() const;
+
+  void accept_all();
+  bool make_room();
+  void open(int peer);
+  void serve(Connection& connection, bool hung_up);
+  bool lost(Connection& connection);
+  bool pump_up(Connection& connection);
+  bool pump_down(Connection& connection);
+  void settle(Connection& connection);
+  bool within_memory(const Connection& connection);
+  bool claims_routing_id(Connection& connection);
+  void listen_again(bool wanted);
+  void tick();
+  void end(Connection& connection, std::uint64_t* counter, const std::string& why);
+
+  std::shared_ptr<Account> account_of(int inner_fd);
+
+  Listener listener;
+  const std::string inner;
+  GuardOptions options;
+  int epoll = -1;
+  int wake = -1;
+  std::atomic<bool> stopping{false};
+  bool listening = true;
+  std::map<int, Connection*> by_fd;                                // both descriptors
+  std::map<std::string, std::unique_ptr<Connection>> connections;  // by name
+  std::map<std::string, Connection*> routing_ids;
+  std::atomic<std::uint64_t> held{0};
+
+  mutable std::mutex mutex;  // of what follows
+  std::map<std::string, std::shared_ptr<Account>> accounts;
+  GuardCounts counts;
+
+  std::thread thread;
+};
+
+void Guard::Impl::watch(int fd, std::uint32_t events, int operation) const {
+  epoll_event event{};
+  event.events = events;
+  event.data.fd = fd;
+  epoll_ctl(epoll, operation, fd, &event);
+}
+
+void Guard::Impl::nudge() const {
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(wake, &one, sizeof one);
+}
+
+void Guard::Impl::work() {
+  std::array<epoll_event, 64> events{};
+  auto next_tick = Clock::now() + kTick;
+  while (!stopping) {
+    // Nobody connected: nothing to look after.
+    const int wait = connections.empty() && listening ? -1 : static_cast<int>(kTick.count());
+    const int count = epoll_wait(epoll, events.data(), static_cast<int>(events.size()), wait);
+    for (int i = 0; i < count; ++i) {
+      const epoll_event& event = events[static_cast<std::size_t>(i)];
+      const int fd = event.data.fd;
+      if (fd == wake) {
+        std::uint64_t value = 0;
+        [[maybe_unused]] const auto got = read(wake, &value, sizeof value);
+        next_tick = Clock::now();
+      } else if (fd == listener.fd()) {
+        accept_all();
+      } else if (const auto found = by_fd.find(fd); found != by_fd.end()) {
+        serve(*found->second, (event.events & (EPOLLHUP | EPOLLERR)) != 0);
+      }
+    }
+    if (Clock::now() >= next_tick) {
+      tick();
+      next_tick = Clock::now() + kTick;
+    }
+  }
+}
+
+void Guard::Impl::listen_again(bool wanted) {
+  if (listening == wanted) return;
+  listening = wanted;
+  watch(listener.fd(), wanted ? static_cast<std::uint32_t>(EPOLLIN) : 0u, EPOLL_CTL_MOD);
+}
+
+// Whether one more connection may be had. A newcomer has a tick to say something, and libzmq that
+// time to close what it had of the one that makes room: its descriptors must not pile up.
+bool Guard::Impl::make_room() {
+  if (connections.size() < static_cast<std::size_t>(options.max_connections)) return true;
+  Connection* oldest = nullptr;
+  for (const auto& [name, connection] : connections) {
+    if (connection->account->served) continue;
+    if (oldest == nullptr || connection->opened < oldest->opened) oldest = connection.get();
+  }
+  if (oldest == nullptr || Clock::now() - oldest->opened < kTick) return false;
+  end(*oldest, &counts.closed_for_room, "room is needed");
+  return true;
+}
+
+void Guard::Impl::accept_all() {
+  // Not all at once: those that are connected get their turn.
+  for (int i = 0; i < 16; ++i) {
+    if (!make_room()) return listen_again(false);  // they wait in the kernel's queue
+    const int peer = accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (peer < 0) {
+      if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS) {
+        listen_again(false);  // until the next tick
+      }
+      return;
+    }
+    open(peer);
+  }
+}
+
+void Guard::Impl::open(int peer) {
+  auto connection = std::make_unique<Connection>(
+      ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping});
+  connection->peer = peer;
+  connection->inner = connect_inner(inner);
+  if (connection->inner < 0) return;  // closes it
+  const int yes = 1;
+  setsockopt(peer, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for ipc, which has none
+  connection->name = socket_name(connection->inner, &getsockname);
+  Connection& added = *connection;
+  by_fd[added.peer] = by_fd[added.inner] = &added;
+  {
+    const std::lock_guard lock(mutex);
+    accounts[added.name] = added.account;
+    ++counts.accepted;
+  }
+  connections[added.name] = std::move(connection);
+  watch(added.peer, EPOLLIN, EPOLL_CTL_ADD);
+  watch(added.inner, EPOLLIN, EPOLL_CTL_ADD);
+}
+
+void Guard::Impl::end(Connection& connection, std::uint64_t* counter, const std::string& why) {
+  {
+    const std::lock_guard lock(mutex);
+    accounts.erase(connection.name);
+    if (counter != nullptr && std::has_single_bit(++*counter)) {
+      spdlog::warn("connection closed times={} reason=\"{}\"", *counter, why);
+    }
+  }
+  held -= connection.held;
+  by_fd.erase(connection.peer);
+  by_fd.erase(connection.inner);
+  const auto claimed = routing_ids.find(connection.stream.routing_id());
+  if (claimed != routing_ids.end() && claimed->second == &connection) routing_ids.erase(claimed);
+  connections.erase(std::string(connection.name));
+  listen_again(true);
+}
+
+// Brings what libzmq holds of the connection up to date.
+void Guard::Impl::settle(Connection& connection) {
+  const std::uint64_t cost = connection.stream.cost();
+  const std::uint64_t delivered = connection.account->delivered;
+  const std::uint64_t messages = connection.account->messages;
+  const auto now = Clock::now();
+  const std::uint64_t before = connection.held;
+  std::uint64_t less = delivered - connection.seen;
+  if (connection.stream.encrypted()) {
+    const double seconds = std::chrono::duration<double>(now - connection.forgiven).count();
+    const auto forgiven = static_cast<std::uint64_t>(kForgivenPerSecond * seconds);
+    if (forgiven > 0) connection.forgiven = now;
+    less += forgiven;
+  }
+  connection.held += cost - connection.settled;
+  connection.held -= std::min(connection.held, less);
+  connection.settled = cost;
+  connection.seen = delivered;
+  if (messages != connection.messages || connection.held == 0) connection.moved = now;
+  connection.messages = messages;
+  held += connection.held;
+  held -= before;
+}
+
+// False when `connection` itself was closed.
+bool Guard::Impl::within_memory(const Connection& connection) {
+  while (held > options.held_bytes) {
+    Connection* longest = nullptr;
+    for (const auto& [name, other] : connections) {
+      settle(*other);
+      if (other->held == 0) continue;
+      if (longest == nullptr || other->moved < longest->moved) longest = other.get();
+    }
+    if (longest == nullptr || held <= options.held_bytes) return true;
+    const bool self = longest == &connection;
+    end(*longest, &counts.closed_for_memory, "peers hold too much of the daemon's memory");
+    if (self) return false;
+  }
+  return true;
+}
+
+// False when another connection has the routing id that this one has just told.
+bool Guard::Impl::claims_routing_id(Connection& connection) {
+  const std::string& id = connection.stream.routing_id();
+  if (id.empty()) return true;
+  const auto [entry, added] = routing_ids.emplace(id, &connection);
+  return added || entry->second == &connection;
+}
+
+// One end has gone. Always false: there is no connection any more.
+bool Guard::Impl::lost(Connection& connection) {
+  end(connection, nullptr, {});
+  return false;
+}
+
+// From the peer to libzmq; false when the connection has ended.
+bool Guard::Impl::pump_up(Connection& connection) {
+  for (int i = 0; i < kReadsPerTurn; ++i) {
+    if (drain(connection.up, connection.inner) == Flow::kEnded) return lost(connection);
+    settle(connection);
+    connection.account->throttled = connection.held > options.max_message_bytes + kSlack;
+    if (!connection.up.empty() || connection.account->throttled) return true;
+    const int got = fill(connection.up, connection.peer);
+    if (got == 0) return true;
+    if (got < 0) return lost(connection);
+    const std::string wrong =
+        connection.stream.take({connection.up.bytes.data(), static_cast<std::size_t>(got)});
+    if (!wrong.empty()) {
+      end(connection, &counts.closed_for_breach, "a peer sent " + wrong);
+      return false;
+    }
+    if (!claims_routing_id(connection)) {
+      end(connection, &counts.closed_for_breach, "a peer chose another's routing id");
+      return false;
+    }
+    settle(connection);
+    if (!within_memory(connection)) return false;
+  }
+  return true;
+}
+
+// From libzmq to the peer; false when the connection has ended.
+bool Guard::Impl::pump_down(Connection& connection) {
+  for (int i = 0; i < kReadsPerTurn; ++i) {
+    if (drain(connection.down, connection.peer) == Flow::kEnded) return lost(connection);
+    if (!connection.down.empty()) return true;
+    const int got = fill(connection.down, connection.inner);
+    if (got == 0) return true;
+    if (got < 0) return lost(connection);
+  }
+  return true;
+}
+
+// hung_up: an end has gone; what it left is passed on, if the other end takes it.
+void Guard::Impl::serve(Connection& connection, bool hung_up) {
+  if (!pump_down(connection) || !pump_up(connection)) return;
+  if (hung_up && connection.stuck()) return end(connection, nullptr, {});
+  const auto interest = [](bool in, bool out) {
+    return (in ? static_cast<std::uint32_t>(EPOLLIN) : 0u) |
+           (out ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
+  };
+  const bool read_peer = connection.up.empty() && !connection.account->throttled;
+  watch(connection.peer, interest(read_peer, !connection.down.empty()), EPOLL_CTL_MOD);
+  watch(connection.inner, interest(connection.down.empty(), !connection.up.empty()), EPOLL_CTL_MOD);
+}
+
+void Guard::Impl::tick() {
+  listen_again(true);
+  std::vector<std::string> names;
+  for (const auto& [name, connection] : connections) names.push_back(name);
+  const auto now = Clock::now();
+  for (const std::string& name : names) {
+    const auto found = connections.find(name);
+    if (found == connections.end()) continue;
+    Connection& connection = *found->second;
+    settle(connection);
+    if (connection.account->to_close) {
+      end(connection, nullptr, {});
+    } else if (connection.held > 0 && now - connection.moved > options.patience) {
+      end(connection, &counts.closed_for_silence, "nothing of a peer could be delivered");
+    } else if (connection.account->throttled) {
+      serve(connection, false);
+    }
+  }
+}
+
+std::shared_ptr<Account> Guard::Impl::account_of(int inner_fd) {
+  const std::string name = socket_name(inner_fd, &getpeername);
+  const std::lock_guard lock(mutex);
+  const auto found = accounts.find(name);
+  return found == accounts.end() ? nullptr : found->second;
+}
+
+Guard::Guard(Listener listener, std::string inner, const GuardOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(listener), std::move(inner), options)) {
+  impl_->thread = std::thread([this] { impl_->work(); });
+}
+
+Guard::~Guard() {
+  impl_->stopping = true;
+  impl_->nudge();
+  impl_->thread.join();
+}
+
+const std::string& Guard::endpoint() const { return impl_->listener.endpoint(); }
+
+void Guard::delivered(int inner_fd, std::size_t bytes, std::size_t parts) {
+  const auto account = impl_->account_of(inner_fd);
+  if (!account) return;
+  account->delivered += bytes + parts * (ZmtpStream::kPartCost + kWrapping);
+  ++account->messages;
+  if (account->throttled) impl_->nudge();
+}
+
+void Guard::served(int inner_fd) {
+  if (const auto account = impl_->account_of(inner_fd)) account->served = true;
+}
+
+void Guard::close(int inner_fd) {
+  const auto account = impl_->account_of(inner_fd);
+  if (!account) return;
+  account->to_close = true;
+  impl_->nudge();
+}
+
+GuardCounts Guard::counts() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->counts;
+}
+
+std::uint64_t Guard::held_bytes() const { return impl_->held; }
+
+}  // namespace brainshift::server

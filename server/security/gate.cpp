@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/security/gate.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <bit>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+
+namespace brainshift::server {
+namespace {
+
+using wire::MessageType;
+
+struct Need {
+  Role least = Role::kAdmin;
+  const char* what = "make this request";
+};
+
+Need need_of(const wire::Frame& request) {
+  switch (request.type) {
+    case MessageType::kStatusRequest: return {Role::kViewer, "ask for the status"};
+    case MessageType::kModelRequest: return {Role::kViewer, "ask for the model"};
+    case MessageType::kReportRequest: return {Role::kViewer, "ask for a report"};
+    case MessageType::kSubscribeRequest: return {Role::kViewer, "subscribe"};
+    case MessageType::kObservation: return {Role::kSource, "hand in observations"};
+    case MessageType::kStartSessionRequest: {
+      // One that cannot be read is answered by the service, with the reason.
+      const auto start = wire::decode_session_request(request.payload);
+      if (start && start->takeover) return {Role::kAdmin, "take over a session"};
+      return {Role::kOwner, "start a session"};
+    }
+    default: return {};
+  }
+}
+
+}  // namespace
+
+std::string Gate::caller(std::string_view user_id, const std::string& routing_id) const {
+  return roles_ ? std::string(user_id) : routing_id;
+}
+
+// A peer that repeats itself fills no log: the 1st, 2nd, 4th, 8th ... refusal of a kind is told.
+tl::unexpected<Error> Gate::refuse(std::uint64_t& counter, ErrorCode code,
+                                   const std::string& sentence) {
+  if (std::has_single_bit(++counter)) {
+    spdlog::warn("request refused code={} times={} reason=\"{}\"", to_string(code), counter,
+                 sentence);
+  }
+  return fail(code, sentence);
+}
+
+Status Gate::enter(const std::string& caller, std::size_t connections) {
+  if (!roles_ || connections < static_cast<std::size_t>(limits_.connections)) return {};
+  return refuse(refusals_.connections, ErrorCode::kUnavailable,
+                fmt::format("the key {} has {} connections already", caller, connections));
+}
+
+Status Gate::check_role(const std::string& caller, const wire::Frame& request) {
+  if (!roles_) return {};
+  const auto found = roles_->find(caller);
+  if (found == roles_->end()) {
+    return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed, "the connection has no key");
+  }
+  const Need need = need_of(request);
+  if (includes(found->second, need.least)) return {};
+  return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed,
+                fmt::format("the key {} has the role {}: to {} takes the role {}", caller,
+                            to_string(found->second), need.what, to_string(need.least)));
+}
+
+Gate::Allowance& Gate::allowance(const std::string& caller, TimePoint now) {
+  const auto found = allowances_.find(caller);
+  if (found != allowances_.end()) return found->second;
+  const double observations = limits_.observations_per_s;
+  const double starts = limits_.session_starts_per_min;
+  return allowances_
+      .emplace(caller, Allowance{TokenBucket(observations, observations, now),
+                                 TokenBucket(starts / 60.0, starts, now)})
+      .first->second;
+}
+
+Status Gate::admit(const std::string& caller, const wire::Frame& request, TimePoint now) {
+  if (Status role = check_role(caller, request); !role) return role;
+  if (request.type == MessageType::kObservation && !allowance(caller, now).observations.take(now)) {
+    return refuse(
+        refusals_.observations, ErrorCode::kUnavailable,
+        fmt::format("more than {} observations a second: send fewer", limits_.observations_per_s));
+  }
+  if (request.type == MessageType::kStartSessionRequest &&
+      !allowance(caller, now).session_starts.take(now)) {
+    return refuse(refusals_.session_starts, ErrorCode::kUnavailable,
+                  fmt::format("more than {} session starts a minute: try again later",
+                              limits_.session_starts_per_min));
+  }
+  return {};
+}
+
+void Gate::left(const std::string& caller) {
+  if (!roles_) allowances_.erase(caller);
+}
+
+}  // namespace brainshift::server
