@@ -8,7 +8,6 @@
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,7 +15,6 @@
 #include <atomic>
 #include <bit>
 #include <cerrno>
-#include <cstring>
 #include <map>
 #include <mutex>
 #include <system_error>
@@ -24,117 +22,18 @@
 #include <utility>
 #include <vector>
 
-#include "server/guard/zmtp_stream.hpp"
+#include "server/guard/connection.hpp"
 
 namespace brainshift::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kLaneBytes = 16u << 10;
 // Reads of one connection before the others get their turn.
 constexpr int kReadsPerTurn = 16;
 constexpr std::chrono::milliseconds kTick{100};
-// Two heartbeats a second with CURVE, which nobody sees delivered: 45 bytes and the part's cost.
-constexpr double kForgivenPerSecond = 512.0;
-// Headers and encryption of a part that was delivered: at most this much was counted for it.
-constexpr std::size_t kWrapping = 48;
 // Beyond one message; what a busy client has under way.
 constexpr std::size_t kSlack = 1u << 20;
-
-// Bytes on their way in one direction.
-struct Lane {
-  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(kLaneBytes);
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  bool empty() const { return begin == end; }
-};
-
-// What both threads know of a connection.
-struct Account {
-  std::atomic<std::uint64_t> delivered{0};
-  std::atomic<std::uint64_t> messages{0};
-  std::atomic<bool> served{false};
-  std::atomic<bool> to_close{false};
-  std::atomic<bool> throttled{false};  // it is not read until more is delivered
-};
-
-struct Connection {
-  explicit Connection(const ZmtpStream::Bounds& bounds) : stream(bounds) {}
-  ~Connection() {
-    if (peer >= 0) ::close(peer);
-    if (inner >= 0) ::close(inner);
-  }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  int peer = -1;
-  int inner = -1;
-  std::string name;  // of the inner socket
-  Lane up, down;     // to libzmq, to the peer
-  ZmtpStream stream;
-  std::shared_ptr<Account> account = std::make_shared<Account>();
-  std::uint64_t settled = 0;   // of the stream's cost
-  std::uint64_t seen = 0;      // of account->delivered
-  std::uint64_t messages = 0;  // of account->messages
-  std::uint64_t held = 0;
-  Clock::time_point opened = Clock::now();
-  Clock::time_point forgiven = opened;
-  Clock::time_point moved = opened;  // something was delivered, or nothing was held
-
-  bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
-};
-
-// The abstract name of a socket, its own or its peer's; empty when it has none.
-std::string socket_name(int fd, decltype(&getsockname) ask) {
-  sockaddr_un address{};
-  socklen_t size = sizeof address;
-  if (ask(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
-  if (size <= offsetof(sockaddr_un, sun_path)) return {};
-  return {address.sun_path, size - offsetof(sockaddr_un, sun_path)};
-}
-
-// A connection to libzmq's socket, under a name of its own; -1 when there is none to be had.
-int connect_inner(const std::string& inner) {
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (fd < 0) return -1;
-  sockaddr_un own{};
-  own.sun_family = AF_UNIX;
-  sockaddr_un other{};
-  other.sun_family = AF_UNIX;
-  inner.copy(other.sun_path + 1, sizeof other.sun_path - 1);
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + inner.size());
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&own), sizeof own.sun_family) == 0 &&
-      connect(fd, reinterpret_cast<const sockaddr*>(&other), size) == 0) {
-    return fd;
-  }
-  ::close(fd);
-  return -1;
-}
-
-enum class Flow { kGoesOn, kEnded };
-
-// Writes out what the lane holds.
-Flow drain(Lane& lane, int to) {
-  while (!lane.empty()) {
-    const auto sent = send(to, lane.bytes.data() + lane.begin, lane.end - lane.begin, MSG_NOSIGNAL);
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) return errno == EAGAIN ? Flow::kGoesOn : Flow::kEnded;
-    lane.begin += static_cast<std::size_t>(sent);
-  }
-  lane.begin = lane.end = 0;
-  return Flow::kGoesOn;
-}
-
-// Reads into the empty lane. What came: 0 nothing yet, -1 the end.
-int fill(Lane& lane, int from) {
-  const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
-  if (got < 0) return errno == EAGAIN || errno == EINTR ? 0 : -1;
-  if (got == 0) return -1;
-  lane.begin = 0;
-  lane.end = static_cast<std::size_t>(got);
-  return static_cast<int>(got);
-}
 
 }  // namespace
 
@@ -271,7 +170,7 @@ void Guard::Impl::accept_all() {
 
 void Guard::Impl::open(int peer) {
   auto connection = std::make_unique<Connection>(
-      ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping});
+      ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
   connection->peer = peer;
   connection->inner = connect_inner(inner);
   if (connection->inner < 0) return;  // closes it
@@ -307,26 +206,9 @@ void Guard::Impl::end(Connection& connection, std::uint64_t* counter, const std:
   listen_again(true);
 }
 
-// Brings what libzmq holds of the connection up to date.
 void Guard::Impl::settle(Connection& connection) {
-  const std::uint64_t cost = connection.stream.cost();
-  const std::uint64_t delivered = connection.account->delivered;
-  const std::uint64_t messages = connection.account->messages;
-  const auto now = Clock::now();
   const std::uint64_t before = connection.held;
-  std::uint64_t less = delivered - connection.seen;
-  if (connection.stream.encrypted()) {
-    const double seconds = std::chrono::duration<double>(now - connection.forgiven).count();
-    const auto forgiven = static_cast<std::uint64_t>(kForgivenPerSecond * seconds);
-    if (forgiven > 0) connection.forgiven = now;
-    less += forgiven;
-  }
-  connection.held += cost - connection.settled;
-  connection.held -= std::min(connection.held, less);
-  connection.settled = cost;
-  connection.seen = delivered;
-  if (messages != connection.messages || connection.held == 0) connection.moved = now;
-  connection.messages = messages;
+  connection.settle(Clock::now());
   held += connection.held;
   held -= before;
 }

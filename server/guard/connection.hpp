@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Connection: a peer's socket, the one to libzmq that its bytes go to, and the account of what
+// libzmq holds of it. Private to server/guard.
+#pragma once
+
+#include <sys/socket.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/guard/lane.hpp"
+#include "server/guard/zmtp_stream.hpp"
+
+namespace brainshift::server {
+
+// Headers and encryption of a part: at most this was counted for it beside ZmtpStream::kPartCost.
+inline constexpr std::size_t kWrapping = 48;
+
+// What the guard and the transport thread both know of a connection.
+struct Account {
+  std::atomic<std::uint64_t> delivered{0};
+  std::atomic<std::uint64_t> messages{0};
+  std::atomic<bool> served{false};
+  std::atomic<bool> to_close{false};
+  std::atomic<bool> throttled{false};  // it is not read until more is delivered
+};
+
+struct Connection {
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  Connection(const ZmtpStream::Bounds& bounds, TimePoint now)
+      : stream(bounds), opened(now), forgiven(now), moved(now) {}
+  ~Connection();  // closes both sockets
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  // Brings `held` and `moved` up to date.
+  void settle(TimePoint now);
+  // Something cannot go on at once.
+  bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
+
+  int peer = -1;
+  int inner = -1;
+  std::string name;  // of the inner socket
+  Lane up, down;     // to libzmq, to the peer
+  ZmtpStream stream;
+  std::shared_ptr<Account> account = std::make_shared<Account>();
+  std::uint64_t held = 0;  // by libzmq
+  TimePoint opened;
+  TimePoint forgiven;
+  TimePoint moved;  // something was delivered, or nothing was held
+
+ private:
+  // What held has taken in: of the stream's cost, of account->delivered and of account->messages.
+  std::uint64_t cost_ = 0;
+  std::uint64_t delivered_ = 0;
+  std::uint64_t messages_ = 0;
+};
+
+// The abstract name of a socket (getsockname) or of its peer (getpeername); empty: it has none.
+std::string socket_name(int fd, decltype(&getsockname) ask);
+
+// A connection to libzmq's socket, under a name of its own; -1 when there is none to be had.
+int connect_inner(const std::string& inner);
+
+}  // namespace brainshift::server

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Lane: bytes on their way in one direction, from one socket that does not block to another.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace brainshift::server {
+
+struct Lane {
+  static constexpr std::size_t kBytes = 16u << 10;
+
+  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(kBytes);
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  bool empty() const { return begin == end; }
+};
+
+enum class Flow { kGoesOn, kEnded };
+
+// Writes out what the lane holds, as far as the socket takes it.
+Flow drain(Lane& lane, int to);
+
+// Reads into the empty lane. The bytes that came; 0: none yet, -1: there will be none.
+int fill(Lane& lane, int from);
+
+}  // namespace brainshift::server
