@@ -91,8 +91,8 @@ void bad_peers(const Settings& settings, Tally& tally) {
   tally.equals("bad peers: descriptors left behind", leaked(daemon, before), 0);
 }
 
-// More connections than the daemon may have descriptors. Each greets as a peer does and stays silent,
-// so that no limit on handshakes drops it.
+// More connections than the daemon may have descriptors. Each greets as a peer does and stays
+// silent, so that no limit on handshakes drops it.
 void few_descriptors(const Settings& settings, Tally& tally) {
   constexpr int kLimit = 256, kConnections = 300;
   constexpr int kJournal = 3;  // file, log and its index, open until the next session

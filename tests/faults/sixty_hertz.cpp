@@ -23,6 +23,11 @@ constexpr double kHertz = 60.0;
 // Memory is looked at from here on: before, caches fill.
 constexpr double kSettled = 0.2;  // share of the time
 
+// The daemon marks what took it too long with this flag.
+bool is_marked_late(const Update& update) {
+  return update.estimate.quality.flags.has(QualityFlag::kDeadline);
+}
+
 struct Account {
   std::map<std::uint64_t, Clock::time_point> sent;  // not answered yet, by sequence
   long received = 0, answered = 0, replaced = 0, refused = 0;
@@ -36,7 +41,7 @@ struct Account {
     ++answered;
     if (!message.error) {
       ages_ms.push_back(Seconds(Clock::now() - found->second).count() * 1e3);
-      marked.push_back(message.update.estimate.quality.flags.has(QualityFlag::kDeadline));
+      marked.push_back(is_marked_late(message.update));
     }
     sent.erase(found);
   }
