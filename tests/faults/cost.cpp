@@ -23,7 +23,9 @@ constexpr int kBlock = 20;  // updates of one daemon before the other has its tu
 class Side {
  public:
   Side(const DaemonOptions& options, const Feed& feed)
-      : feed_(feed), daemon_(options), opened_(open_session(daemon_.endpoint(), feed, false)) {
+      : feed_(feed),
+        daemon_(options),
+        opened_(open_session(daemon_.endpoint(), feed, false, daemon_.keys())) {
     need(opened_.client.subscribe(), "subscribe");
   }
   void ask(int times) {
@@ -46,7 +48,7 @@ class Side {
   std::vector<double> latencies_ms_;
 };
 
-// `what`: in which the second differs from the first ("journal").
+// `what`: in which the second differs from the first ("journal and keys").
 void compare(const std::string& what, const DaemonOptions& without, const DaemonOptions& with,
              const Settings& settings, Tally& tally) {
   const Feed feed(settings.surgery);
@@ -63,7 +65,7 @@ void compare(const std::string& what, const DaemonOptions& without, const Daemon
     other.ask(kBlock);
     show_progress(what, done + kBlock, settings.count);
   }
-  Rows rows(settings.work / ("cost-" + what + ".csv"), "with,latency_ms");
+  Rows rows(settings.work / "cost.csv", "with,latency_ms");
   for (const double each : first.latencies_ms()) rows.add({0.0, each});
   for (const double each : second.latencies_ms()) rows.add({1.0, each});
   const auto p = [](const Side& side, double share) {
@@ -92,10 +94,10 @@ DaemonOptions in_folder(const Settings& settings, const char* name) {
 
 void run_cost(const Settings& settings, Tally& tally) {
   const DaemonOptions plain = in_folder(settings, "plain");
-  DaemonOptions journal = in_folder(settings, "journal-on");
-  journal.journal = true;
-  compare("journal", plain, journal, settings, tally);
-  fs::remove_all(journal.folder / "journal");
+  DaemonOptions safe = in_folder(settings, "journal-and-keys");
+  safe.journal = safe.keys = true;
+  compare("journal and keys", plain, safe, settings, tally);
+  fs::remove_all(safe.folder / "journal");
 }
 
 }  // namespace brainshift::faults

@@ -18,6 +18,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "common/io/config/key_file.hpp"
+#include "tests/faults/need.hpp"
 #include "tests/integration/workspace.hpp"
 
 extern char** environ;
@@ -38,6 +40,22 @@ std::string proc_file(pid_t pid, const char* name) {
   return "/proc/" + std::to_string(pid) + "/" + name;
 }
 
+// Key pairs of the daemon and of an admin, and the allow-list that names the admin.
+client::ClientKeys make_keys(const fs::path& folder) {
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  const auto pair = [&](const char* name) {
+    const auto made = need(client::new_keys(), "keys");
+    io::KeyPair keys{name, made.public_key, made.secret_key};
+    need(io::write_key_pair(folder, keys), "keys");
+    return keys;
+  };
+  const io::KeyPair daemon = pair("daemon"), admin = pair("admin");
+  need(io::add_allowed_key(folder / "allow-list", {Role::kAdmin, admin.name, admin.public_key}),
+       "allow-list");
+  return {daemon.public_key, admin.public_key, admin.secret_key};
+}
+
 fs::path write_configuration(const DaemonOptions& options) {
   const fs::path file = options.folder / "daemon.yaml";
   std::ofstream stream(file);
@@ -45,6 +63,11 @@ fs::path write_configuration(const DaemonOptions& options) {
   if (options.journal) {
     fs::create_directories(options.folder / "journal");
     stream << "journal_dir: " << fs::absolute(options.folder / "journal").string() << "\n";
+  }
+  if (options.keys) {
+    const std::string keys = fs::absolute(options.folder / "keys").string();
+    stream << "security: {secret_key: " << keys << "/daemon.secret, allow_list: " << keys
+           << "/allow-list}\n";
   }
   stream.close();
   if (!stream) throw std::runtime_error("cannot write " + file.string());
@@ -81,6 +104,7 @@ std::string first_line(int fd) {
 }  // namespace
 
 DaemonProcess::DaemonProcess(const DaemonOptions& options) : options_(options) {
+  if (options.keys) keys_ = make_keys(options.folder / "keys");
   const auto begin = std::chrono::steady_clock::now();
   std::vector<std::string> arguments = {integration::brainshiftd(),   "serve",   "--config",
                                         write_configuration(options), "--model", options.model};

@@ -5,8 +5,11 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "client/lib/client_keys.hpp"
 
 namespace brainshift::faults {
 
@@ -14,6 +17,7 @@ struct DaemonOptions {
   std::filesystem::path model;
   std::filesystem::path folder;  // for its configuration and its log; exists
   bool journal = false;          // keeps one in folder/journal, which is made
+  bool keys = false;             // asks for keys, which are made in folder/keys
   std::string endpoint = "tcp://127.0.0.1:*";
   int max_clients = 64;
   bool log = true;                            // into folder/daemon.log; false: nowhere
@@ -31,6 +35,8 @@ class DaemonProcess {
   DaemonProcess& operator=(const DaemonProcess&) = delete;
 
   const std::string& endpoint() const { return endpoint_; }
+  // Of its one client, an admin; none when it asks for none.
+  const std::optional<client::ClientKeys>& keys() const { return keys_; }
   double listening_after_s() const { return listening_after_s_; }
   std::filesystem::path journal() const { return options_.folder / "journal"; }
   pid_t pid() const { return pid_; }
@@ -45,6 +51,7 @@ class DaemonProcess {
 
  private:
   DaemonOptions options_;
+  std::optional<client::ClientKeys> keys_;
   pid_t pid_ = -1;
   int stdout_fd_ = -1;
   std::string endpoint_;

@@ -90,8 +90,11 @@ void Feed::write(const std::filesystem::path& path, std::size_t count) const {
   need(file.close(), path.string());
 }
 
-Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded_clock) {
-  auto client = need(client::Client::connect(endpoint), "connect");
+Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded_clock,
+                    const std::optional<client::ClientKeys>& keys) {
+  client::ClientOptions options;
+  options.keys = keys;
+  auto client = need(client::Client::connect(endpoint, options), "connect");
   wire::SessionRequest request;
   request.case_id = feed.case_id();
   request.recorded_clock = recorded_clock;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,7 +46,8 @@ struct Opened {
   client::Client client;
   wire::SessionInfo info;
 };
-Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded_clock);
+Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded_clock,
+                    const std::optional<client::ClientKeys>& keys = std::nullopt);
 
 // Sends an observation and waits for the update that answers it; the client must have subscribed.
 wire::UpdateMessage answer_to(client::Client& client, const Observation& observation);

@@ -28,14 +28,16 @@ const std::map<std::string, Topic> kTopics = {
     {"messages", {run_bad_messages, "COUNT bad messages", 1000000, 20000, 0, 0}},
     {"unfinished", {run_unfinished_messages, "COUNT MiB of unfinished messages", 1024, 160, 0, 0}},
     {"stalled", {run_stalled_viewer, "a viewer that does not read for SECONDS", 3, 1, 30, 2}},
-    {"viewers", {run_many_viewers, "16 viewers against one, SECONDS per turn", 0, 0, 20, 1}},
+    {"viewers",
+     {run_many_viewers, "16 viewers of a region against one, SECONDS per turn", 0, 0, 20, 1}},
     {"rate", {run_sixty_hertz, "60 Hz for SECONDS", 0, 0, 600, 20}},
     {"half-open", {run_half_open, "COUNT connections that swallow everything", 20, 2, 0, 0}},
     {"crowds",
      {run_crowds, "COUNT raw connections; bad peers; few descriptors", 10000, 1000, 0, 0}},
     {"restart", {run_restart, "COUNT restarts with another patient's model", 10, 1, 0, 0}},
     {"clocks", {run_clocks, "clocks that are wrong", 0, 0, 0, 0}},
-    {"cost", {run_cost, "latency with a journal and without, COUNT updates each", 2000, 20, 0, 0}},
+    {"cost",
+     {run_cost, "latency with journal and keys and without, COUNT updates each", 2000, 20, 0, 0}},
 };
 
 int run(const std::string& name, const Topic& topic, Settings settings, bool brief) {

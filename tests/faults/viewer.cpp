@@ -12,7 +12,7 @@ using Clock = std::chrono::steady_clock;
 
 Viewer::Viewer(const std::string& endpoint, const ViewerOptions& options)
     : client_(need(client::Client::connect(endpoint), "connect")) {
-  need(client_.subscribe(options.window), "subscribe");
+  need(client_.subscribe(options.window, options.choice), "subscribe");
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 

@@ -20,9 +20,10 @@ namespace brainshift::faults {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-// How a viewer subscribes. A subscription to a region of interest becomes a member here.
+// How a viewer subscribes.
 struct ViewerOptions {
   std::uint32_t window = 1;
+  FieldChoice choice = {};
 };
 
 struct Arrival {

@@ -117,10 +117,12 @@ void run_stalled_viewer(const Settings& settings, Tally& tally) {
   compare_p99(tally, without, with, 1.2);
 }
 
-// In turns: one viewer, and 16.
+// In turns: one viewer of a region of interest, and 16.
 void run_many_viewers(const Settings& settings, Tally& tally) {
   constexpr int kMany = 16, kRounds = 5;
-  const ViewerOptions options;
+  constexpr double kMargin_mm = 40.0;
+  ViewerOptions options;
+  options.choice.region = TumourRegion{kMargin_mm};
   const Feed feed(settings.surgery);
   const DaemonProcess daemon({.model = settings.model, .folder = settings.work});
   Opened opened = open_session(daemon.endpoint(), feed, false);
@@ -134,6 +136,7 @@ void run_many_viewers(const Settings& settings, Tally& tally) {
   }
   write_rows(settings, "many-viewers.csv", one, many);
   tally.shown("viewers", kMany);
+  tally.shown("margin of the region about the tumour mm", kMargin_mm);
   compare_p99(tally, one, many, 1.5);
 }
 
