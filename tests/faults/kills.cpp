@@ -31,7 +31,7 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t kObservations = 60;
 constexpr std::size_t kSources = 3;
-constexpr int kFloodedLast_ms = 120;  // the last moment of a kill after a session's start
+constexpr int kFloodedLast_ms = 60;  // the last moment of a kill after a session's start
 constexpr int kPacedLast_ms = 300;
 constexpr milliseconds kPace{4};
 
@@ -217,9 +217,9 @@ void run_kills(const Settings& settings, Tally& tally) {
   }
   tally.shown("kills", settings.count);
   tally.shown("load and start without a kill s", load_s);
-  tally.shown("observations called recorded before a kill", claimed);
-  tally.at_least("share of kills after something was called recorded %",
-                 100.0 * with_claims / std::max(1, settings.count), 50.0);
+  // Kills before anything was called recorded show nothing of it; there must be others.
+  tally.shown("kills after something was called recorded", with_claims);
+  tally.at_least("observations called recorded before a kill", claimed, settings.count);
   tally.equals("observations called recorded and lost", lost, 0);
   tally.at_most("slowest start after a kill beyond the load s", slowest_s - load_s, 2.0);
   tally.equals("starts after a kill that took longer", late, 0);
