@@ -19,8 +19,9 @@ struct HealthArguments {
 // interfaces". kInvalidArgument for a port that the system chooses (*): only the daemon knows it.
 Result<std::string> endpoint_to_ask(const std::string& endpoint);
 
-// Asks the daemon for its status, with the daemon's own key where it asks for keys. Prints one line: "ok version=... case=... updates=...". Returns
-// the exit status: 0 when it answers within 3 s, with or without a model; 1 when it does not.
+// Asks the daemon for its status, with the daemon's own key where it asks for keys. Prints one
+// line: "ok version=... case=... updates=...". Returns the exit status: 0 when it answers within
+// 3 s, with or without a model; 1 when it does not.
 int run_health(const HealthArguments& arguments);
 
 }  // namespace brainshift::server

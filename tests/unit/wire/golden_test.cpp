@@ -335,16 +335,14 @@ TEST_P(Golden, FrameHoldsTheDescribedValuesAndIsReproducedByteForByte) {
   EXPECT_EQ(encode_frame(frame->type, frame->request_id, payload), bytes);
 }
 
-INSTANTIATE_TEST_SUITE_P(Frames, Golden,
-                         ::testing::Values("status_request", "status_reply",
-                                           "start_session_request", "start_session_reply",
-                                           "model_request", "model_reply", "subscribe_request",
-                                           "subscribe_ball", "subscribe_tumour", "session_state",
-                                           "observation_tumour", "observation_cortex",
-                                           "observation_landmarks", "observation_pose",
-                                           "observation_reply", "error_reply", "update",
-                                           "update_unusable", "update_changes", "update_failed",
-                                           "report_request", "report_reply"));
+INSTANTIATE_TEST_SUITE_P(
+    Frames, Golden,
+    ::testing::Values("status_request", "status_reply", "start_session_request",
+                      "start_session_reply", "model_request", "model_reply", "subscribe_request",
+                      "subscribe_ball", "subscribe_tumour", "session_state", "observation_tumour",
+                      "observation_cortex", "observation_landmarks", "observation_pose",
+                      "observation_reply", "error_reply", "update", "update_unusable",
+                      "update_changes", "update_failed", "report_request", "report_reply"));
 
 }  // namespace
 }  // namespace brainshift::wire
