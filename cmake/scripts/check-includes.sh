@@ -5,7 +5,8 @@
 #   1  A source includes its own folder, folders that its folder links, and onward their public links.
 #      A header includes only what its folder's public links give, because it carries its includes on.
 #   2  Inside a folder the includes have no cycle. A unit is a header with the sources of its name.
-#   3  common includes neither server nor client; server and client do not include each other.
+#   3  common includes neither server nor client; server and client do not include each other, but for
+#      server/main, which may be a client (client/lib).
 #   4  Protobuf headers stay in common/wire, ZeroMQ headers in server/transport and client/lib, CGAL
 #      headers in folders whose CMakeLists.txt links CGAL.
 # Prints one line per violation. Exit status: 0 none, 1 violations, 2 nothing to check.
