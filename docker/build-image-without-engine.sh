@@ -102,10 +102,12 @@ else
 fi
 
 say "building $image"
-bud bud --isolation chroot --pull-never --quiet "${host_apt[@]}" --build-arg "JOBS=${JOBS:-2}" \
+# The format docker keeps the health check; OCI knows none.
+bud bud --isolation chroot --format docker --pull-never --quiet "${host_apt[@]}" --build-arg "JOBS=${JOBS:-2}" \
   --file docker/Dockerfile --tag "$image" . >"$dir/build.log" 2>&1 ||
   { tail -n 30 "$dir/build.log" >&2; fail "build failed; whole log in $dir/build.log"; }
 
+bud inspect --type image "$image" | grep -c '"Healthcheck": {' >/dev/null || fail "the image has lost its health check"
 say "starting the daemon from the image"
 container=$(bud from --pull-never "$image")
 in_image() { bud run --isolation chroot "$container" -- "$@"; }

@@ -24,6 +24,7 @@ struct Arguments {
   fs::path file;
   fs::path out;
   fs::path csv;
+  fs::path fields_file;
   FieldSeries fields;
   std::uint64_t first = 0;
   std::uint64_t last = 0;
@@ -49,11 +50,14 @@ Status check(const std::vector<fs::path>& files) {
 }
 
 Status export_tables(const Arguments& arguments) {
-  if (arguments.csv.empty() && arguments.fields.folder.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "journal export: give --csv, or --vtu and --model");
+  const bool fields_wanted = !arguments.fields.folder.empty() || !arguments.fields_file.empty();
+  if (arguments.csv.empty() && !fields_wanted) {
+    return fail(ErrorCode::kInvalidArgument,
+                "journal export: give --csv, or --vtu or --hdf5 with --model");
   }
-  if (arguments.fields.folder.empty() != arguments.fields.model.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "journal export: --vtu and --model need each other");
+  if (fields_wanted == arguments.fields.model.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "journal export: --model needs --vtu or --hdf5, and they need it");
   }
   const auto file = io::SurgeryFile::open(arguments.file);
   if (!file) return tl::unexpected(file.error());
@@ -64,10 +68,16 @@ Status export_tables(const Arguments& arguments) {
     std::printf("%s: %llu records\n", arguments.csv.c_str(),
                 static_cast<unsigned long long>(file->state().records));
   }
-  if (arguments.fields.folder.empty()) return {};
-  const auto fields = write_field_series(*file, arguments.file, arguments.fields);
+  if (!arguments.fields.folder.empty()) {
+    const auto fields = write_field_series(*file, arguments.file, arguments.fields);
+    if (!fields) return tl::unexpected(fields.error());
+    std::printf("%s: %d fields\n", arguments.fields.folder.c_str(), *fields);
+  }
+  if (arguments.fields_file.empty()) return {};
+  const auto fields =
+      write_field_file(*file, arguments.file, arguments.fields.model, arguments.fields_file);
   if (!fields) return tl::unexpected(fields.error());
-  std::printf("%s: %d fields\n", arguments.fields.folder.c_str(), *fields);
+  std::printf("%s: %d fields\n", arguments.fields_file.c_str(), *fields);
   return {};
 }
 
@@ -103,20 +113,25 @@ void add_check(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, S
 
 void add_export(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, Status& status) {
   CLI::App* action = add_action(
-      journal, "export", "Write a table of the records, and the fields as a series for ParaView.",
+      journal, "export",
+      "Write a table of the records, and the fields for ParaView or as one HDF5 file.",
       "Examples:\n"
       "  brainshift journal export paper.surgery --csv paper.csv\n"
       "  brainshift journal export journal/colin27-20250131T120000Z-1.surgery --csv records.csv "
       "\\\n"
-      "    --vtu fields --model colin27.h5\n"
+      "    --vtu fields --hdf5 fields.h5 --model colin27.h5\n"
       "The table has a row per record: kind, sequence, source, time, bytes; of decisions the\n"
       "outcome; of updates status, quality, flags, times of the stages, active slaves and the\n"
       "largest motion. The series has a .vtu per usable update and a .pvd that lists them by "
       "time.\n"
-      "A broken file must be repaired first.");
+      "The HDF5 file holds the mesh, and a group per usable update with displacement_mm (n x 3) "
+      "and\n"
+      "sd_mm (n), both in patient RAS. A broken file must be repaired first.");
   action->add_option("file", arguments->file, "surgery file (.surgery)")->required();
   action->add_option("--csv", arguments->csv, "table to write; replaced if it exists");
   action->add_option("--vtu", arguments->fields.folder, "folder for the fields; needs --model");
+  action->add_option("--hdf5", arguments->fields_file,
+                     "one file of all fields to write (.h5); needs --model");
   action->add_option("--model", arguments->fields.model,
                      "prepared model (.h5) that the surgery was recorded with");
   action->callback([arguments, &status] { status = export_tables(*arguments); });

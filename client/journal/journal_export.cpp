@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/model/field_series_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
@@ -95,6 +98,47 @@ Status write_field(const fs::path& out, const BrainModel& model, const Estimate&
   return io::write_vtu(out, model.mesh, fields);
 }
 
+// Shows every usable update with its time in s; gives their number. `path` is the surgery's.
+using ShowField = std::function<Status(const Update&, double time_s)>;
+Result<int> visit_fields(const io::SurgeryFile& file, const fs::path& path, const BrainModel& model,
+                         const ShowField& show) {
+  Clock clock;
+  int fields = 0;
+  const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
+    const double time_s = clock.seconds(record.recorded_ns);
+    if (record.kind != io::RecordKind::kUpdate) return {};
+    const auto message = wire::decode_update(record.payload);
+    if (!message) return undecodable(path, record, message.error());
+    if (message->error || !message->update.usable()) return {};
+    const auto nodes = message->update.estimate.displacement.cols();
+    if (nodes != model.mesh.num_nodes()) {
+      return undecodable(
+          path, record,
+          {ErrorCode::kUnreadable, fmt::format("displacement of {} nodes, the model has {}", nodes,
+                                               model.mesh.num_nodes())});
+    }
+    ++fields;
+    return show(message->update, time_s);
+  });
+  if (!ok) return tl::unexpected(ok.error());
+  if (fields == 0) return io::file_error(ErrorCode::kEmptySet, path, "holds no usable update");
+  return fields;
+}
+
+// The model that the surgery was recorded with.
+Result<BrainModel> model_of(const io::SurgeryFile& file, const fs::path& path,
+                            const fs::path& model_file) {
+  auto model = io::read_model(model_file);
+  if (!model) return tl::unexpected(model.error());
+  if (model->model.model_id != file.meta().model_id) {
+    return io::file_error(
+        ErrorCode::kInvalidArgument, path,
+        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
+                    model_file.string(), model->model.model_id));
+  }
+  return std::move(model->model);
+}
+
 }  // namespace
 
 Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& path) {
@@ -131,46 +175,39 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& pat
 
 Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
                                const FieldSeries& series) {
-  const auto model = io::read_model(series.model);
+  const auto model = model_of(file, path, series.model);
   if (!model) return tl::unexpected(model.error());
-  if (model->model.model_id != file.meta().model_id) {
-    return io::file_error(
-        ErrorCode::kInvalidArgument, path,
-        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
-                    series.model.string(), model->model.model_id));
-  }
   std::error_code failed;
   fs::create_directories(series.folder, failed);
   if (failed) return io::file_error(ErrorCode::kWriteFailed, series.folder, failed.message());
-  Clock clock;
   std::string list;
-  int fields = 0;
-  const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
-    const double time_s = clock.seconds(record.recorded_ns);
-    if (record.kind != io::RecordKind::kUpdate) return {};
-    const auto message = wire::decode_update(record.payload);
-    if (!message) return undecodable(path, record, message.error());
-    if (message->error || !message->update.usable()) return {};
-    const Estimate& estimate = message->update.estimate;
-    if (estimate.displacement.cols() != model->model.mesh.num_nodes()) {
-      return undecodable(
-          path, record,
-          {ErrorCode::kUnreadable,
-           fmt::format("displacement of {} nodes, the model has {}", estimate.displacement.cols(),
-                       model->model.mesh.num_nodes())});
-    }
-    const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), record.sequence);
-    list += fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
-    ++fields;
-    return write_field(series.folder / name, model->model, estimate);
-  });
-  if (!ok) return tl::unexpected(ok.error());
-  if (fields == 0) return io::file_error(ErrorCode::kEmptySet, path, "holds no usable update");
+  const auto fields =
+      visit_fields(file, path, *model, [&](const Update& update, double time_s) -> Status {
+        const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), update.sequence);
+        list +=
+            fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
+        return write_field(series.folder / name, *model, update.estimate);
+      });
+  if (!fields) return fields;
   const std::string pvd =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n" +
       list + "  </Collection>\n</VTKFile>\n";
   const fs::path out = series.folder / (path.stem().string() + ".pvd");
   if (Status written = io::write_file(out, pvd); !written) return tl::unexpected(written.error());
+  return fields;
+}
+
+Result<int> write_field_file(const io::SurgeryFile& file, const fs::path& path,
+                             const fs::path& model_file, const fs::path& out) {
+  const auto model = model_of(file, path, model_file);
+  if (!model) return tl::unexpected(model.error());
+  auto series = io::FieldSeriesFile::create(out, *model);
+  if (!series) return tl::unexpected(series.error());
+  const auto fields = visit_fields(
+      file, path, *model,
+      [&](const Update& update, double time_s) -> Status { return series->add(update, time_s); });
+  if (!fields) return fields;
+  if (Status whole = series->commit(); !whole) return tl::unexpected(whole.error());
   return fields;
 }
 

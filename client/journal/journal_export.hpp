@@ -21,7 +21,7 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const std::filesyst
 
 struct FieldSeries {
   std::filesystem::path model;   // .h5 that the surgery was recorded with
-  std::filesystem::path folder;  // is made if it does not exist
+  std::filesystem::path folder;  // for write_field_series; is made if it does not exist
 };
 
 // For every usable update a file `<stem>-<sequence>.vtu` with the point arrays displacement and,
@@ -30,5 +30,9 @@ struct FieldSeries {
 // kEmptySet without a usable update; kWriteFailed.
 Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
                                const FieldSeries& series);
+
+// The same fields as one file, which appears whole or not at all (io::FieldSeriesFile).
+Result<int> write_field_file(const io::SurgeryFile& file, const std::filesystem::path& path,
+                             const std::filesystem::path& model, const std::filesystem::path& out);
 
 }  // namespace brainshift::client

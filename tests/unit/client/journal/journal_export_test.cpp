@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <hdf5.h>
+
 #include <algorithm>
 #include <sstream>
 #include <vector>
@@ -107,6 +109,54 @@ TEST_F(ExportJournal, TheSeriesHasAFieldPerUsableUpdateAndAListByTime) {
   EXPECT_EQ(read->node_fields[0].name, "displacement");
   EXPECT_EQ(read->node_fields[0].values(0, 5), 0.25);
   EXPECT_EQ(read->node_fields[1].values(0, 5), 0.5);
+}
+
+// Read with HDF5's own high-level calls, as another program would.
+std::vector<float> floats(hid_t file, const std::string& name) {
+  const hid_t set = H5Dopen2(file, name.c_str(), H5P_DEFAULT);
+  EXPECT_GE(set, 0) << name;
+  const hid_t space = H5Dget_space(set);
+  std::vector<float> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  EXPECT_GE(H5Dread(set, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Sclose(space);
+  H5Dclose(set);
+  return values;
+}
+
+TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
+  write(path, 2);
+  const fs::path out = folder / "fields.h5";
+  const auto fields = write_field_file(open(), path, series().model, out);
+  ASSERT_TRUE(fields) << fields.error().message;
+  EXPECT_EQ(*fields, 2);
+  const hid_t file = H5Fopen(out.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  ASSERT_GE(file, 0);
+  const auto nodes = floats(file, "mesh/nodes_mm");
+  const auto displacement = floats(file, "updates/000002/displacement_mm");
+  const auto sd = floats(file, "updates/000002/sd_mm");
+  H5Fclose(file);
+  ASSERT_EQ(nodes.size(), static_cast<std::size_t>(model.mesh.nodes.size()));
+  EXPECT_EQ(nodes[3 * 5 + 1], static_cast<float>(model.mesh.nodes(1, 5)));
+  ASSERT_EQ(displacement.size(), nodes.size());
+  EXPECT_EQ(displacement[3 * 5], 0.25f);
+  EXPECT_EQ(displacement[3 * 5 + 1], 0.0f);
+  ASSERT_EQ(3 * sd.size(), nodes.size());
+  EXPECT_EQ(sd[5], 0.5f);
+}
+
+TEST_F(ExportJournal, AFileIsNotLeftBehindHalfWritten) {
+  {
+    auto file = io::SurgeryFile::create(path, {.model_id = model.model_id});
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->append(observation(1, "ius")));
+    ASSERT_TRUE(file->close());
+  }
+  const fs::path model_file = series().model;
+  const auto before = std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator());
+  const auto fields = write_field_file(open(), path, model_file, folder / "fields.h5");
+  ASSERT_FALSE(fields);
+  EXPECT_EQ(fields.error().code, ErrorCode::kEmptySet);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator()), before);
 }
 
 TEST_F(ExportJournal, AnotherModelIsRefused) {
