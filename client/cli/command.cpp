@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
+
+#include "client/keys/keys.hpp"
 
 namespace brainshift::client {
 
@@ -14,6 +17,13 @@ void add_key_options(CLI::App& command, KeyOptions& options) {
   command.add_option("--server-key", options.server_key,
                      "the daemon's public key, a file; for daemons that ask for keys");
   command.add_option("--key", options.key, "own secret key, a file (see brainshift keys --help)");
+}
+
+Status read_keys(const KeyOptions& options, std::optional<ClientKeys>& keys) {
+  auto read = client_keys(options.server_key, options.key);
+  if (!read) return tl::unexpected(read.error());
+  keys = std::move(*read);
+  return {};
 }
 
 void print_error(std::string_view sentence) {

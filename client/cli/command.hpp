@@ -6,8 +6,10 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
+#include "client/lib/client_keys.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 
@@ -31,12 +33,15 @@ void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);
 void add_keys(CLI::App& app, Status& status);
 
-// Keys of a command that talks to a daemon: files, both or none (client_keys() of client/keys).
+// Keys of a command that talks to a daemon: files, both or none.
 struct KeyOptions {
   std::filesystem::path server_key;
   std::filesystem::path key;
 };
 void add_key_options(CLI::App& command, KeyOptions& options);
+// Reads the files into `keys`, which stays empty without files; fails as client_keys() of
+// client/keys does.
+Status read_keys(const KeyOptions& options, std::optional<ClientKeys>& keys);
 
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);

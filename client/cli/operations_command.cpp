@@ -5,10 +5,8 @@
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "client/cli/command.hpp"
-#include "client/keys/keys.hpp"
 #include "client/lib/client.hpp"
 #include "client/operations/page.hpp"
 #include "client/operations/report_json.hpp"
@@ -34,9 +32,7 @@ struct TopArguments {
 
 Status show_status(const StatusArguments& arguments) {
   ClientOptions options;
-  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
-  if (!keys) return tl::unexpected(keys.error());
-  options.keys = std::move(*keys);
+  if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   auto client = Client::connect(arguments.endpoint, options);
   if (!client) return tl::unexpected(client.error());
   auto report = client->report();
@@ -62,9 +58,7 @@ Status show_top(const TopArguments& arguments) {
   options.endpoint = arguments.endpoint;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
   options.once = arguments.once;
-  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
-  if (!keys) return tl::unexpected(keys.error());
-  options.keys = std::move(*keys);
+  if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   return top(options);
 }
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "client/cli/command.hpp"
-#include "client/keys/keys.hpp"
 #include "client/replay/replay.hpp"
 #include "client/replay/verify.hpp"
 #include "common/io/files/output_path.hpp"
@@ -56,9 +55,7 @@ Status run(Arguments arguments) {
     return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
-  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
-  if (!keys) return tl::unexpected(keys.error());
-  options.keys = std::move(*keys);
+  if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   if (arguments.verify) return verify(options);
   if (options.report.empty()) {
     return fail(ErrorCode::kInvalidArgument, "--report is required (see brainshift replay --help)");

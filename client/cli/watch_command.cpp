@@ -2,10 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
-#include <utility>
 
 #include "client/cli/command.hpp"
-#include "client/keys/keys.hpp"
 #include "client/watch/choice_text.hpp"
 #include "client/watch/watch.hpp"
 
@@ -23,9 +21,7 @@ Status run(const Arguments& arguments) {
   if (!choice) return tl::unexpected(choice.error());
   WatchOptions options = arguments.options;
   options.choice = *choice;
-  auto keys = client_keys(arguments.keys.server_key, arguments.keys.key);
-  if (!keys) return tl::unexpected(keys.error());
-  options.keys = std::move(*keys);
+  if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   return watch(options, [](const std::string& line) {
     std::puts(line.c_str());
     std::fflush(stdout);

@@ -3,12 +3,9 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <exception>
-#include <random>
 #include <utility>
 #include <zmq.hpp>
 
@@ -17,6 +14,7 @@
 #include "server/transport/connection_monitor.hpp"
 #include "server/transport/parcels.hpp"
 #include "server/transport/peers.hpp"
+#include "server/transport/router_socket.hpp"
 #include "server/transport/zap_handler.hpp"
 
 namespace brainshift::server {
@@ -28,104 +26,10 @@ constexpr int kRequestsPerTurn = 64;
 constexpr std::chrono::milliseconds kRetryInterval{20};
 // How often the handler is told that the loop turns.
 constexpr std::chrono::milliseconds kTurnInterval{100};
-// Messages of one peer that may wait unread; large ones are bounded by their size.
-constexpr int kReceiveQueue = 8;
-
-enum class Sent { kYes, kQueueFull, kPeerGone };
-
-struct Incoming {
-  std::string peer;
-  int connection_fd = -1;
-  std::string user_id;  // the key's name; empty without keys
-  zmq::message_t payload;
-  std::size_t parts = 0;  // after the routing id
-  std::size_t bytes = 0;  // of these
-};
-
-// Shares the bytes with the socket, which drops its reference after sending.
-zmq::message_t share(const Bytes& bytes) {
-  auto* reference = new Bytes(bytes);
-  auto release = [](void*, void* hint) { delete static_cast<Bytes*>(hint); };
-  return {const_cast<char*>(bytes->data()), bytes->size(), release, reference};
-}
-
-Sent send(zmq::socket_t& socket, const std::string& peer, const Bytes& bytes) {
-  constexpr auto kNow = zmq::send_flags::dontwait;
-  const auto begin = [&] {
-    return socket.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore).has_value();
-  };
-  try {
-    if (!begin()) {
-      // libzmq takes note only now and then of what a peer has read; asked for its events, it does.
-      static_cast<void>(socket.get(zmq::sockopt::events));
-      if (!begin()) return Sent::kQueueFull;
-    }
-    return socket.send(share(bytes), kNow) ? Sent::kYes : Sent::kQueueFull;
-  } catch (const zmq::error_t& error) {
-    if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
-    throw;
-  }
-}
-
-std::optional<Incoming> receive(zmq::socket_t& socket) {
-  zmq::message_t routing_id;
-  if (!socket.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
-  Incoming incoming;
-  incoming.peer = routing_id.to_string();
-  bool more = routing_id.more();
-  while (more) {
-    zmq::message_t part;
-    static_cast<void>(socket.recv(part));  // the rest of a message is always there
-    more = part.more();
-    incoming.bytes += part.size();
-    if (incoming.parts++ == 0) {
-      incoming.connection_fd = zmq_msg_get(part.handle(), ZMQ_SRCFD);
-      if (const char* user = zmq_msg_gets(part.handle(), "User-Id")) incoming.user_id = user;
-      incoming.payload = std::move(part);
-    }
-  }
-  return incoming;
-}
 
 Bytes error_frame(std::uint64_t request_id, const Error& error) {
   return std::make_shared<const std::string>(
       wire::encode_frame(wire::MessageType::kErrorReply, request_id, wire::encode(error)));
-}
-
-// Where libzmq listens: a name that no other process may connect to, but for this one's guard.
-std::string inner_name() {
-  std::random_device entropy;
-  return fmt::format("brainshiftd-{}-{:08x}{:08x}", getpid(), entropy(), entropy());
-}
-
-int milliseconds(std::chrono::milliseconds duration) { return static_cast<int>(duration.count()); }
-
-// What CURVE adds to a message.
-constexpr std::size_t kEncryption = 64;
-
-std::size_t max_message_bytes(const RouterOptions& options) {
-  return (static_cast<std::size_t>(options.max_message_mib) << 20) + wire::kHeaderBytes;
-}
-
-void configure(zmq::socket_t& socket, const RouterOptions& options) {
-  socket.set(zmq::sockopt::router_mandatory, true);
-  const pid_t own = getpid();
-  if (zmq_setsockopt(socket.handle(), ZMQ_IPC_FILTER_PID, &own, sizeof own) != 0) {
-    throw zmq::error_t();
-  }
-  socket.set(zmq::sockopt::linger, 0);
-  socket.set(zmq::sockopt::maxmsgsize,
-             static_cast<std::int64_t>(max_message_bytes(options) + kEncryption));
-  socket.set(zmq::sockopt::rcvhwm, kReceiveQueue);
-  socket.set(zmq::sockopt::sndhwm, options.send_queue);
-  socket.set(zmq::sockopt::handshake_ivl, milliseconds(options.handshake_limit));
-  socket.set(zmq::sockopt::heartbeat_ivl, milliseconds(options.heartbeat_interval));
-  socket.set(zmq::sockopt::heartbeat_timeout, milliseconds(options.heartbeat_timeout));
-  socket.set(zmq::sockopt::heartbeat_ttl, milliseconds(options.heartbeat_timeout));
-  if (!options.keys) return;
-  socket.set(zmq::sockopt::curve_server, true);
-  socket.set(zmq::sockopt::curve_secretkey, options.keys->secret_key);
-  socket.set(zmq::sockopt::zap_domain, std::string("brainshiftd"));
 }
 
 Roles roles_of(const RouterOptions& options) {
@@ -138,20 +42,17 @@ Roles roles_of(const RouterOptions& options) {
 struct Router::Impl {
   Impl(const RouterOptions& given, Listener listener)
       : options(given),
-        socket(context, zmq::socket_type::router),
-        monitor(context, socket),
+        socket(context, options),
+        monitor(context, socket.zmq()),
         gate(roles_of(given), given.limits),
         peers(static_cast<std::size_t>(given.max_clients)) {
     if (options.keys) zap.emplace(context, options.keys->names);
-    configure(socket, options);
-    const std::string inner = inner_name();
-    socket.bind("ipc://@" + inner);
     GuardOptions guarding;
     guarding.max_message_bytes = max_message_bytes(options);
     guarding.held_bytes = options.held_bytes;
     guarding.max_connections = options.max_connections;
     guarding.patience = options.patience;
-    guard.emplace(std::move(listener), inner, guarding);
+    guard.emplace(std::move(listener), socket.bind(), guarding);
   }
 
   void serve_requests();
@@ -174,7 +75,7 @@ struct Router::Impl {
   RouterOptions options;
   zmq::context_t context;
   std::optional<ZapHandler> zap;  // with keys
-  zmq::socket_t socket;
+  RouterSocket socket;
   ConnectionMonitor monitor;
   Gate gate;
   Peers peers;
@@ -210,7 +111,7 @@ Result<Router> Router::bind(const RouterOptions& options) {
 Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
   Impl& self = *impl_;
   self.handler = &handler;
-  zmq::pollitem_t items[] = {{self.socket.handle(), 0, ZMQ_POLLIN, 0},
+  zmq::pollitem_t items[] = {{self.socket.zmq().handle(), 0, ZMQ_POLLIN, 0},
                              {self.monitor.socket().handle(), 0, ZMQ_POLLIN, 0},
                              {nullptr, outbox.fd(), ZMQ_POLLIN, 0},
                              {nullptr, stop_fd, ZMQ_POLLIN, 0}};
@@ -247,7 +148,7 @@ void Router::Impl::turned() {
 
 void Router::Impl::serve_requests() {
   for (int served = 0; served < kRequestsPerTurn; ++served) {
-    const auto incoming = receive(socket);
+    const auto incoming = socket.receive();
     if (!incoming) return;
     guard->delivered(incoming->connection_fd, incoming->bytes, incoming->parts);
     forget_closed();  // before the peer is looked up, see ConnectionMonitor
@@ -329,7 +230,7 @@ void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer)
 void Router::Impl::reply(const std::string& routing_id, const Bytes& bytes) {
   Peer* peer = peers.find(routing_id);
   const bool behind = peer != nullptr && !peer->replies.empty();
-  const Sent sent = behind ? Sent::kQueueFull : send(socket, routing_id, bytes);
+  const Sent sent = behind ? Sent::kQueueFull : socket.send(routing_id, bytes);
   if (sent == Sent::kYes) return;
   if (sent == Sent::kPeerGone) {
     spdlog::debug("reply lost: the peer is gone");
@@ -375,7 +276,7 @@ void Router::Impl::push(const std::string& routing_id, Viewer& viewer, const Out
     if (!viewer.may_iterate()) return;
     const auto parcel = parcels.make(message.bytes, viewer.selection(), viewer.held());
     if (!parcel) return;
-    const Sent sent = send(socket, routing_id, parcel->bytes);
+    const Sent sent = socket.send(routing_id, parcel->bytes);
     if (sent == Sent::kYes) viewer.iterate_sent();
     if (sent == Sent::kPeerGone) remove(routing_id);
     return;
@@ -393,7 +294,7 @@ void Router::Impl::pay(const std::string& routing_id) {
   Peer* peer = peers.find(routing_id);
   if (peer == nullptr) return;
   while (!peer->replies.empty()) {
-    const Sent sent = send(socket, routing_id, peer->replies.front());
+    const Sent sent = socket.send(routing_id, peer->replies.front());
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return remove(routing_id);
     peer->reply_bytes -= peer->replies.front()->size();
@@ -404,7 +305,7 @@ void Router::Impl::pay(const std::string& routing_id) {
   while (const Bytes next = viewer.next()) {
     const auto parcel = parcels.make(next, viewer.selection(), viewer.held());
     if (!parcel) return;  // in the next turn
-    const Sent sent = send(socket, routing_id, parcel->bytes);
+    const Sent sent = socket.send(routing_id, parcel->bytes);
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return remove(routing_id);
     if (parcel->held) viewer.hold(parcel->held);

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/transport/router_socket.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <random>
+#include <utility>
+
+#include "common/wire/frame.hpp"
+
+namespace brainshift::server {
+namespace {
+
+// Messages of one peer that may wait unread; large ones are bounded by their size.
+constexpr int kReceiveQueue = 8;
+// What CURVE adds to a message.
+constexpr std::size_t kEncryption = 64;
+
+int milliseconds(std::chrono::milliseconds duration) { return static_cast<int>(duration.count()); }
+
+void use_keys(zmq::socket_t& socket, const ServerKeys& keys) {
+  socket.set(zmq::sockopt::curve_server, true);
+  socket.set(zmq::sockopt::curve_secretkey, keys.secret_key);
+  socket.set(zmq::sockopt::zap_domain, std::string("brainshiftd"));
+}
+
+// The socket drops its reference after sending.
+zmq::message_t share(const Bytes& bytes) {
+  auto* reference = new Bytes(bytes);
+  auto release = [](void*, void* hint) { delete static_cast<Bytes*>(hint); };
+  return {const_cast<char*>(bytes->data()), bytes->size(), release, reference};
+}
+
+}  // namespace
+
+std::size_t max_message_bytes(const RouterOptions& options) {
+  return (static_cast<std::size_t>(options.max_message_mib) << 20) + wire::kHeaderBytes;
+}
+
+RouterSocket::RouterSocket(zmq::context_t& context, const RouterOptions& options)
+    : socket_(context, zmq::socket_type::router) {
+  socket_.set(zmq::sockopt::router_mandatory, true);
+  const pid_t own = getpid();
+  if (zmq_setsockopt(socket_.handle(), ZMQ_IPC_FILTER_PID, &own, sizeof own) != 0) {
+    throw zmq::error_t();
+  }
+  socket_.set(zmq::sockopt::linger, 0);
+  socket_.set(zmq::sockopt::maxmsgsize,
+              static_cast<std::int64_t>(max_message_bytes(options) + kEncryption));
+  socket_.set(zmq::sockopt::rcvhwm, kReceiveQueue);
+  socket_.set(zmq::sockopt::sndhwm, options.send_queue);
+  socket_.set(zmq::sockopt::handshake_ivl, milliseconds(options.handshake_limit));
+  socket_.set(zmq::sockopt::heartbeat_ivl, milliseconds(options.heartbeat_interval));
+  socket_.set(zmq::sockopt::heartbeat_timeout, milliseconds(options.heartbeat_timeout));
+  socket_.set(zmq::sockopt::heartbeat_ttl, milliseconds(options.heartbeat_timeout));
+  if (options.keys) use_keys(socket_, *options.keys);
+}
+
+std::string RouterSocket::bind() {
+  std::random_device entropy;
+  std::string name = fmt::format("brainshiftd-{}-{:08x}{:08x}", getpid(), entropy(), entropy());
+  socket_.bind("ipc://@" + name);
+  return name;
+}
+
+std::optional<Incoming> RouterSocket::receive() {
+  zmq::message_t routing_id;
+  if (!socket_.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
+  Incoming incoming;
+  incoming.peer = routing_id.to_string();
+  bool more = routing_id.more();
+  while (more) {
+    zmq::message_t part;
+    static_cast<void>(socket_.recv(part));  // the rest of a message is always there
+    more = part.more();
+    incoming.bytes += part.size();
+    if (incoming.parts++ == 0) {
+      incoming.connection_fd = zmq_msg_get(part.handle(), ZMQ_SRCFD);
+      if (const char* user = zmq_msg_gets(part.handle(), "User-Id")) incoming.user_id = user;
+      incoming.payload = std::move(part);
+    }
+  }
+  return incoming;
+}
+
+Sent RouterSocket::send(const std::string& peer, const Bytes& bytes) {
+  constexpr auto kNow = zmq::send_flags::dontwait;
+  const auto begin = [&] {
+    return socket_.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore).has_value();
+  };
+  try {
+    if (!begin()) {
+      // libzmq takes note only now and then of what a peer has read; asked for its events, it does.
+      static_cast<void>(socket_.get(zmq::sockopt::events));
+      if (!begin()) return Sent::kQueueFull;
+    }
+    return socket_.send(share(bytes), kNow) ? Sent::kYes : Sent::kQueueFull;
+  } catch (const zmq::error_t& error) {
+    if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
+    throw;
+  }
+}
+
+}  // namespace brainshift::server
