@@ -23,6 +23,7 @@ class Condensed final : public Inverter {
     return inverter_.omission_errors();
   }
   std::uint64_t bytes() const override { return bytes_; }
+  const UpdateProfile* profile() const override { return &inverter_.profile(); }
 
  private:
   Status invert(const SparseData& data, const InversionOptions& options,

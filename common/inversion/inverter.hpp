@@ -42,6 +42,8 @@ class Inverter {
   virtual std::optional<OmissionErrors> omission_errors() const = 0;
   // Memory of what was prepared for it: operators, or factor, matrix and prior.
   virtual std::uint64_t bytes() const = 0;
+  // How long the stages of the last update took; null for the methods that do not say.
+  virtual const UpdateProfile* profile() const { return nullptr; }
 
  private:
   // What the method does: all of update() but the verdict.

@@ -144,8 +144,9 @@ struct CondensedInverter::Impl {
         deformation(given_locator->nodes(), given_locator->tets(), team),
         sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
         strengths(operators->part_columns, window, SparseData::kMaxCommonErrors,
-                  config.prior.estimate_scales),
-        descent(*operators, window, config.contact.penalty_n_per_mm, options.contact, team),
+                  config.prior.estimate_scales, team),
+        descent(*operators, window, config.contact.penalty_n_per_mm, options.contact, team,
+                profile),
         rebuild(*operators, window, options.region_of_interest),
         robust(config.sensing.robust_weights),
         medium_sd_mm(displacement_sd_mm(*operators, PriorPart::kMedium)) {
@@ -191,6 +192,9 @@ struct CondensedInverter::Impl {
   // Samples the data and takes their linear model.
   Status sample(const SparseData& data);
   Status distrust_outliers(const SparseData& data);
+  // PriorStrengths::fit and refit for the present linear model.
+  Status fit();
+  Result<bool> refit(bool may_change);
   // Strengths and rough descents in turn until the strengths stay.
   Status find_strengths(const DescentLimits& limits, EstimateStatus& outcome);
   // Weights and places of the data for the present estimate; whether anything changed.
@@ -209,6 +213,7 @@ struct CondensedInverter::Impl {
   CondensedConfig condensed;
   double poisson_ratio;
   ThreadTeam team;
+  UpdateProfile profile;  // of the last update
   fem::DeformationCheck deformation;
   SampledOperators sampled;
   PriorStrengths strengths;
@@ -232,6 +237,7 @@ struct CondensedInverter::Impl {
 Status CondensedInverter::Impl::accept(const SparseData& data) {
   if (auto status = check_data(data); !status) return status;
   reserve(data.size());
+  const StageClock clock(profile, UpdateStage::kLocate);
   return sampled.locate(data);
 }
 
@@ -243,10 +249,14 @@ bool CondensedInverter::Impl::reweigh(const SparseData& data) {
 }
 
 Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
-  rebuild.displacement_at(moving.nodes, descent.z(), descent.contact(), moving_displacement);
   if (&data != &moved) moved = data;
   const int before = moved.size();
-  if (!moving.relocate(moving_displacement, moved)) return false;
+  {
+    const StageClock clock(profile, UpdateStage::kFollow);
+    rebuild.displacement_at(team, moving.nodes, descent.z(), descent.contact(),
+                            moving_displacement);
+    if (!moving.relocate(moving_displacement, moved)) return false;
+  }
   if (auto status = accept(moved); !status) return tl::unexpected(status.error());
   if (moved.size() != before) weights.reset(moved.size());
   return true;
@@ -265,20 +275,27 @@ RemainderVariances CondensedInverter::Impl::remainder_variances() const {
 // weights under the case's own strengths, without contact.
 Status CondensedInverter::Impl::distrust_outliers(const SparseData& data) {
   for (int round = 0; round < kMaxFirstRounds; ++round) {
-    if (auto status = descent.posterior().minimise(strengths); !status) return status;
+    if (auto status = descent.minimise(strengths); !status) return status;
     if (!reweigh(data)) return {};
     if (auto status = sample(data); !status) return status;
   }
   return {};
 }
 
+Status CondensedInverter::Impl::fit() {
+  const StageClock clock(profile, UpdateStage::kHypotheses);
+  return strengths.fit(descent.posterior().gram(), descent.posterior().right_hand_side());
+}
+
+Result<bool> CondensedInverter::Impl::refit(bool may_change) {
+  const StageClock clock(profile, UpdateStage::kHypotheses);
+  return strengths.refit(descent.posterior().gram(), descent.posterior().right_hand_side(),
+                         may_change);
+}
+
 Status CondensedInverter::Impl::find_strengths(const DescentLimits& limits,
                                                EstimateStatus& outcome) {
-  if (auto status =
-          strengths.fit(descent.posterior().gram(), descent.posterior().right_hand_side());
-      !status) {
-    return status;
-  }
+  if (auto status = fit(); !status) return status;
   for (int fit = 1;; ++fit) {
     if (auto status = descent.jump(sampled, strengths); !status) return status;
     const auto descended = descent.descend(sampled, strengths, false, limits);
@@ -286,8 +303,7 @@ Status CondensedInverter::Impl::find_strengths(const DescentLimits& limits,
     outcome = *descended;
     // Strengths that change need loads of their own.
     const bool may_change = outcome == EstimateStatus::kConverged && fit < kMaxFits;
-    const auto changed = strengths.refit(descent.posterior().gram(),
-                                         descent.posterior().right_hand_side(), may_change);
+    const auto changed = refit(may_change);
     if (!changed) return tl::unexpected(changed.error());
     if (!*changed) return {};
   }
@@ -324,7 +340,10 @@ double CondensedInverter::Impl::model_error_floor(const SparseData& data) {
 
 Status CondensedInverter::Impl::sample(const SparseData& data) {
   left_out = remainder_variances();
-  sampled.sample(data, left_out, weights.values());
+  {
+    const StageClock clock(profile, UpdateStage::kSample);
+    sampled.sample(data, left_out, weights.values());
+  }
   return descent.take(sampled);
 }
 
@@ -338,7 +357,6 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
   strengths.reset();
   strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
   auto outcome = EstimateStatus::kConverged;
-  const auto& posterior = descent.posterior();
   if (auto status = sample(*data); !status) return tl::unexpected(status.error());
   if (auto status = distrust_outliers(*data); !status) return tl::unexpected(status.error());
   // Once more, without them.
@@ -367,7 +385,7 @@ Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
     if (!descended) return tl::unexpected(descended.error());
     outcome = *descended;
     const bool may_change = outcome == EstimateStatus::kConverged && round < kMaxRounds / 2;
-    const auto changed = strengths.refit(posterior.gram(), posterior.right_hand_side(), may_change);
+    const auto changed = refit(may_change);
     if (!changed) return tl::unexpected(changed.error());
     if (*changed) {
       if (auto status = find_strengths(limits, outcome); !status) {
@@ -404,6 +422,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   const Stopwatch rebuilding;
   const double misfit_ratio = descent.posterior().misfit_ratio();
   if (options.uncertainty) {
+    const StageClock clock(profile, UpdateStage::kDeviation);
     rebuild.standard_deviation(team, descent.reduction(), descent.covariance_factor(),
                                remainder_variances(), estimate.sd_mm);
     // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
@@ -412,7 +431,10 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
     estimate.sd_mm.resize(0);
   }
   const ContactAtLoads& contact = descent.contact();
-  rebuild.displacement(team, descent.z(), contact, estimate.displacement);
+  {
+    const StageClock clock(profile, UpdateStage::kField);
+    rebuild.displacement(team, descent.z(), contact, estimate.displacement);
+  }
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
                                       estimate.displacement);
       !status) {
@@ -504,6 +526,7 @@ Result<CondensedInverter> CondensedInverter::build(
 }
 
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
+const UpdateProfile& CondensedInverter::profile() const { return impl_->profile; }
 
 Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
                                  const InversionOptions& asked) {
@@ -511,6 +534,7 @@ Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
   impl.watch = Stopwatch();
   impl.descent.forget();
   impl.history.clear();
+  impl.profile = {};
   if (auto status = impl.accept(given); !status) return status;
   impl.weights.reset(given.size());
   const SparseData* data = &given;

@@ -36,6 +36,7 @@
 
 #include "common/core/error.hpp"
 #include "common/geometry/tet_locator.hpp"
+#include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
 #include "common/inversion/contract/omission_errors.hpp"
 #include "common/values/case_config.hpp"
@@ -80,6 +81,8 @@ class CondensedInverter {
   Status update(const SparseData& data, Estimate& estimate, const InversionOptions& asked = {});
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;
+  // Of the last update().
+  const UpdateProfile& profile() const;
 
  private:
   struct Impl;

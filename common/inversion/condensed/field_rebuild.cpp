@@ -85,20 +85,22 @@ void FieldRebuild::sum_columns(ThreadTeam& team, const VecX& z, const ContactAtL
   });
 }
 
-void FieldRebuild::displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
-                                   const ContactAtLoads& contact, Points& u) const {
+void FieldRebuild::displacement_at(ThreadTeam& team, const std::vector<NodeIndex>& nodes,
+                                   const VecX& z, const ContactAtLoads& contact, Points& u) const {
   u.setZero(3, static_cast<Eigen::Index>(nodes.size()));
-  const auto add = [&](const auto& column, double factor) {
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      u.col(static_cast<Eigen::Index>(i)) +=
-          factor * column.template segment<3>(3 * nodes[i]).template cast<double>();
+  team.split(u.cols(), [&](long begin, long end) {
+    const auto add = [&](const auto& column, double factor) {
+      for (long i = begin; i < end; ++i) {
+        const NodeIndex node = nodes[static_cast<std::size_t>(i)];
+        u.col(i) += factor * column.template segment<3>(3L * node).template cast<double>();
+      }
+    };
+    for (int j = 0; j < window_.count; ++j) add(operators_.modes.col(window_.first + j), z[j]);
+    for (int j = 0; j < contact.size(); ++j) {
+      add(operators_.contact_columns.col(contact.active()[static_cast<std::size_t>(j)]),
+          contact.forces()[j]);
     }
-  };
-  for (int j = 0; j < window_.count; ++j) add(operators_.modes.col(window_.first + j), z[j]);
-  for (int j = 0; j < contact.size(); ++j) {
-    add(operators_.contact_columns.col(contact.active()[static_cast<std::size_t>(j)]),
-        contact.forces()[j]);
-  }
+  });
 }
 
 void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact,

@@ -38,7 +38,7 @@ class FieldRebuild {
   // u: 3 x n, mm.
   void displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact, Points& u);
   // u: 3 x nodes, mm, at these nodes only.
-  void displacement_at(const std::vector<NodeIndex>& nodes, const VecX& z,
+  void displacement_at(ThreadTeam& team, const std::vector<NodeIndex>& nodes, const VecX& z,
                        const ContactAtLoads& contact, Points& u) const;
   // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was
   // rebuilt.

@@ -31,9 +31,10 @@ constexpr double kShort = 0.1;
 }  // namespace
 
 LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta,
-                         bool contact, ThreadTeam& team)
+                         bool contact, ThreadTeam& team, UpdateProfile& profile)
     : window_(window),
       team_(team),
+      profile_(profile),
       factor_(operators, beta, team),
       reduction_(operators, window, factor_, team),
       contact_(operators, window, beta, contact, factor_, team),
@@ -73,13 +74,19 @@ double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& s
   return misfit(sampled, z) + 0.5 * sum;
 }
 
+Status LoadDescent::minimise(const PriorStrengths& strengths) {
+  const StageClock clock(profile_, UpdateStage::kMinimise);
+  return posterior_.minimise(strengths);
+}
+
 double LoadDescent::misfit(SampledOperators& sampled, const VecX& z) {
+  const StageClock clock(profile_, UpdateStage::kGradient);
   const auto free_body = sampled.free_body();
   const int q = sampled.common();
   whitened_ = free_body.col(q + window_.count);
   whitened_.noalias() -= free_body.middleCols(q, window_.count) * z;
   if (contact_.size() > 0) {
-    whitened_.noalias() -= sampled.contact(contact_.active()) * contact_.forces();
+    sampled.subtract_contact(contact_.active(), contact_.forces(), whitened_);
   }
   double sum = whitened_.squaredNorm();
   if (q > 0) {
@@ -96,6 +103,7 @@ double LoadDescent::misfit(SampledOperators& sampled, const VecX& z) {
 }
 
 Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths& strengths) {
+  const StageClock clock(profile_, UpdateStage::kGradient);
   const auto free_body = sampled.free_body();
   const int q = sampled.common();
   adjoint_ = whitened_;  // R^-1/2 (d - A u - common error)
@@ -103,7 +111,7 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
   gradient_.noalias() = -free_body.middleCols(q, window_.count).transpose() * adjoint_;
   if (contact_.size() > 0) {
     felt_.resize(contact_.size());
-    felt_.noalias() = sampled.contact(contact_.active()).transpose() * adjoint_;
+    sampled.contact_transposed(contact_.active(), adjoint_, felt_);
     if (auto status = contact_.add_adjoint(felt_, gradient_); !status) return status;
   }
   for (int i = 0; i < window_.count; ++i) {
@@ -115,6 +123,7 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
 }
 
 Status LoadDescent::solve_contact(const VecX& z) {
+  const StageClock clock(profile_, UpdateStage::kContact);
   auto forces = foretold_.head(reduction_.size());
   reduction_.forces_at(z, forces);
   contact_.begin_from(reduction_.active(), forces);
@@ -135,6 +144,7 @@ void LoadDescent::accept_trial() {
 }
 
 Status LoadDescent::linearise(SampledOperators& sampled) {
+  const StageClock clock(profile_, UpdateStage::kLinearise);
   if (auto status = reduction_.activate(contact_.set()); !status) return status;
   posterior_.linearise(sampled, reduction_, team_);
   return {};
@@ -154,7 +164,7 @@ bool LoadDescent::far_from_model() const {
 }
 
 Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
-  if (auto status = posterior_.minimise(strengths); !status) return status;
+  if (auto status = minimise(strengths); !status) return status;
   z_ = posterior_.z();
   contact_at_z_ = false;
   if (auto status = return_contact(); !status) return status;
@@ -169,7 +179,7 @@ Status LoadDescent::take(SampledOperators& sampled) {
 Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {
   if (auto status = return_contact(); !status) return status;
   value_ = objective(sampled, strengths, z_);
-  if (auto status = posterior_.minimise(strengths); !status) return status;
+  if (auto status = minimise(strengths); !status) return status;
   step_ = posterior_.z() - z_;
   posterior_.whiten(step_, newton_);
   return {};
@@ -198,7 +208,7 @@ Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
   if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
-    if (auto status = posterior_.minimise(strengths); !status) {
+    if (auto status = minimise(strengths); !status) {
       return tl::unexpected(status.error());
     }
   }
@@ -309,7 +319,12 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
 
 Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths) {
   auto shift = shift_.head(posterior_.unknowns());
-  if (!strengths.mean_shift(shift)) {
+  bool finite = false;
+  {
+    const StageClock clock(profile_, UpdateStage::kHypotheses);
+    finite = strengths.mean_shift(shift);
+  }
+  if (!finite) {
     return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
   }
   if (auto status = return_contact(); !status) return status;
@@ -327,6 +342,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
 }
 
 Status LoadDescent::spread(PriorStrengths& strengths) {
+  const StageClock clock(profile_, UpdateStage::kHypotheses);
   if (strengths.covariance(covariance_factor_)) return {};
   return fail(ErrorCode::kNotFinite, "inversion: the covariance is not positive definite");
 }

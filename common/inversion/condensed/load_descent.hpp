@@ -41,6 +41,7 @@
 #include "common/inversion/condensed/prior_strengths.hpp"
 #include "common/inversion/condensed/quasi_newton.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
+#include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
 #include "common/inversion/skull/contact_factor.hpp"
 #include "common/inversion/skull/contact_reach.hpp"
@@ -68,15 +69,18 @@ struct DescentLimits {
 
 class LoadDescent {
  public:
-  // Keeps references to operators and team. contact: false keeps every slave open.
+  // Keeps references to operators, team and profile, to which it adds its stages. contact: false
+  // keeps every slave open.
   LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
-              ThreadTeam& team);
+              ThreadTeam& team, UpdateProfile& profile);
   void reserve(int data) { posterior_.reserve(data); }
   // The next search begins without loads and contact.
   void forget();
 
   // New data: the linear model at the last z.
   Status take(SampledOperators& sampled);
+  // The minimum of the present linear model, for posterior(); the loads stay where they are.
+  Status minimise(const PriorStrengths& strengths);
   // To the minimum of the present linear model for strengths that are new, and the linear model
   // there.
   Status jump(SampledOperators& sampled, const PriorStrengths& strengths);
@@ -134,6 +138,7 @@ class LoadDescent {
 
   ModeWindow window_;
   ThreadTeam& team_;
+  UpdateProfile& profile_;
   ContactFactor factor_;
   ContactReduction reduction_;
   ContactAtLoads contact_;

@@ -44,9 +44,23 @@ void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction&
                      j.middleCols(common_ + begin, end - begin));
     });
   }
+  // Parts of the lower triangle with about as much work for each thread.
   Eigen::Map<Eigen::MatrixXd> gram(gram_storage_.data(), size, size);
-  blas::gram(j.leftCols(size), 0.0, gram);
-  right_.head(size).noalias() = j.leftCols(size).transpose() * j.col(size);
+  const auto columns = j.leftCols(size);
+  const auto edge = [&](long part) {
+    const double left = 1.0 - static_cast<double>(part) / static_cast<double>(team.size());
+    return size - static_cast<Eigen::Index>(std::lround(std::sqrt(left) * double(size)));
+  };
+  team.split(team.size(), [&](long begin, long end) {
+    const Eigen::Index first = edge(begin), count = edge(end) - first, below = size - first - count;
+    auto own = gram.block(first, first, count, count);
+    if (count == 0) return;
+    blas::gram(columns.middleCols(first, count), 0.0, own);
+    if (below == 0) return;
+    blas::multiply_transposed(1.0, columns.rightCols(below), columns.middleCols(first, count), 0.0,
+                              gram.block(first + count, first, below, count));
+  });
+  right_.head(size).noalias() = columns.transpose() * j.col(size);
 }
 
 void ModePosterior::fill_scales(const PriorStrengths& strengths) {

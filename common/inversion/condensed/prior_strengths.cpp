@@ -2,19 +2,17 @@
 #include "common/inversion/condensed/prior_strengths.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 
 namespace brainshift::inversion {
 namespace {
 
 namespace blas = linalg::blas;
-using Eigen::MatrixXd;
 
-// What L may leave out of the trace of G, at the greatest strengths. It bounds the change of ln p.
-constexpr double kTruncatedTrace = 0.05;
 constexpr int kMaxSteps = 60;
-constexpr double kLeastGain = 1e-9;
+// Of ln p, which is known to about 1e-7.
+constexpr double kLeastGain = 1e-6;
 // A hypothesis of less weight than this changes nothing that anyone sees; of the others, so many
 // are kept.
 constexpr double kLeastWeight = 0.01;
@@ -22,8 +20,8 @@ constexpr std::size_t kMostHypotheses = 20;
 // Makes the covariance of absent parts, which is zero, positive definite.
 constexpr double kJitter = 1e-12;
 
-std::array<double, kStrengths.size()> log_prior() {
-  std::array<double, kStrengths.size()> result{};
+StrengthProfile log_prior() {
+  StrengthProfile result{};
   double sum = 0.0;
   for (std::size_t i = 1; i < kStrengths.size(); ++i) {
     const double log_strength = std::log(kStrengths[i]) / kLogStrengthSd;
@@ -47,21 +45,34 @@ tl::unexpected<Error> not_finite() {
               "inversion: the evidence of the prior's strengths is not finite");
 }
 
+PerPart<int> modes_of_window(const PerPart<int>& columns, ModeWindow window) {
+  PerPart<int> counts{};
+  int column = 0;
+  for (std::size_t part = 0; part < columns.size(); ++part) {
+    for (int i = 0; i < columns[part]; ++i, ++column) {
+      if (column >= window.first && column < window.first + window.count) ++counts[part];
+    }
+  }
+  return counts;
+}
+
 }  // namespace
 
 PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common,
-                               bool estimate)
-    : window_(window), estimate_(estimate), max_common_(max_common), log_prior_(log_prior()) {
-  int column = 0;
-  for (std::size_t part = 0; part < columns.size(); ++part) {
-    first_[part] = static_cast<int>(part_of_mode_.size());
-    for (int i = 0; i < columns[part]; ++i, ++column) {
-      if (column < window.first || column >= window.first + window.count) continue;
-      part_of_mode_.push_back(part);
-    }
-    count_[part] = static_cast<int>(part_of_mode_.size()) - first_[part];
+                               bool estimate, ThreadTeam& team)
+    : window_(window),
+      estimate_(estimate),
+      team_(&team),
+      count_(modes_of_window(columns, window)),
+      evidence_(count_, max_common),
+      works_(static_cast<std::size_t>(team.size())),
+      projections_(works_.size()),
+      log_prior_(log_prior()) {
+  for (std::size_t part = 0; part < count_.size(); ++part) {
+    part_of_mode_.insert(part_of_mode_.end(), static_cast<std::size_t>(count_[part]), part);
   }
   hypotheses_.reserve(kMostHypotheses);
+  done_.reserve(kMostHypotheses);
   candidates_.reserve((1 + kPriorParts) * kPriorParts * kStrengths.size());
   reset();
 }
@@ -69,16 +80,7 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
 void PriorStrengths::reset() {
   hypotheses_.assign(1, {as_in_the_case(), 1.0});
   floor_ = {};
-  size_ = 0;
-}
-
-bool PriorStrengths::weighed_for(const blas::In<double>& gram,
-                                 const Eigen::Ref<const VecX>& right) const {
-  if (gram.rows() != size_ || right != right_) return false;
-  for (Eigen::Index j = 0; j < size_; ++j) {
-    if (gram.col(j).tail(size_ - j) != gram_.col(j).tail(size_ - j)) return false;
-  }
-  return true;
+  evidence_.forget();
 }
 
 // 0 for parts that the window does not have.
@@ -90,131 +92,54 @@ PriorScaleValues PriorStrengths::as_in_the_case() const {
   return scales;
 }
 
-// G = L L^T, the column of the largest remaining diagonal next. In units of the greatest strengths.
-bool PriorStrengths::compress(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
-  size_ = gram.rows();
-  common_ = size_ - window_.count;
-  if (!gram.diagonal().allFinite() || !right.allFinite()) return false;
-  gram_ = gram;
-  right_ = right;
-  const auto greatest = [&](Eigen::Index i) { return i < common_ ? 1.0 : kLargestStrength; };
-  residual_diagonal_ = gram.diagonal();
-  for (Eigen::Index i = 0; i < size_; ++i) residual_diagonal_[i] *= greatest(i) * greatest(i);
-  if (left_.rows() < size_) {
-    left_.resize(max_common_ + window_.count, max_common_ + window_.count);
-    row_.resize(left_.cols());
-  }
-  pivots_.clear();
-  rank_ = 0;
-  while (rank_ < size_ && residual_diagonal_.sum() > kTruncatedTrace) {
-    Eigen::Index pivot = 0;
-    const double largest = residual_diagonal_.maxCoeff(&pivot);
-    if (!(largest > 0.0)) break;
-    auto column = left_.col(rank_).head(size_);
-    column.head(pivot) = gram.row(pivot).head(pivot).transpose();
-    column.tail(size_ - pivot) = gram.col(pivot).tail(size_ - pivot);
-    auto row = row_.head(rank_);
-    row = left_.row(pivot).head(rank_).transpose();
-    column.noalias() -= left_.topLeftCorner(size_, rank_) * row;
-    for (const Eigen::Index done : pivots_) column[done] = 0.0;
-    const double diagonal = largest / (greatest(pivot) * greatest(pivot));
-    column /= std::sqrt(diagonal);
-    for (Eigen::Index i = 0; i < size_; ++i) {
-      residual_diagonal_[i] =
-          std::max(0.0, residual_diagonal_[i] - std::pow(greatest(i) * column[i], 2));
-    }
-    residual_diagonal_[pivot] = 0.0;
-    pivots_.push_back(pivot);
-    ++rank_;
-  }
-  y_.resize(rank_);
-  for (Eigen::Index k = 0; k < rank_; ++k) {
-    const Eigen::Index row = pivots_[static_cast<std::size_t>(k)];
-    y_[k] = (right[row] - left_.row(row).head(k).dot(y_.head(k))) / left_(row, k);
-  }
-  const auto square = [&](Eigen::Index first, Eigen::Index count, linalg::GrowingMatrix& out) {
-    out.resize(rank_, rank_);
-    out.setZero();
-    if (count > 0 && rank_ > 0) blas::gram(left_.block(first, 0, count, rank_), 0.0, out);
-  };
-  square(0, common_, of_common_);
-  for (std::size_t part = 0; part < count_.size(); ++part) {
-    square(common_ + first_[part], count_[part], of_part_[part]);
-  }
-  return y_.allFinite();
+PerPart<double> PriorStrengths::variances(const PriorScaleValues& scales) const {
+  PerPart<double> result{};
+  for (std::size_t part = 0; part < result.size(); ++part) result[part] = variance(part, scales);
+  return result;
 }
 
-void PriorStrengths::fill_omega(const PriorScaleValues& scales) {
-  omega_ = of_common_;
-  omega_.diagonal().array() += 1.0;
-  for (std::size_t part = 0; part < count_.size(); ++part) {
-    const double square = variance(part, scales);
-    if (count_[part] == 0 || square == 0.0) continue;
-    omega_ += square * of_part_[part];
+PerPart<double> PriorStrengths::floors() const {
+  PerPart<double> result{};
+  for (std::size_t part = 0; part < result.size(); ++part) {
+    result[part] = floor_[part] * floor_[part];
+  }
+  return result;
+}
+
+void PriorStrengths::add_prior(Profiles& log_p) const {
+  for (StrengthProfile& profile : log_p) {
+    for (std::size_t i = 0; i < profile.size(); ++i) profile[i] += log_prior_[i];
   }
 }
 
-// With Omega of all parts, X = K^-1 L^T, K K^T = Omega: for part g
-//   M = X_g^T X_g,   b = X_g^T K^-1 y,   N = I - s_g^2 M
-// and without the part M' = N^-1 M, b' = N^-1 b (Woodbury), so that its strength t has
-//   ln p = const + 1/2 ln |N| - 1/2 ln |I + t^2 M'| + 1/2 t^2 b' (I + t^2 M')^-1 b'.
-bool PriorStrengths::profiles(const PriorScaleValues& scales, PerPart<Profile>& out) {
-  fill_omega(scales);
-  if (rank_ > 0 && !blas::cholesky(omega_)) return false;
-  whitened_ = y_;
-  scratch_ = left_.topLeftCorner(size_, rank_).transpose();
-  if (rank_ > 0) {
-    blas::solve_lower(omega_, whitened_);
-    blas::solve_lower(omega_, scratch_);
-  }
+bool PriorStrengths::log_posterior(const PriorScaleValues& scales, Workspace& work,
+                                   double& out) const {
+  if (!evidence_.log_evidence(variances(scales), work, out)) return false;
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    const Eigen::Index count = count_[part];
-    if (count == 0) continue;
-    const auto x = scratch_.middleCols(common_ + first_[part], count);
-    solved_.resize(count, count);
-    solved_.setZero();
-    if (rank_ > 0) blas::gram(x, 0.0, solved_);
-    solved_.triangularView<Eigen::StrictlyUpper>() = solved_.transpose();
-    projected_.resize(count);
-    projected_.noalias() = x.transpose() * whitened_;
-    const double own = variance(part, scales);
-    if (own > 0.0) {
-      small_ = -own * solved_;
-      small_.diagonal().array() += 1.0;
-      if (!blas::cholesky(small_)) return false;
-      blas::solve_lower(small_, solved_);
-      blas::solve_lower_transposed(small_, solved_);
-      blas::solve_lower(small_, projected_);
-      blas::solve_lower_transposed(small_, projected_);
-    }
-    for (std::size_t i = 0; i < kStrengths.size(); ++i) {
-      const double square = kStrengths[i] * kStrengths[i] + floor_[part] * floor_[part];
-      out[part][i] = log_prior_[i];
-      if (square == 0.0) continue;
-      small_ = square * solved_;
-      small_.diagonal().array() += 1.0;
-      if (!blas::cholesky(small_)) return false;
-      mean_of_ = std::sqrt(square) * projected_;
-      blas::solve_lower(small_, mean_of_);
-      out[part][i] += 0.5 * mean_of_.squaredNorm() - small_.diagonal().array().log().sum();
-    }
+    if (count_[part] > 0) out += log_prior_[index_of(scales[part])];
   }
   return true;
 }
 
-bool PriorStrengths::ascend(PriorScaleValues& scales) {
+bool PriorStrengths::ascend(PriorScaleValues& scales, Projection& projection,
+                            Workspace& work) const {
+  Profiles log_p{};
   for (int step = 0; step < kMaxSteps; ++step) {
     double gain = 0.0;
     std::size_t best_part = 0, best_strength = 0;
-    if (!profiles(scales, profiles_)) return false;
+    const PerPart<double> own = variances(scales);
+    if (!evidence_.project(own, projection, work) ||
+        !evidence_.profiles(projection, own, floors(), log_p, work)) {
+      return false;
+    }
+    add_prior(log_p);
     for (std::size_t part = 0; part < count_.size(); ++part) {
       if (count_[part] == 0) continue;
-      const Profile& log_p = profiles_[part];
-      const auto best = std::max_element(log_p.begin(), log_p.end());
-      if (*best - log_p[index_of(scales[part])] <= gain) continue;
-      gain = *best - log_p[index_of(scales[part])];
+      const auto best = std::max_element(log_p[part].begin(), log_p[part].end());
+      if (*best - log_p[part][index_of(scales[part])] <= gain) continue;
+      gain = *best - log_p[part][index_of(scales[part])];
       best_part = part;
-      best_strength = static_cast<std::size_t>(best - log_p.begin());
+      best_strength = static_cast<std::size_t>(best - log_p[part].begin());
     }
     if (gain <= kLeastGain) return true;
     scales[best_part] = kStrengths[best_strength];
@@ -222,26 +147,40 @@ bool PriorStrengths::ascend(PriorScaleValues& scales) {
   return true;
 }
 
-double PriorStrengths::log_posterior(const PriorScaleValues& scales) {
-  fill_omega(scales);
-  if (rank_ > 0 && !blas::cholesky(omega_)) return -std::numeric_limits<double>::infinity();
-  double sum = 0.0;
-  if (rank_ > 0) {
-    whitened_ = y_;
-    blas::solve_lower(omega_, whitened_);
-    sum = -omega_.diagonal().array().log().sum() - 0.5 * whitened_.squaredNorm();
-  }
-  for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (count_[part] > 0) sum += log_prior_[index_of(scales[part])];
-  }
-  return sum;
+bool PriorStrengths::search(PriorScaleValues& best) {
+  struct Ascent {
+    PriorScaleValues scales;
+    double log_p = 0.0;
+    bool done = false;
+  };
+  std::array<Ascent, 2> ascents{Ascent{{}}, Ascent{as_in_the_case()}};
+  team_->split(2, [&](long begin, long end) {
+    for (long i = begin; i < end; ++i) {
+      Ascent& each = ascents[static_cast<std::size_t>(i)];
+      const auto member = static_cast<std::size_t>(begin) % works_.size();
+      Workspace& work = works_[member];
+      each.done = ascend(each.scales, projections_[member], work) &&
+                  log_posterior(each.scales, work, each.log_p);
+    }
+  });
+  if (!ascents[0].done || !ascents[1].done) return false;
+  best = ascents[ascents[1].log_p > ascents[0].log_p ? 1 : 0].scales;
+  return true;
 }
 
 bool PriorStrengths::weigh(const PriorScaleValues& best) {
-  return profiles(best, profiles_) && take_neighbours(best);
+  const PerPart<double> own = variances(best);
+  if (!evidence_.project(own, projections_.front(), works_.front()) ||
+      !evidence_.profiles(projections_.front(), own, floors(), profiles_, works_.front())) {
+    return false;
+  }
+  add_prior(profiles_);
+  if (!gather_candidates(best)) return false;
+  weigh_candidates(best);
+  return true;
 }
 
-void PriorStrengths::gather_neighbours(const PerPart<Profile>& log_p, const PriorScaleValues& from,
+void PriorStrengths::gather_neighbours(const Profiles& log_p, const PriorScaleValues& from,
                                        double log_weight) {
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (count_[part] == 0) continue;
@@ -254,23 +193,46 @@ void PriorStrengths::gather_neighbours(const PerPart<Profile>& log_p, const Prio
   }
 }
 
-// Of the hypothesis whose profiles_ are given.
-bool PriorStrengths::take_neighbours(const PriorScaleValues& best) {
+bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
+  // Of each part: what it becomes where two parts change.
+  PerPart<std::size_t> other{};
+  PerPart<char> done{};
+  for (std::size_t part = 0; part < count_.size(); ++part) {
+    const StrengthProfile& log_p = profiles_[part];
+    if (index_of(best[part]) > 0) continue;
+    other[part] =
+        static_cast<std::size_t>(std::max_element(log_p.begin() + 1, log_p.end()) - log_p.begin());
+  }
+  auto profile = [&](int member) {
+    const auto own = static_cast<std::size_t>(member);
+    for (std::size_t part = own; part < count_.size(); part += works_.size()) {
+      if (count_[part] == 0) continue;
+      PriorScaleValues changed = best;
+      changed[part] = kStrengths[other[part]];
+      const bool found = evidence_.changed_profiles(projections_.front(), variances(best), part,
+                                                    variance(part, changed), floors(),
+                                                    changed_profiles_[part], works_[own]);
+      add_prior(changed_profiles_[part]);
+      done[part] = found ? 1 : 0;
+    }
+  };
+  team_->run(profile);
   candidates_.clear();
   gather_neighbours(profiles_, best, 0.0);
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (count_[part] == 0) continue;
-    const Profile& log_p = profiles_[part];
-    const std::size_t own = index_of(best[part]);
-    const auto other = own > 0
-                           ? 0
-                           : static_cast<std::size_t>(
-                                 std::max_element(log_p.begin() + 1, log_p.end()) - log_p.begin());
+    if (!done[part]) return false;
     PriorScaleValues changed = best;
-    changed[part] = kStrengths[other];
-    if (!profiles(changed, changed_profiles_)) return false;
-    gather_neighbours(changed_profiles_, changed, log_p[other] - log_p[own]);
+    changed[part] = kStrengths[other[part]];
+    gather_neighbours(changed_profiles_[part], changed,
+                      profiles_[part][other[part]] - profiles_[part][index_of(best[part])]);
   }
+  // Two changes of one part may lead back.
+  std::erase_if(candidates_, [&](const Hypothesis& each) { return each.scales == best; });
+  return true;
+}
+
+void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
   std::sort(candidates_.begin(), candidates_.end(), [](const Hypothesis& a, const Hypothesis& b) {
     return a.weight != b.weight ? a.weight > b.weight : a.scales < b.scales;
   });
@@ -294,27 +256,18 @@ bool PriorStrengths::take_neighbours(const PriorScaleValues& best) {
   }
   const double kept = sum();
   for (Hypothesis& each : hypotheses_) each.weight /= kept;
-  return true;
-}
-
-bool PriorStrengths::search(PriorScaleValues& best) {
-  best = {};
-  PriorScaleValues from_all = as_in_the_case();
-  if (!ascend(best) || !ascend(from_all)) return false;
-  if (log_posterior(from_all) > log_posterior(best)) best = from_all;
-  return true;
 }
 
 bool PriorStrengths::climb() {
   for (int step = 0; step < kMaxSteps && gain() > kLeastGain; ++step) {
     PriorScaleValues next = candidates_.front().scales;
-    if (!ascend(next) || !weigh(next)) return false;
+    if (!ascend(next, projections_.front(), works_.front()) || !weigh(next)) return false;
   }
   return true;
 }
 
 Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
-  if (!compress(gram, right)) return not_finite();
+  if (!evidence_.take(gram, right)) return not_finite();
   if (!estimate_) return {};
   PriorScaleValues best;
   if (!search(best) || !weigh(best) || !climb()) return not_finite();
@@ -323,9 +276,9 @@ Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const 
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
                                    const Eigen::Ref<const VecX>& right, bool may_change) {
-  if (!weighed_for(gram, right)) {
+  if (!evidence_.holds(gram, right)) {
     const PriorScaleValues same = held();
-    if (!compress(gram, right)) return not_finite();
+    if (!evidence_.take(gram, right)) return not_finite();
     if (estimate_ && !weigh(same)) return not_finite();
   }
   if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
@@ -333,58 +286,69 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
   return true;
 }
 
+template <typename Work>
+bool PriorStrengths::for_each_hypothesis(Work&& work_on) {
+  done_.assign(hypotheses_.size(), 0);
+  auto share = [&](int member) {
+    const auto own = static_cast<std::size_t>(member);
+    for (std::size_t h = own; h < hypotheses_.size(); h += works_.size()) {
+      const bool done = work_on(static_cast<Eigen::Index>(h), hypotheses_[h], works_[own]);
+      done_[h] = done ? 1 : 0;
+    }
+  };
+  team_->run(share);
+  return std::all_of(done_.begin(), done_.end(), [](char done) { return done != 0; });
+}
+
 bool PriorStrengths::mean_shift(Eigen::Ref<VecX> out) {
   const auto hypotheses = static_cast<Eigen::Index>(hypotheses_.size());
-  means_.resize(size_, hypotheses + 1);
+  means_.resize(evidence_.size(), hypotheses + 1);
   auto mean = means_.col(hypotheses);
   mean.setZero();
+  if (!for_each_hypothesis([&](Eigen::Index h, const Hypothesis& each, Workspace& work) {
+        return evidence_.mean(variances(each.scales), work, means_.col(h));
+      })) {
+    return false;
+  }
   for (Eigen::Index h = 0; h < hypotheses; ++h) {
-    const Hypothesis& each = hypotheses_[static_cast<std::size_t>(h)];
-    fill_omega(each.scales);
-    if (rank_ > 0 && !blas::cholesky(omega_)) return false;
-    whitened_ = y_;
-    if (rank_ > 0) {
-      blas::solve_lower(omega_, whitened_);
-      blas::solve_lower_transposed(omega_, whitened_);
-    }
-    // m = S^2 L Omega^-1 y
-    means_.col(h).noalias() = left_.topLeftCorner(size_, rank_) * whitened_;
-    for (int i = 0; i < window_.count; ++i) {
-      means_(common_ + i, h) *= variance(part_of_mode_[static_cast<std::size_t>(i)], each.scales);
-    }
-    mean += each.weight * means_.col(h);
+    mean += hypotheses_[static_cast<std::size_t>(h)].weight * means_.col(h);
   }
   out = mean - means_.col(0);
   return out.allFinite();
 }
 
+// sum w_h (S_h^2 - X_h^T X_h + (m_h - z)(m_h - z)^T)
 bool PriorStrengths::covariance(blas::Out<double> factor) {
-  const Eigen::Index r = window_.count, hypotheses = means_.cols() - 1;
-  covariance_.setZero(r, r);
-  for (Eigen::Index h = 0; h < hypotheses; ++h) {
-    const Hypothesis& each = hypotheses_[static_cast<std::size_t>(h)];
-    fill_omega(each.scales);
-    if (rank_ > 0 && !blas::cholesky(omega_)) return false;
-    // X = K^-1 L^T S^2 with K K^T = Omega; C = S^2 - X^T X
-    solved_ = left_.block(common_, 0, r, rank_).transpose();
+  const Eigen::Index r = window_.count, rank = evidence_.rank();
+  const auto hypotheses = static_cast<Eigen::Index>(hypotheses_.size());
+  explained_.resize(hypotheses * rank, r);
+  apart_.resize(hypotheses, r);
+  if (!for_each_hypothesis([&](Eigen::Index h, const Hypothesis& each, Workspace& work) {
+        const double root = std::sqrt(each.weight);
+        auto x = explained_.middleRows(h * rank, rank);
+        if (!evidence_.explained(variances(each.scales), work, x)) return false;
+        x *= root;
+        apart_.row(h) = root * (means_.col(h) - means_.col(hypotheses)).tail(r).transpose();
+        return true;
+      })) {
+    return false;
+  }
+  team_->split(r, [&](long begin, long end) {
+    const Eigen::Index columns = end - begin, rows = r - begin;
+    auto block = factor.block(begin, begin, rows, columns);
+    blas::multiply_transposed(-1.0, explained_.rightCols(rows),
+                              explained_.middleCols(begin, columns), 0.0, block);
+    blas::multiply_transposed(1.0, apart_.rightCols(rows), apart_.middleCols(begin, columns), 1.0,
+                              block);
+  });
+  for (const Hypothesis& each : hypotheses_) {
     for (int i = 0; i < r; ++i) {
-      const double square = variance(part_of_mode_[static_cast<std::size_t>(i)], each.scales);
-      solved_.col(i) *= std::sqrt(each.weight) * square;
-      covariance_(i, i) += each.weight * square;
-    }
-    if (rank_ > 0) {
-      blas::solve_lower(omega_, solved_);
-      blas::gram(solved_, 0.0, factor);
-      covariance_.triangularView<Eigen::Lower>() -= factor;
-    }
-    if (hypotheses == 1) break;
-    mean_of_ = (means_.col(h) - means_.col(hypotheses)).tail(r);
-    for (Eigen::Index j = 0; j < r; ++j) {
-      covariance_.col(j).tail(r - j) += each.weight * mean_of_[j] * mean_of_.tail(r - j);
+      factor(i, i) +=
+          each.weight * variance(part_of_mode_[static_cast<std::size_t>(i)], each.scales);
     }
   }
-  covariance_.diagonal().array() += kJitter * (1.0 + covariance_.diagonal().maxCoeff());
-  factor = covariance_.triangularView<Eigen::Lower>();
+  factor.diagonal().array() += kJitter * (1.0 + factor.diagonal().maxCoeff());
+  factor.triangularView<Eigen::StrictlyUpper>().setZero();
   return blas::cholesky(factor);
 }
 

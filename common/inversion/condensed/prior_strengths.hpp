@@ -7,10 +7,8 @@
 //
 //   p(s_g = 0) = kAbsent        p(s_g) ~ exp(-ln^2 s_g / (2 kLogStrengthSd^2)) for the others
 //
-// A *hypothesis* is one strength for every part. For the linear model of one contact set, with G =
-// J^T R^-1 J and b = J^T R^-1 d of [common errors | modes], its evidence is
-//
-//   ln p(d | s) = -1/2 ln |I + S G S| + 1/2 b^T S (I + S G S)^-1 S b + const
+// A *hypothesis* is one strength for every part. Its evidence p(d | s) is that of the linear model
+// of one contact set (strength_evidence.hpp).
 //
 // A part may have a *floor*: variance that it has besides, whatever its strength, because something
 // else acts through it that is never absent (the model's own error, condensed_inverter.hpp). s_g^2
@@ -25,11 +23,9 @@
 //
 //   z = sum w_h m_h        Cov = sum w_h (C_h + (m_h - z)(m_h - z)^T)
 //
-// The result depends on G and b alone, not on earlier updates.
-//
-// Cheap because the data say little: a pivoted Cholesky factor G ~ L L^T with few columns (some
-// tens), L y = b, makes y ~ N(0, I + sum s_g^2 L_g^T L_g) all that the data say about s.
-// Allocates nothing after construction but when more columns are needed than ever before.
+// The result depends on G and b alone, not on earlier updates. Neighbours are weighed by all
+// threads of the team, each by one of them. Allocates nothing after construction but when more
+// columns are needed than ever before.
 #pragma once
 
 #include <array>
@@ -37,7 +33,9 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
+#include "common/inversion/condensed/strength_evidence.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/linalg/growing_matrix.hpp"
@@ -46,9 +44,6 @@
 
 namespace brainshift::inversion {
 
-// In units of the case's standard deviations.
-inline constexpr std::array<double, 8> kStrengths = {0.0, 0.125, 0.25, 0.5,
-                                                     1.0, 2.0,   4.0,  kLargestStrength};
 inline constexpr double kAbsent = 0.5;
 // ln 3: the case's strengths are right to a factor of 9 (two standard deviations).
 inline constexpr double kLogStrengthSd = 1.0986122886681098;
@@ -58,8 +53,10 @@ inline constexpr double kWorthwhile = 1.0;
 
 class PriorStrengths {
  public:
-  // columns: of the operators, by part. estimate: false keeps every strength at 1.
-  PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common, bool estimate);
+  // columns: of the operators, by part. estimate: false keeps every strength at 1. Keeps a
+  // reference to the team, which shares the work.
+  PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common, bool estimate,
+                 ThreadTeam& team);
 
   // gram: G, lower triangle; right: b; the common errors come first. kNotFinite when G is not
   // positive semidefinite or not finite.
@@ -101,55 +98,56 @@ class PriorStrengths {
   [[nodiscard]] bool covariance(linalg::blas::Out<double> factor);
 
  private:
-  // ln p for every value of kStrengths of a part when the others are as in `scales`, up to a
-  // constant for each part; for every part that the window has.
-  using Profile = std::array<double, kStrengths.size()>;
-  bool profiles(const PriorScaleValues& scales, PerPart<Profile>& out);
+  using Workspace = StrengthEvidence::Workspace;
+  using Projection = StrengthEvidence::Projection;
+  // ln p for every strength of a part when the others are as in `scales`, up to a constant for each
+  // part; of the parts that the window has.
+  using Profiles = PerPart<StrengthProfile>;
+  void add_prior(Profiles& log_p) const;
+  bool log_posterior(const PriorScaleValues& scales, Workspace& work, double& out) const;
   double variance(std::size_t part, const PriorScaleValues& scales) const {
     return scales[part] * scales[part] + floor_[part] * floor_[part];
   }
-  bool compress(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
-  // Whether candidates_ are those of the held hypothesis for this linear model.
-  bool weighed_for(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right) const;
-  // Omega = I + sum s_g^2 L_g^T L_g, common errors included.
-  void fill_omega(const PriorScaleValues& scales);
+  PerPart<double> variances(const PriorScaleValues& scales) const;
   PriorScaleValues as_in_the_case() const;
-  bool ascend(PriorScaleValues& scales);  // to the next maximum over one part at a time
-  double log_posterior(const PriorScaleValues& scales);
+  PerPart<double> floors() const;
+  // To the next maximum over one part at a time.
+  bool ascend(PriorScaleValues& scales, Projection& projection, Workspace& work) const;
   bool search(PriorScaleValues& best);
   bool weigh(const PriorScaleValues& best);
   // candidates_: those that differ from `from`, whose profiles are given, in one part. Their
   // weights are ln p, `log_weight` that of `from`.
-  void gather_neighbours(const PerPart<Profile>& log_p, const PriorScaleValues& from,
-                         double log_weight);
-  bool take_neighbours(const PriorScaleValues& best);
+  void gather_neighbours(const Profiles& log_p, const PriorScaleValues& from, double log_weight);
+  // Those of the hypothesis whose profiles_ are given.
+  bool gather_candidates(const PriorScaleValues& best);
+  void weigh_candidates(const PriorScaleValues& best);
   // Of ln p, from the held hypothesis to the most probable neighbour; they have been weighed.
   double gain() const { return candidates_.empty() ? 0.0 : candidates_.front().weight; }
   // From the held hypothesis to one that is more probable than its neighbours.
   bool climb();
 
+  // work_on(index, hypothesis, workspace) for each of them, shared by the team; false when any is.
+  template <typename Work>
+  bool for_each_hypothesis(Work&& work_on);
+
   ModeWindow window_;
   bool estimate_;
-  int max_common_;
+  ThreadTeam* team_;
   std::vector<std::size_t> part_of_mode_;  // of the window
-  PerPart<int> first_ = {}, count_ = {};   // columns of the window, by part
+  PerPart<int> count_ = {};                // modes of the window, by part
+  StrengthEvidence evidence_;
+  std::vector<Workspace> works_;  // by member of the team
+  std::vector<Projection> projections_;
   std::vector<Hypothesis> hypotheses_, candidates_;
   PriorScaleValues floor_{};
-  Profile log_prior_{};
-  PerPart<Profile> profiles_{}, changed_profiles_{};
+  StrengthProfile log_prior_{};
+  Profiles profiles_{};
+  PerPart<Profiles> changed_profiles_{};  // with that part changed
 
-  Eigen::Index common_ = 0, size_ = 0, rank_ = 0;  // q, q + r, columns of L
-  linalg::GrowingMatrix gram_;                     // G and b of the last compress()
-  linalg::GrowingVector right_;
-  Eigen::MatrixXd left_;  // L, (q + r) x rank
-  VecX residual_diagonal_, row_;
-  linalg::GrowingVector y_;
-  PerPart<linalg::GrowingMatrix> of_part_;  // L_g^T L_g
-  linalg::GrowingMatrix means_;             // (c, z) by hypothesis, then their mean
-  linalg::GrowingMatrix of_common_, omega_, solved_, small_, scratch_;
-  Eigen::MatrixXd covariance_;
-  linalg::GrowingVector whitened_, projected_, mean_of_;
-  std::vector<Eigen::Index> pivots_;
+  linalg::GrowingMatrix means_;      // (c, z) by hypothesis, then their mean
+  linalg::GrowingMatrix explained_;  // of every hypothesis, one below the other
+  linalg::GrowingMatrix apart_;      // the means' distances from their mean, a row for each
+  std::vector<char> done_;           // of every hypothesis
 };
 
 }  // namespace brainshift::inversion

@@ -22,7 +22,8 @@ SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> ope
       team_(team),
       region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
       region_modes_(gather_rows(operators_->modes, operators_->region)),
-      region_contact_(gather_rows(operators_->contact_columns, operators_->region)) {
+      region_contact_(gather_rows(operators_->contact_columns, operators_->region)),
+      has_column_(static_cast<std::size_t>(operators_->num_slaves()), 0) {
   for (std::size_t i = 0; i < operators_->region.size(); ++i) {
     region_row_[static_cast<std::size_t>(operators_->region[i])] = static_cast<int>(i);
   }
@@ -40,8 +41,13 @@ void SampledOperators::reserve(int data) {
   sd_.resize(data);
   free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
   before_.resize(3 * data, window_.first);
-  contact_storage_.reset(new double[3 * static_cast<std::size_t>(data) *
-                                    static_cast<std::size_t>(operators_->num_slaves())]);
+  row_weights_.resize(3 * data);
+  forced_.resize(3 * data);
+  const auto slaves = static_cast<std::size_t>(operators_->num_slaves());
+  const std::size_t contact = 3 * static_cast<std::size_t>(data) * slaves;
+  contact_columns_.reset(new double[contact]);  // uninitialised: memory is used as it is touched
+  whitened_contact_.reset(new double[contact]);
+  missing_.reserve(slaves);
 }
 
 Status SampledOperators::refuse(const SparseData& data, int datum, const std::string& where) {
@@ -56,6 +62,7 @@ Status SampledOperators::locate(const SparseData& data) {
   assert(data.size() <= capacity_);
   size_ = data.size();
   outside_region_ = 0;
+  std::fill(has_column_.begin(), has_column_.end(), char{0});
   common_ = data.common_error.rows() > 0 ? static_cast<int>(data.common_error.cols()) : 0;
   first_row_[0] = 0;
   for (int i = 0; i < size_; ++i) {
@@ -112,14 +119,17 @@ void SampledOperators::sample(const SparseData& data, const RemainderVariances& 
     const double left_out = left_out_.col(i).dot(strengths_squared);
     sd_[i] = std::sqrt((data.sd_mm[i] * data.sd_mm[i] + left_out) / weights[i]);
     weights_.col(i) = barycentric_.col(i) / sd_[i];
+    row_weights_.segment(first_row(i), first_row(i + 1) - first_row(i)).setConstant(1.0 / sd_[i]);
   }
   const Eigen::MatrixXf& modes = outside_region_ == 0 ? region_modes_ : operators_->modes;
-  for (int j = 0; j < window_.first; ++j) {
-    sample_column(modes.col(j).data(), before_.col(j).data());
-  }
-  for (int j = 0; j < window_.count; ++j) {
-    sample_column(modes.col(window_.first + j).data(), free_body_.col(common_ + j).data());
-  }
+  team_.split(window_.first + window_.count, [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      const bool left_out = j < window_.first;
+      sample_column(
+          modes.col(j).data(), weights_,
+          left_out ? before_.col(j).data() : free_body_.col(common_ + j - window_.first).data());
+    }
+  });
   for (int i = 0; i < size_; ++i) {
     put(data.displacements.col(i) / sd_[i], i, free_body_.col(common_ + window_.count).data());
     for (int q = 0; q < common_; ++q) {
@@ -137,11 +147,12 @@ void SampledOperators::put(const Vec3& value, int datum, double* column) const {
   }
 }
 
-void SampledOperators::sample_column(const float* array, double* out) const {
+void SampledOperators::sample_column(const float* array, const NodeWeights& weights,
+                                     double* out) const {
   for (int i = 0; i < size_; ++i) {
     double x = 0.0, y = 0.0, z = 0.0;
     for (int k = 0; k < 4; ++k) {
-      const double weight = weights_(k, i);
+      const double weight = weights(k, i);
       const float* node = array + 3 * static_cast<std::ptrdiff_t>(rows_(k, i));
       x += weight * static_cast<double>(node[0]);
       y += weight * static_cast<double>(node[1]);
@@ -151,16 +162,60 @@ void SampledOperators::sample_column(const float* array, double* out) const {
   }
 }
 
-Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+void SampledOperators::sample_contact(const std::vector<int>& slaves) {
+  missing_.clear();
+  for (const int slave : slaves) {
+    char& has = has_column_[static_cast<std::size_t>(slave)];
+    if (!has) missing_.push_back(slave);
+    has = 1;
+  }
+  if (missing_.empty()) return;
   const Eigen::MatrixXf& columns =
       outside_region_ == 0 ? region_contact_ : operators_->contact_columns;
-  team_.split(static_cast<long>(active.size()), [&](long begin, long end) {
+  team_.split(static_cast<long>(missing_.size()), [&](long begin, long end) {
     for (long j = begin; j < end; ++j) {
-      sample_column(columns.col(active[static_cast<std::size_t>(j)]).data(),
-                    contact_storage_.get() + rows() * j);
+      const int slave = missing_[static_cast<std::size_t>(j)];
+      sample_column(columns.col(slave).data(), barycentric_,
+                    contact_columns_.get() + static_cast<std::ptrdiff_t>(rows()) * slave);
     }
   });
-  return {contact_storage_.get(), rows(), static_cast<Eigen::Index>(active.size())};
+}
+
+Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+  sample_contact(active);
+  Eigen::Map<Eigen::MatrixXd> whitened(whitened_contact_.get(), rows(),
+                                       static_cast<Eigen::Index>(active.size()));
+  team_.split(whitened.cols(), [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      const Eigen::Map<const VecX> column(contact_column(active[static_cast<std::size_t>(j)]),
+                                          rows());
+      whitened.col(j) = row_weights_.head(rows()).cwiseProduct(column);
+    }
+  });
+  return {whitened_contact_.get(), rows(), whitened.cols()};
+}
+
+void SampledOperators::subtract_contact(const std::vector<int>& active,
+                                        const Eigen::Ref<const VecX>& forces, VecX& out) {
+  sample_contact(active);
+  auto sum = forced_.head(rows());
+  sum.setZero();
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    linalg::blas::add_scaled(rows(), forces[static_cast<Eigen::Index>(j)],
+                             contact_column(active[j]), sum.data());
+  }
+  out.array() -= row_weights_.head(rows()).array() * sum.array();
+}
+
+void SampledOperators::contact_transposed(const std::vector<int>& active, const VecX& v,
+                                          Eigen::Ref<VecX> out) {
+  sample_contact(active);
+  auto weighted = forced_.head(rows());
+  weighted = row_weights_.head(rows()).cwiseProduct(v);
+  for (std::size_t j = 0; j < active.size(); ++j) {
+    out[static_cast<Eigen::Index>(j)] =
+        Eigen::Map<const VecX>(contact_column(active[j]), rows()).dot(weighted);
+  }
 }
 
 }  // namespace brainshift::inversion

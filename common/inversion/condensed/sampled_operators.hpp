@@ -56,8 +56,13 @@ class SampledOperators {
   // R^-1/2 A of the modes before the window (gravity modes that a scene leaves out), rows x
   // window.first.
   auto modes_before() const { return before_.topRows(rows()); }
-  // Valid until the next call.
+  // R^-1/2 A G_A; valid until the next call.
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
+  // out -= R^-1/2 A G_A f; f: one force per active slave, N; out: rows.
+  void subtract_contact(const std::vector<int>& active, const Eigen::Ref<const VecX>& forces,
+                        VecX& out);
+  // out = (R^-1/2 A G_A)^T v; v: rows; out: k.
+  void contact_transposed(const std::vector<int>& active, const VecX& v, Eigen::Ref<VecX> out);
 
  private:
   // What the modes of each remainder leave out at unit strength, mm^2; false when every node that
@@ -66,9 +71,15 @@ class SampledOperators {
   Status refuse(const SparseData& data, int datum, const std::string& where);
   // The rows of one datum in a column of rows().
   void put(const Vec3& value, int datum, double* column) const;
-  // out = R^-1/2 A (array column); `array` has 3n rows when any datum lies outside the region, else
-  // 3e rows.
-  void sample_column(const float* array, double* out) const;
+  using NodeWeights = Eigen::Matrix<double, 4, Eigen::Dynamic>;  // 4 x m
+  // out = A (array column), each datum's rows with its weights; `array` has 3n rows when any datum
+  // lies outside the region, else 3e rows.
+  void sample_column(const float* array, const NodeWeights& weights, double* out) const;
+  // A G of these slaves, in contact_columns_ from now on.
+  void sample_contact(const std::vector<int>& slaves);
+  const double* contact_column(int slave) const {
+    return contact_columns_.get() + static_cast<std::ptrdiff_t>(rows()) * slave;
+  }
 
   std::shared_ptr<const CondensedOperators> operators_;
   std::shared_ptr<const geometry::TetLocator> locator_;
@@ -79,13 +90,17 @@ class SampledOperators {
   Eigen::MatrixXf region_modes_, region_contact_;
   int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
-  Eigen::Matrix<double, 4, Eigen::Dynamic> barycentric_, weights_;  // 4 x m; weights_: / sd
-  Points directions_;                                               // 3 x m, zero: whole
-  std::vector<int> first_row_;                                      // m + 1
-  Eigen::Matrix<double, kRemainders, Eigen::Dynamic> left_out_;     // at unit strength, mm^2
+  NodeWeights barycentric_, weights_;           // 4 x m; weights_: / sd
+  Points directions_;                           // 3 x m, zero: whole
+  std::vector<int> first_row_;                  // m + 1
+  Eigen::Matrix<double, kRemainders, Eigen::Dynamic> left_out_;  // at unit strength, mm^2
   VecX sd_;
   Eigen::MatrixXd free_body_, before_;
-  std::unique_ptr<double[]> contact_storage_;
+  VecX row_weights_, forced_;  // rows; R^-1/2, and what forces or adjoint make of it
+  // A G, a column per slave, of those that have been asked for since locate(); whitened when used.
+  std::unique_ptr<double[]> contact_columns_, whitened_contact_;
+  std::vector<char> has_column_;  // by slave
+  std::vector<int> missing_;
 };
 
 }  // namespace brainshift::inversion

@@ -50,7 +50,11 @@ void ContactAtLoads::begin_from(const std::vector<int>& slaves,
 
 Status ContactAtLoads::solve(const VecX& z) {
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
-  free_penetration_.noalias() = operators_.initial_penetration_mm - modes * z;
+  team_.split(free_penetration_.size(), [&](long begin, long end) {
+    free_penetration_.segment(begin, end - begin).noalias() =
+        operators_.initial_penetration_mm.segment(begin, end - begin) -
+        modes.middleRows(begin, end - begin) * z;
+  });
   violation_mm_ = 0.0;
   sets_ = 0;
   if (!contact_) {

@@ -25,8 +25,9 @@ double ContactReach::along(const VecX& step, const VecX& penetration, int most) 
   const int k = reduction_.size();
   auto opening = opening_.head(k);
   opening.noalias() = -reduction_.response().leftCols(window_.count) * step;
-  closing_.noalias() = -operators_.slave_modes.middleCols(window_.first, window_.count) * step;
+  const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
   team_.split(closing_.size(), [&](long begin, long end) {
+    closing_.segment(begin, end - begin).noalias() = -modes.middleRows(begin, end - begin) * step;
     for (int j = 0; j < k; ++j) {
       linalg::blas::add_scaled(
           end - begin, -opening[j],

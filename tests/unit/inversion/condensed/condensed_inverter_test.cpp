@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
@@ -330,6 +331,25 @@ TEST_P(Condensed, TheCertificateIsMet) {
     EXPECT_LE(estimate.contact.decrement, kDecrement);
     EXPECT_LE(estimate.contact.max_violation_mm, kContactViolation_mm);
   }
+}
+
+TEST_P(Condensed, TheStagesOfAnUpdateAreThoseOfThatUpdateAlone) {
+  auto inverter = Condensed::inverter(GetParam());
+  Estimate estimate;
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  ASSERT_TRUE(inverter.update(data, estimate));
+  const UpdateProfile first = inverter.profile();
+  const Stopwatch watch;
+  ASSERT_TRUE(inverter.update(data, estimate));
+  const double all_ms = watch.milliseconds();
+  double sum_ms = 0.0;
+  for (std::size_t i = 0; i < kUpdateStages; ++i) {
+    EXPECT_EQ(inverter.profile().stages[i].times, first.stages[i].times) << i;
+    sum_ms += inverter.profile().stages[i].ms;
+  }
+  EXPECT_LE(sum_ms, all_ms) << "stages do not overlap";
+  EXPECT_GT(inverter.profile().of(UpdateStage::kContact).times, 0);
+  EXPECT_EQ(inverter.profile().of(UpdateStage::kField).times, 1);
 }
 
 TEST_P(Condensed, LeavingPartsOutChangesOnlyThem) {

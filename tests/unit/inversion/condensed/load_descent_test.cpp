@@ -13,8 +13,8 @@ struct Descent {
       : operators(std::move(given)),
         window{0, operators->num_modes()},
         sampled(operators, std::move(locator), window, OutsideRegion::kExtend, team),
-        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors, true),
-        descent(*operators, window, config.contact.penalty_n_per_mm, true, team) {
+        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors, true, team),
+        descent(*operators, window, config.contact.penalty_n_per_mm, true, team, profile) {
     limits.out_of_time = [] { return false; };
     limits.on_step = [] {};
   }
@@ -47,6 +47,7 @@ struct Descent {
   ModeWindow window;
   SampledOperators sampled;
   PriorStrengths strengths;
+  UpdateProfile profile;
   LoadDescent descent;
   DescentLimits limits;
 };

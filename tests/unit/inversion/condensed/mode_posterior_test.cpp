@@ -50,7 +50,7 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
     ModePosterior posterior(window);
     posterior.reserve(data.size());
     posterior.linearise(sampled, no_contact, team);
-    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true);
+    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, team);
     ASSERT_TRUE(strengths.fit(posterior.gram(), posterior.right_hand_side()));
     Consistency found;
     ASSERT_TRUE(posterior.check_source(sampled, strengths, {"pointer", half, rest}, found));

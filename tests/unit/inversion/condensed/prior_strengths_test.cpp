@@ -21,6 +21,11 @@ constexpr ModeWindow kWindow{0, kModes};
 constexpr PerPart<int> kColumns = {2, 4, 8, 0, 0, 0, 34, 0, 0};
 constexpr std::size_t kPresent[] = {0, 1, 2, 6};
 
+ThreadTeam& team() {
+  static ThreadTeam two(2);
+  return two;
+}
+
 PriorScaleValues strengths(double along, double across, double volume, double fine) {
   return {along, across, volume, 0, 0, 0, fine, 0, 0};
 }
@@ -87,7 +92,7 @@ double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
 }
 
 PriorStrengths fitted(const Problem& problem, bool estimate = true) {
-  PriorStrengths result(kColumns, kWindow, kCommon, estimate);
+  PriorStrengths result(kColumns, kWindow, kCommon, estimate, team());
   EXPECT_TRUE(result.fit(problem.gram(), problem.right()));
   return result;
 }
@@ -267,14 +272,14 @@ TEST(PriorStrengths, MomentsAreThoseOfTheMixture) {
 
 TEST(PriorStrengths, AFloorIsVarianceThatNoHypothesisTakesAway) {
   const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.0), 5);
-  PriorStrengths result(kColumns, kWindow, kCommon, true);
+  PriorStrengths result(kColumns, kWindow, kCommon, true, team());
   result.set_floor(static_cast<PriorPart>(6), 0.4);
   ASSERT_TRUE(result.fit(problem.gram(), problem.right()));
   EXPECT_EQ(result.held()[6], 0.0) << "the test shows nothing";
   EXPECT_EQ(result.scale_of(kModes - 1), 0.4);
   EXPECT_GE(result.mean_square()[6], 0.16);
   expect_moments_of_the_mixture(problem, result, 6, 0.4);
-  PriorStrengths fixed(kColumns, kWindow, kCommon, false);
+  PriorStrengths fixed(kColumns, kWindow, kCommon, false, team());
   fixed.set_floor(static_cast<PriorPart>(6), 0.4);
   EXPECT_EQ(fixed.scale_of(kModes - 1), 1.0) << "without effect where strengths are given";
 }
@@ -289,7 +294,7 @@ TEST(PriorStrengths, StrengthsThatAreNotEstimatedStayAsInTheCase) {
 
 TEST(PriorStrengths, NumbersThatAreNotFiniteAreRejected) {
   Problem problem = drawn(strengths(1, 1, 1, 1), 3);
-  PriorStrengths result(kColumns, kWindow, kCommon, true);
+  PriorStrengths result(kColumns, kWindow, kCommon, true, team());
   MatrixXd gram = problem.gram();
   gram(5, 5) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(result.fit(gram, problem.right()).error().code, ErrorCode::kNotFinite);
@@ -304,7 +309,7 @@ TEST(PriorStrengths, AWindowLeavesTheFirstModesOut) {
   const int size = kCommon + kModes - left;
   MatrixXd jacobian(kData, size);
   jacobian << problem.jacobian.leftCols(kCommon), problem.jacobian.rightCols(size - kCommon);
-  PriorStrengths result(kColumns, {left, kModes - left}, kCommon, true);
+  PriorStrengths result(kColumns, {left, kModes - left}, kCommon, true, team());
   ASSERT_TRUE(result.fit(jacobian.transpose() * jacobian, jacobian.transpose() * problem.data));
   EXPECT_EQ(result.held()[0], 0.0);
   EXPECT_EQ(result.held()[1], 0.0);

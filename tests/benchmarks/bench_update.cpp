@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How long an update takes and where the time goes: surgeries played through the daemon's pipeline
+// in this process, beside the time of one triangular solve with the model's factor.
+//   build/release/bin/bench_update --model M.h5 [--passes N] [--csv FILE] S.surgery...
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/core/statistics.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/inversion/inverter.hpp"
+#include "common/inversion/prepared/full_solve.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/linalg/blas_kernel.hpp"
+#include "common/wire/convert.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "tests/benchmarks/value_or_exit.hpp"
+
+namespace brainshift {
+namespace {
+
+using bench::value_or_exit;
+using inversion::UpdateProfile;
+using inversion::UpdateStage;
+
+struct Arguments {
+  std::string model_file, csv;
+  std::vector<std::string> surgeries;
+  int passes = 5;
+};
+
+struct Head {
+  CaseConfig config;
+  std::shared_ptr<const BrainModel> model;
+  std::shared_ptr<const CondensedOperators> operators;
+  std::shared_ptr<const geometry::TetLocator> locator;
+  double t_solve_ms = 0.0;
+};
+
+Head load(const std::string& file) {
+  auto read = value_or_exit(io::read_model(file));
+  Head head;
+  head.config = read.config;
+  head.model = std::make_shared<const BrainModel>(std::move(read.model));
+  for (auto& operators : read.condensed) {
+    if (operators.boundary != Boundary::kContact) continue;
+    head.operators = std::make_shared<const CondensedOperators>(std::move(operators));
+  }
+  if (head.operators == nullptr) {
+    std::fprintf(stderr, "benchmark: %s: holds no operators for contact\n", file.c_str());
+    std::exit(2);
+  }
+  head.locator = std::make_shared<const geometry::TetLocator>(head.model->mesh);
+  const auto prepared =
+      value_or_exit(inversion::PreparedModel::prepare(head.model, head.config, Boundary::kContact));
+  head.t_solve_ms = inversion::measure_full_solve_ms(prepared);
+  return head;
+}
+
+// A session's pipeline, and the inverter inside it.
+struct Player {
+  explicit Player(const Head& head) {
+    auto made =
+        value_or_exit(inversion::condensed_inverter(head.operators, head.locator, head.config));
+    inverter = made.get();
+    pipeline = std::make_unique<server::Pipeline>(value_or_exit(server::Pipeline::build(
+        head.model, head.config, Method::kCondensed, Boundary::kContact, std::move(made))));
+  }
+  const inversion::Inverter* inverter = nullptr;
+  std::unique_ptr<server::Pipeline> pipeline;
+};
+
+struct Timed {
+  std::vector<double> ms, active, steps;
+  std::vector<std::vector<double>> stage_ms, stage_times;
+};
+
+std::vector<Observation> observations_of(const std::string& file) {
+  const auto surgery = value_or_exit(io::SurgeryFile::open(file));
+  std::vector<Observation> observations;
+  for (const auto& record : value_or_exit(surgery.records(io::RecordKind::kObservation))) {
+    observations.push_back(value_or_exit(wire::decode_observation(record.payload)));
+  }
+  return observations;
+}
+
+Timed play(Player& player, const std::vector<Observation>& observations, int passes) {
+  Timed timed;
+  timed.stage_ms.resize(inversion::kUpdateStages);
+  timed.stage_times.resize(inversion::kUpdateStages);
+  for (int pass = 0; pass < passes; ++pass) {
+    player.pipeline->reset();
+    for (const Observation& observation : observations) {
+      const Stopwatch watch;
+      const Update update = value_or_exit(player.pipeline->run(observation));
+      timed.ms.push_back(watch.milliseconds());
+      timed.active.push_back(update.estimate.contact.active);
+      timed.steps.push_back(update.estimate.contact.iterations);
+      const UpdateProfile& profile = *player.inverter->profile();
+      for (std::size_t i = 0; i < inversion::kUpdateStages; ++i) {
+        timed.stage_ms[i].push_back(profile.stages[i].ms);
+        timed.stage_times[i].push_back(profile.stages[i].times);
+      }
+    }
+  }
+  return timed;
+}
+
+void print(const std::string& name, const Timed& timed, double t_solve_ms) {
+  const auto median = [](const std::vector<double>& values) { return percentile(values, 50.0); };
+  std::printf(
+      "%s: %zu updates, p50 %.1f ms = %.2f t_solve, p95 %.2f, p99 / p50 %.2f; %.0f active, "
+      "%.0f steps\n",
+      name.c_str(), timed.ms.size(), median(timed.ms), median(timed.ms) / t_solve_ms,
+      percentile(timed.ms, 95.0) / t_solve_ms, percentile(timed.ms, 99.0) / median(timed.ms),
+      median(timed.active), median(timed.steps));
+  for (std::size_t i = 0; i < inversion::kUpdateStages; ++i) {
+    std::printf("  %-10s %7.2f ms  %5.2f t_solve  %4.0f times\n",
+                inversion::to_string(static_cast<UpdateStage>(i)), median(timed.stage_ms[i]),
+                median(timed.stage_ms[i]) / t_solve_ms, median(timed.stage_times[i]));
+  }
+}
+
+void run(const Arguments& arguments) {
+  const Head head = load(arguments.model_file);
+  std::printf("%d nodes, %d slaves, %d modes; t_solve %.1f ms; BLAS kernel %s\n",
+              head.operators->num_nodes(), head.operators->num_slaves(),
+              head.operators->num_modes(), head.t_solve_ms, linalg::blas_kernel().c_str());
+  std::ofstream csv;
+  if (!arguments.csv.empty()) csv.open(arguments.csv);
+  if (csv.is_open()) csv << "surgery,update,ms,t_solve_ms,active,steps\n";
+  Player player(head);
+  for (const std::string& file : arguments.surgeries) {
+    const auto observations = observations_of(file);
+    const std::string name = std::filesystem::path(file).stem().string();
+    const Timed timed = play(player, observations, arguments.passes);
+    print(name, timed, head.t_solve_ms);
+    for (std::size_t i = 0; csv.is_open() && i < timed.ms.size(); ++i) {
+      csv << name << ',' << i + 1 << ',' << timed.ms[i] << ',' << head.t_solve_ms << ','
+          << timed.active[i] << ',' << timed.steps[i] << '\n';
+    }
+  }
+}
+
+}  // namespace
+}  // namespace brainshift
+
+int main(int argc, char** argv) {
+  brainshift::Arguments arguments;
+  CLI::App app("Times updates and their stages.");
+  app.add_option("--model", arguments.model_file, "model file of brainshiftd prepare")->required();
+  app.add_option("--passes", arguments.passes, "how often each surgery is played")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--csv", arguments.csv, "file for a row per update");
+  app.add_option("surgeries", arguments.surgeries, "surgery files of the same case")->required();
+  CLI11_PARSE(app, argc, argv);
+  brainshift::run(arguments);
+  return 0;
+}
