@@ -12,7 +12,7 @@
 #include <zmq.hpp>
 
 #include "server/transport/outbox.hpp"
-#include "server/transport/router.hpp"
+#include "server/transport/router_options.hpp"
 
 namespace brainshift::server {
 

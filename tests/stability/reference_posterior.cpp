@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "common/inversion/condensed/prior_strengths.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 
 namespace brainshift::stability {
 namespace {

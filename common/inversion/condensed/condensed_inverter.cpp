@@ -14,7 +14,7 @@
 #include "common/inversion/condensed/field_rebuild.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
-#include "common/inversion/condensed/prior_strengths.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/contract/data_check.hpp"

@@ -38,7 +38,6 @@
 #include "common/core/thread_team.hpp"
 #include "common/inversion/condensed/mode_posterior.hpp"
 #include "common/inversion/condensed/newton_bundle.hpp"
-#include "common/inversion/condensed/prior_strengths.hpp"
 #include "common/inversion/condensed/quasi_newton.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
@@ -46,6 +45,7 @@
 #include "common/inversion/skull/contact_factor.hpp"
 #include "common/inversion/skull/contact_reach.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/values/estimate.hpp"
 

@@ -12,10 +12,10 @@
 
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/prior_strengths.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/source_check.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {

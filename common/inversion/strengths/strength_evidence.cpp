@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/condensed/strength_evidence.hpp"
+#include "common/inversion/strengths/strength_evidence.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/condensed/prior_strengths.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 
 #include <algorithm>
 #include <array>
