@@ -14,12 +14,12 @@
 #include "common/inversion/condensed/field_rebuild.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
-#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/contract/penetration.hpp"
+#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {
