@@ -1,5 +1,6 @@
 # Language level, warnings, sanitizers.
 option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
+option(BRAINSHIFT_CLIENT_ONLY "Build and install the C++ client library alone: no solver, nothing under the GPL" OFF)
 set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
 option(BRAINSHIFT_FUZZ "Build the fuzz targets with libFuzzer (clang)" OFF)

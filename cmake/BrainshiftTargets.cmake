@@ -16,8 +16,10 @@ function(brainshift_library)
   brainshift_folder_name(folder)
   add_library(brainshift_${folder} STATIC ${ARG_SOURCES})
   add_library(brainshift::${folder} ALIAS brainshift_${folder})
-  target_include_directories(brainshift_${folder} PUBLIC ${CMAKE_SOURCE_DIR})
-  target_link_libraries(brainshift_${folder} PUBLIC ${ARG_PUBLIC} PRIVATE brainshift_warnings ${ARG_PRIVATE})
+  target_include_directories(brainshift_${folder} PUBLIC
+    $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:include/brainshift>)
+  target_link_libraries(brainshift_${folder} PUBLIC ${ARG_PUBLIC}
+    PRIVATE $<BUILD_INTERFACE:brainshift_warnings> ${ARG_PRIVATE})
   brainshift_precompile(brainshift_${folder} brainshift_headers)
   brainshift_record_links(brainshift_${folder} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
 endfunction()
