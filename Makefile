@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior faults fuzz format format-check tidy image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior faults fuzz format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -77,6 +77,11 @@ format-check: ## fail where a C++ source is not in the house format
 
 tidy: setup ## run clang-tidy over common/, server/ and client/
 	@cmake/scripts/clang-tidy.sh build/tidy
+
+packages: configure ## Debian packages of the programs and of the client library, into out/packages
+	@cmake --build --preset release --target brainshiftd brainshift brainshift_client_lib
+	@mkdir -p out/packages && cd out/packages && cpack --config ../../build/release/CPackConfig.cmake >cpack.log 2>&1 || { tail -n 20 cpack.log >&2; exit 1; }
+	@rm -rf out/packages/_CPack_Packages && ls out/packages/*.deb
 
 image: ## build the container image and start it once, without a container engine (root)
 	docker/build-image-without-engine.sh

@@ -80,3 +80,22 @@ def test_it_says_in_one_line_that_nobody_answers(program, tmp_path):
     told = subprocess.run([program, f"ipc://{tmp_path}/none.sock", "none"], capture_output=True, text=True, timeout=60)
     assert told.returncode == 1
     assert told.stderr.startswith("send_boundary: no daemon at ipc://") and told.stderr.count("\n") == 1
+
+
+def test_debian_packages_hold_programs_and_client_apart(tmp_path):
+    made = subprocess.run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", tmp_path], capture_output=True,
+                          text=True, timeout=240)
+    assert made.returncode == 0, made.stdout + made.stderr
+
+    def tell(package, *question):
+        (file,) = tmp_path.glob(f"{package}_*.deb")
+        return subprocess.run(["dpkg-deb", *question[:1], file, *question[1:]], capture_output=True, text=True,
+                              check=True).stdout
+
+    programs, client = tell("brainshift", "-c"), tell("libbrainshift-client-dev", "-c")
+    assert "./usr/bin/brainshiftd" in programs and "./usr/lib/systemd/system/brainshiftd.service" in programs
+    assert "./usr/include" not in programs
+    assert "/cmake/brainshift_client/brainshift_client-config.cmake" in client and "./usr/bin" not in client
+    assert "libopenblas0-pthread" in tell("brainshift", "-f", "Depends")
+    assert "cholmod" not in tell("libbrainshift-client-dev", "-f", "Depends")
+    assert "medical device" in tell("brainshift", "-f", "Description")
