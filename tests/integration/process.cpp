@@ -77,7 +77,8 @@ Finished run(const std::vector<std::string>& argv, double limit_s) {
   Finished finished;
   std::array<pollfd, 2> streams = {pollfd{out.read_end, POLLIN, 0},
                                    pollfd{err.read_end, POLLIN, 0}};
-  const auto deadline = Clock::now() + std::chrono::duration<double>(limit_s);
+  const auto deadline =
+      Clock::now() + std::chrono::duration<double>(BRAINSHIFT_TIMEOUT_FACTOR * limit_s);
   while (streams[0].fd >= 0 || streams[1].fd >= 0) {
     const auto left = std::chrono::duration<double, std::milli>(deadline - Clock::now()).count();
     if (left <= 0.0 || poll(streams.data(), streams.size(), static_cast<int>(left) + 1) == 0) {

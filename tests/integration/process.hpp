@@ -15,7 +15,7 @@ struct Finished {
   std::string err;
 };
 
-// argv[0] is the program. Kills it after limit_s.
+// argv[0] is the program. Kills it after limit_s, ten times that with sanitizers.
 Finished run(const std::vector<std::string>& argv, double limit_s = 120.0);
 
 // A program that keeps running until told to end.
