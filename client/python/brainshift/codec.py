@@ -32,7 +32,7 @@ def _bytes_of_numbers(message: Any, kind: str) -> Any:
 
 
 def _points(message: Any, name: str) -> v.Floats:
-    points = _bytes_of_numbers(message, "<f8").astype(np.float64)
+    points: v.Floats = _bytes_of_numbers(message, "<f8").astype(np.float64)
     if points.size % 3 != 0:
         raise ProtocolError(f"{name}: {points.size} numbers, must be a multiple of 3")
     return points.reshape(-1, 3)
