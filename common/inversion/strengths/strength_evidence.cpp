@@ -227,7 +227,7 @@ bool StrengthEvidence::profile(double variance, double floor, StrengthProfile& o
   out.fill(0.0);
   if (count == 0) return true;
   // Lower factor of I + change M in work.shifted; ln of its determinant in `log_root`, halved. By
-  // Eigen: matrices this small are done before BLAS has begun.
+  // Eigen: BLAS takes as long for matrices this small.
   double log_root = 0.0;
   const auto shift = [&](double change) {
     work.shifted.resize(count, count);
