@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   using namespace brainshift;
   CLI::App app{
-      "brainshift: simulate surgeries with known truth, replay recorded ones to brainshiftd, and "
+      "brainshift: look at a case before it is prepared; simulate surgeries with known truth, "
+      "replay recorded ones to brainshiftd, and "
       "report how "
       "well the deformation was recovered; solve single forward problems on any mesh; import "
       "recordings "
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "A whole run, with the daemon in a second terminal:\n"
+      "  brainshift preview --case config/cases/colin27.yaml --out preview\n"
       "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
       "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
       "  brainshift simulate --case config/cases/colin27.yaml --scenario paper --seed 1 --out "
@@ -33,6 +35,7 @@ int main(int argc, char** argv) {
       "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
 
   Status status;
+  client::add_preview(app, status);
   client::add_simulate(app, status);
   client::add_replay(app, status);
   client::add_report(app, status);
@@ -48,9 +51,10 @@ int main(int argc, char** argv) {
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error("unknown command \"" + std::string(argv[1]) +
-                        "\": must be simulate, replay, report, solve, import, stereo, journal, "
-                        "watch, status, top or keys (see brainshift --help)");
+    client::print_error(
+        "unknown command \"" + std::string(argv[1]) +
+        "\": must be preview, simulate, replay, report, solve, import, stereo, journal, "
+        "watch, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {

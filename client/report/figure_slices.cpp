@@ -6,7 +6,7 @@
 #include "client/plot/sheet.hpp"
 #include "client/plot/ticks.hpp"
 #include "client/report/figures.hpp"
-#include "client/report/slice_panel.hpp"
+#include "client/slices/slice_panel.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::client {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/report/slice_panel.hpp"
+#include "client/slices/slice_panel.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,6 +26,16 @@ TEST(SliceWindow, CoronalShowsSuperiorUp) {
   EXPECT_LT(window.pixel({8, 5, 5}).x, middle.x);
   EXPECT_LT(window.pixel({5, 5, 8}).y, middle.y);
   EXPECT_TRUE(window.position(window.pixel({3, 5, 7})).isApprox(Vec3(3, 5, 7), 1e-12));
+}
+
+TEST(SliceWindow, SagittalShowsAnteriorOnTheLeftAndSuperiorUp) {
+  SliceWindow window = kWindow;
+  window.plane = Plane::kSagittal;
+  const cv::Point2d middle = window.pixel({5, 5, 5});
+  EXPECT_LT(window.pixel({5, 8, 5}).x, middle.x);
+  EXPECT_LT(window.pixel({5, 5, 8}).y, middle.y);
+  EXPECT_EQ(window.normal_axis(), 0);
+  EXPECT_TRUE(window.position(window.pixel({5, 3, 7})).isApprox(Vec3(5, 3, 7), 1e-12));
 }
 
 TEST(SliceSamples, CoverTheInsideOfTheMeshAndNothingElse) {

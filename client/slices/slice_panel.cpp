@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/report/slice_panel.hpp"
+#include "client/slices/slice_panel.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "client/plot/ticks.hpp"
+#include "client/slices/gravity_arrow.hpp"
 #include "common/core/statistics.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
@@ -13,17 +14,17 @@
 namespace brainshift::client {
 
 cv::Size SliceWindow::size() const {
-  return {static_cast<int>(std::lround((x_max - x_min) * px_per_mm)),
+  return {static_cast<int>(std::lround((across_max - across_min) * px_per_mm)),
           static_cast<int>(std::lround((up_max - up_min) * px_per_mm))};
 }
 
 cv::Point2d SliceWindow::pixel(const Vec3& x_ras) const {
-  return {(x_max - x_ras.x()) * px_per_mm, (up_max - x_ras(up_axis())) * px_per_mm};
+  return {(across_max - x_ras(across_axis())) * px_per_mm, (up_max - x_ras(up_axis())) * px_per_mm};
 }
 
 Vec3 SliceWindow::position(cv::Point2d pixel) const {
   Vec3 x_ras = Vec3::Constant(offset_mm);
-  x_ras.x() = x_max - pixel.x / px_per_mm;
+  x_ras(across_axis()) = across_max - pixel.x / px_per_mm;
   x_ras(up_axis()) = up_max - pixel.y / px_per_mm;
   return x_ras;
 }
@@ -36,9 +37,9 @@ SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow
   // Multiples of the spacing, so that panels of different windows sample the same places.
   const auto first = [spacing_mm](double min) { return std::ceil(min / spacing_mm) * spacing_mm; };
   for (double up = first(window.up_min); up <= window.up_max; up += spacing_mm) {
-    for (double x = first(window.x_min); x <= window.x_max; x += spacing_mm) {
+    for (double x = first(window.across_min); x <= window.across_max; x += spacing_mm) {
       Vec3 position = Vec3::Constant(window.offset_mm);
-      position.x() = x;
+      position(window.across_axis()) = x;
       position(window.up_axis()) = up;
       const geometry::TetLocation location = locator.locate(position);
       if (location.tet < 0 || location.distance_mm > kInside_mm) continue;
@@ -164,6 +165,7 @@ void SlicePanel::draw_section(const TriangleSurface& surface, const Stroke& stro
 
 void SlicePanel::draw_orientation(double bar_mm) {
   const bool axial = window_.plane == Plane::kAxial;
+  const bool sagittal = window_.plane == Plane::kSagittal;
   const TextStyle letter{.cap_px = 26.0,
                          .colour = palette::kWhite,
                          .align = Align::kCentre,
@@ -171,8 +173,8 @@ void SlicePanel::draw_orientation(double bar_mm) {
                          .halo = true};
   const int w = image_.cols;
   const int h = image_.rows;
-  draw_text(image_, {24, h / 2 + 13}, "R", letter);
-  draw_text(image_, {w - 24, h / 2 + 13}, "L", letter);
+  draw_text(image_, {24, h / 2 + 13}, sagittal ? "A" : "R", letter);
+  draw_text(image_, {w - 24, h / 2 + 13}, sagittal ? "P" : "L", letter);
   draw_text(image_, {w / 2, 40}, axial ? "A" : "S", letter);
   draw_text(image_, {w / 2, h - 14}, axial ? "P" : "I", letter);
   const double length = bar_mm * window_.px_per_mm;
@@ -189,18 +191,8 @@ void SlicePanel::draw_orientation(double bar_mm) {
 }
 
 void SlicePanel::draw_gravity(const Vec3& direction) {
-  const cv::Point2d along(-direction.x(),
-                          -direction(window_.up_axis()));  // both turn on the way to pixels
-  if (cv::norm(along) < 0.1) return;                       // nearly along the line of sight
-  const cv::Point2d centre(86.0, 100.0);
-  const cv::Point2d half = 44.0 * along;
-  draw_arrow(image_, centre - half, centre + half, {palette::kWhite, 5, 0.0}, 22.0, 3);
-  draw_text(image_, {static_cast<int>(centre.x), 34}, "gravity",
-            {.cap_px = 18.0,
-             .colour = palette::kWhite,
-             .align = Align::kCentre,
-             .bold = false,
-             .halo = true});
+  // Both axes of a slice run against those of its pixels.
+  draw_gravity_arrow(image_, {-direction(window_.across_axis()), -direction(window_.up_axis())});
 }
 
 }  // namespace brainshift::client

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One slice: MRI, field arrows, magnitude map, outlines. Private to client/report.
+// One slice of a head as a picture: MRI, field arrows, magnitude map, outlines.
 //
-// Radiological view: the patient's right is on the left of the picture; anterior (axial slice) or
-// superior (coronal slice) is up. Arrows and maps are sampled on the undeformed slice. An arrow
+// Radiological view. Axial and coronal slices: the patient's right is on the left of the picture.
+// Sagittal slices: anterior is on the left. Anterior (axial) or superior (coronal, sagittal) is up.
+// Arrows and maps are sampled on the undeformed slice. An arrow
 // begins at the undeformed point and is the projection of the displacement on the slice plane; its
 // colour shows the full length of the displacement.
 #pragma once
@@ -19,19 +20,22 @@
 namespace brainshift::client {
 
 enum class Plane {
-  kAxial,    // S constant, A up
-  kCoronal,  // A constant, S up
+  kAxial,     // S constant, A up
+  kCoronal,   // A constant, S up
+  kSagittal,  // R constant, S up
 };
 
-// Rectangle of a slice plane, mm RAS: x runs along R, "up" along A or S.
+// Rectangle of a slice plane, mm RAS. "Across" runs along R (axial, coronal) or A (sagittal), from
+// the picture's right edge to its left; "up" along A or S.
 struct SliceWindow {
   Plane plane = Plane::kAxial;
   double offset_mm = 0.0;  // the constant coordinate
-  double x_min = 0.0, x_max = 0.0, up_min = 0.0, up_max = 0.0;
+  double across_min = 0.0, across_max = 0.0, up_min = 0.0, up_max = 0.0;
   double px_per_mm = 5.0;
 
+  int across_axis() const { return plane == Plane::kSagittal ? 1 : 0; }
   int up_axis() const { return plane == Plane::kAxial ? 1 : 2; }
-  int normal_axis() const { return plane == Plane::kAxial ? 2 : 1; }
+  int normal_axis() const { return 3 - across_axis() - up_axis(); }
   cv::Size size() const;
   cv::Point2d pixel(const Vec3& x_ras) const;
   Vec3 position(cv::Point2d pixel) const;  // in the plane
@@ -71,7 +75,8 @@ class SlicePanel {
   void draw_arrows(const SliceSamples& samples, const Points& displacement, double magnification,
                    double max_mm, bool thin);
   void draw_section(const TriangleSurface& surface, const Stroke& stroke);
-  // The letters of the four sides (R, L, A or S, P or I), and a scale bar of `bar_mm`.
+  // The letters of the four sides (R and L, or A and P; A and P, or S and I), and a scale bar of
+  // `bar_mm`.
   void draw_orientation(double bar_mm);
   // An arrow named "gravity" in the upper left corner (its projection on the slice).
   void draw_gravity(const Vec3& direction);
