@@ -114,7 +114,7 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
   } else if (inputs->brain) {
     view.background = *inputs->brain;
   }
-  const auto model = anatomy::build_brain_model(*inputs, progress);
+  const auto model = anatomy::build_brain_model(*inputs, progress, &view.notes);
   if (model) {
     take_model(view, *model);
   } else {
@@ -242,7 +242,7 @@ void doubt_opening(const CaseView& view, const OpeningView& opening,
 }  // namespace
 
 std::vector<std::string> doubts(const CaseView& view) {
-  std::vector<std::string> lines;
+  std::vector<std::string> lines = view.notes;
   if (view.brain.num_vertices() == 0) return lines;
   const double longest = extent_of(view.brain).maxCoeff();
   if (longest < kShortBrain_mm || longest > kLongBrain_mm) {

@@ -32,6 +32,8 @@ struct CaseView {
   // Along gravity, mm; with roles only.
   double fluid_plane_depth_mm = 0.0;
   double slave_plane_depth_mm = 0.0;
+  // What the builder made of the inputs (anatomy::build_brain_model).
+  std::vector<std::string> notes;
   // Each ends the preparation of the case.
   std::vector<std::string> problems;
 };
@@ -61,6 +63,7 @@ std::vector<std::string> facts(const CaseView& view);
 
 // What is unusual enough for a second look: each a sentence that names the key to look at. A wrong
 // side, a wrong axis and metres for millimetres show here.
+//   what the builder noted: a tumour that sticks out of the brain and is cut
 //   tumour and opening on different sides of the brain, each more than 10 mm from its middle
 //   an opening farther than 60 mm from the tumour's surface
 //   an opening that faces down: the brain would sag out of it

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/node_sets.hpp"
@@ -56,7 +57,8 @@ Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
 
 }  // namespace
 
-Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress) {
+Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress,
+                                     std::vector<std::string>* notes) {
   const CaseConfig& config = inputs.config;
   if (Status status = validate(config); !status) return tl::unexpected(status.error());
 
@@ -66,8 +68,9 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
 
   auto mesh = make_brain_mesh(inputs, *tumour, progress);
   if (!mesh) return tl::unexpected(mesh.error());
-  if (Status status = check_tumour_inside(*tumour, *mesh, config); !status)
-    return tl::unexpected(status.error());
+  auto fitted = fit_tumour(std::move(*tumour), *mesh, config);
+  if (!fitted) return tl::unexpected(fitted.error());
+  if (notes != nullptr && !fitted->note.empty()) notes->push_back(fitted->note);
 
   report(progress, "node sets", 0.0);
   const BrainSurface brain = brain_surface_of(*mesh);
@@ -77,7 +80,7 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   if (!skull) return tl::unexpected(skull.error());
 
   report(progress, "tumour distances", 0.0);
-  auto distances = tumour_distances(*tumour);
+  auto distances = tumour_distances(fitted->surface);
   if (!distances) return fail(distances.error().code, "tumour: " + distances.error().message);
 
   BrainModel model;
@@ -85,7 +88,7 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   model.boundary_triangles = geometry::boundary_triangles(*mesh);
   model.mesh = std::move(*mesh);
   model.skull = std::move(*skull);
-  model.tumour = std::move(*tumour);
+  model.tumour = std::move(fitted->surface);
   model.tumour_distance = std::move(*distances);
   model.craniotomy = std::move(sets->craniotomy);
   model.brainstem = std::move(sets->brainstem);

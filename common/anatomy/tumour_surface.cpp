@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "common/geometry/mask.hpp"
 #include "common/geometry/mesh_generation.hpp"
@@ -91,22 +92,32 @@ Result<TriangleSurface> make_tumour_surface(const CaseInputs& inputs) {
                          std::get<TumourSurfaceFile>(inputs.config.tumour).path.string());
 }
 
-Status check_tumour_inside(const TriangleSurface& tumour, const TetMesh& mesh,
-                           const CaseConfig& config) {
+Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
+                                const CaseConfig& config) {
   const geometry::TetLocator locator(mesh);
+  FittedTumour fitted{std::move(tumour), {}};
   int outside = 0;
   double farthest = 0.0;
-  for (int v = 0; v < tumour.num_vertices(); ++v) {
-    const double distance = locator.locate(tumour.vertices.col(v)).distance_mm;
-    if (!(distance > 0.0)) continue;
+  for (int v = 0; v < fitted.surface.num_vertices(); ++v) {
+    const geometry::TetLocation place = locator.locate(fitted.surface.vertices.col(v));
+    if (!(place.distance_mm > 0.0)) continue;
     ++outside;
-    farthest = std::max(farthest, distance);
+    farthest = std::max(farthest, place.distance_mm);
+    Vec3 closest = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) closest += place.weights(k) * mesh.nodes.col(place.nodes(k));
+    fitted.surface.vertices.col(v) = closest;
   }
-  if (outside == 0) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("{}: {} of {} tumour surface points lie outside the brain, by up to "
-                          "{:.1f} mm",
-                          tumour_key(config), outside, tumour.num_vertices(), farthest));
+  if (outside == 0) return fitted;
+  const std::string what =
+      fmt::format("{}: {} of {} tumour surface points lie outside the brain, by up to {:.1f} mm",
+                  tumour_key(config), outside, fitted.surface.num_vertices(), farthest);
+  if (farthest > kLargestCut_mm) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}; at most {:g} mm are cut at the brain's surface", what, kLargestCut_mm));
+  }
+  fitted.note = what + "; they were moved to its surface";
+  return fitted;
 }
 
 }  // namespace brainshift::anatomy

@@ -102,7 +102,7 @@ Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOpt
 
   if (auto status = not_stopped(options); !status) return tl::unexpected(status.error());
   const Stopwatch meshing;
-  auto built = anatomy::build_brain_model(*inputs, options.progress);
+  auto built = anatomy::build_brain_model(*inputs, options.progress, &prepared.notes);
   if (!built) return tl::unexpected(built.error());
   const auto model = std::make_shared<BrainModel>(std::move(*built));
   prepared.mesh_s = meshing.seconds();

@@ -14,6 +14,8 @@
 #include <functional>
 #include <optional>
 #include <stop_token>
+#include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
@@ -44,6 +46,7 @@ struct BoundaryReport {
 
 struct PreparedPatient {
   io::ModelFile file;
+  std::vector<std::string> notes;  // of anatomy::build_brain_model
   double read_s = 0.0;
   double mesh_s = 0.0;
   std::array<BoundaryReport, kPreparedBoundaries.size()> boundaries;

@@ -54,6 +54,9 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   };
   auto prepared = patient::prepare_model(*config, options);
   if (!prepared) return tl::unexpected(prepared.error());
+  for (const std::string& note : prepared->notes) {
+    bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
+  }
   bar.show("", "write model", 1.0);
   if (auto written = io::write_model(arguments.out, prepared->file); !written) {
     return tl::unexpected(written.error());
@@ -85,6 +88,7 @@ nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out)
         {"brainstem", model.brainstem.size()},
         {"slaves", model.slaves.size()},
         {"fixed", model.fixed.size()}}},
+      {"notes", outcome.patient.notes},
       {"read_s", outcome.patient.read_s},
       {"mesh_s", outcome.patient.mesh_s}};
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {

@@ -75,6 +75,14 @@ TEST_F(CaseViewOf, DoubtsNameABrainstemOnTop) {
   EXPECT_THAT(doubts(view(box)), Contains(HasSubstr("brainstem.centre_mm")));
 }
 
+TEST_F(CaseViewOf, DoubtsNameATumourThatIsCutAtTheSurface) {
+  BoxCase box;
+  box.tumour = "[65, -10, 20]";  // sticks out by 2 mm
+  const CaseView seen = view(box);
+  EXPECT_THAT(seen.problems, IsEmpty());
+  EXPECT_THAT(doubts(seen), Contains(HasSubstr("outside the brain, by up to 2.0 mm")));
+}
+
 TEST_F(CaseViewOf, ATumourOutsideTheBrainIsAProblemThatIsStillSeen) {
   BoxCase box;
   box.tumour = "[90, -10, 20]";

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a tumour is fitted into the brain. Its making is tested in brain_model_builder_test.cpp.
+#include "common/anatomy/tumour_surface.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <numbers>
+
+#include "common/geometry/surface.hpp"
+#include "common/geometry/tet_locator.hpp"
+#include "tests/support/box_mesh.hpp"
+
+namespace brainshift::anatomy {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr double kRadius_mm = 10.0;
+
+// The box |x| <= 40 mm, and a ball whose surface reaches x = 40 mm + out.
+const TetMesh& box() {
+  static const TetMesh mesh = test_support::box_mesh(Vec3::Constant(-40), Vec3::Constant(40), 8);
+  return mesh;
+}
+TriangleSurface ball(double out_mm) {
+  return geometry::ellipsoid_surface(Vec3(40.0 - kRadius_mm + out_mm, 3, -2),
+                                     Vec3::Constant(kRadius_mm), 0.8);
+}
+
+TEST(FitTumour, ATumourInsideStaysAsItIs) {
+  const TriangleSurface inside = ball(-0.01);
+  const auto fitted = fit_tumour(inside, box(), {});
+  ASSERT_TRUE(fitted);
+  EXPECT_THAT(fitted->note, IsEmpty());
+  EXPECT_EQ(fitted->surface.vertices, inside.vertices);
+}
+
+TEST(FitTumour, WhatSticksOutIsCutAtTheBrainsSurface) {
+  const TriangleSurface whole = ball(2.0);
+  const auto fitted = fit_tumour(whole, box(), {});
+  ASSERT_TRUE(fitted) << fitted.error().message;
+  EXPECT_THAT(fitted->note, AllOf(HasSubstr("tumour.ellipsoid"), HasSubstr("by up to 2.0 mm")));
+  const geometry::TetLocator locator(box());
+  for (int v = 0; v < whole.num_vertices(); ++v) {
+    const Vec3 x = fitted->surface.vertices.col(v);
+    EXPECT_LE(locator.locate(x).distance_mm, 1e-9);
+    const Vec3 before = whole.vertices.col(v);
+    if (before.x() <= 40.0) {
+      EXPECT_EQ(x, before);
+    }
+  }
+  EXPECT_TRUE(geometry::is_closed(fitted->surface));
+  // The volume that is gone is that of a spherical cap of height h: pi h^2 (3 r - h) / 3.
+  const double h = 2.0;
+  const double cap = std::numbers::pi * h * h * (3.0 * kRadius_mm - h) / 3.0;
+  EXPECT_NEAR(geometry::enclosed_volume(whole) - geometry::enclosed_volume(fitted->surface), cap,
+              0.05 * cap);
+}
+
+TEST(FitTumour, ThreeMillimetresAreCutAndMoreIsRefused) {
+  EXPECT_TRUE(fit_tumour(ball(2.99), box(), {}));
+  const auto refused = fit_tumour(ball(3.3), box(), {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message,
+              AllOf(HasSubstr("by up to 3.3 mm"), HasSubstr("at most 3 mm are cut")));
+}
+
+TEST(FitTumour, AVertexThatIsNoNumberIsRefused) {
+  TriangleSurface broken = ball(-1.0);
+  broken.vertices(1, 7) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(fit_tumour(broken, box(), {}));
+}
+
+}  // namespace
+}  // namespace brainshift::anatomy
