@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing surgeries prior faults fuzz format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries prior faults fuzz format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -48,6 +48,12 @@ sensing: setup ## registration, ultrasound, stereopsis, joint data: accuracy and
 	@cmake --preset $(PRESET) --log-level=WARNING
 	cmake --build --preset $(PRESET) -j $(JOBS) --target sensing_programs
 	cmake/scripts/sensing.sh $(BUILD)
+
+interchange: setup ## exported fields in ITK, elastix, plastimatch, workbench, nibabel and VTK, into out/interchange
+	@docker/install-packages.sh docker/packages-interchange.txt
+	@cmake --preset $(PRESET) --log-level=WARNING
+	cmake --build --preset $(PRESET) -j $(JOBS) --target interchange_programs
+	cmake/scripts/interchange.sh $(BUILD)
 
 surgeries: configure ## many different simulated surgeries on two heads, scored, into out/surgeries; an hour; RESUME=1 goes on
 	cmake --build --preset $(PRESET) -j $(JOBS) --target surgery_programs

@@ -27,12 +27,15 @@ void add_replay(CLI::App& app, Status& status);
 void add_report(CLI::App& app, Status& status);
 void add_solve(CLI::App& app, Status& status);
 void add_import(CLI::App& app, Status& status);
+void add_register(CLI::App& app, Status& status);
 void add_stereo(CLI::App& app, Status& status);
 void add_journal(CLI::App& app, Status& status);
+void add_export(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
 void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);
 void add_keys(CLI::App& app, Status& status);
+void add_bridge(CLI::App& app, Status& status);
 
 // Keys of a command that talks to a daemon: files, both or none.
 struct KeyOptions {

@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
       "report how "
       "well the deformation was recovered; solve single forward problems on any mesh; import "
       "recordings "
-      "of tracked ultrasound; check, export and mend journals; watch a running brainshiftd; make "
+      "of tracked ultrasound and landmarks; register patients by fiducials; check, export and mend "
+      "journals; watch a running brainshiftd; make "
       "keys.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
@@ -41,9 +42,12 @@ int main(int argc, char** argv) {
   client::add_report(app, status);
   client::add_solve(app, status);
   client::add_import(app, status);
+  client::add_register(app, status);
   client::add_stereo(app, status);
   client::add_journal(app, status);
+  client::add_export(app, status);
   client::add_watch(app, status);
+  client::add_bridge(app, status);
   client::add_status(app, status);
   client::add_top(app, status);
   client::add_keys(app, status);
@@ -51,10 +55,10 @@ int main(int argc, char** argv) {
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error(
-        "unknown command \"" + std::string(argv[1]) +
-        "\": must be preview, simulate, replay, report, solve, import, stereo, journal, "
-        "watch, status, top or keys (see brainshift --help)");
+    client::print_error("unknown command \"" + std::string(argv[1]) +
+                        "\": must be preview, simulate, replay, report, solve, import, register, "
+                        "stereo, journal, export, "
+                        "watch, bridge, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {

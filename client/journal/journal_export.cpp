@@ -3,14 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <functional>
-#include <optional>
-#include <utility>
+#include <string>
 
+#include "client/journal/journal_fields.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
-#include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
 
@@ -18,27 +16,6 @@ namespace brainshift::client {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kNanosecondsPerSecond = 1e9;
-
-// Seconds since the first record that it was asked for.
-class Clock {
- public:
-  double seconds(std::int64_t recorded_ns) {
-    if (!first_ns_) first_ns_ = recorded_ns;
-    return static_cast<double>(recorded_ns - *first_ns_) / kNanosecondsPerSecond;
-  }
-
- private:
-  std::optional<std::int64_t> first_ns_;
-};
-
-tl::unexpected<Error> undecodable(const fs::path& path, const io::SurgeryRecord& record,
-                                  const Error& error) {
-  return io::file_error(
-      ErrorCode::kUnreadable, path,
-      fmt::format("{} {}: {}", to_string(record.kind), record.sequence, error.message));
-}
 
 // Quoted where a comma or a quote would end it.
 std::string csv_text(const std::string& text) {
@@ -67,16 +44,6 @@ std::string xml_text(const std::string& text) {
   return escaped;
 }
 
-std::string flags_of(const QualityVerdict& verdict) {
-  std::string text;
-  for (const QualityFlag flag : kAllQualityFlags) {
-    if (!verdict.flags.has(flag)) continue;
-    text += text.empty() ? "" : "+";
-    text += to_string(flag);
-  }
-  return text;
-}
-
 std::string update_columns(const Update& update) {
   const StageTimings& t = update.timings;
   const Estimate& estimate = update.estimate;
@@ -84,9 +51,9 @@ std::string update_columns(const Update& update) {
       estimate.displacement.cols() == 0 ? 0.0 : estimate.displacement.colwise().norm().maxCoeff();
   return fmt::format("{},{},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.6f}",
                      update.observation_sequence, to_string(estimate.status),
-                     to_string(estimate.quality.quality), flags_of(estimate.quality), t.register_ms,
-                     t.invert_ms, t.rebuild_ms, t.encode_ms, t.journal_ms, estimate.contact.active,
-                     motion);
+                     to_string(estimate.quality.quality), flags_text(estimate.quality),
+                     t.register_ms, t.invert_ms, t.rebuild_ms, t.encode_ms, t.journal_ms,
+                     estimate.contact.active, motion);
 }
 
 Status write_field(const fs::path& out, const BrainModel& model, const Estimate& estimate) {
@@ -98,71 +65,30 @@ Status write_field(const fs::path& out, const BrainModel& model, const Estimate&
   return io::write_vtu(out, model.mesh, fields);
 }
 
-// Shows every usable update with its time in s; gives their number. `path` is the surgery's.
-using ShowField = std::function<Status(const Update&, double time_s)>;
-Result<int> visit_fields(const io::SurgeryFile& file, const fs::path& path, const BrainModel& model,
-                         const ShowField& show) {
-  Clock clock;
-  int fields = 0;
-  const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
-    const double time_s = clock.seconds(record.recorded_ns);
-    if (record.kind != io::RecordKind::kUpdate) return {};
-    const auto message = wire::decode_update(record.payload);
-    if (!message) return undecodable(path, record, message.error());
-    if (message->error || !message->update.usable()) return {};
-    const auto nodes = message->update.estimate.displacement.cols();
-    if (nodes != model.mesh.num_nodes()) {
-      return undecodable(
-          path, record,
-          {ErrorCode::kUnreadable, fmt::format("displacement of {} nodes, the model has {}", nodes,
-                                               model.mesh.num_nodes())});
-    }
-    ++fields;
-    return show(message->update, time_s);
-  });
-  if (!ok) return tl::unexpected(ok.error());
-  if (fields == 0) return io::file_error(ErrorCode::kEmptySet, path, "holds no usable update");
-  return fields;
-}
-
-// The model that the surgery was recorded with.
-Result<BrainModel> model_of(const io::SurgeryFile& file, const fs::path& path,
-                            const fs::path& model_file) {
-  auto model = io::read_model(model_file);
-  if (!model) return tl::unexpected(model.error());
-  if (model->model.model_id != file.meta().model_id) {
-    return io::file_error(
-        ErrorCode::kInvalidArgument, path,
-        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
-                    model_file.string(), model->model.model_id));
-  }
-  return std::move(model->model);
-}
-
 }  // namespace
 
 Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& path) {
   std::string text =
       "record,kind,sequence,source,recorded_s,bytes,observation_sequence,status,quality,flags,"
       "register_ms,invert_ms,rebuild_ms,encode_ms,journal_ms,active,max_motion_mm\n";
-  Clock clock;
+  RecordClock clock;
   std::uint64_t id = 0;
   const Status ok = file.visit([&](const io::SurgeryRecord& record) -> Status {
     std::string source;
     std::string columns(10, ',');
     if (record.kind == io::RecordKind::kObservation) {
       const auto observation = wire::decode_observation(record.payload);
-      if (!observation) return undecodable(path, record, observation.error());
+      if (!observation) return undecodable_record(path, record, observation.error());
       source = csv_text(observation->source);
     } else if (record.kind == io::RecordKind::kDecision) {
       const auto decision = wire::decode_decision(record.payload);
-      if (!decision) return undecodable(path, record, decision.error());
+      if (!decision) return undecodable_record(path, record, decision.error());
       source = csv_text(decision->source);
       columns = fmt::format("{},{},,,,,,,,{},", decision->observation_sequence,
                             to_string(decision->outcome), decision->active);
     } else {
       const auto message = wire::decode_update(record.payload);
-      if (!message) return undecodable(path, record, message.error());
+      if (!message) return undecodable_record(path, record, message.error());
       columns = update_columns(message->update);
     }
     text += fmt::format("{},{},{},{},{:.6f},{},{}\n", ++id, to_string(record.kind), record.sequence,
@@ -175,31 +101,36 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& pat
 
 Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
                                const FieldSeries& series) {
-  const auto model = model_of(file, path, series.model);
+  const auto model = recorded_model(file, path, series.model);
   if (!model) return tl::unexpected(model.error());
+  return write_field_series(file, path, *model, series.folder);
+}
+
+Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
+                               const BrainModel& model, const fs::path& folder) {
   std::error_code failed;
-  fs::create_directories(series.folder, failed);
-  if (failed) return io::file_error(ErrorCode::kWriteFailed, series.folder, failed.message());
+  fs::create_directories(folder, failed);
+  if (failed) return io::file_error(ErrorCode::kWriteFailed, folder, failed.message());
   std::string list;
   const auto fields =
-      visit_fields(file, path, *model, [&](const Update& update, double time_s) -> Status {
+      visit_fields(file, path, model, [&](const Update& update, double time_s) -> Status {
         const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), update.sequence);
         list +=
             fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
-        return write_field(series.folder / name, *model, update.estimate);
+        return write_field(folder / name, model, update.estimate);
       });
   if (!fields) return fields;
   const std::string pvd =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n" +
       list + "  </Collection>\n</VTKFile>\n";
-  const fs::path out = series.folder / (path.stem().string() + ".pvd");
+  const fs::path out = folder / (path.stem().string() + ".pvd");
   if (Status written = io::write_file(out, pvd); !written) return tl::unexpected(written.error());
   return fields;
 }
 
 Result<int> write_field_file(const io::SurgeryFile& file, const fs::path& path,
                              const fs::path& model_file, const fs::path& out) {
-  const auto model = model_of(file, path, model_file);
+  const auto model = recorded_model(file, path, model_file);
   if (!model) return tl::unexpected(model.error());
   auto series = io::FieldSeriesFile::create(out, *model);
   if (!series) return tl::unexpected(series.error());

@@ -7,6 +7,7 @@
 
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/brain_model.hpp"
 
 namespace brainshift::client {
 
@@ -30,6 +31,9 @@ struct FieldSeries {
 // kEmptySet without a usable update; kWriteFailed.
 Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
                                const FieldSeries& series);
+// The same with the model at hand (recorded_model of journal_fields.hpp).
+Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
+                               const BrainModel& model, const std::filesystem::path& folder);
 
 // The same fields as one file, which appears whole or not at all (io::FieldSeriesFile).
 Result<int> write_field_file(const io::SurgeryFile& file, const std::filesystem::path& path,

@@ -7,15 +7,14 @@
 #include <cmath>
 #include <map>
 
-#include "client/ultrasound/surgery_writer.hpp"
-#include "common/core/utc_time.hpp"
+#include "client/surgery/import_case.hpp"
+#include "client/surgery/surgery_writer.hpp"
+#include "client/ultrasound/seed_contours.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/geometry/pose_file.hpp"
-#include "common/io/model/model_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/io/recording/fiducial_file.hpp"
 #include "common/io/recording/sequence_file.hpp"
-#include "common/patient/read_patient.hpp"
 #include "common/values/observation.hpp"
 
 namespace brainshift::client {
@@ -29,12 +28,6 @@ constexpr double kFarthest_mm = 100.0;
 // nearer than this is suspicious.
 constexpr double kNearTracker_mm = 10.0;
 constexpr double kMostSd_mm = 20.0;
-
-// What the case contributes.
-struct Patient {
-  std::string case_id, model_id, case_file;
-  Vec3 tumour_centroid = Vec3::Zero();
-};
 
 Status check_options(const ImportOptions& options) {
   const auto one_of = [](bool first, bool second, const char* names) -> Status {
@@ -56,10 +49,7 @@ Status check_options(const ImportOptions& options) {
       !ok) {
     return ok;
   }
-  if (Status ok = one_of(!options.case_file.empty(), !options.model.empty(), "--case and --model");
-      !ok) {
-    return ok;
-  }
+  if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
   const auto range = [](const char* name, double value, double least, double most) -> Status {
     if (value >= least && value <= most) return {};
     return fail(ErrorCode::kInvalidArgument,
@@ -76,22 +66,6 @@ Status check_options(const ImportOptions& options) {
   return {};
 }
 
-Patient patient_of(const BrainModel& model, const fs::path& case_file) {
-  return {model.case_id, model.model_id, fs::absolute(case_file).lexically_normal().string(),
-          model.tumour.vertices.rowwise().mean()};
-}
-
-Result<Patient> load_patient(const ImportOptions& options, const Progress& progress) {
-  if (!options.model.empty()) {
-    const auto file = io::read_model(options.model);
-    if (!file) return tl::unexpected(file.error());
-    return patient_of(file->model, file->config.file);
-  }
-  const auto patient = patient::read_patient(options.case_file, progress);
-  if (!patient) return tl::unexpected(patient.error());
-  return patient_of(patient->model, options.case_file);
-}
-
 // T_ras_reference, from the file or from fiducials.
 Result<RigidTransform> patient_registration(const ImportOptions& options,
                                             std::optional<io::FiducialFile>& fiducials) {
@@ -100,17 +74,6 @@ Result<RigidTransform> patient_registration(const ImportOptions& options,
   if (!file) return tl::unexpected(file.error());
   fiducials = std::move(*file);
   return fiducials->fit.T_image_measured;
-}
-
-FiducialReport describe(const io::FiducialFile& file, const Patient& patient) {
-  FiducialReport report;
-  report.count = static_cast<int>(file.fit.residuals_mm.size());
-  report.matched = file.matched;
-  report.fre_mm = file.fit.fre_mm;
-  report.worst_mm = file.fit.residuals_mm.maxCoeff();
-  report.tre_mm =
-      registration::expected_tre_mm(file.fit.image, file.fit.fle_mm, patient.tumour_centroid);
-  return report;
 }
 
 // Device transforms and the patient registration.
@@ -126,33 +89,6 @@ Result<std::vector<tracking::ConstantLink>> constant_links(
   if (!T_ras_reference) return tl::unexpected(T_ras_reference.error());
   links.push_back({{options.reference_frame, kRas}, AffineTransform(*T_ras_reference)});
   return links;
-}
-
-// Contours of every seed; where two seeds reach the same image, the more confident one.
-Result<std::vector<ultrasound::Contour>> trace_seeds(const tracking::Recording& recording,
-                                                     const fs::path& path,
-                                                     std::vector<std::string>& notes) {
-  const auto seeds = io::read_seeds(path);
-  if (!seeds) return tl::unexpected(seeds.error());
-  std::map<int, ultrasound::TracedContour> best;
-  for (const ultrasound::Seed& seed : *seeds) {
-    auto sweep = ultrasound::trace_sweep(recording, seed);
-    if (!sweep) return fail(sweep.error().code, path.string() + ": " + sweep.error().message);
-    const auto& contours = sweep->contours;
-    notes.push_back(fmt::format("seed on frame {}: {} lesion traced on frames {} to {}", seed.frame,
-                                contours.front().bright ? "bright" : "dark",
-                                contours.front().contour.frame, contours.back().contour.frame));
-    for (const std::string& stopped : {sweep->stopped_before, sweep->stopped_after}) {
-      if (!stopped.empty()) notes.push_back("tracing ended: " + stopped);
-    }
-    for (const ultrasound::TracedContour& traced : contours) {
-      const auto [known, is_new] = best.emplace(traced.contour.frame, traced);
-      if (!is_new && traced.confidence > known->second.confidence) known->second = traced;
-    }
-  }
-  std::vector<ultrasound::Contour> contours;
-  for (const auto& [frame, traced] : best) contours.push_back(traced.contour);
-  return contours;
 }
 
 void note_recording(const tracking::Recording& recording, std::vector<std::string>& notes) {
@@ -182,7 +118,7 @@ void note_recording(const tracking::Recording& recording, std::vector<std::strin
 }
 
 Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
-                                                 const Patient& patient, double sd_mm,
+                                                 const ImportCase& patient, double sd_mm,
                                                  ImportReport& report) {
   std::vector<Observation> observations;
   for (const SweepBoundary& sweep : boundaries.sweeps) {
@@ -192,7 +128,7 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
     told.contours = sweep.contours, told.points = sweep.points.cols();
     told.extent_mm = (sweep.points.rowwise().maxCoeff() - sweep.points.rowwise().minCoeff()).norm();
     const Vec3 centroid = sweep.points.rowwise().mean();
-    told.tumour_distance_mm = (centroid - patient.tumour_centroid).norm();
+    told.tumour_distance_mm = (centroid - patient.tumour_centroid()).norm();
     if (told.tumour_distance_mm > kFarthest_mm) {
       std::string notes;
       for (const std::string& note : report.notes) notes += "; " + note;
@@ -200,11 +136,11 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
           ErrorCode::kInvalidArgument,
           fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of case {}: "
                       "must be within {:.0f} mm; is it the right registration{}",
-                      sweep.first_frame, sweep.last_frame, told.tumour_distance_mm, patient.case_id,
-                      kFarthest_mm, notes.empty() ? "?" : notes));
+                      sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
+                      patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
     }
     Observation observation;
-    observation.case_id = patient.case_id;
+    observation.case_id = patient.model.case_id;
     observation.source = "ius";
     observation.sequence = told.sequence;
     observation.acquired_ns = std::llround(1e9 * sweep.time_s);
@@ -228,7 +164,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   note_recording(*recording, told.notes);
   const auto contours = options.seeds.empty()
                             ? io::read_contours(options.contours, !options.open_contours)
-                            : trace_seeds(*recording, options.seeds, told.notes);
+                            : contours_of_seeds(*recording, options.seeds, told.notes);
   if (!contours) return tl::unexpected(contours.error());
 
   BoundaryOptions boundary;
@@ -246,21 +182,17 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   told.links = boundaries->chain.links;
   told.dropped = boundaries->chain.dropped;
   told.lost_contours = boundaries->lost_contours;
-  const auto patient = load_patient(options, progress);
+  const auto patient = load_import_case(options.case_file, options.model, progress);
   if (!patient) return tl::unexpected(patient.error());
-  if (fiducials) told.fiducials = describe(*fiducials, *patient);
+  if (fiducials) {
+    told.fiducials = describe(fiducials->fit, fiducials->matched, patient->tumour_centroid());
+  }
   const auto observations = observations_of(*boundaries, *patient, options.sd_mm, told);
   if (!observations) {
     return fail(observations.error().code,
                 options.recording.string() + ": " + observations.error().message);
   }
-  io::SurgeryMeta meta;
-  meta.case_id = patient->case_id;
-  meta.model_id = patient->model_id;
-  meta.case_file = patient->case_file;
-  meta.scenario = options.recording.stem().string();
-  meta.created_utc = utc_now();
-  meta.software = "brainshift import";
+  const auto meta = patient->meta(options.recording.stem().string(), "brainshift import");
   if (Status ok = write_surgery(options.out, meta, *observations); !ok) {
     return tl::unexpected(ok.error());
   }
@@ -281,11 +213,9 @@ std::vector<std::string> report_lines(const ImportReport& report) {
     }
   };
   if (report.fiducials) {
-    const FiducialReport& told = *report.fiducials;
-    lines.push_back(fmt::format(
-        "fiducials: {}{}, registration error {:.2f} mm rms, {:.2f} mm at worst; expected error at "
-        "the tumour {:.2f} mm rms",
-        told.count, told.matched ? ", order found" : "", told.fre_mm, told.worst_mm, told.tre_mm));
+    for (std::string& line : fiducial_lines(*report.fiducials, {}, "the tumour")) {
+      lines.push_back(std::move(line));
+    }
   }
   tell("frames left out", report.dropped);
   tell("contours left out", report.lost_contours);

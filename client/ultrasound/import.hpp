@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "client/registration/fiducial_report.hpp"
 #include "client/ultrasound/import_boundaries.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
@@ -52,14 +53,6 @@ struct ImportedSweep {
   Eigen::Index points = 0;
   double extent_mm = 0.0;           // diagonal of the bounding box
   double tumour_distance_mm = 0.0;  // between centroids of boundary and undeformed tumour
-};
-
-// Of the patient registration by fiducials.
-struct FiducialReport {
-  int count = 0;
-  bool matched = false;  // the correspondence was found, not given
-  double fre_mm = 0.0, worst_mm = 0.0;
-  double tre_mm = 0.0;  // expected at the tumour, rms
 };
 
 struct ImportReport {

@@ -57,19 +57,24 @@ tl::unexpected<Error> refuse(std::string_view option, std::string_view text,
 
 }  // namespace
 
+Result<double> parse_length(std::string_view option, std::string_view text) {
+  const auto length = length_mm(text);
+  if (!length) return refuse(option, text, "a length like 10mm");
+  return *length;
+}
+
 Result<FieldChoice> parse_choice(const ChoiceText& text) {
-  constexpr std::string_view kLength = "a length like 10mm";
   FieldChoice choice;
   const auto chosen = region(text.region);
   if (!chosen) {
     return refuse("--region", text.region, "brain, tumour:40mm, or a ball like -30,12,44:40mm");
   }
   choice.region = *chosen;
-  const auto spacing_mm = length_mm(text.spacing);
-  if (!spacing_mm) return refuse("--decimate", text.spacing, kLength);
+  const auto spacing_mm = parse_length("--decimate", text.spacing);
+  if (!spacing_mm) return tl::unexpected(spacing_mm.error());
   choice.spacing_mm = *spacing_mm;
-  const auto tolerance_mm = length_mm(text.tolerance);
-  if (!tolerance_mm) return refuse("--tolerance", text.tolerance, kLength);
+  const auto tolerance_mm = parse_length("--tolerance", text.tolerance);
+  if (!tolerance_mm) return tl::unexpected(tolerance_mm.error());
   choice.tolerance_mm = *tolerance_mm;
   choice.with_sd = !text.without_sd;
   return validate(choice).map([&] { return choice; });

@@ -24,5 +24,7 @@ struct ChoiceText {
 
 // kInvalidArgument or kNotFinite: the sentence names the option, its text and what it must be.
 Result<FieldChoice> parse_choice(const ChoiceText& text);
+// A length in mm. kInvalidArgument: the sentence names the option, its text and what it must be.
+Result<double> parse_length(std::string_view option, std::string_view text);
 
 }  // namespace brainshift::client

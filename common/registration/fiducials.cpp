@@ -220,6 +220,11 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
   return *matcher.best();
 }
 
+double thinness(const Points& points) {
+  const Vec3 spread = principal_spread(points).cwiseMax(0.0);
+  return std::sqrt(spread[1] / spread[2]);
+}
+
 double expected_tre_mm(const Points& image_fiducials, double fle_mm, const Vec3& target) {
   const Vec3 centre = image_fiducials.rowwise().mean();
   const Points arms = image_fiducials.colwise() - centre;

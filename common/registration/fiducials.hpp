@@ -58,6 +58,11 @@ struct MatchOptions {
 Result<FiducialRegistration> match_fiducials(const Points& measured, const Points& image,
                                              const MatchOptions& options = {});
 
+// How far the points are from lying on one line: their rms extent along the second principal axis
+// over that along the first. 1: as wide as long; 0: on a line.
+// Precondition: at least 2 points, not all at one place.
+double thinness(const Points& points);
+
 // Expected rms target registration error, mm, at `target` (image frame, mm), for image fiducials
 // with the given localisation error. Precondition: at least 3 fiducials, not on one line.
 double expected_tre_mm(const Points& image_fiducials, double fle_mm, const Vec3& target);

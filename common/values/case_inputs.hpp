@@ -13,7 +13,7 @@ struct CaseInputs {
   CaseConfig config;
   std::optional<VoxelImage> brain;                // when the mesh is generated; > 0 is brain
   std::optional<TetMesh> mesh;                    // when a ready mesh is given
-  std::optional<VoxelImage> tumour_labels;        // TumourLabel
+  std::optional<VoxelImage> tumour_labels;        // TumourLabel: its label marks the tumour
   std::optional<TriangleSurface> tumour_surface;  // TumourSurfaceFile
   std::optional<TriangleSurface> skull;           // contact.skull_file
 };

@@ -87,8 +87,13 @@ void visit_kind(A& a, V& v) {
 template <typename A, Of<TumourLabel> V>
 void visit_kind(A& a, V& v) {
   a.section({kind_name(v), "", "A label in a segmentation"}, Need::kRequired, [&] {
-    a({"file", "", "The segmentation (NIfTI)"}, v.path, Need::kRequired);
-    a({"label", "", "The tumour's label"}, v.label, unlimited());
+    a({"file", "", "The segmentation: NIfTI, or NRRD as 3D Slicer writes it (.nrrd, .seg.nrrd)"},
+      v.path, Need::kRequired);
+    a({"label", "", "The tumour's label", "", "Not used where the file names its segments."},
+      v.label, unlimited());
+    a({"segment", "", "The tumour's name in a .seg.nrrd", "",
+       "Not needed where the file has one segment."},
+      v.segment);
   });
 }
 template <typename A, Of<TumourSurfaceFile> V>

@@ -154,4 +154,8 @@ void KeyDocumenter::operator()(const Key& key, const std::optional<std::filesyst
   add(key, "Default none", "");
 }
 
+void KeyDocumenter::operator()(const Key& key, const std::optional<std::string>&) {
+  add(key, "Default none", "not empty");
+}
+
 }  // namespace brainshift

@@ -138,6 +138,10 @@ class KeyChecker : public KeyWalker<KeyChecker> {
   void operator()(const Key& key, const std::vector<double>& value, const Limits& limits);
   // A text that is needed must not be empty.
   void operator()(const Key& key, const std::string& value, Need need = Need::kOptional);
+  // A text that may be left out must not be empty where it is given.
+  void operator()(const Key& key, const std::optional<std::string>& value) {
+    if (value) (*this)(key, *value, Need::kRequired);
+  }
   void operator()(const Key&, const std::filesystem::path&, Need = Need::kOptional) {}
   void operator()(const Key&, const std::optional<std::filesystem::path>&) {}
   template <typename T, typename W, std::size_t N>
@@ -172,6 +176,7 @@ class KeyDocumenter : public KeyWalker<KeyDocumenter> {
   void operator()(const Key& key, const std::string& value, Need need = Need::kOptional);
   void operator()(const Key& key, const std::filesystem::path& value, Need need = Need::kOptional);
   void operator()(const Key& key, const std::optional<std::filesystem::path>& value);
+  void operator()(const Key& key, const std::optional<std::string>& value);
   template <typename T, typename W, std::size_t N>
   void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
     std::string list;

@@ -8,10 +8,13 @@ namespace brainshift::fuzz {
 
 void run(std::string_view bytes) {
   for (const char* name : {"sweep.mha", "sweep.nrrd"}) {
-    const auto recording = io::read_sequence(scratch_file(name, bytes), {"MF"});
-    if (!recording) continue;
-    require(recording->time_s.size() == static_cast<std::size_t>(recording->num_frames()),
-            "every frame has a time");
+    for (const bool tracking_only : {false, true}) {
+      const auto recording = io::read_sequence(scratch_file(name, bytes), {"MF", tracking_only});
+      if (!recording) continue;
+      require(recording->image_ok.size() == static_cast<std::size_t>(recording->num_frames()),
+              "every frame has a time and a state");
+      require(recording->pixels.empty() == tracking_only, "images are there where they are wanted");
+    }
   }
 }
 

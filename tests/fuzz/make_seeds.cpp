@@ -109,6 +109,40 @@ void surfaces(const Seeds& seeds) {
   seeds.write("surface", "points.csv", "0,0,0\n1,0,0\n0,1,0\n");
 }
 
+void label_maps(const Seeds& seeds) {
+  const std::string space =
+      "space: left-posterior-superior\nspace directions: none (1,0,0) (0,1,0) (0,0,2)\n"
+      "space origin: (1,2,3)\nspace units: \"mm\" \"mm\" \"mm\"\n";
+  const std::string keys =
+      "Segment0_Name:=Head\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
+      "Segment1_Name:=Mass\nSegment1_LabelValue:=2\nSegment1_Layer:=1\n";
+  seeds.write("nrrd", "layers.seg.nrrd",
+              "NRRD0004\ntype: unsigned short\ndimension: 4\nsizes: 2 2 1 1\nencoding: raw\n"
+              "endian: big\nkinds: list domain domain domain\n" +
+                  space + keys + "\n" + std::string({0, 1, 0, 2, 0, 1, 0, 0}));
+  seeds.write("nrrd", "plain.nrrd",
+              "NRRD0004\ntype: double\ndimension: 3\nsizes: 1 1 1\nencoding: raw\nspace: RAS\n"
+              "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n\n" +
+                  std::string(8, '\0'));
+}
+
+void landmarks(const Seeds& seeds) {
+  seeds.write("landmarks", "a.tag",
+              "MNI Tag Point File\nVolumes = 2;\n%\nPoints =\n 1 2 3 4 5 6 \"a\"\n"
+              " 1 2 3 4 5 6 1 2 3;\n");
+  seeds.write("landmarks", "a.csv",
+              "label,x_src,y_src,z_src,x_dst,y_dst,z_dst\n\"a, b\",1,2,3,4,5,6\n");
+  seeds.write("landmarks", "b.csv", "label,l,p,s\na,1,2,3\n");
+  seeds.write("landmarks", "a.fcsv",
+              "# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label\n"
+              "1,1,2,3,0,0,0,1,1,1,0,\"a\"\"\"\n");
+  seeds.write(
+      "landmarks", "a.mrk.json",
+      R"({"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": ["mm"],
+                  "controlPoints": [{"label": "a", "position": [1, 2, 3],
+                                     "positionStatus": "defined"}]}]})");
+}
+
 void sequences(const Seeds& seeds) {
   test_support::VirtualSweep sweep;
   sweep.width = 4, sweep.height = 3, sweep.frames = 2;
@@ -118,6 +152,10 @@ void sequences(const Seeds& seeds) {
     seeds.write("sequence", end + ".mha", test_support::meta_text(content, packed));
     seeds.write("sequence", end + ".nrrd", test_support::nrrd_text(content, packed));
   }
+  auto tracker = content;  // alone
+  tracker.width = tracker.height = 0;
+  tracker.pixels.clear();
+  seeds.write("sequence", "tracker.mha", test_support::meta_text(tracker, false));
   seeds.write("plus", "device.xml", sweep.device_text());
 }
 
@@ -137,6 +175,7 @@ void surgeries(const Seeds& seeds) {
 
 void make(const Seeds& seeds) {
   seeds.copy_all("wire", "tests/data/wire", ".bin");
+  seeds.copy_all("igtl", "tests/data/igtl", ".bin");
   seeds.copy_all("case", "config/cases", ".yaml");
   seeds.copy("daemon", "config/daemon.yaml");
   seeds.copy("daemon", "docker/daemon.yaml");
@@ -152,6 +191,8 @@ void make(const Seeds& seeds) {
               "0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n"
               "$EndElements\n");
   surfaces(seeds);
+  label_maps(seeds);
+  landmarks(seeds);
   sequences(seeds);
   surgeries(seeds);
   check(io::write_model(seeds.path("model", "small.h5"), io::test_example::model_file()));

@@ -66,6 +66,37 @@ class ImportCommand : public testing::Test {
     return run(argv);
   }
 
+  std::string prepared_model() const {
+    const auto model = files.path("model.h5");
+    const Finished prepared =
+        run({brainshiftd(), "prepare", "--case", coarse_case(), "--out", model});
+    EXPECT_EQ(prepared.exit_status, 0) << prepared.err;
+    return model;
+  }
+
+  // Replays the surgery to a daemon with this model: every observation is answered once, under the
+  // name of what was recorded.
+  void expect_answered(const std::string& model, const std::string& surgery,
+                       const std::string& recorded) const {
+    const Background daemon(
+        {brainshiftd(), "serve", "--config",
+         files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n"), "--model", model},
+        files.path("daemon.log"));
+    ASSERT_THAT(daemon.first_line(), StartsWith("listening on "));
+    const Finished replayed =
+        run({brainshift(), "replay", files.path(surgery + ".surgery"), "--endpoint",
+             daemon.first_line().substr(std::string("listening on ").size()), "--report",
+             files.path("r.json")});
+    ASSERT_EQ(replayed.exit_status, 0) << replayed.err;
+    std::ifstream stream(files.path("r.json"));
+    const auto report = nlohmann::json::parse(stream);
+    ASSERT_EQ(report.size(), 2U);
+    for (const auto& one : report) {
+      EXPECT_EQ(one.at("updates"), 1);
+      EXPECT_EQ(one.at("scenario"), std::filesystem::path(recorded).stem().string());
+    }
+  }
+
   void expect_refused(const std::string& says) const {
     SCOPED_TRACE(says);
     const Finished finished = import();
@@ -87,33 +118,75 @@ class ImportCommand : public testing::Test {
 };
 
 TEST_F(ImportCommand, MakesASurgeryThatTheDaemonAnswers) {
-  const auto model = files.path("model.h5");
-  const Finished prepared =
-      run({brainshiftd(), "prepare", "--case", coarse_case(), "--out", model});
-  ASSERT_EQ(prepared.exit_status, 0) << prepared.err;
+  const auto model = prepared_model();
   arguments["--case"] = "";
   arguments["--model"] = model;
   const Finished imported = import();
   ASSERT_EQ(imported.exit_status, 0) << imported.err;
   EXPECT_THAT(imported.out, HasSubstr("frames: 21 of 21 with a valid chain"));
   EXPECT_THAT(imported.out, HasSubstr("sweep 1: frames 0 to 20, 21 contours"));
+  expect_answered(model, "sweep", "sweep.igs.mha");
+}
 
-  const Background daemon(
-      {brainshiftd(), "serve", "--config",
-       files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n"), "--model", model},
-      files.path("daemon.log"));
-  ASSERT_THAT(daemon.first_line(), StartsWith("listening on "));
-  const Finished replayed = run({brainshift(), "replay", files.path("sweep.surgery"), "--endpoint",
-                                 daemon.first_line().substr(std::string("listening on ").size()),
-                                 "--report", files.path("r.json")});
-  ASSERT_EQ(replayed.exit_status, 0) << replayed.err;
-  std::ifstream stream(files.path("r.json"));
-  const auto report = nlohmann::json::parse(stream);
-  ASSERT_EQ(report.size(), 2U);
-  for (const auto& one : report) {
-    EXPECT_EQ(one.at("updates"), 1);
-    EXPECT_EQ(one.at("scenario"), "sweep.igs");
+TEST_F(ImportCommand, LandmarksMakeASurgeryThatTheDaemonAnswers) {
+  const auto model = prepared_model();
+  const auto before = files.write("before.fcsv",
+                                  "# CoordinateSystem = LPS\n1,-30,45,20,0,0,0,1,1,1,0,a,,\n"
+                                  "2,-50,40,30,0,0,0,1,1,1,0,b,,\n3,-45,60,0,0,0,0,1,1,1,0,c,,\n"
+                                  "4,-40,20,10,0,0,0,1,1,1,0,d,,\n");
+  const auto during =
+      files.write("during.mrk.json", R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
+      "controlPoints": [{"label": "d", "position": [40, -20, 9]},
+                        {"label": "c", "position": [45, -60, -2]},
+                        {"label": "b", "position": [50, -41, 27]},
+                        {"label": "a", "position": [30, -45, 18]}]}]})");
+  const Finished imported =
+      run({brainshift(), "import", "--landmarks", before, "--landmarks-moved", during, "--model",
+           model, "--out", files.path("landmarks.surgery")});
+  ASSERT_EQ(imported.exit_status, 0) << imported.err;
+  EXPECT_THAT(imported.out, HasSubstr("landmarks: 4 pairs, moved 2.04 mm on average"));
+  EXPECT_THAT(imported.out, HasSubstr("rigid part: rotation"));
+  expect_answered(model, "landmarks", "before.fcsv");
+}
+
+// The registration of a stylus that was held still on four fiducials is as good as the one that
+// the scene was made with.
+TEST_F(ImportCommand, ARegistrationFromAStylusGivesTheSameSweep) {
+  const auto model = prepared_model();
+  SequenceContent stylus;
+  stylus.fields.clear();
+  std::string ras = "name,x,y,z\n";
+  const RigidTransform T_reference_ras = sweep.T_ras_reference().inverse();
+  for (const Vec3& at : {Vec3(0, 95, 0), Vec3(-70, 10, -20), Vec3(75, 5, -15), Vec3(10, 20, 90)}) {
+    std::ostringstream row;
+    row << "f," << at.x() << ',' << at.y() << ',' << at.z() << '\n';
+    ras += row.str();
+    for (int pose = 0; pose < 30; ++pose) {
+      RigidTransform T_reference_tip = RigidTransform::Identity();
+      T_reference_tip.translation() = T_reference_ras * at;
+      stylus.frames.push_back(
+          {{"Timestamp", std::to_string(0.05 * static_cast<double>(stylus.frames.size()))},
+           {"StylusTipToReferenceTransform", test_support::matrix_text(T_reference_tip.matrix())},
+           {"StylusTipToReferenceTransformStatus", "OK"}});
+    }
   }
+  const auto out = files.path("T_ras_reference.txt");
+  const Finished registered =
+      run({brainshift(), "register", "--recording",
+           files.write("stylus.igs.mha", test_support::meta_text(stylus, false)), "--ras",
+           files.write("ras.csv", ras), "--pair", "order", "--model", model, "--out", out});
+  ASSERT_EQ(registered.exit_status, 0) << registered.err;
+  EXPECT_THAT(registered.out, HasSubstr("held still 4: "));
+  EXPECT_THAT(registered.out, HasSubstr("expected error at the tumour 0.00 mm rms"));
+  arguments["--case"] = "";
+  arguments["--model"] = model;
+  const Finished expected = import();
+  ASSERT_EQ(expected.exit_status, 0) << expected.err;
+  arguments["--registration"] = out;
+  arguments["--out"] = files.path("again.surgery");
+  const Finished again = import();
+  ASSERT_EQ(again.exit_status, 0) << again.err;
+  EXPECT_EQ(again.out, expected.out);
 }
 
 TEST_F(ImportCommand, BadOptionsExitTwoWithOneLine) {

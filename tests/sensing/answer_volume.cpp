@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/packed_values.hpp"
 #include "common/io/recording/sequence_header.hpp"
-#include "common/io/recording/sequence_values.hpp"
 
 namespace brainshift::test_support {
 namespace {
@@ -26,9 +26,9 @@ Vec3 three_numbers(const io::SequenceHeader& header, const char* key) {
 Result<AnswerVolume> read_answer(const std::filesystem::path& path) {
   const auto content = io::read_file(path);
   if (!content) return tl::unexpected(content.error());
-  const auto header = io::parse_meta_header(*content);
+  const auto header = io::parse_meta_sequence(*content);
   if (!header) return io::file_error(header.error().code, path, header.error().message);
-  const auto bytes = io::sequence_values(*header, 1);
+  const auto bytes = io::unpack(*header, 1);
   if (!bytes) return io::file_error(bytes.error().code, path, bytes.error().message);
   AnswerVolume volume;
   volume.grid.origin_mm = three_numbers(*header, "Offset");

@@ -3,6 +3,7 @@
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/values/case_keys.hpp"
 
@@ -17,10 +18,10 @@ class Loader {
 
   // Puts what `read` makes of the file into its place. An error names the key. Nothing happens
   // after the first error.
-  template <typename T>
-  void load(const fs::path& member, Result<T> (*read)(const fs::path&), std::optional<T>& place) {
+  template <typename Read, typename T>
+  void load(const fs::path& member, const Read& read, std::optional<T>& place) {
     if (!status_) return;
-    Result<T> result = read(member);
+    auto result = read(member);
     if (result) {
       place = std::move(*result);
     } else {
@@ -54,7 +55,9 @@ Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
     loader.load(config.brain, read_nifti, inputs.brain);
   }
   if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
-    loader.load(label->path, read_nifti, inputs.tumour_labels);
+    const LabelChoice choice{label->segment.value_or(""), label->label};
+    const auto read = [&](const fs::path& path) { return read_label_map(path, choice); };
+    loader.load(label->path, read, inputs.tumour_labels);
   } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {
     loader.load(surface->path, read_surface, inputs.tumour_surface);
   }

@@ -46,6 +46,9 @@ class KeyReader {
   void operator()(const Key& key, std::filesystem::path& value, Need need = Need::kOptional) {
     here_->path(key.name, value, presence(need));
   }
+  void operator()(const Key& key, std::optional<std::string>& value) {
+    if (here_->has(key.name)) here_->text(key.name, value.emplace(), Presence::kRequired);
+  }
   // A key that is there must name a file.
   void operator()(const Key& key, std::optional<std::filesystem::path>& value) {
     if (here_->has(key.name)) here_->path(key.name, value.emplace(), Presence::kRequired);

@@ -32,6 +32,9 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   void operator()(const Key& key, const std::optional<std::filesystem::path>& value) {
     if (value) (*this)(key, *value);
   }
+  void operator()(const Key& key, const std::optional<std::string>& value) {
+    if (value) (*this)(key, *value);
+  }
   template <typename T, typename W, std::size_t N>
   void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
     line(key, quoted(word_of(value, words)));

@@ -86,4 +86,17 @@ Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::s
   return nearest_rigid(matrix);
 }
 
+Status write_pose(const std::filesystem::path& path, const std::string& name,
+                  const RigidTransform& T, const std::vector<std::string>& comments) {
+  std::string text;
+  for (const std::string& comment : comments) text += "# " + comment + "\n";
+  text += name + ":\n";
+  for (int row = 0; row < 4; ++row) {
+    const auto numbers = T.matrix().row(row);
+    text += fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}\n", numbers[0], numbers[1], numbers[2],
+                        numbers[3]);
+  }
+  return write_file(path, text);
+}
+
 }  // namespace brainshift::io

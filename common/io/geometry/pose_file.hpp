@@ -12,6 +12,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/rigid_motion.hpp"
@@ -25,5 +26,10 @@ namespace brainshift::io {
 // numbers, not a rigid motion.
 Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name,
                                  double tolerance = kThreeDecimals);
+
+// Writes the numbers with all digits as text that read_pose reads back, or nothing. comments:
+// lines without a line break, put in front. kWriteFailed.
+Status write_pose(const std::filesystem::path& path, const std::string& name,
+                  const RigidTransform& T, const std::vector<std::string>& comments = {});
 
 }  // namespace brainshift::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces with fields to .ply and .vtp files; mm RAS.
+// Surfaces with fields to .ply and .vtp files; mm RAS. A .vtp says so (vtk_xml_writing.hpp).
 #pragma once
 
 #include <filesystem>

@@ -11,6 +11,12 @@ namespace {
 
 // Readers expand one block at a time; 1 MiB compresses as well as larger ones.
 constexpr std::size_t kBlockSize = std::size_t{1} << 20;
+
+// The string "RAS", as VTK writes strings: character codes, each string ended by a 0.
+constexpr const char* kSpaceIsRas =
+    "<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">"
+    "82 65 83 0</Array>\n</FieldData>\n";
+
 std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -55,7 +61,8 @@ std::string vtk_array_of_bytes(const std::string& name, const std::string& type,
 std::string vtk_heading(const std::string& grid) {
   return "<?xml version=\"1.0\"?>\n<VTKFile type=\"" + grid + "\" version=\"1.0\" byte_order=\"" +
          (std::endian::native == std::endian::little ? "LittleEndian" : "BigEndian") +
-         "\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<" + grid + ">\n";
+         "\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<" + grid + ">\n" +
+         kSpaceIsRas;
 }
 
 Status check_vtk_fields(const std::filesystem::path& path, const std::vector<NodeField>& fields,

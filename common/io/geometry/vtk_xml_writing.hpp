@@ -13,7 +13,9 @@
 
 namespace brainshift::io {
 
-// Up to and with the opening tag of the data set, e.g. "UnstructuredGrid".
+// Up to and with the opening tag of the data set, e.g. "UnstructuredGrid", and its field data: the
+// string array SPACE = "RAS". 3D Slicer takes points for LPS, which mirrors them, unless a file
+// says this (Slicer, vtkMRMLModelStorageNode.cxx).
 std::string vtk_heading(const std::string& grid);
 
 // Bytes as the content of a DataArray.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tetrahedra with fields to a VTK .vtu file; mm RAS.
+// Tetrahedra with fields to a VTK .vtu file; mm RAS. The file says so (vtk_xml_writing.hpp).
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The few HDF5 calls that a model file needs. For the .cpp files of this folder only.
+// The few HDF5 calls that a model file needs. For the .cpp files of io only.
 //
 // Every number has a fixed size and byte order in the file, so that it means the same on every
 // machine. Data sets are contiguous and not compressed: they are read straight into their final

@@ -8,8 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/recording/csv_numbers.hpp"
 
 namespace brainshift::io {
 namespace {

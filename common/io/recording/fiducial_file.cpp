@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/recording/csv_numbers.hpp"
 
 namespace brainshift::io {
 namespace {

@@ -7,9 +7,9 @@
 #include <cctype>
 
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/packed_values.hpp"
 #include "common/io/recording/sequence_frames.hpp"
 #include "common/io/recording/sequence_header.hpp"
-#include "common/io/recording/sequence_values.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -76,6 +76,11 @@ Status read_sizes(const SequenceHeader& header, tracking::Recording& recording, 
     return unreadable(fmt::format("images of {} x {} pixels: at most {} along a side", sizes[0],
                                   sizes[1], kLargestImage));
   }
+  // PLUS writes "DimSize = 0 0 N" where it recorded a tracker alone.
+  if ((sizes[0] == 0) != (sizes[1] == 0) || sizes[2] == 0) {
+    return unreadable(fmt::format("images of {} x {} pixels, {} of them: nothing is recorded",
+                                  sizes[0], sizes[1], sizes[2]));
+  }
   recording.width = static_cast<int>(sizes[0]);
   recording.height = static_cast<int>(sizes[1]);
   count = static_cast<int>(sizes[2]);
@@ -101,29 +106,45 @@ void flip_images(tracking::Recording& recording, const Flip& flip) {
   }
 }
 
+Status read_images(const SequenceHeader& header, const SequenceOptions& options,
+                   tracking::Recording& recording) {
+  const auto type = pixel_type(header);
+  if (!type) return tl::unexpected(type.error());
+  recording.pixel_type = *type;
+  const std::string kind = find_field(header, "UltrasoundImageType", "ultrasound image type");
+  if (!kind.empty() && kind != "BRIGHTNESS") {
+    return unreadable("UltrasoundImageType = " + kind + ": must be BRIGHTNESS");
+  }
+  const auto flip = flip_to_mf(header, options);
+  if (!flip) return tl::unexpected(flip.error());
+  auto pixels = unpack(header, tracking::bytes_per_pixel(*type));
+  if (!pixels) return tl::unexpected(pixels.error());
+  recording.pixels = std::move(*pixels);
+  flip_images(recording, *flip);
+  return {};
+}
+
 Result<tracking::Recording> parse_sequence(const std::string& content, bool nrrd,
                                            const SequenceOptions& options) {
-  const auto header = nrrd ? parse_nrrd_header(content) : parse_meta_header(content);
+  const auto header = nrrd ? parse_nrrd_sequence(content) : parse_meta_sequence(content);
   if (!header) return tl::unexpected(header.error());
   tracking::Recording recording;
   int count = 0;
   if (Status ok = read_sizes(*header, recording, count); !ok) return tl::unexpected(ok.error());
-  const auto type = pixel_type(*header);
-  if (!type) return tl::unexpected(type.error());
-  recording.pixel_type = *type;
-  const std::string kind = find_field(*header, "UltrasoundImageType", "ultrasound image type");
-  if (!kind.empty() && kind != "BRIGHTNESS") {
-    return unreadable("UltrasoundImageType = " + kind + ": must be BRIGHTNESS");
+  if (recording.width == 0 && !options.tracking_only) {
+    return unreadable(fmt::format(
+        "holds {} poses of a tracker and no images (brainshift register reads such a recording)",
+        count));
   }
-  const auto flip = flip_to_mf(*header, options);
-  if (!flip) return tl::unexpected(flip.error());
   if (Status ok = read_frame_fields(*header, count, recording); !ok) {
     return tl::unexpected(ok.error());
   }
-  auto pixels = sequence_values(*header, tracking::bytes_per_pixel(*type));
-  if (!pixels) return tl::unexpected(pixels.error());
-  recording.pixels = std::move(*pixels);
-  flip_images(recording, *flip);
+  if (options.tracking_only) {
+    recording.width = recording.height = 0;
+    recording.image_ok.assign(static_cast<std::size_t>(count), 1);
+    return recording;
+  }
+  if (Status ok = read_images(*header, options, recording); !ok) return tl::unexpected(ok.error());
   return recording;
 }
 

@@ -27,6 +27,10 @@ namespace brainshift::io {
 struct SequenceOptions {
   // Taken for a file that does not say; empty: such a file is refused.
   std::string orientation;
+  // Times and transforms alone: images are neither needed nor read, and their state does not count.
+  // The recording then has width and height 0. PLUS writes such files ("DimSize = 0 0 N") where it
+  // recorded a tracker without images; without this option they are refused.
+  bool tracking_only = false;
 };
 
 // kNotFound; kUnreadable, naming file, frame, field and value: no such format, sizes that

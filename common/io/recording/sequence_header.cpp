@@ -3,23 +3,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+
+#include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/nrrd_header.hpp"
 
 namespace brainshift::io {
 namespace {
 
 constexpr std::string_view kFramePrefix = "Seq_Frame";
-constexpr std::int64_t kLargestSize = 1'000'000;
 constexpr std::size_t kLargestHeader = std::size_t{256} << 20;
 
 tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
-}
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
 // Cuts the first line off, without its line feed.
@@ -51,56 +48,26 @@ Status store(SequenceHeader& header, std::string_view key, std::string_view valu
   return {};
 }
 
-Result<std::vector<std::int64_t>> parse_sizes(const std::string& field, std::string_view text) {
-  std::vector<std::int64_t> sizes;
-  for (std::string_view rest = trimmed(text); !rest.empty(); rest = trimmed(rest)) {
-    std::int64_t size = 0;
-    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), size);
-    if (error != std::errc() || size < 1 || size > kLargestSize) {
-      return unreadable(
-          fmt::format("{} = {}: every size must be 1 to {}", field, text, kLargestSize));
-    }
-    sizes.push_back(size);
-    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
-  }
-  return sizes;
-}
-
 std::string take_field(SequenceHeader& header, const std::string& key) {
   const auto found = header.fields.find(key);
   return found == header.fields.end() ? std::string() : found->second;
 }
 
-Status check_dimensions(const SequenceHeader& header, const std::string& name,
-                        const std::string& dimensions, const std::string& sizes) {
+Status check_dimensions(const SequenceHeader& header, const std::string& dimensions,
+                        const std::string& sizes) {
   if (sizes.empty() || std::to_string(header.sizes.size()) != dimensions) {
-    return unreadable(fmt::format("{} = \"{}\" does not agree with the {} sizes \"{}\"", name,
+    return unreadable(fmt::format("NDims = \"{}\" does not agree with the {} sizes \"{}\"",
                                   dimensions, header.sizes.size(), sizes));
   }
   return {};
 }
 
-// MetaImage's name of a type, or NRRD's, as one of ours; others unchanged.
-std::string element_type(const std::string& name) {
-  static const std::map<std::string, std::string> kNames = {
-      {"MET_UCHAR", "uint8"},    {"MET_SHORT", "int16"},
-      {"MET_USHORT", "uint16"},  {"MET_FLOAT", "float"},
-      {"uchar", "uint8"},        {"unsigned char", "uint8"},
-      {"uint8_t", "uint8"},      {"short", "int16"},
-      {"short int", "int16"},    {"int16_t", "int16"},
-      {"signed short", "int16"}, {"signed short int", "int16"},
-      {"ushort", "uint16"},      {"unsigned short", "uint16"},
-      {"uint16_t", "uint16"},    {"unsigned short int", "uint16"}};
-  const auto found = kNames.find(name);
-  return found == kNames.end() ? name : found->second;
-}
-
 Status understand_meta(SequenceHeader& header) {
   const std::string dim_size = take_field(header, "DimSize");
-  auto sizes = parse_sizes("DimSize", dim_size);
+  auto sizes = parse_sizes("DimSize", dim_size, 0);
   if (!sizes) return tl::unexpected(sizes.error());
   header.sizes = std::move(*sizes);
-  if (Status ok = check_dimensions(header, "NDims", take_field(header, "NDims"), dim_size); !ok) {
+  if (Status ok = check_dimensions(header, take_field(header, "NDims"), dim_size); !ok) {
     return ok;
   }
   header.element_type = element_type(take_field(header, "ElementType"));
@@ -124,46 +91,13 @@ Status understand_meta(SequenceHeader& header) {
   return {};
 }
 
-Status understand_nrrd(SequenceHeader& header) {
-  const std::string text = take_field(header, "sizes");
-  auto sizes = parse_sizes("sizes", text);
-  if (!sizes) return tl::unexpected(sizes.error());
-  header.sizes = std::move(*sizes);
-  if (Status ok = check_dimensions(header, "dimension", take_field(header, "dimension"), text);
-      !ok) {
-    return ok;
-  }
-  header.element_type = element_type(take_field(header, "type"));
-  const std::string encoding = take_field(header, "encoding");
-  header.compressed = encoding == "gzip" || encoding == "gz";
-  if (!header.compressed && encoding != "raw") {
-    return unreadable("encoding = " + encoding + ": must be raw or gzip");
-  }
-  const std::string endian = take_field(header, "endian");
-  if (!endian.empty() && endian != "little" && endian != "big") {
-    return unreadable("endian = " + endian + ": must be little or big");
-  }
-  header.big_endian = endian == "big";
-  for (const char* key : {"data file", "datafile", "line skip", "byte skip"}) {
-    const std::string value = take_field(header, key);
-    if (!value.empty() && value != "0") {
-      return unreadable(fmt::format("{} = {}: pixels must follow the header", key, value));
-    }
-  }
-  const std::string kinds = take_field(header, "kinds");
-  if (!kinds.starts_with("domain") && !kinds.empty()) {
-    return unreadable("kinds = " + kinds + ": the first axis must be the image's");
-  }
-  return {};
-}
-
 }  // namespace
 
 std::string frame_field(int frame, const std::string& name) {
   return fmt::format("{}{:04d}_{}", kFramePrefix, frame, name);
 }
 
-Result<SequenceHeader> parse_meta_header(std::string_view content) {
+Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
   SequenceHeader header;
   std::string_view rest = content;
   while (true) {
@@ -192,28 +126,18 @@ Result<SequenceHeader> parse_meta_header(std::string_view content) {
   return header;
 }
 
-Result<SequenceHeader> parse_nrrd_header(std::string_view content) {
-  SequenceHeader header;
-  std::string_view rest = content;
-  if (!take_line(rest).starts_with("NRRD000")) return unreadable("is no NRRD file");
-  while (true) {
-    if (rest.empty() || content.size() - rest.size() > kLargestHeader) {
-      return unreadable("its NRRD header has no end (an empty line)");
-    }
-    const std::string_view line = trimmed(take_line(rest));
-    if (line.empty()) break;
-    if (line.front() == '#') continue;
-    const std::size_t colon = line.find(':');
-    if (colon == std::string_view::npos || colon + 1 == line.size()) {
-      return unreadable(fmt::format("header line \"{}\" has no value", line.substr(0, 60)));
-    }
-    const std::size_t skip = line[colon + 1] == '=' ? 2 : 1;
-    const Status ok =
-        store(header, trimmed(line.substr(0, colon)), trimmed(line.substr(colon + skip)));
-    if (!ok) return tl::unexpected(ok.error());
+Result<SequenceHeader> parse_nrrd_sequence(std::string_view content) {
+  auto nrrd = parse_nrrd_header(content);
+  if (!nrrd) return tl::unexpected(nrrd.error());
+  const std::string kinds = nrrd->field("kinds");
+  if (!kinds.starts_with("domain") && !kinds.empty()) {
+    return unreadable("kinds = " + kinds + ": the first axis must be the image's");
   }
-  header.data = rest;
-  if (Status ok = understand_nrrd(header); !ok) return tl::unexpected(ok.error());
+  SequenceHeader header;
+  static_cast<PackedValues&>(header) = std::move(*nrrd);
+  for (const auto& [key, value] : nrrd->fields) {
+    if (Status ok = store(header, key, value); !ok) return tl::unexpected(ok.error());
+  }
   return header;
 }
 

@@ -118,6 +118,18 @@ TEST(Fiducials, ExpectedTargetErrorIsThatOfManyRegistrations) {
   }
 }
 
+TEST(Fiducials, ThinnessIsTheRatioOfTheExtents) {
+  Points cross(3, 4);  // arms of 10 and 2 mm
+  cross.transpose() << 10, 0, 5, -10, 0, 5, 0, 2, 5, 0, -2, 5;
+  EXPECT_NEAR(thinness(cross), 0.2, 1e-12);
+  Points line(3, 3);
+  line.transpose() << 0, 0, 0, 1, 1, 1, 3, 3, 3;
+  EXPECT_NEAR(thinness(line), 0.0, 1e-7);
+  Points square(3, 4);
+  square.transpose() << 1, 1, 0, 1, -1, 0, -1, 1, 0, -1, -1, 0;
+  EXPECT_NEAR(thinness(square), 1.0, 1e-12);
+}
+
 TEST(Fiducials, AreMatchedWithoutKnowingTheirOrder) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);

@@ -56,6 +56,22 @@ TEST_F(CaseInputsFile, NamedFilesAreReadAndOthersAreNot) {
   EXPECT_FALSE(inputs->tumour_labels);
 }
 
+TEST_F(CaseInputsFile, ASegmentOfASegmentationIsTheTumour) {
+  const auto file = folder_.write(
+      "t.seg.nrrd",
+      std::string("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\nspace: LPS\n"
+                  "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+                  "Segment0_Name:=Brain\nSegment0_LabelValue:=1\n"
+                  "Segment1_Name:=Tumour\nSegment1_LabelValue:=2\n\n") +
+          "\1\2");
+  config_.tumour = TumourLabel{file, 5, "Tumour"};
+  const auto inputs = load_case_inputs(config_);
+  ASSERT_TRUE(inputs) << inputs.error().message;
+  EXPECT_THAT(inputs->tumour_labels.value().values, testing::ElementsAre(0, 5));
+  config_.tumour = TumourLabel{file, 5};
+  expect_blame(ErrorCode::kInvalidArgument, "tumour.label_volume.file", "\"Brain\", \"Tumour\"");
+}
+
 TEST_F(CaseInputsFile, MissingFilesAreBlamedOnTheirKeys) {
   config_.mri = folder_ / "no_t1.nii";
   expect_blame(ErrorCode::kNotFound, "images.mri", "no_t1.nii: no such file");

@@ -102,6 +102,7 @@ TEST(CaseFile, EveryKeyArrivesInItsField) {
   EXPECT_EQ(generate.smoothing_mm, 1.5);
   EXPECT_EQ(std::get<TumourLabel>(read->tumour).path, "/cases/labels.nii");
   EXPECT_EQ(std::get<TumourLabel>(read->tumour).label, 7);
+  EXPECT_EQ(std::get<TumourLabel>(read->tumour).segment, std::nullopt);
   EXPECT_EQ(read->craniotomy.centre_mm, Vec3(7, 8, 9));
   EXPECT_EQ(read->craniotomy.long_axis_mm, 30);
   EXPECT_EQ(read->craniotomy.short_axis_mm, 20);
@@ -328,6 +329,8 @@ INSTANTIATE_TEST_SUITE_P(
                 ":12: tumour.label_volume.file: key is missing"},
         BadCase{"EmptyLabelFile", "file: labels.nii", "file: ''",
                 ":12: tumour.label_volume.file: must name a file"},
+        BadCase{"EmptySegment", "label: 7", "segment: ''",
+                ":12: tumour.label_volume.segment: must not be empty"},
         BadCase{"EmptySkullFile", "skull_file: skull.stl", "skull_file: ''",
                 ":26: contact.skull_file: must name a file"},
         BadCase{"MissingCaseId", "case_id: full\n", "", ": case_id: key is missing"},

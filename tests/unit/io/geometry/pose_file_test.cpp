@@ -77,6 +77,20 @@ TEST_F(PoseFile, WhatIsNoRigidMotionIsRefused) {
   }
 }
 
+TEST_F(PoseFile, WhatIsWrittenIsReadBack) {
+  RigidTransform T = RigidTransform::Identity();
+  T.linear() = Eigen::AngleAxisd(2.5, Vec3(1, -2, 1).normalized()).toRotationMatrix();
+  T.translation() = Vec3(-1e-9, 1234.5678901234567, -0.1);
+  const auto path = temporary_.path() / "w.txt";
+  ASSERT_TRUE(write_pose(path, "T_ras_reference", T, {"a comment: 1 2 3", "another"}));
+  const auto read = read_pose(path, "T_ras_reference", 1e-12);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_LT((read->matrix() - T.matrix()).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(read->translation(), T.translation());
+  EXPECT_EQ(write_pose(temporary_.path() / "none" / "w.txt", "T", T).error().code,
+            ErrorCode::kWriteFailed);
+}
+
 TEST_F(PoseFile, OtherTextsAreRefused) {
   EXPECT_THAT(refusal("p.txt", "1 0 0\n0 1 0\n0 0 1\n"),
               HasSubstr("p.txt: T_ras_camera has 9 numbers: must have 16"));

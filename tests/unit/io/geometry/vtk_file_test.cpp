@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
+#include "common/io/geometry/surface_writer.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -343,6 +344,33 @@ TEST_F(VtuFile, UnwritablePlaceIsNamed) {
   EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
   EXPECT_THAT(status.error().message, HasSubstr("no/m.vtu"));
 }
+
+// 3D Slicer takes the points of a VTK file for LPS unless it finds this in the field data.
+constexpr const char* kSpaceIsRas =
+    "<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">"
+    "82 65 83 0</Array>\n</FieldData>\n<Piece ";
+
+TEST_F(VtuFile, SaysThatItsPointsAreRas) {
+  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", large_mesh(), {}));
+  EXPECT_THAT(test_support::content_of(folder_ / "m.vtu"), HasSubstr(kSpaceIsRas));
+}
+
+TEST(VtpFile, SaysThatItsPointsAreRasAndIsReadBack) {
+  const TemporaryFolder folder;
+  TriangleSurface surface;
+  surface.vertices = Points::Random(3, 4);
+  surface.triangles.resize(3, 2);
+  surface.triangles << 0, 0, 2, 1, 1, 3;
+  ASSERT_TRUE(write_surface(folder / "s.vtp", surface));
+  EXPECT_THAT(test_support::content_of(folder / "s.vtp"), HasSubstr(kSpaceIsRas));
+  const auto read = read_surface(folder / "s.vtp");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->vertices, surface.vertices);
+  EXPECT_EQ(read->triangles, surface.triangles);
+}
+
+// Files of other programs and of earlier versions of this one have none: TrianglesAreReadIn...
+// and KnownMeshIsReadWithItsFields read such.
 
 std::string vtp(const Encoding& encoding, const std::vector<std::int32_t>& offsets,
                 const std::string& attributes) {

@@ -185,6 +185,37 @@ TEST(SequenceFile, StatusDecides) {
   EXPECT_EQ(samples[3].status, LinkStatus::kMissing);
 }
 
+// As PLUS records a stylus for registration.
+SequenceContent tracker_alone() {
+  SequenceContent content = small_sweep().content();
+  content.width = content.height = 0;
+  content.pixels.clear();
+  content.fields.clear();
+  for (auto& frame : content.frames) frame["ImageStatus"] = "INVALID";
+  return content;
+}
+
+TEST(SequenceFile, ATrackerAloneIsReadWhereNoImagesAreWanted) {
+  const TemporaryFolder folder;
+  SequenceOptions options;
+  options.tracking_only = true;
+  for (const auto& [name, text] : {std::pair{"a.mha", meta_text(tracker_alone(), false)},
+                                   std::pair{"b.nrrd", nrrd_text(tracker_alone(), false)},
+                                   // Images of which nobody says how they lie are no obstacle.
+                                   std::pair{"c.mha", meta_text(small_sweep().content(), true)}}) {
+    SCOPED_TRACE(name);
+    const auto recording = read_sequence(folder.write(name, text), options);
+    ASSERT_TRUE(recording) << recording.error().message;
+    EXPECT_EQ(recording->width, 0);
+    EXPECT_EQ(recording->height, 0);
+    EXPECT_EQ(recording->pixels, "");
+    ASSERT_EQ(recording->num_frames(), 4);
+    EXPECT_NEAR(recording->time_s[3], 1000.3, 1e-9);
+    EXPECT_EQ(find_link(*recording, "ProbeToTracker")->samples[2].status, LinkStatus::kOk);
+    for (const char ok : recording->image_ok) EXPECT_TRUE(ok);
+  }
+}
+
 // ---------- refusals: a row is what is done to good content and what the sentence says ----------
 
 TEST(SequenceFile, NamesFrameAndFieldOfBadTimes) {
@@ -230,7 +261,9 @@ TEST(SequenceFile, RefusesHeadersThatDisagree) {
   EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 8 4"), HasSubstr("more than its sizes say"));
   EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 10 4"),
               HasSubstr("truncated: 432 of 480 bytes"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 0 4"), HasSubstr("DimSize = 12 0 4"));
+  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 0 4"), HasSubstr("images of 12 x 0 pixels"));
+  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9 0"), HasSubstr("0 of them"));
+  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 -9 4"), HasSubstr("every size must be"));
   EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 nine 4"), HasSubstr("DimSize = 12 nine 4"));
   EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9"), HasSubstr("NDims"));
   EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 20000 9 4"), HasSubstr("20000 x 9 pixels"));
@@ -251,6 +284,23 @@ TEST(SequenceFile, RefusesHeadersThatDisagree) {
   EXPECT_THAT(bad("Seq_Frame0001_", "Seq_Frame999999999999_"), HasSubstr("Seq_Frame999999999999_"));
   EXPECT_THAT(bad("Seq_Frame0001_ImageStatus", "Seq_Frame0000_ImageStatus"),
               HasSubstr("given twice"));
+}
+
+TEST(SequenceFile, RefusesATrackerAloneWhereImagesAreWanted) {
+  EXPECT_THAT(refusal(meta_text(tracker_alone(), false)),
+              HasSubstr("holds 4 poses of a tracker and no images"));
+}
+
+TEST(SequenceFile, RefusesATrackerAloneWithBadTimesOrMatrices) {
+  SequenceOptions options;
+  options.tracking_only = true;
+  SequenceContent content = tracker_alone();
+  content.frames[2].erase("Timestamp");
+  EXPECT_THAT(refusal(meta_text(content, false), "bad.mha", options),
+              HasSubstr("frame 2: Seq_Frame0002_Timestamp is missing"));
+  content = tracker_alone();
+  content.frames[1]["ProbeToTrackerTransform"] = "1 2 3";
+  EXPECT_THAT(refusal(meta_text(content, false), "bad.mha", options), HasSubstr("frame 1"));
 }
 
 TEST(SequenceFile, RefusesOrientationsThatAreNotSaidOrNotFlat) {

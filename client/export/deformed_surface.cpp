@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/export/deformed_surface.hpp"
+
+#include <utility>
+
+#include "common/geometry/surface.hpp"
+#include "common/geometry/tet_locator.hpp"
+
+namespace brainshift::client {
+namespace {
+
+DeformedSurface moved(TriangleSurface surface, Points u, VecX sd_mm) {
+  DeformedSurface out;
+  out.surface = std::move(surface);
+  out.surface.vertices += u;
+  out.vertex_fields.push_back({"displacement_mm", std::move(u)});
+  if (sd_mm.size() > 0) out.vertex_fields.push_back({"sd_mm", sd_mm.transpose()});
+  return out;
+}
+
+}  // namespace
+
+DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+  const geometry::TetLocator locator(model.mesh);
+  Points at_vertices(3, model.tumour.num_vertices());
+  VecX sd(sd_mm.size() > 0 ? model.tumour.num_vertices() : 0);
+  for (int v = 0; v < model.tumour.num_vertices(); ++v) {
+    const auto at = locator.locate(model.tumour.vertices.col(v));
+    Vec3 value = Vec3::Zero();
+    double deviation = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      value += at.weights[k] * u.col(at.nodes[k]);
+      if (sd.size() > 0) deviation += at.weights[k] * sd_mm[at.nodes[k]];
+    }
+    at_vertices.col(v) = value;
+    if (sd.size() > 0) sd[v] = deviation;
+  }
+  return moved(model.tumour, std::move(at_vertices), std::move(sd));
+}
+
+DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+  std::vector<NodeIndex> node_of_vertex;
+  TriangleSurface surface = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  Points at_vertices(3, surface.num_vertices());
+  VecX sd(sd_mm.size() > 0 ? surface.num_vertices() : 0);
+  for (int v = 0; v < surface.num_vertices(); ++v) {
+    const NodeIndex node = node_of_vertex[static_cast<std::size_t>(v)];
+    at_vertices.col(v) = u.col(node);
+    if (sd.size() > 0) sd[v] = sd_mm[node];
+  }
+  return moved(std::move(surface), std::move(at_vertices), std::move(sd));
+}
+
+}  // namespace brainshift::client

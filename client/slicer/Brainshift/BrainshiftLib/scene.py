@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes of the scene that show a field: its transform, what follows it, the standard deviation, the deformed surfaces.
+
+Needs Slicer, unlike label, grid and colours beside it.
+"""
+from __future__ import annotations
+
+import slicer
+
+from .colours import FULL_SCALE_MM, sd_colours
+from .grid import grid_transform
+from .label import LabelError, belongs, parse_metadata
+
+# The devices of `brainshift bridge`; SlicerOpenIGTLink gives their nodes the same names.
+FIELD, SD, STATE = "brainshift_u", "brainshift_sd", "brainshift_state"
+SURFACES = ("brainshift_tumour", "brainshift_cortex")
+_CLASSES = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", STATE: "vtkMRMLTextNode"}
+TRANSFORM = "brainshift_transform"
+# A singleton's ID is its class and this tag. Slicer writes a node's reference to the transform into a scene file although
+# the transform itself is not saved. With an ID that no other node takes, the reference can never find another transform.
+SINGLETON = "Brainshift"
+
+
+def bridge_node(name):
+    """The node of a device, or None."""
+    return slicer.mrmlScene.GetFirstNode(name, _CLASSES.get(name, "vtkMRMLModelNode"))
+
+
+class SceneNodes:
+    def __init__(self):
+        self.largest_mm = None  # of the field that is shown
+        self.sd_wanted = False
+        self._built = None      # the VectorField that the transform was made of; None: there is no transform
+        self._followers = []    # ids of the nodes that the user chose
+        self._transform_id = self._colours_id = None
+        self._sd_on = False
+        self._behind = {}       # device -> since when its data have been of another update than the field
+        self._hidden = set()    # ids of the surfaces that were visible and were hidden here
+
+    def set_followers(self, nodes):
+        """Volumes and models that the field moves. Returns one line for every node that is refused."""
+        refused, chosen = [], []
+        for node in nodes:
+            if node.GetName() in (FIELD, SD, *SURFACES):
+                refused.append(f"{node.GetName()} comes from the bridge and is deformed already")
+            elif node.GetTransformNodeID() not in (None, "", self._transform_id):
+                refused.append(f"{node.GetName()} lies under another transform: harden that one first")
+            else:
+                chosen.append(node.GetID())
+        for node_id in set(self._followers) - set(chosen):
+            self._detach(slicer.mrmlScene.GetNodeByID(node_id))
+        self._followers = chosen
+        return refused
+
+    def show(self, field, label, now):
+        """A checked VectorField and the label that came with it; seconds of a clock."""
+        node = self._transform_node()
+        if self._built is not field:
+            node.SetAndObserveTransformToParent(grid_transform(field, slicer.vtkOrientedGridTransform))
+            self._built = field
+            self.largest_mm = float(field.magnitudes_mm.max())
+        for node_id in self._followers:
+            follower = slicer.mrmlScene.GetNodeByID(node_id)
+            # A node that the user has put under another transform since then is left alone.
+            if follower is not None and not follower.GetTransformNodeID():
+                follower.SetAndObserveTransformNodeID(node.GetID())
+        self._show_sd(self.sd_wanted and label.has_sd and self._goes_with(SD, label, now))
+        for name in SURFACES:
+            self._set_surface_visible(name, self._goes_with(name, label, now))
+
+    def take_away(self):
+        for node_id in self._followers:
+            self._detach(slicer.mrmlScene.GetNodeByID(node_id))
+        node = self._existing_transform_node()
+        if node is not None and self._built is not None:
+            node.SetAndObserveTransformToParent(None)
+        self._built = self.largest_mm = None
+        self._show_sd(False)
+        for name in SURFACES:
+            self._set_surface_visible(name, False)
+
+    def forget(self):
+        """The scene was closed. Slicer keeps singletons then, so the transform has to be removed here: a volume of the next
+        scene might name it."""
+        self.take_away()
+        node = self._existing_transform_node()
+        if node is not None:
+            slicer.mrmlScene.RemoveNode(node)
+        wanted = self.sd_wanted
+        self.__init__()
+        self.sd_wanted = wanted  # as the panel's box still says
+
+    def release_surfaces(self):
+        """After the end of a connection: surfaces that were hidden here stay hidden and are the user's again."""
+        self._hidden.clear()
+
+    def detach_strangers(self):
+        """Nodes of a loaded scene that followed the transform when the scene was saved. Nobody chose them in this one."""
+        for node in slicer.util.getNodesByClass("vtkMRMLTransformableNode"):
+            if node.GetID() not in self._followers:
+                self._detach(node)
+
+    def _existing_transform_node(self):
+        return None if self._transform_id is None else slicer.mrmlScene.GetNodeByID(self._transform_id)
+
+    def _transform_node(self):
+        node = self._existing_transform_node()
+        if node is None:
+            node = slicer.vtkMRMLGridTransformNode()
+            node.SetName(TRANSFORM)
+            node.SetSingletonTag(SINGLETON)
+            node.SetSaveWithScene(False)  # a saved field would be shown, without a word, when the scene is opened again
+            node = slicer.mrmlScene.AddNode(node)
+            self._transform_id, self._built = node.GetID(), None
+            self.detach_strangers()
+        return node
+
+    def _detach(self, node):
+        if node is not None and self._transform_id is not None and node.GetTransformNodeID() == self._transform_id:
+            node.SetAndObserveTransformNodeID(None)
+
+    def _show_sd(self, show):
+        if show == self._sd_on:
+            return
+        self._sd_on = show
+        if not show:
+            slicer.util.setSliceViewerLayers(foreground=None)
+            return
+        volume = bridge_node(SD)
+        display = volume.GetDisplayNode()  # the connector makes it with the volume
+        display.SetAndObserveColorNodeID(self._colour_node().GetID())
+        display.SetAutoWindowLevel(0)
+        display.SetWindowLevelMinMax(0.0, FULL_SCALE_MM)
+        display.SetLowerThreshold(1e-3)  # 0: outside the brain
+        display.SetApplyThreshold(1)
+        slicer.util.setSliceViewerLayers(foreground=volume, foregroundOpacity=0.4)
+
+    def _colour_node(self):
+        node = None if self._colours_id is None else slicer.mrmlScene.GetNodeByID(self._colours_id)
+        if node is None:
+            node = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLColorTableNode", "brainshift_sd_colours")
+            node.SetTypeToUser()
+            node.SetSaveWithScene(False)
+            colours = sd_colours()
+            node.SetNumberOfColors(len(colours))
+            for index, (red, green, blue) in enumerate(colours):
+                node.SetColor(index, f"{index * FULL_SCALE_MM / (len(colours) - 1):.2f} mm", red, green, blue, 1.0)
+            self._colours_id = node.GetID()
+        return node
+
+    def _goes_with(self, name, label, now):
+        """Whether the data of a device are there and may be shown with the field."""
+        node = bridge_node(name)
+        try:
+            own = None if node is None else parse_metadata(node.GetAttribute)
+        except LabelError:
+            return False
+        if own is None or own.sequence == label.sequence:
+            self._behind.pop(name, None)
+        else:
+            self._behind.setdefault(name, now)
+        return belongs(own, label, now - self._behind.get(name, now))
+
+    def _set_surface_visible(self, name, visible):
+        """Hides a deformed surface that may not be shown, and gives back only what was hidden here."""
+        node = bridge_node(name)
+        display = None if node is None else node.GetDisplayNode()
+        if display is None:
+            return
+        if not visible and display.GetVisibility():
+            display.SetVisibility(0)
+            self._hidden.add(node.GetID())
+        elif visible and node.GetID() in self._hidden:
+            display.SetVisibility(1)
+            self._hidden.discard(node.GetID())

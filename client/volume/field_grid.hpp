@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// FieldGrid: a regular grid of voxels for a displacement field, aligned with the axes of patient
+// RAS, with the same spacing along all three.
+//
+// The centre of voxel (i, j, k) lies at origin_mm + spacing_mm * (i, j, k). Its value is number
+// i + dims[0] * (j + dims[1] * k): x fastest, as VTK, NIfTI and OpenIGTLink have it.
+//
+// The outermost layer of voxels, the rim, is always zero: VTK repeats a grid transform's border
+// value everywhere outside of the grid.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "common/core/error.hpp"
+#include "common/core/types.hpp"
+
+namespace brainshift::client {
+
+struct FieldGrid {
+  // A head at 0.5 mm has 2^27 voxels; their vectors take 1.5 GiB.
+  static constexpr std::size_t kMaxVoxels = std::size_t{1} << 27;
+  // Of one axis: what an OpenIGTLink image can say.
+  static constexpr int kMaxVoxelsAlongAxis = 65535;
+
+  std::array<int, 3> dims{0, 0, 0};
+  Vec3 origin_mm = Vec3::Zero();  // centre of voxel (0, 0, 0)
+  double spacing_mm = 0.0;
+
+  std::size_t num_voxels() const {
+    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+           static_cast<std::size_t>(dims[2]);
+  }
+  std::size_t index(int i, int j, int k) const {
+    return static_cast<std::size_t>(i) +
+           static_cast<std::size_t>(dims[0]) *
+               (static_cast<std::size_t>(j) +
+                static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k));
+  }
+  Vec3 voxel_mm(int i, int j, int k) const { return origin_mm + spacing_mm * Vec3(i, j, k); }
+  // Centre of the last voxel of every axis.
+  Vec3 last_mm() const { return voxel_mm(dims[0] - 1, dims[1] - 1, dims[2] - 1); }
+  // Centre of the whole volume: between two voxels along an axis of even size.
+  Vec3 centre_mm() const { return 0.5 * (origin_mm + last_mm()); }
+  bool in_rim(int i, int j, int k) const {
+    return i == 0 || j == 0 || k == 0 || i == dims[0] - 1 || j == dims[1] - 1 || k == dims[2] - 1;
+  }
+};
+
+// kInvalidArgument: fewer than 3 voxels along an axis (a rim on both sides needs them) or more than
+// kMaxVoxelsAlongAxis, more than kMaxVoxels in all, a spacing that is not above 0. kNotFinite: the
+// origin or the spacing.
+Status validate(const FieldGrid& grid);
+
+// The smallest grid whose voxels inside the rim reach margin_mm beyond the bounding box of the
+// points (3 x n), centred on that box.
+// kEmptySet: no point. kNotFinite: a point. kInvalidArgument: margin_mm outside [0, 1000],
+// spacing_mm outside [0.1, 100], or too many voxels (the sentence names the spacing).
+Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spacing_mm);
+
+}  // namespace brainshift::client

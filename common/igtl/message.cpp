@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/igtl/message.hpp"
+
+#include <utility>
+
+#include "common/igtl/crc64.hpp"
+
+namespace brainshift::igtl {
+namespace {
+
+Error of_type(std::string_view type, Error error) {
+  error.message = std::string(type) + ": " + error.message;
+  return error;
+}
+
+template <typename T>
+Status encode_one(const Envelope& envelope, const T& content, std::string& out) {
+  out.clear();
+  const Status valid = validate(content);
+  if (!valid) return tl::unexpected<Error>(of_type(T::kType, valid.error()));
+  Header header{envelope.version, std::string(T::kType), envelope.device, envelope.timestamp, 0, 0};
+  if (const Status status = validate(header); !status) {
+    return tl::unexpected<Error>(of_type(T::kType, status.error()));
+  }
+  if (envelope.version != 1) {
+    if (const Status status = validate(envelope.metadata); !status) {
+      return tl::unexpected<Error>(of_type(T::kType, status.error()));
+    }
+  }
+  const BodyFrame frame =
+      encode_body_frame(envelope.version, envelope.message_id, envelope.metadata);
+  out.append(kHeaderBytes, '\0').append(frame.before);
+  append_content(content, out);
+  out.append(frame.after);
+  const std::string_view body = std::string_view(out).substr(kHeaderBytes);
+  header.body_bytes = body.size();
+  header.crc = crc64(body);
+  out.replace(0, kHeaderBytes, encode_header(header));
+  return {};
+}
+
+// Result<T> of one decoder as a Result<Content>.
+template <typename T>
+Result<Content> as_content(Result<T> decoded) {
+  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+  return Content(std::move(*decoded));
+}
+
+template <typename T>
+Result<Content> without_content(std::string_view) {
+  return Content(T{});  // some implementations send bytes all the same
+}
+
+using Decoder = Result<Content> (*)(std::string_view);
+constexpr std::pair<std::string_view, Decoder> kDecoders[] = {
+    {Image::kType, [](std::string_view c) { return as_content(decode_image(c)); }},
+    {Transform::kType, [](std::string_view c) { return as_content(decode_transform(c)); }},
+    {TrackingData::kType, [](std::string_view c) { return as_content(decode_tracking_data(c)); }},
+    {PolyData::kType, [](std::string_view c) { return as_content(decode_poly_data(c)); }},
+    {PointList::kType, [](std::string_view c) { return as_content(decode_point_list(c)); }},
+    {Text::kType, [](std::string_view c) { return as_content(decode_text(c)); }},
+    {StatusReport::kType, [](std::string_view c) { return as_content(decode_status_report(c)); }},
+    {StatusRequest::kType, without_content<StatusRequest>},
+    {Capability::kType, [](std::string_view c) { return as_content(decode_capability(c)); }},
+    {CapabilityRequest::kType, without_content<CapabilityRequest>},
+};
+static_assert(std::size(kDecoders) == std::variant_size_v<Content>);
+
+Decoder decoder_of(std::string_view type) {
+  for (const auto& [name, decoder] : kDecoders) {
+    if (name == type) return decoder;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::string_view type_of(const Content& content) {
+  return std::visit([]<typename T>(const T&) { return T::kType; }, content);
+}
+
+bool is_known_type(std::string_view type) { return decoder_of(type) != nullptr; }
+
+Status encode(const Envelope& envelope, const Content& content, std::string& out) {
+  return std::visit([&](const auto& one) { return encode_one(envelope, one, out); }, content);
+}
+
+Status encode(const Envelope& envelope, const ImageView& image, std::string& out) {
+  return encode_one(envelope, image, out);
+}
+
+Result<Message> decode(const Header& header, std::string_view body) {
+  const Decoder decoder = decoder_of(header.type);
+  if (decoder == nullptr) {
+    return fail(ErrorCode::kProtocol, header.type + ": a message type that is not read");
+  }
+  auto parts = decode_body(header.version, body);
+  if (!parts) return tl::unexpected<Error>(of_type(header.type, std::move(parts.error())));
+  auto content = decoder(parts->content);
+  if (!content) return tl::unexpected<Error>(of_type(header.type, std::move(content.error())));
+  return Message{{header.version, header.device, header.timestamp, parts->message_id,
+                  std::move(parts->metadata)},
+                 std::move(*content)};
+}
+
+Result<Message> decode(std::string_view bytes) {
+  const auto header = decode_header(bytes);
+  if (!header) return tl::unexpected<Error>(header.error());
+  const std::string_view body = bytes.substr(kHeaderBytes);
+  if (body.size() != header->body_bytes) {
+    return fail(ErrorCode::kProtocol, header->type + ": body of " +
+                                          std::to_string(header->body_bytes) + " bytes stated, " +
+                                          std::to_string(body.size()) + " received");
+  }
+  if (const Status status = check_crc(*header, crc64(body)); !status) {
+    return tl::unexpected<Error>(status.error());
+  }
+  return decode(*header, body);
+}
+
+}  // namespace brainshift::igtl

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/csv_numbers.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace brainshift::io {
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+bool parse_number(std::string_view text, double& number) {
+  text = trimmed(text);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
+}
+
+std::vector<std::string_view> cells_of(std::string_view row) {
+  std::vector<std::string_view> cells;
+  for (std::size_t comma = row.find(','); comma != std::string_view::npos; comma = row.find(',')) {
+    cells.push_back(trimmed(row.substr(0, comma)));
+    row.remove_prefix(comma + 1);
+  }
+  cells.push_back(trimmed(row));
+  return cells;
+}
+
+std::vector<std::string> quoted_cells_of(std::string_view row) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const bool mark = row[i] == '"';
+    if (mark && quoted && i + 1 < row.size() && row[i + 1] == '"') {
+      cells.back() += '"';
+      ++i;
+    } else if (mark) {
+      quoted = !quoted;
+    } else if (row[i] == ',' && !quoted) {
+      cells.emplace_back();
+    } else {
+      cells.back() += row[i];
+    }
+  }
+  for (std::string& cell : cells) cell = std::string(trimmed(cell));
+  return cells;
+}
+
+bool has_number(const std::vector<std::string>& cells) {
+  double number = 0.0;
+  return std::any_of(cells.begin(), cells.end(),
+                     [&](const std::string& cell) { return parse_number(cell, number); });
+}
+
+}  // namespace brainshift::io

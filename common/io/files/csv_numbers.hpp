@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cells of the small .csv files that people write by hand.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace brainshift::io {
+
+// Without blanks at either end.
+std::string_view trimmed(std::string_view text);
+// The whole text is one finite number.
+bool parse_number(std::string_view text, double& number);
+// Between commas, trimmed; at least one.
+std::vector<std::string_view> cells_of(std::string_view row);
+// The same where a cell may stand in quotation marks: "a, b" is one cell, and "" in it is one mark
+// (RFC 4180).
+std::vector<std::string> quoted_cells_of(std::string_view row);
+// At least one cell is a number: the row is no heading.
+bool has_number(const std::vector<std::string>& cells);
+
+}  // namespace brainshift::io

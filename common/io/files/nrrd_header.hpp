@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The text header of an NRRD file whose values follow in the same file, raw or gzip.
+//
+// A magic line, then lines "field: value", "key:=value" and comments "#" up to an empty line.
+// Source: teem.sourceforge.net/nrrd/format.html.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "common/core/error.hpp"
+#include "common/io/files/packed_values.hpp"
+
+namespace brainshift::io {
+
+struct NrrdHeader : PackedValues {
+  std::map<std::string, std::string> fields;  // of both kinds of line, as text
+
+  // Empty where there is none.
+  std::string field(const std::string& name) const;
+};
+
+// kUnreadable with a sentence that names the field and its value, without the file: no NRRD, a
+// header without an end, a field without a value or given twice, `dimension` that disagrees with
+// `sizes`, an encoding other than raw and gzip, values in another file.
+Result<NrrdHeader> parse_nrrd_header(std::string_view content);
+
+}  // namespace brainshift::io

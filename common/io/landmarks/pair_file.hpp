@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Homologous landmarks: where a structure lay before surgery, and where it was found during it. mm
+// RAS.
+//
+// In one file:
+//   .csv  rows of 6 numbers (before x, y, z, during x, y, z), or of a name and these; or any
+//         columns below a heading that names the six, e.g. x_before,y_before,z_before,x_during, ...
+//         (for before also src or undeformed, for during dst or deformed; _mm is ignored) and
+//         perhaps label, name or row
+//   .tag  MNI tag points of two volumes: 6 numbers, perhaps weight, structure and patient, and a
+//         name in quotation marks
+//         (source: MNI, "MNI Tag Point File", as register and tagtoxfm of MINC read it)
+// In two files: point_file.hpp, paired by name.
+// Lines of a .csv that begin with # are skipped; in a .tag those that begin with % or #.
+#pragma once
+
+#include <filesystem>
+
+#include "common/core/error.hpp"
+#include "common/io/landmarks/named_points.hpp"
+
+namespace brainshift::io {
+
+// first: before surgery, second: during it. kNotFound; kUnreadable or kEmptySet naming the file,
+// the line and what is wrong there; for two files also the errors of pair_by_name, naming both
+// files.
+Result<NamedPairs> read_pairs(const std::filesystem::path& path);
+Result<NamedPairs> read_pairs(const std::filesystem::path& before,
+                              const std::filesystem::path& during);
+
+}  // namespace brainshift::io
