@@ -4,9 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
-#include "common/geometry/closest_point.hpp"
+#include "common/geometry/region_nodes.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/igtl/surface.hpp"
 
@@ -30,45 +29,15 @@ igtl::PolyData resting(const TriangleSurface& surface, bool with_sd) {
   return data;
 }
 
-std::vector<NodeIndex> near_tumour(const BrainModel& model,
-                                   const geometry::ClosestPointIndex& tumour, double margin_mm) {
-  std::vector<NodeIndex> nodes;
-  for (NodeIndex node = 0; node < model.mesh.num_nodes(); ++node) {
-    const Vec3 x = model.mesh.nodes.col(node);
-    if (tumour.closest(x).distance_mm <= margin_mm || tumour.contains(x)) nodes.push_back(node);
-  }
-  return nodes;
-}
-
 }  // namespace
 
-Result<std::vector<NodeIndex>> nodes_in_region(const BrainModel& model, const Region& region) {
-  std::vector<NodeIndex> nodes;
-  if (const auto* ball = std::get_if<BallRegion>(&region)) {
-    for (NodeIndex node = 0; node < model.mesh.num_nodes(); ++node) {
-      const double away_mm = (model.mesh.nodes.col(node) - ball->centre_mm).norm();
-      if (away_mm <= ball->radius_mm) nodes.push_back(node);
-    }
-  } else if (const auto* near = std::get_if<TumourRegion>(&region)) {
-    const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
-    if (!tumour) {
-      return fail(ErrorCode::kEmptySet,
-                  "--region tumour: case " + model.case_id + " has no tumour");
-    }
-    nodes = near_tumour(model, *tumour, near->margin_mm);
-  } else {
-    nodes.resize(static_cast<std::size_t>(model.mesh.num_nodes()));
-    std::iota(nodes.begin(), nodes.end(), 0);
-  }
-  if (nodes.empty()) {
-    return fail(ErrorCode::kEmptySet, "--region: no node of case " + model.case_id + " lies in it");
-  }
-  return nodes;
-}
-
 Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOptions& options) {
-  const auto nodes = nodes_in_region(model, options.region);
-  if (!nodes) return tl::unexpected(nodes.error());
+  std::vector<double> tumour_distance_mm;
+  if (std::holds_alternative<TumourRegion>(options.region)) {
+    tumour_distance_mm = geometry::distances_from_tumour(model);
+  }
+  const auto nodes = geometry::nodes_in_region(model, options.region, tumour_distance_mm);
+  if (!nodes) return fail(nodes.error().code, "--region: " + nodes.error().message);
   Points places(3, static_cast<Eigen::Index>(nodes->size()));
   for (Eigen::Index i = 0; i < places.cols(); ++i) {
     places.col(i) = model.mesh.nodes.col((*nodes)[static_cast<std::size_t>(i)]);

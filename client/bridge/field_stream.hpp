@@ -28,10 +28,6 @@ struct StreamOptions {
   bool with_surfaces = true;
 };
 
-// Nodes of the mesh in the region, ascending; by the same rules as the daemon's
-// (common/values/session_state.hpp). kEmptySet: no node, or no tumour.
-Result<std::vector<NodeIndex>> nodes_in_region(const BrainModel& model, const Region& region);
-
 class FieldStream {
  public:
   // kEmptySet, kInvalidArgument: of the region and the grid.

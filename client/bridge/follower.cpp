@@ -218,8 +218,12 @@ void Follower::sign_of_life(const FieldStatus& status) {
   if (Clock::now() - said_ < kSignOfLife) return;
   said_ = Clock::now();
   auto state = std::make_shared<Picture>();
-  state->state = shown_->state;
-  state->state.age_ms = shown_->state.blank ? std::nan("") : 1e3 * status.age_s;
+  if (shown_->state.blank) {
+    state->state = state_without_field(status);  // a session may have begun
+  } else {
+    state->state = shown_->state;
+    state->state.age_ms = 1e3 * status.age_s;
+  }
   state->time = time_now();
   calls_.show_state(state);
 }

@@ -72,7 +72,9 @@ void FrameCollector::take(const igtl::Message& message, TimePoint arrived) {
                    *moment_at(envelope.timestamp, arrived));
   } else if (const auto* tools = std::get_if<igtl::TrackingData>(&message.content)) {
     for (const igtl::TrackedTool& tool : tools->tools) {
-      take_transform(tool.name, tool.matrix, igtl::find(envelope.metadata, tool.name + "Status"),
+      const bool names_two_frames = tracking::parse_transform_name(tool.name).has_value();
+      take_transform(names_two_frames ? tool.name : tool.name + kTracker, tool.matrix,
+                     igtl::find(envelope.metadata, tool.name + "Status"),
                      *moment_at(envelope.timestamp, arrived));
     }
   }
@@ -98,8 +100,7 @@ void FrameCollector::take_image(const igtl::Image& image, Moment& moment, TimePo
 
 void FrameCollector::take_transform(const std::string& name, const igtl::Matrix34f& values,
                                     const std::string* status, Moment& moment) {
-  auto frames = tracking::parse_transform_name(name);
-  if (!frames) frames = tracking::parse_transform_name(name + kTracker);
+  const auto frames = tracking::parse_transform_name(name);
   if (!frames) return leave_out("transform " + name + ", which names no two frames");
   const std::string key = frames->name();
   pairs_.emplace(key, *frames);

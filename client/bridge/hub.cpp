@@ -171,7 +171,8 @@ Status Hub::run(int stop_descriptor) {
     if (ends && (all_sent || now >= *ends)) return {};
 
     polled.assign({{ends ? -1 : stop_descriptor, POLLIN, 0},
-                   {wake_descriptor_, POLLIN, 0},
+                   // What comes after the goodbye must not take its place.
+                   {ends ? -1 : wake_descriptor_, POLLIN, 0},
                    {ends ? -1 : listener_.descriptor(), POLLIN, 0},
                    {-1, POLLIN, 0}});
     if (upstream_ && !ends) {

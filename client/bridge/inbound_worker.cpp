@@ -13,6 +13,7 @@ namespace {
 constexpr double kFarthest_mm = 100.0;
 // How often the end of a sweep is looked for.
 constexpr std::chrono::milliseconds kLook{100};
+constexpr std::chrono::milliseconds kForASession{2000};
 constexpr std::size_t kSmallMessage = 1024;
 
 std::size_t bytes_of(const igtl::Message& message) {
@@ -85,6 +86,7 @@ void InboundWorker::post(igtl::Message&& message) {
 void InboundWorker::follow(const Followed& followed) {
   const std::lock_guard lock(mutex_);
   followed_ = followed;
+  news_.notify_one();
 }
 
 void InboundWorker::run(const std::stop_token& stop) {
@@ -102,16 +104,16 @@ void InboundWorker::run(const std::stop_token& stop) {
       tell_(fmt::format("{} messages dropped: more came than could be used", dropped));
     for (const Item& item : items) {
       if (stop.stop_requested()) return;
-      deal_with(inbox_.take(item.message, item.arrived));
+      deal_with(inbox_.take(item.message, item.arrived), stop);
     }
-    deal_with(inbox_.tick(std::chrono::steady_clock::now()));
+    deal_with(inbox_.tick(std::chrono::steady_clock::now()), stop);
   }
 }
 
-void InboundWorker::deal_with(Taken taken) {
+void InboundWorker::deal_with(const Taken& taken, const std::stop_token& stop) {
   for (const std::string& note : taken.notes) tell_(note);
   for (const Found& found : taken.found) {
-    const Status status = submit(found);
+    const Status status = submit(found, stop);
     tell_(found.told + (status ? ": accepted" : ": not accepted: " + status.error().message));
   }
 }
@@ -123,10 +125,12 @@ std::uint64_t InboundWorker::next_sequence(const std::string& source) {
   return last;
 }
 
-Status InboundWorker::submit(const Found& found) {
+Status InboundWorker::submit(const Found& found, const std::stop_token& stop) {
   Followed followed;
   {
-    const std::lock_guard lock(mutex_);
+    // A bridge that has just begun learns of the session within moments.
+    std::unique_lock lock(mutex_);
+    news_.wait_for(lock, stop, kForASession, [&] { return followed_.session.session_id != 0; });
     followed = followed_;
   }
   if (followed.session.session_id == 0) {

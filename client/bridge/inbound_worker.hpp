@@ -50,8 +50,8 @@ class InboundWorker {
     Inbox::TimePoint arrived;
     std::size_t bytes = 0;
   };
-  void deal_with(Taken taken);
-  Status submit(const Found& found);
+  void deal_with(const Taken& taken, const std::stop_token& stop);
+  Status submit(const Found& found, const std::stop_token& stop);
   std::uint64_t next_sequence(const std::string& source);
 
   Inbox inbox_;

@@ -26,14 +26,8 @@ DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const 
   VecX sd(sd_mm.size() > 0 ? model.tumour.num_vertices() : 0);
   for (int v = 0; v < model.tumour.num_vertices(); ++v) {
     const auto at = locator.locate(model.tumour.vertices.col(v));
-    Vec3 value = Vec3::Zero();
-    double deviation = 0.0;
-    for (int k = 0; k < 4; ++k) {
-      value += at.weights[k] * u.col(at.nodes[k]);
-      if (sd.size() > 0) deviation += at.weights[k] * sd_mm[at.nodes[k]];
-    }
-    at_vertices.col(v) = value;
-    if (sd.size() > 0) sd[v] = deviation;
+    at_vertices.col(v) = geometry::value_at(at, u);
+    if (sd.size() > 0) sd[v] = geometry::value_at(at, sd_mm);
   }
   return moved(model.tumour, std::move(at_vertices), std::move(sd));
 }

@@ -70,20 +70,16 @@ class Sampling {
     const double factor = taper_.factor(at.distance_mm);
     if (factor == 0.0) return false;
     const std::size_t index = grid_.index(i, j, k);
-    Vec3 value = Vec3::Zero();
-    double sd = 0.0;
-    for (int corner = 0; corner < 4; ++corner) {
-      value += at.weights[corner] * u_.col(at.nodes[corner]);
-      if (sd_mm_.size() > 0) sd += at.weights[corner] * sd_mm_[at.nodes[corner]];
-    }
-    value *= sign_ * factor;
+    const Vec3 value = sign_ * factor * geometry::value_at(at, u_);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       out_.field.ras_mm[3 * index + axis] =
           static_cast<float>(value[static_cast<Eigen::Index>(axis)]);
     }
     if (!inside) return false;
     out_.jacobian.values[index] = static_cast<float>(ratios_[at.tet]);
-    if (sd_mm_.size() > 0) out_.sd_mm.values[index] = static_cast<float>(sd);
+    if (sd_mm_.size() > 0) {
+      out_.sd_mm.values[index] = static_cast<float>(geometry::value_at(at, sd_mm_));
+    }
     return true;
   }
 

@@ -67,7 +67,7 @@ double largest_in_plane(const SliceSamples& samples, const Points& field,
                         const SliceWindow& window) {
   double largest = 0.0;
   for (const auto& location : samples.locations) {
-    Vec3 u = interpolate(location, field);
+    Vec3 u = geometry::value_at(location, field);
     u(window.normal_axis()) = 0.0;
     largest = std::max(largest, u.norm());
   }
@@ -77,7 +77,7 @@ double largest_in_plane(const SliceSamples& samples, const Points& field,
 double largest_on(const SliceSamples& samples, const Points& field) {
   double largest = 0.0;
   for (const auto& location : samples.locations)
-    largest = std::max(largest, interpolate(location, field).norm());
+    largest = std::max(largest, geometry::value_at(location, field).norm());
   return largest;
 }
 

@@ -50,17 +50,12 @@ SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow
   return samples;
 }
 
-Vec3 interpolate(const geometry::TetLocation& location, const Points& nodal) {
-  Vec3 value = Vec3::Zero();
-  for (int k = 0; k < 4; ++k) value += location.weights(k) * nodal.col(location.nodes(k));
-  return value;
-}
-
 TriangleSurface deformed_surface(const TriangleSurface& surface,
                                  const geometry::TetLocator& locator, const Points& displacement) {
   TriangleSurface moved = surface;
   for (Eigen::Index v = 0; v < surface.vertices.cols(); ++v) {
-    moved.vertices.col(v) += interpolate(locator.locate(surface.vertices.col(v)), displacement);
+    moved.vertices.col(v) +=
+        geometry::value_at(locator.locate(surface.vertices.col(v)), displacement);
   }
   return moved;
 }
@@ -131,7 +126,7 @@ void SlicePanel::draw_magnitude_map(const SliceSamples& samples, const Points& f
   const int half = static_cast<int>(std::ceil(0.5 * samples.spacing_mm * window_.px_per_mm));
   cv::Mat colours = image_.clone();
   for (std::size_t i = 0; i < samples.positions.size(); ++i) {
-    const double value = interpolate(samples.locations[i], field).norm();
+    const double value = geometry::value_at(samples.locations[i], field).norm();
     const cv::Point2d p = window_.pixel(samples.positions[i]);
     cv::rectangle(
         colours,
@@ -144,7 +139,7 @@ void SlicePanel::draw_magnitude_map(const SliceSamples& samples, const Points& f
 void SlicePanel::draw_arrows(const SliceSamples& samples, const Points& displacement,
                              double magnification, double max_mm, bool thin) {
   for (std::size_t i = 0; i < samples.positions.size(); ++i) {
-    const Vec3 u = interpolate(samples.locations[i], displacement);
+    const Vec3 u = geometry::value_at(samples.locations[i], displacement);
     const cv::Point2d from = window_.pixel(samples.positions[i]);
     const cv::Point2d to = window_.pixel(samples.positions[i] + magnification * u);
     const cv::Scalar colour =

@@ -50,9 +50,6 @@ struct SliceSamples {
 SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow& window,
                           double spacing_mm);
 
-// The field at the location: the sum of weights times nodal values.
-Vec3 interpolate(const geometry::TetLocation& location, const Points& nodal);
-
 // The surface with every vertex moved by the field at its undeformed place.
 TriangleSurface deformed_surface(const TriangleSurface& surface,
                                  const geometry::TetLocator& locator, const Points& displacement);

@@ -27,14 +27,14 @@ through_the_daemon() {
   local surgery=$out/joint-mixed.surgery
   rm -f "$surgery"
   local case_file=config/cases/colin27.yaml
-  "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" >"$out/prepare.txt"
-  "$bin/brainshift" simulate --case "$case_file" --scenario joint-mixed --seed 1 --out "$surgery"
-  start_daemon "$out/colin27.h5"
+  "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" >"$out/prepare.txt" || return
+  "$bin/brainshift" simulate --case "$case_file" --scenario joint-mixed --seed 1 --out "$surgery" || return
+  start_daemon "$out/colin27.h5" || return
   "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact --sources ius \
-    --report "$out/tumour-alone.json"
+    --report "$out/tumour-alone.json" || return
   "$bin/brainshift" replay "$surgery" --endpoint "$endpoint" --boundary contact \
-    --report "$out/joint.json"
-  stop_daemon
+    --report "$out/joint.json" || return
+  stop_daemon || return
   "$bin/brainshift" report "$out/joint.json" --out "$out/report"
 }
 step "through the daemon: joint-mixed" through_the_daemon || status=1

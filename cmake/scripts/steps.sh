@@ -11,14 +11,18 @@ current=start
 daemon=
 endpoint=
 
-# step TITLE COMMAND...: runs the command and prints how long it took.
+# step TITLE COMMAND...: runs the command, prints how long it took, and ends with the command's status:
+# `step ... || status=1` goes on after a failure and remembers it. A function that is called so must
+# end its own failing lines with `|| return`, because the shell's -e does not reach into it.
 step() {
   current=$1
   shift
   local begin=$EPOCHREALTIME
   printf '== %s\n' "$current"
   "$@"
+  local code=$?
   printf '   %s s\n' "$(seconds_since "$begin" 1)"
+  return "$code"
 }
 
 # seconds_since EPOCHREALTIME DIGITS

@@ -103,9 +103,7 @@ Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
     if (!(place.distance_mm > 0.0)) continue;
     ++outside;
     farthest = std::max(farthest, place.distance_mm);
-    Vec3 closest = Vec3::Zero();
-    for (int k = 0; k < 4; ++k) closest += place.weights(k) * mesh.nodes.col(place.nodes(k));
-    fitted.surface.vertices.col(v) = closest;
+    fitted.surface.vertices.col(v) = geometry::value_at(place, mesh.nodes);
   }
   if (outside == 0) return fitted;
   const std::string what =

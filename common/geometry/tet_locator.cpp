@@ -128,9 +128,7 @@ TetLocation TetLocator::Impl::locate_outside(const Vec3& query) const {
   location.nodes = tets.col(location.tet);
   location.weights = weights(location.tet, closest.point).cwiseMax(0.0);
   location.weights /= location.weights.sum();
-  Vec3 described = Vec3::Zero();
-  for (int k = 0; k < 4; ++k) described += location.weights[k] * nodes.col(location.nodes[k]);
-  location.distance_mm = (query - described).norm();
+  location.distance_mm = (query - value_at(location, nodes)).norm();
   return location;
 }
 

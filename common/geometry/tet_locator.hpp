@@ -25,6 +25,18 @@ struct TetLocation {
   double distance_mm = 0.0;
 };
 
+// What the mesh interpolates at a location from the values of its nodes: 3 x nodes, or one each.
+inline Vec3 value_at(const TetLocation& at, const Points& nodal) {
+  Vec3 value = Vec3::Zero();
+  for (int k = 0; k < 4; ++k) value += at.weights[k] * nodal.col(at.nodes[k]);
+  return value;
+}
+inline double value_at(const TetLocation& at, const VecX& nodal) {
+  double value = 0.0;
+  for (int k = 0; k < 4; ++k) value += at.weights[k] * nodal[at.nodes[k]];
+  return value;
+}
+
 class TetLocator {
  public:
   // Copies the mesh. Precondition: check_mesh(mesh), or no tetrahedron at all.

@@ -7,9 +7,6 @@
 // fading over 40 mm from the tumour. Daemon and viewers are threads of one process on the loopback
 // interface, so that clocks agree. Measured twice: with viewers that decode, whose work competes
 // with the daemon's, and with viewers that only take the bytes.
-#include <sys/eventfd.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -26,18 +23,19 @@
 #include <zmq.hpp>
 
 #include "client/lib/client.hpp"
-#include "common/core/random.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 #include "server/delivery/selections.hpp"
 #include "server/transport/parcels.hpp"
-#include "server/transport/router.hpp"
+#include "tests/benchmarks/made_up_daemon.hpp"
 #include "tests/benchmarks/median_time.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
 namespace {
 
+using bench::MadeUpDaemon;
+using bench::SaggingHead;
 using bench::value_or_exit;
 using Clock = std::chrono::steady_clock;
 using server::Bytes;
@@ -62,46 +60,6 @@ const std::vector<Case>& cases() {
        {.region = TumourRegion{40.0}, .tolerance_mm = 0.1, .with_sd = false}}};
   return all;
 }
-
-class SaggingHead {
- public:
-  explicit SaggingHead(std::shared_ptr<const BrainModel> model) : model_(std::move(model)) {
-    const Vec3 tumour = model_->tumour.vertices.rowwise().mean();
-    for (const auto& node : model_->mesh.nodes.colwise()) {
-      fade_.push_back(std::exp(-0.5 * (node - tumour).squaredNorm() / (40.0 * 40.0)));
-    }
-  }
-
-  Bytes frame(std::uint64_t sequence) {
-    wire::UpdateMessage message;
-    message.session_id = 1;
-    message.boot_id = 7;
-    Update& update = message.update;
-    update.case_id = model_->case_id;
-    update.model_id = model_->model_id;
-    update.sequence = sequence;
-    Estimate& estimate = update.estimate;
-    estimate.status = EstimateStatus::kConverged;
-    estimate.quality.quality = Quality::kGood;
-    estimate.displacement.resize(3, model_->mesh.nodes.cols());
-    estimate.sd_mm.resize(model_->mesh.nodes.cols());
-    const double sag_mm = 0.05 * static_cast<double>(sequence);
-    for (std::size_t i = 0; i < fade_.size(); ++i) {
-      const auto node = static_cast<Eigen::Index>(i);
-      const Vec3 noise(random_.normal(), random_.normal(), random_.normal());
-      estimate.displacement.col(node) =
-          fade_[i] * (sag_mm * model_->gravity_direction + 0.02 * noise);
-      estimate.sd_mm[node] = 0.3 + 0.5 * (1.0 - fade_[i]);
-    }
-    return std::make_shared<const std::string>(
-        wire::encode_frame(wire::MessageType::kUpdate, 0, wire::encode(message)));
-  }
-
- private:
-  std::shared_ptr<const BrainModel> model_;
-  std::vector<double> fade_;
-  Random random_{1};
-};
 
 void print_costs(const std::shared_ptr<const BrainModel>& model, const std::vector<Bytes>& frames) {
   server::Selections selections(model);
@@ -137,28 +95,6 @@ void print_costs(const std::shared_ptr<const BrainModel>& model, const std::vect
         median(ms), choose_ms);
   }
 }
-
-// Subscribes whoever asks; nothing else.
-class Handler final : public server::RequestHandler {
- public:
-  explicit Handler(const std::shared_ptr<const BrainModel>& model)
-      : selections_(model), model_id_(model->model_id) {}
-
-  std::optional<server::Reply> handle(const std::string&, const wire::Frame& frame) override {
-    const auto wanted = value_or_exit(wire::decode_subscription(frame.payload));
-    SessionState state;
-    state.session = {7, 1, model_id_};
-    state.phase = SessionPhase::kTracking;
-    state.valid_ms = 1000;
-    return server::Reply{wire::MessageType::kSessionState, wire::encode(state), wanted, 1,
-                         value_or_exit(selections_.resolve(wanted.choice))};
-  }
-  void left(const std::string&) override {}
-
- private:
-  server::Selections selections_;
-  std::string model_id_;
-};
 
 // When each update was published, and how long each viewer waited for it.
 class Latencies {
@@ -214,39 +150,12 @@ void view(const std::string& endpoint, const FieldChoice& choice, Latencies& lat
   }
 }
 
-// The transport of a daemon, without a session behind it.
-class Daemon {
- public:
-  explicit Daemon(const std::shared_ptr<const BrainModel>& model)
-      : router_(value_or_exit(server::Router::bind({}))),
-        handler_(model),
-        thread_([this] { (void)router_.run(handler_, outbox_, stop_fd_); }) {}
-  Daemon(const Daemon&) = delete;
-  Daemon& operator=(const Daemon&) = delete;
-  ~Daemon() {
-    const std::uint64_t one = 1;
-    if (write(stop_fd_, &one, sizeof one) != sizeof one) std::exit(1);
-    thread_.join();
-    close(stop_fd_);
-  }
-
-  const std::string& endpoint() const { return router_.endpoint(); }
-  void publish(const Bytes& frame) { outbox_.post({server::Delivery::kFinal, {}, frame, 1}); }
-
- private:
-  server::Router router_;
-  server::Outbox outbox_;
-  Handler handler_;
-  int stop_fd_ = eventfd(0, EFD_CLOEXEC);
-  std::thread thread_;
-};
-
 using P50AndP99 = std::pair<double, double>;
 
 // Until a viewer has the decoded update: every viewer a thread with the client library.
 P50AndP99 until_decoded(const std::shared_ptr<const BrainModel>& model,
                         const std::vector<Bytes>& frames, const FieldChoice& choice, int viewers) {
-  Daemon daemon(model);
+  MadeUpDaemon daemon(model);
   Latencies latencies(viewers);
   std::atomic<int> ready{0};
   {
@@ -258,7 +167,7 @@ P50AndP99 until_decoded(const std::shared_ptr<const BrainModel>& model,
     for (std::uint64_t sequence = 1; sequence <= kUpdates; ++sequence) {
       std::this_thread::sleep_for(kBetweenUpdates);
       latencies.published(sequence);
-      daemon.publish(frames[sequence - 1]);
+      daemon.publish(sequence, frames[sequence - 1]);
       latencies.wait_for_all(sequence);
     }
   }
@@ -269,7 +178,7 @@ P50AndP99 until_decoded(const std::shared_ptr<const BrainModel>& model,
 // for all viewers and decodes nothing, as if each had a machine of its own.
 P50AndP99 until_arrived(const std::shared_ptr<const BrainModel>& model,
                         const std::vector<Bytes>& frames, const FieldChoice& choice, int viewers) {
-  Daemon daemon(model);
+  MadeUpDaemon daemon(model);
   zmq::context_t context;
   std::vector<zmq::socket_t> sockets;
   const auto renew = [&](zmq::socket_t& socket, std::uint64_t received) {
@@ -292,7 +201,7 @@ P50AndP99 until_arrived(const std::shared_ptr<const BrainModel>& model,
   for (std::uint64_t sequence = 1; sequence <= kUpdates; ++sequence) {
     std::this_thread::sleep_for(kBetweenUpdates);
     latencies.published(sequence);
-    daemon.publish(frames[sequence - 1]);
+    daemon.publish(sequence, frames[sequence - 1]);
     for (int waiting = viewers; waiting > 0;) {
       zmq_poll(items.data(), static_cast<int>(items.size()), -1);
       for (std::size_t i = 0; i < sockets.size(); ++i) {

@@ -84,6 +84,7 @@ images: {brain: mask.nii}
 tumour: {ellipsoid: {centre_mm: [30, 30, 40], semi_axes_mm: [10, 10, 10]}}
 craniotomy: {centre_mm: [30, 30, 60]}
 brainstem: {centre_mm: [30, 30, 0]}
+gravity: {direction: [0, 0, -1]}
 )",
                                             path.parent_path() / "toy.yaml");
   if (!config) throw std::runtime_error(config.error().message);

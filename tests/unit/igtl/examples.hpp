@@ -2,6 +2,8 @@
 // One small message of every type, with signs, fractions and full-width texts in it.
 #pragma once
 
+#include <gmock/gmock.h>
+
 #include <numeric>
 #include <string>
 #include <utility>
@@ -10,6 +12,21 @@
 #include "common/igtl/message.hpp"
 
 namespace brainshift::igtl::test_example {
+
+// The content of a message alone.
+template <typename T>
+std::string content_of(const T& value) {
+  std::string content;
+  append_content(value, content);
+  return content;
+}
+
+template <typename T>
+void expect_refused(const Result<T>& decoded, const char* part) {
+  ASSERT_FALSE(decoded) << part;
+  EXPECT_EQ(decoded.error().code, ErrorCode::kProtocol);
+  EXPECT_THAT(decoded.error().message, ::testing::HasSubstr(part));
+}
 
 inline constexpr std::uint16_t kVersions[] = {1, 2};
 

@@ -18,10 +18,7 @@ Header example() {
 }
 
 void expect_refused(const std::string& bytes, const char* part) {
-  const auto header = decode_header(bytes);
-  ASSERT_FALSE(header);
-  EXPECT_EQ(header.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(header.error().message, HasSubstr(part));
+  test_example::expect_refused(decode_header(bytes), part);
 }
 
 TEST(Header, LayoutIsTheDocumentedOne) {

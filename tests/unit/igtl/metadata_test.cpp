@@ -22,10 +22,7 @@ std::string body_of(const Metadata& metadata, const std::string& content) {
 }
 
 void expect_refused(const std::string& body, const char* part) {
-  const auto parts = decode_body(2, body);
-  ASSERT_FALSE(parts) << part;
-  EXPECT_EQ(parts.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(parts.error().message, HasSubstr(part));
+  test_example::expect_refused(decode_body(2, body), part);
 }
 
 TEST(Metadata, LayoutIsTheDocumentedOne) {

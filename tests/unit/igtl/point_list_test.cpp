@@ -11,14 +11,9 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::content_of;
 using test_example::point_list;
 using ::testing::HasSubstr;
-
-std::string content_of(const PointList& list) {
-  std::string content;
-  append_content(list, content);
-  return content;
-}
 
 void expect_invalid(const PointList& list, const char* part) {
   const Status status = validate(list);

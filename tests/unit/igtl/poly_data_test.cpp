@@ -11,15 +11,10 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::content_of;
 using test_example::poly_data;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
-
-std::string content_of(const PolyData& data) {
-  std::string content;
-  append_content(data, content);
-  return content;
-}
 
 std::string message_of(const PolyData& data) {
   const Status status = validate(data);
@@ -27,10 +22,7 @@ std::string message_of(const PolyData& data) {
 }
 
 void expect_refused(const std::string& content, const char* part) {
-  const auto decoded = decode_poly_data(content);
-  ASSERT_FALSE(decoded) << part;
-  EXPECT_EQ(decoded.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(decoded.error().message, HasSubstr(part));
+  test_example::expect_refused(decode_poly_data(content), part);
 }
 
 std::string with(std::size_t at, const std::string& bytes) {

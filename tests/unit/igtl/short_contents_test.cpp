@@ -11,22 +11,10 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::content_of;
+using test_example::expect_refused;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
-
-template <typename T>
-std::string content_of(const T& value) {
-  std::string content;
-  append_content(value, content);
-  return content;
-}
-
-template <typename T>
-void expect_refused(const Result<T>& decoded, const char* part) {
-  ASSERT_FALSE(decoded) << part;
-  EXPECT_EQ(decoded.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(decoded.error().message, HasSubstr(part));
-}
 
 TEST(ShortContents, LayoutsAreTheDocumentedOnes) {
   EXPECT_EQ(content_of(Text{"text", 3}), "\0\3\0\4text"s);

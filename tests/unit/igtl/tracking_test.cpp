@@ -11,25 +11,13 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::content_of;
+using test_example::expect_refused;
 using test_example::tracking_data;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-template <typename T>
-std::string content_of(const T& value) {
-  std::string content;
-  append_content(value, content);
-  return content;
-}
-
-template <typename T>
-void expect_refused(const Result<T>& decoded, const char* part) {
-  ASSERT_FALSE(decoded) << part;
-  EXPECT_EQ(decoded.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(decoded.error().message, HasSubstr(part));
-}
 
 // 1, 2, 3 down the first column, and so on: float32 of 1 is 3f800000.
 TEST(Tracking, ATransformIsWrittenColumnByColumn) {

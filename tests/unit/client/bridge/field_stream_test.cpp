@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "common/geometry/region_nodes.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -95,7 +96,9 @@ TEST(FieldStream, TheRegionLiesInsideOfTheFade) {
   const BrainModel model = test_support::toy_patient(6);
   for (const double spacing_mm : {1.0, 2.0, 3.0}) {
     const StreamOptions options{.region = TumourRegion{6.0}, .spacing_mm = spacing_mm};
-    const auto nodes = nodes_in_region(model, options.region).value();
+    const auto nodes =
+        geometry::nodes_in_region(model, options.region, geometry::distances_from_tumour(model))
+            .value();
     FieldStream stream = FieldStream::build(model, options).value();
     auto far = update_of(model);
     // Only the region's nodes move: another weight than 1 on them would show.
@@ -125,7 +128,7 @@ TEST(FieldStream, AsksForTheBallThatHoldsWhatItNeedsAndForAllWithSurfaces) {
   FieldStream without = FieldStream::build(model, options).value();
   const auto* ball = std::get_if<BallRegion>(&without.choice().region);
   ASSERT_NE(ball, nullptr);
-  const auto nodes = nodes_in_region(model, *ball).value();
+  const auto nodes = geometry::nodes_in_region(model, *ball, {}).value();
   EXPECT_LT(nodes.size(), static_cast<std::size_t>(model.mesh.num_nodes()));
   const auto part = without.picture(part_of(model, nodes));
   ASSERT_TRUE(part) << part.error().message;

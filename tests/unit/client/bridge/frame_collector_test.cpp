@@ -121,8 +121,7 @@ TEST(FrameCollector, AMatrixThatIsNoMotionIsInvalidWhateverItsStatus) {
       << "pixels scale";
 }
 
-// Open: transforms whose names cannot be read are left out without being counted.
-TEST(FrameCollector, DISABLED_LeavesOutWhatNoRecordingHoldsAndCountsIt) {
+TEST(FrameCollector, LeavesOutWhatNoRecordingHoldsAndCountsIt) {
   FrameCollector collector({.image_device = "Image_Reference"});
   collector.take(image(1000), kBegin);
   collector.take(image(1100, 7, 4, 2), kBegin);

@@ -20,16 +20,16 @@ using test_support::IgtlListener;
 using test_support::IgtlPeer;
 using testing::HasSubstr;
 
-PicturePtr picture(std::uint64_t sequence) {
+PicturePtr picture(std::uint64_t sequence, int side = 4) {
   auto rest = std::make_shared<Rest>();
-  rest->geometry.dims = {4, 4, 4};
+  rest->geometry.dims = {side, side, side};
   rest->with_sd = false;
   auto made = std::make_shared<Picture>();
   made->rest = rest;
   made->state.sequence = sequence;
   made->state.blank = false;
   made->state.currency = Currency::kCurrent;
-  made->u.assign(3 * 64, static_cast<float>(sequence));
+  made->u.assign(static_cast<std::size_t>(3 * side * side * side), static_cast<float>(sequence));
   return made;
 }
 
@@ -123,6 +123,21 @@ TEST_F(HubOnLoopback, BlanksBeforeItEnds) {
   ASSERT_TRUE(status);
   EXPECT_EQ(std::get<igtl::StatusReport>(status->message.content).text, "the bridge has ended");
   EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 0.0F);
+}
+
+// A client that does not read keeps the hub for the second that a goodbye may take.
+TEST_F(HubOnLoopback, WhatIsPostedAfterTheGoodbyeDoesNotReplaceIt) {
+  serve();
+  const IgtlPeer stalled = IgtlPeer::connect(hub->address().port, 4096);
+  IgtlPeer viewer = client();
+  hub->post(picture(1, 96), Broadcast::Part::kWhole);  // 11 MB: more than sockets hold
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 1.0F);
+  const std::uint64_t one = 1;
+  ASSERT_EQ(::write(stop_descriptor, &one, sizeof one), 8);
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 0.0F);
+  post(2);
+  while (const auto later = viewer.receive()) EXPECT_NE(later->header.device, "brainshift_u");
+  thread.join();
 }
 
 TEST_F(HubOnLoopback, TurnsAwayMoreClientsThanItHasRoomFor) {

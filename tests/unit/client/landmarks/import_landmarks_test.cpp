@@ -8,12 +8,11 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "common/io/config/config_file.hpp"
-#include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/model_id.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/toy_journal.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -52,21 +51,10 @@ class ImportLandmarks : public testing::Test {
   }
 
   std::filesystem::path write_model(BrainModel model) const {
-    io::ModelFile file;
-    file.config = io::parse_case_config(R"(case_id: toy
-images: {brain: mask.nii}
-tumour: {ellipsoid: {centre_mm: [30, 30, 40], semi_axes_mm: [10, 10, 10]}}
-craniotomy: {centre_mm: [30, 30, 60]}
-brainstem: {centre_mm: [30, 30, 0]}
-gravity: {direction: [0, 0, -1]}
-)",
-                                        folder / "toy.yaml")
-                      .value();
-    file.model = std::move(model);
-    file.model.case_id = "toy";
-    file.model.model_id = content_hash(file.model);
+    model.case_id = "toy";
+    model.model_id = content_hash(model);
     const auto path = folder / "toy.h5";
-    EXPECT_TRUE(io::write_model(path, file));
+    test_support::write_toy_model(path, model);
     return path;
   }
 

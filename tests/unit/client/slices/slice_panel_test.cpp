@@ -45,7 +45,8 @@ TEST(SliceSamples, CoverTheInsideOfTheMeshAndNothingElse) {
   EXPECT_EQ(samples.positions.size(), 11u * 11u);
   Points identity = mesh.nodes;
   for (std::size_t i = 0; i < samples.positions.size(); ++i) {
-    EXPECT_TRUE(interpolate(samples.locations[i], identity).isApprox(samples.positions[i], 1e-9));
+    EXPECT_TRUE(
+        geometry::value_at(samples.locations[i], identity).isApprox(samples.positions[i], 1e-9));
   }
 }
 

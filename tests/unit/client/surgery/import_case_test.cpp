@@ -3,11 +3,8 @@
 
 #include <gmock/gmock.h>
 
-#include "common/io/config/config_file.hpp"
-#include "common/io/model/model_file.hpp"
-#include "common/values/model_id.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/support/toy_patient.hpp"
+#include "tests/support/toy_journal.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -17,25 +14,14 @@ using testing::HasSubstr;
 
 TEST(ImportCase, APreparedModelSaysWhoseItIs) {
   const TemporaryFolder folder;
-  io::ModelFile file;
-  file.config = io::parse_case_config(R"(case_id: toy
-images: {brain: mask.nii}
-tumour: {ellipsoid: {centre_mm: [30, 30, 40], semi_axes_mm: [10, 10, 10]}}
-craniotomy: {centre_mm: [30, 30, 60]}
-brainstem: {centre_mm: [30, 30, 0]}
-)",
-                                      folder / "toy.yaml")
-                    .value();
-  file.model = test_support::toy_patient();
-  file.model.case_id = "toy";
-  file.model.model_id = content_hash(file.model);
-  ASSERT_TRUE(io::write_model(folder / "toy.h5", file));
+  const BrainModel model = test_support::toy_model(5);
+  test_support::write_toy_model(folder / "toy.h5", model);
   const auto known = load_import_case({}, folder / "toy.h5");
   ASSERT_TRUE(known) << known.error().message;
   EXPECT_LT((known->tumour_centroid() - Vec3(30, 30, 40)).norm(), 0.1);
   const io::SurgeryMeta meta = known->meta("a sweep", "a test");
   EXPECT_EQ(meta.case_id, "toy");
-  EXPECT_EQ(meta.model_id, file.model.model_id);
+  EXPECT_EQ(meta.model_id, model.model_id);
   EXPECT_EQ(meta.case_file, (folder / "toy.yaml").string());
   EXPECT_EQ(meta.scenario, "a sweep");
   EXPECT_EQ(meta.software, "a test");
