@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries prior faults fuzz format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries prior faults fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -68,6 +68,10 @@ faults: setup ## the daemon through kills, bad peers, stalls, loads; into out/fa
 	@cmake --preset $(PRESET) --log-level=WARNING
 	cmake --build --preset $(PRESET) -j $(JOBS) --target fault_programs
 	cmake/scripts/faults.sh $(BUILD) out/faults $(TOPICS)
+
+documents: configure ## what docs/slicer.md, python.md and cpp.md say, typed as written; needs THROWAWAY=1, since it installs
+	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift python_client
+	cmake/scripts/documents.sh $(BUILD)
 
 fuzz: setup ## random inputs for every reader and decoder, SECONDS=60 each, into out/fuzz
 	@docker/install-packages.sh docker/packages-fuzz.txt

@@ -182,7 +182,7 @@ Result<std::shared_ptr<Picture>> FieldStream::picture(const wire::UpdateMessage&
   state.model_id = message.update.model_id;
   state.case_id = message.update.case_id;
   state.quality = to_string(verdict.quality);
-  state.flags = flag_names(verdict.flags);
+  state.flags = flag_names(message.update);
   state.blank = false;
   state.has_sd = has_sd_;
   state.grid_error_mm = sampler_.interpolation_error_mm(u_, picture->u.data());

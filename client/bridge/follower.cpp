@@ -112,7 +112,7 @@ void Follower::note(const wire::UpdateMessage& message) {
   if (!message.update.final) return;
   const QualityVerdict& verdict = message.update.estimate.quality;
   newest_quality_ = message.error ? "none" : to_string(verdict.quality);
-  newest_flags_ = message.error ? "" : flag_names(verdict.flags);
+  newest_flags_ = message.error ? "" : flag_names(message.update);
   newest_reason_ = message.error ? message.error->message : verdict.reason;
 }
 

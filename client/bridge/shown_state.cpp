@@ -41,24 +41,16 @@ bool is_ascii(std::string_view text) {
 
 }  // namespace
 
-std::string_view to_string(Currency currency) {
-  switch (currency) {
-    case Currency::kNone: return "none";
-    case Currency::kCurrent: return "current";
-    case Currency::kSuperseded: return "superseded";
-    case Currency::kDegraded: return "degraded";
-    case Currency::kStale: return "stale";
-  }
-  return "unknown";
-}
-
-std::string flag_names(const QualityFlags& flags) {
+std::string flag_names(const Update& update) {
   std::string names;
-  for (const QualityFlag flag : kAllQualityFlags) {
-    if (!flags.has(flag)) continue;
+  const auto add = [&](std::string_view name) {
     if (!names.empty()) names += '+';
-    names += to_string(flag);
+    names += name;
+  };
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (update.estimate.quality.flags.has(flag)) add(to_string(flag));
   }
+  if (update.answer_time.late()) add("late");
   return names;
 }
 

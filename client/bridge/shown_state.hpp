@@ -13,7 +13,7 @@
 #include "common/core/error.hpp"
 #include "common/igtl/metadata.hpp"
 #include "common/igtl/short_contents.hpp"
-#include "common/values/quality.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::client {
 
@@ -23,7 +23,7 @@ struct ShownState {
   std::string model_id;          // that the mesh and the grid belong to; empty: none loaded yet
   std::string case_id;
   std::string quality = "none";  // good, caution, unusable, none
-  std::string flags;             // "data_outside_region+deadline"; empty: none is set
+  std::string flags;             // "data_outside_region+late"; empty: none is set
   Currency currency = Currency::kNone;
   std::string reason;  // one sentence for people; empty when current
   double age_ms = std::numeric_limits<double>::quiet_NaN();  // NaN: not known
@@ -37,10 +37,8 @@ struct ShownState {
   bool usable() const { return !blank && currency == Currency::kCurrent; }
 };
 
-// "none", "current", "superseded", "degraded", "stale".
-std::string_view to_string(Currency currency);
-// Names of the flags that are set, joined by "+".
-std::string flag_names(const QualityFlags& flags);
+// Names of the quality's flags that are set, and "late" for an answer that was, joined by "+".
+std::string flag_names(const Update& update);
 
 // Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null when
 // not known), direction ("modeling"), blank, has_sd, grid_error_mm, spacing_mm, fade_mm. UTF-8;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace brainshift::client {
 
@@ -14,6 +15,8 @@ enum class Currency {
   kDegraded,    // it is the newest usable one, but a newer observation gave none
   kStale,       // nothing is known of the daemon any more: it may be older than it looks
 };
+
+std::string_view to_string(Currency currency);  // "none", "current", ..., "stale"
 
 struct FieldStatus {
   Currency currency = Currency::kNone;

@@ -122,6 +122,7 @@ class Page {
   void add_updates() {
     std::string text =
         fmt::format("{} usable, {} unusable, {} failed", now_.usable, now_.unusable, now_.failures);
+    if (now_.late > 0) text += fmt::format(", {} late", now_.late);
     if (now_.iterates > 0) text += fmt::format(", {} iterates", now_.iterates);
     if (has_rates()) text += ", " + per_second(final_updates(now_), final_updates(*before_));
     add("updates", text);

@@ -84,6 +84,7 @@ std::string report_json(const wire::DaemonReport& report) {
   out["limit_ms"] = report.limit_ms;
   out["usable"] = report.usable;
   out["unusable"] = report.unusable;
+  out["late"] = report.late;
   out["failures"] = report.failures;
   out["iterates"] = report.iterates;
   out["sources"] = list(report.sources);

@@ -20,17 +20,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds kForItsAge{20};
 constexpr milliseconds kBetweenLooks{250};
 
-std::string_view name(Currency currency) {
-  switch (currency) {
-    case Currency::kNone: return "none";
-    case Currency::kCurrent: return "current";
-    case Currency::kSuperseded: return "superseded";
-    case Currency::kDegraded: return "degraded";
-    case Currency::kStale: return "stale";
-  }
-  return "unknown";
-}
-
 nlohmann::json number_or_null(double value) {
   if (std::isfinite(value)) return value;
   return nullptr;
@@ -40,8 +29,10 @@ std::string json_line(const WatchedUpdate& update) {
   nlohmann::ordered_json line = {{"sequence", update.sequence},
                                  {"failure", update.failure},
                                  {"quality", update.quality},
+                                 {"answer_ms", update.answer_time.ms},
+                                 {"late", update.answer_time.late()},
                                  {"age_s", number_or_null(update.status.age_s)},
-                                 {"currency", name(update.status.currency)},
+                                 {"currency", to_string(update.status.currency)},
                                  {"reason", update.status.reason},
                                  {"nodes", update.nodes},
                                  {"mesh_nodes", update.mesh_nodes},
@@ -53,14 +44,14 @@ std::string json_line(const WatchedUpdate& update) {
 }
 
 std::string status_text(const FieldStatus& status) {
-  std::string text(name(status.currency));
+  std::string text(to_string(status.currency));
   if (!status.reason.empty()) text += ": " + status.reason;
   return text;
 }
 
 std::string status_line(const FieldStatus& status, bool json) {
   if (!json) return status_text(status);
-  const nlohmann::ordered_json line = {{"currency", name(status.currency)},
+  const nlohmann::ordered_json line = {{"currency", to_string(status.currency)},
                                        {"reason", status.reason},
                                        {"age_s", number_or_null(status.age_s)}};
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
@@ -148,6 +139,7 @@ WatchedUpdate watched(const wire::UpdateMessage& message, const std::vector<Node
     return update;
   }
   update.quality = to_string(estimate.quality.quality);
+  update.answer_time = message.update.answer_time;
   update.nodes = static_cast<int>(estimate.displacement.cols());
   double sum_mm = 0.0;
   int found = 0;
@@ -181,7 +173,9 @@ std::string watch_line(const WatchedUpdate& update, bool json) {
   } else {
     line += "  no tumour node";
   }
-  return line + "  " + update.quality + ", " + status_text(update.status);
+  line += "  " + update.quality + ", " + status_text(update.status);
+  if (update.answer_time.late()) line += "  LATE: " + sentence(update.answer_time);
+  return line;
 }
 
 Status watch(const WatchOptions& options, const std::function<void(const std::string&)>& tell) {

@@ -30,8 +30,9 @@ struct WatchOptions {
 // What a line tells of an update.
 struct WatchedUpdate {
   std::uint64_t sequence = 0;
-  std::string failure;     // why there is no field; empty with a field
-  std::string quality;     // of the field
+  std::string failure;  // why there is no field; empty with a field
+  std::string quality;  // of the field
+  AnswerTime answer_time;
   int nodes = 0;           // that the viewer now has
   int mesh_nodes = 0;      // of the whole mesh
   int received_nodes = 0;  // that travelled

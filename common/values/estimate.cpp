@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/values/estimate.hpp"
 
+#include <cstdio>
+
 namespace brainshift {
 
 std::string_view to_string(Boundary boundary) {
@@ -43,6 +45,13 @@ std::string_view to_string(EstimateStatus status) {
     case EstimateStatus::kDeadline: return "deadline";
   }
   return "not_run";
+}
+
+std::string sentence(const AnswerTime& time) {
+  char text[96];
+  std::snprintf(text, sizeof text, "answered %.4g ms after its observation came, usually %.3g ms",
+                time.ms, time.usual_ms);
+  return text;
 }
 
 }  // namespace brainshift

@@ -187,6 +187,20 @@ struct StageTimings {  // milliseconds, monotonic clock
   double journal_ms = 0.0;  // queueing the newest observation for the journal; 0 without a journal
 };
 
+// How long an answer took: from the arrival of its observation at the daemon until its encoding.
+// (SourceSummary::age_s is another age: of the data, behind the newest observation.)
+struct AnswerTime {
+  double ms = 0.0;        // monotonic clock; 0: not told (iterates, older daemons)
+  double usual_ms = 0.0;  // median over the answers of the session before it; 0: too few yet
+
+  // Later after its observation than navigation may take for granted: the brain may have moved
+  // since. Says nothing about the field itself, which its verdict is for.
+  bool late() const { return usual_ms > 0.0 && ms > kLate * usual_ms; }
+  static constexpr double kLate = 3.0;
+};
+// "answered 812 ms after its observation came, usually 34 ms"
+std::string sentence(const AnswerTime& time);
+
 // The nodes that the columns of an update's displacement, and its standard deviations, are of.
 struct FieldPart {
   int mesh_nodes = 0;            // of the whole mesh
@@ -208,6 +222,7 @@ struct Update {
   bool final = true;  // false: an intermediate iterate
   Estimate estimate;
   StageTimings timings;
+  AnswerTime answer_time;
   RigidTransform T_undeformed_deformed = RigidTransform::Identity();  // from ICP; identity without
   std::vector<Omission> left_out;
   // Of a viewer that chose a part of every field: the nodes that the columns of the displacement

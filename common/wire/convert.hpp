@@ -103,10 +103,10 @@ std::string encode(const Observation& observation);
 std::string encode(const ObservationReceipt& receipt);
 std::string encode(const UpdateMessage& message);
 // The same in two steps, for an update that is to carry the time of its own encoding: the payload
-// without timings, and the timings behind it. The result decodes like that of encode(); Protobuf
-// does not prescribe the order of fields.
+// without timings and answer_time, and these behind it. The result decodes like that of encode();
+// Protobuf does not prescribe the order of fields.
 std::string encode_without_timings(const UpdateMessage& message);
-void append_timings(const StageTimings& timings, std::string& payload);
+void append_timings(const Update& update, std::string& payload);
 std::string encode(const Error& error);
 std::string encode(const Subscription& subscription);
 std::string encode(const SessionState& state);

@@ -47,6 +47,13 @@ void set_timings(const StageTimings& timings, pb::StageTimings* out) {
   out->set_journal_ms(timings.journal_ms);
 }
 
+void set_answer_time(const AnswerTime& time, pb::Update& out) {
+  if (time.ms == 0.0) return;
+  out.mutable_answer_time()->set_ms(time.ms);
+  out.mutable_answer_time()->set_usual_ms(time.usual_ms);
+  out.mutable_answer_time()->set_late(time.late());
+}
+
 void set_source(const SourceSummary& source, pb::SourceSummary* out) {
   out->set_source(to_utf8(source.source));
   out->set_observation_sequence(source.observation_sequence);
@@ -87,6 +94,14 @@ StageTimings get_timings(const pb::StageTimings& message, Checked& checked) {
           checked.non_negative(message.rebuild_ms(), "update.timings.rebuild_ms"),
           checked.non_negative(message.encode_ms(), "update.timings.encode_ms"),
           checked.non_negative(message.journal_ms(), "update.timings.journal_ms")};
+}
+
+AnswerTime get_answer_time(const pb::AnswerTime& message, Checked& checked) {
+  const AnswerTime time{checked.non_negative(message.ms(), "update.answer_time.ms"),
+                        checked.non_negative(message.usual_ms(), "update.answer_time.usual_ms")};
+  checked.require(message.late() == time.late(), "update.answer_time.late",
+                  "does not follow from ms and usual_ms");
+  return time;
 }
 
 IterationRecord get_iteration(const pb::Iteration& message, Checked& checked) {
@@ -200,6 +215,7 @@ Update get_envelope(const pb::Update& message, Checked& checked) {
   update.boundary = boundary.value_or(Boundary::kContact);
   update.final = message.final();
   update.timings = get_timings(message.timings(), checked);
+  update.answer_time = get_answer_time(message.answer_time(), checked);
   if (message.has_t_undeformed_deformed()) {
     update.T_undeformed_deformed =
         checked.rigid(message.t_undeformed_deformed(), "update.t_undeformed_deformed");
@@ -210,7 +226,7 @@ Update get_envelope(const pb::Update& message, Checked& checked) {
   return update;
 }
 
-// All but the timings.
+// All but timings and answer_time.
 pb::Update to_message(const UpdateMessage& message) {
   const Update& update = message.update;
   pb::Update out;
@@ -250,11 +266,12 @@ pb::Update to_message(const UpdateMessage& message) {
 std::string encode(const UpdateMessage& message) {
   pb::Update out = to_message(message);
   set_timings(message.update.timings, out.mutable_timings());
+  set_answer_time(message.update.answer_time, out);
   return out.SerializeAsString();
 }
 
 std::string encode_without_timings(const UpdateMessage& message) {
-  constexpr std::size_t kTimingsBytes = 64;  // five doubles and their tags take 49 at most
+  constexpr std::size_t kTimingsBytes = 96;  // seven doubles, a bool and their tags take 73 at most
   const pb::Update out = to_message(message);
   std::string payload;
   payload.reserve(out.ByteSizeLong() + kTimingsBytes);
@@ -262,9 +279,10 @@ std::string encode_without_timings(const UpdateMessage& message) {
   return payload;
 }
 
-void append_timings(const StageTimings& timings, std::string& payload) {
+void append_timings(const Update& update, std::string& payload) {
   pb::Update only;
-  set_timings(timings, only.mutable_timings());
+  set_timings(update.timings, only.mutable_timings());
+  set_answer_time(update.answer_time, only);
   only.AppendToString(&payload);
 }
 

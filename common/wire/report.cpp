@@ -111,6 +111,7 @@ std::string encode(const DaemonReport& report) {
   message.set_limit_ms(report.limit_ms);
   message.set_usable(report.usable);
   message.set_unusable(report.unusable);
+  message.set_late(report.late);
   message.set_failures(report.failures);
   message.set_iterates(report.iterates);
   for (const SourceCounts& source : report.sources) set(source, message.add_sources());
@@ -146,6 +147,7 @@ Result<DaemonReport> decode_report(std::string_view payload) {
   report.limit_ms = checked.non_negative(message.limit_ms(), "report.limit_ms");
   report.usable = message.usable();
   report.unusable = message.unusable();
+  report.late = message.late();
   report.failures = message.failures();
   report.iterates = message.iterates();
   for (const auto& source : message.sources()) {

@@ -100,6 +100,7 @@ struct DaemonReport {
   double limit_ms = 0.0;    // above this the worker hangs
   std::uint64_t usable = 0;
   std::uint64_t unusable = 0;
+  std::uint64_t late = 0;  // of both: AnswerTime::late
   std::uint64_t failures = 0;
   std::uint64_t iterates = 0;
   std::vector<SourceCounts> sources = {};

@@ -69,6 +69,7 @@ void Counters::answered(const Passage& passage) {
       milliseconds(passage.published - passage.arrived)};
   const std::lock_guard lock(mutex_);
   ++(passage.usable ? usable_ : unusable_);
+  if (passage.late) ++late_;
   for (std::size_t i = 0; i < stages_.size(); ++i) stages_[i].add(stages_ms[i]);
 }
 
@@ -89,6 +90,7 @@ void Counters::report(wire::DaemonReport& report, TimePoint now) const {
     const std::lock_guard lock(mutex_);
     report.usable = usable_;
     report.unusable = unusable_;
+    report.late = late_;
     report.failures = failures_;
     report.iterates = iterates_;
     rows = rows_;

@@ -37,6 +37,7 @@ struct Passage {
   TimePoint published;  // handed to the transport
   StageTimings timings;
   bool usable = false;
+  bool late = false;  // AnswerTime::late
 };
 
 class Counters {
@@ -79,6 +80,7 @@ class Counters {
   std::vector<Row> rows_;
   std::uint64_t usable_ = 0;
   std::uint64_t unusable_ = 0;
+  std::uint64_t late_ = 0;
   std::uint64_t failures_ = 0;
   std::uint64_t iterates_ = 0;
   Stages stages_;

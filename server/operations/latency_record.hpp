@@ -29,6 +29,9 @@ class LatencyRecord {
   wire::LatencyFigures recent() const;
   wire::LatencyFigures all() const;
   double sum_ms() const { return sum_ms_; }
+  std::uint64_t count() const { return count_; }
+  // Of all values, within 1 %; 0 without any. q in [0, 1].
+  double quantile_ms(double q) const;
   // One more than the bounds; not cumulative.
   const std::array<std::uint64_t, kBounds_ms.size() + 1>& buckets() const { return coarse_; }
 
@@ -39,7 +42,6 @@ class LatencyRecord {
 
   static std::size_t bucket_of(std::uint64_t nanoseconds);
   static double middle_ms(std::size_t bucket);
-  double quantile_ms(double q) const;
 
   std::array<std::uint32_t, kBuckets> fine_{};
   std::array<std::uint64_t, kBounds_ms.size() + 1> coarse_{};

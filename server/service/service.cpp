@@ -70,8 +70,9 @@ Service::Service(ServiceOptions options, Outbox& outbox)
     hooks.on_ready = [this](const auto& request, const auto& info) {
       begin_journal(request, info);
     };
-    hooks.publish = [this](wire::UpdateMessage message) { publish(std::move(message)); };
-    hooks.published = [this](auto arrived, auto begun) { count_update(arrived, begun); };
+    hooks.publish = [this](wire::UpdateMessage message, const Handled& handled) {
+      publish(std::move(message), handled);
+    };
     hooks.decided = [this](const wire::Decision& decision) {
       counters_.decided(decision);
       record_decision(decision);
@@ -248,7 +249,8 @@ void Service::record_decision(const wire::Decision& decision) {
       record(io::RecordKind::kDecision, decision.observation_sequence, wire::encode(decision)));
 }
 
-void Service::publish(wire::UpdateMessage message) {
+void Service::publish(wire::UpdateMessage message, const Handled& handled) {
+  using Clock = std::chrono::steady_clock;
   Update& update = message.update;
   const bool estimated = update.final && !message.error;
   if (journal_) {
@@ -263,7 +265,13 @@ void Service::publish(wire::UpdateMessage message) {
     update.timings.encode_ms = encoding.milliseconds();
     update.timings.journal_ms = journal_ms_;
   }
-  wire::append_timings(update.timings, payload);
+  if (update.final) {
+    const double ms =
+        std::chrono::duration<double, std::milli>(Clock::now() - handled.arrived).count();
+    update.answer_time = {ms, usual_time_.of(message.session_id)};
+    if (estimated) usual_time_.add(ms);
+  }
+  wire::append_timings(update, payload);
   auto frame =
       std::make_shared<const std::string>(wire::encode_frame(MessageType::kUpdate, 0, payload));
   if (estimated && journal_) {
@@ -280,9 +288,11 @@ void Service::publish(wire::UpdateMessage message) {
   outbox_.post({delivery, {}, std::move(frame), message.session_id});
   if (!update.final) {
     counters_.iterate();
+  } else if (!estimated) {
+    counters_.failed();
   } else {
-    passage_.reset();
-    if (estimated) passage_ = Passage{{}, {}, {}, update.timings, update.usable()};
+    counters_.answered({handled.arrived, handled.begun, Clock::now(), update.timings,
+                        update.usable(), update.answer_time.late()});
   }
 }
 

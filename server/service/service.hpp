@@ -48,6 +48,7 @@
 #include "server/journal/journal.hpp"
 #include "server/operations/counters.hpp"
 #include "server/operations/service_manager.hpp"
+#include "server/operations/usual_time.hpp"
 #include "server/session/session.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
@@ -99,8 +100,7 @@ class Service final : public RequestHandler {
   wire::DaemonStatus status() const;
   std::optional<wire::JournalFigures> journal_figures() const;
   void begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info);
-  void publish(wire::UpdateMessage message);
-  void count_update(Passage::TimePoint arrived, Passage::TimePoint begun);
+  void publish(wire::UpdateMessage message, const Handled& handled);
   void record_decision(const wire::Decision& decision);
 
   const ServiceOptions options_;  // boot_id is set
@@ -111,8 +111,7 @@ class Service final : public RequestHandler {
   std::string encoded_model_;             // made once, on the first request
   std::optional<Selections> selections_;  // empty without a model; of the transport thread
   Counters counters_;
-  // Of the update that the worker published last; none when that had no estimate.
-  std::optional<Passage> passage_;  // worker only
+  UsualTime usual_time_;  // worker only
   mutable std::mutex viewers_mutex_;
   std::vector<wire::ViewerFigures> viewers_;  // `peer` holds the routing id as it is
   std::uint32_t clients_ = 0;

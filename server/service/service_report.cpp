@@ -57,14 +57,6 @@ void Service::turned(const Peers& peers) {
   if (options_.on_turn) options_.on_turn();
 }
 
-void Service::count_update(Passage::TimePoint arrived, Passage::TimePoint begun) {
-  if (!passage_) return counters_.failed();
-  passage_->arrived = arrived;
-  passage_->begun = begun;
-  passage_->published = std::chrono::steady_clock::now();
-  counters_.answered(*passage_);
-}
-
 WorkerHealth Service::worker_health() const {
   WorkerHealth health;
   health.limit = ServiceManager::kGrace;

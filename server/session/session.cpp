@@ -343,7 +343,7 @@ void Session::begin(Prepared prepared) {
 }
 
 void Session::process(const Box& box) {
-  const TimePoint begun = std::chrono::steady_clock::now();
+  const Handled handled{box.arrived, std::chrono::steady_clock::now()};
   const Observation& observation = box.observation;
   SessionKey key;
   wire::SessionRequest request;
@@ -365,7 +365,7 @@ void Session::process(const Box& box) {
   if (request.publish_iterates) {
     options.on_iterate = [&](Update iterate) {
       iterate.sequence = number;
-      hooks_.publish({key.session_id, std::move(iterate), std::nullopt, boot_id_});
+      hooks_.publish({key.session_id, std::move(iterate), std::nullopt, boot_id_}, handled);
     };
   }
   auto result = guarded(ErrorCode::kInternal, kUnexpected,
@@ -388,8 +388,7 @@ void Session::process(const Box& box) {
   message.update.sequence = number;
   const auto phase = state().shared.phase;
   if (!finish(box, message, options.stop)) return;
-  hooks_.publish(std::move(message));
-  if (hooks_.published) hooks_.published(box.arrived, begun);
+  hooks_.publish(std::move(message), handled);
   if (state().shared.phase != phase) changed();
 }
 

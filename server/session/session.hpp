@@ -58,18 +58,21 @@ struct SessionModel {
 using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
     const wire::SessionRequest&, const std::stop_token&)>;
 
-// Called one at a time, but for on_change and decided.
-struct SessionHooks {
+// The way of an observation to its answer, monotonic clock.
+struct Handled {
   using TimePoint = std::chrono::steady_clock::time_point;
 
+  TimePoint arrived;  // at the session
+  TimePoint begun;    // by the worker
+};
+
+// Called one at a time, but for on_change and decided.
+struct SessionHooks {
   MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
   std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
-  // An iterate, a final update, or the error that an observation ended in.
-  std::function<void(wire::UpdateMessage)> publish;
-  // On the worker, after `publish` of a final update: when its observation arrived, and when the
-  // worker began with it. May be empty.
-  std::function<void(TimePoint arrived, TimePoint begun)> published;
+  // On the worker: an iterate, a final update, or the error that an observation ended in.
+  std::function<void(wire::UpdateMessage, const Handled&)> publish;
   // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
   // thread, after the update that changed it. May be empty.
   std::function<void()> on_change;

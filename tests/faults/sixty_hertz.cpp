@@ -23,16 +23,12 @@ constexpr double kHertz = 60.0;
 // Memory is looked at from here on: before, caches fill.
 constexpr double kSettled = 0.2;  // share of the time
 
-// The daemon marks what took it too long with this flag.
-bool is_marked_late(const Update& update) {
-  return update.estimate.quality.flags.has(QualityFlag::kDeadline);
-}
-
 struct Account {
   std::map<std::uint64_t, Clock::time_point> sent;  // not answered yet, by sequence
   long received = 0, answered = 0, replaced = 0, refused = 0;
-  std::vector<double> ages_ms;  // of the fields, when they arrived
-  std::vector<bool> marked;     // as late, by the daemon
+  std::vector<double> ages_ms;    // of the fields, when they arrived
+  std::vector<bool> marked;       // as late, by the daemon
+  std::vector<double> beyond_ms;  // of these ages, what lies outside the daemon's own account
 
   void take(const wire::UpdateMessage& message) {
     if (!message.update.final) return;
@@ -40,8 +36,10 @@ struct Account {
     if (found == sent.end()) return;
     ++answered;
     if (!message.error) {
+      const AnswerTime& answer = message.update.answer_time;
       ages_ms.push_back(Seconds(Clock::now() - found->second).count() * 1e3);
-      marked.push_back(is_marked_late(message.update));
+      marked.push_back(answer.late());
+      beyond_ms.push_back(ages_ms.back() - answer.ms);
     }
     sent.erase(found);
   }
@@ -128,6 +126,10 @@ void run_sixty_hertz(const Settings& settings, Tally& tally) {
   tally.shown("age of a field p50 ms", p50);
   tally.shown("age of a field p99 ms", quantile(account.ages_ms, 0.99));
   tally.shown("age of a field largest ms", quantile(account.ages_ms, 1.0));
+  tally.shown("fields marked late",
+              double(std::count(account.marked.begin(), account.marked.end(), true)));
+  tally.shown("age outside the daemon p50 ms", quantile(account.beyond_ms, 0.5));
+  tally.shown("age outside the daemon largest ms", quantile(account.beyond_ms, 1.0));
   tally.time_at_most("fields older than 3 x p50 and not marked late",
                      old_and_unmarked(account, 3.0 * p50), 0.0);
   const double grown_mib = x.size() > 1 ? slope(x, y) * (x.back() - x.front()) : 0.0;

@@ -294,6 +294,17 @@ def test_silence_and_absence_are_refused():
     assert not may_be_shown(None, None, "", 0.1, 3.0, 0.0).show
 
 
+def test_a_late_answer_is_amber():
+    late = label(flags="late")
+    assert judge(late, late).light is Light.AMBER
+    assert "late" in judge(late, late).reason
+    both = label(quality="caution", flags="deadline+late", reason="time ran out")
+    assert judge(both, both).light is Light.AMBER
+    assert "late" in judge(both, both).reason and "time ran out" in judge(both, both).reason
+    unrelated = label(flags="latent")
+    assert judge(unrelated, unrelated).light is Light.GREEN
+
+
 def test_a_reservation_is_amber_with_its_reason():
     assert judge(label(quality="caution"), label(quality="caution", reason="few data")).reason == "few data"
     assert judge(label(quality="caution", flags="a+b"), label(quality="caution", flags="a+b")).light is Light.AMBER

@@ -19,13 +19,13 @@ from .client import Client, connect
 from .errors import Error, ProtocolError, Unavailable
 from .keys import Keys, read_keys
 from .surgery import Surgery
-from .values import (Ball, Choice, Contact, CorticalSurface, Currency, FieldStatus, LandmarkPairs, MeanStd, Model,
+from .values import (AnswerTime, Ball, Choice, Contact, CorticalSurface, Currency, FieldStatus, LandmarkPairs, MeanStd, Model,
                      NearTumour, Observation, Omission, PatientPose, Phase, PriorStrength, Quality, QualityFlag,
                      Receipt, Session, SessionKey, SessionState, SourceSummary, Status, Surface, Timings,
                      TumourBoundary, Update)
 
 __all__ = [
-    "Ball", "Choice", "Client", "Contact", "CorticalSurface", "Currency", "Error", "FieldStatus", "Keys",
+    "AnswerTime", "Ball", "Choice", "Client", "Contact", "CorticalSurface", "Currency", "Error", "FieldStatus", "Keys",
     "LandmarkPairs", "MeanStd", "Model", "NearTumour", "Observation", "Omission", "PatientPose", "Phase",
     "PriorStrength", "ProtocolError", "Quality", "QualityFlag", "Receipt", "Session", "SessionKey", "SessionState",
     "SourceSummary", "Status", "Surface", "Surgery", "Timings", "TumourBoundary", "Unavailable", "Update", "connect",

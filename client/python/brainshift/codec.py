@@ -243,6 +243,7 @@ def update(payload: bytes) -> v.Update:
         initial_misfit=_mean_std(m, "initial_misfit"), misfit=_mean_std(m, "misfit"),
         timings=v.Timings(timings.register_ms, timings.invert_ms, timings.rebuild_ms, timings.encode_ms,
                           timings.journal_ms),
+        answer_time=v.AnswerTime(m.answer_time.ms, m.answer_time.usual_ms, m.answer_time.late),
         left_out=tuple(v.Omission(o.part, o.reason, o.estimated_error) for o in m.left_out),
         sources=tuple(_source(s) for s in m.sources),
         prior_strengths=tuple(v.PriorStrength(s.part, s.mean, s.absent, s.at_bound) for s in m.prior_strengths),

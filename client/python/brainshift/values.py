@@ -246,6 +246,15 @@ class Timings:
 
 
 @dataclass(frozen=True)
+class AnswerTime:
+    """From the arrival of the observation at the daemon until its answer was encoded."""
+
+    ms: float
+    usual_ms: float  # median over the earlier answers of the session; 0: too few yet
+    late: bool  # ms > 3 usual_ms: the brain may have moved since
+
+
+@dataclass(frozen=True)
 class Omission:
     part: str
     reason: str
@@ -298,6 +307,7 @@ class Update:
     initial_misfit: Optional[MeanStd]
     misfit: Optional[MeanStd]
     timings: Timings
+    answer_time: AnswerTime
     left_out: tuple[Omission, ...]
     sources: tuple[SourceSummary, ...]
     prior_strengths: tuple[PriorStrength, ...]

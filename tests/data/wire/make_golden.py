@@ -88,7 +88,8 @@ SCHEMA = {
         "quality_flags": (23, "*int"), "quality_reason": (24, "text"),
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
-        "boot_id": (31, "fixed"), "part": (32, "FieldPart")},
+        "boot_id": (31, "fixed"), "part": (32, "FieldPart"), "answer_time": (33, "AnswerTime")},
+    "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int")},
     "LatencyFigures": {
         "count": (1, "int"), "p50_ms": (2, "double"), "p95_ms": (3, "double"), "p99_ms": (4, "double"),
         "max_ms": (5, "double")},
@@ -117,7 +118,7 @@ SCHEMA = {
         "sources": (17, "*SourceCounts"), "clients": (18, "int"), "viewers": (19, "*ViewerFigures"),
         "recent_updates": (20, "int"), "bounds_ms": (21, "*double"), "stages": (22, "*StageLatency"),
         "journal": (23, "JournalFigures"), "log_lines_lost": (24, "int"),
-        "process": (25, "ProcessFigures")},
+        "process": (25, "ProcessFigures"), "late": (26, "int")},
 }
 
 KEY = {"boot_id": 2**64 - 3, "session_id": 3, "model_id": "0123456789abcdef"}
@@ -217,7 +218,8 @@ MESSAGES = {
             "translation_mm": [0.5, -1.25, 3.3]},
         "left_out": [], "quality": 3, "quality_flags": [1, 17],
         "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
-        "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7}),
+        "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7,
+        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1}}),
     "update_changes": (12, 0, "Update", UPDATE | {
         "status": "converged", "reason": "contact holds", "quality": 1, "quality_flags": [],
         "quality_reason": "", "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]},
@@ -264,7 +266,8 @@ MESSAGES = {
                     "records": 41, "lost": 1},
         "log_lines_lost": 303,
         "process": {"resident_bytes": 2**32 + 1, "peak_bytes": 2**33 + 1, "descriptors": 31,
-                    "descriptor_limit": 1024, "threads": 9}}),
+                    "descriptor_limit": 1024, "threads": 9},
+        "late": 5}),
 }
 
 

@@ -38,5 +38,14 @@ TEST(Estimate, HasNotRunByDefault) {
   EXPECT_TRUE(std::isnan(Estimate{}.min_volume_ratio));
 }
 
+TEST(AnswerTime, IsLateBeyondThreeTimesTheUsual) {
+  EXPECT_FALSE((AnswerTime{300.0, 100.0}.late()));
+  EXPECT_TRUE((AnswerTime{300.5, 100.0}.late()));
+  EXPECT_FALSE((AnswerTime{1e6, 0.0}.late())) << "nothing is usual yet";
+  EXPECT_FALSE(AnswerTime{}.late());
+  EXPECT_EQ(sentence({812.4, 34.25}),
+            "answered 812.4 ms after its observation came, usually 34.2 ms");
+}
+
 }  // namespace
 }  // namespace brainshift

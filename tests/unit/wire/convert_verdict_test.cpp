@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Verdicts and strengths that a receiver must reject. Round trips: round_trip_test.cpp.
+#include <cmath>
 #include <limits>
 
 #include "brainshift/v1/brainshift.pb.h"
@@ -43,6 +44,20 @@ TEST(VerdictRefusal, VerdictsThatAreUnknownOrContradictTheirFlags) {
     m.set_error_code("internal");
     m.clear_displacement();
   });
+}
+
+TEST(VerdictRefusal, AMarkThatDoesNotFollowFromItsTimes) {
+  const auto expect = [](const char* text, const std::function<void(pb::Update&)>& change) {
+    expect_refused(decode_changed_verdict(change), ErrorCode::kProtocol, text);
+  };
+  expect("update.answer_time.late: does not follow",
+         [](auto& m) { m.mutable_answer_time()->set_late(false); });
+  expect("update.answer_time.late: does not follow",
+         [](auto& m) { m.mutable_answer_time()->set_ms(3.0 * 34.25); });
+  expect("update.answer_time.ms: -1", [](auto& m) { m.mutable_answer_time()->set_ms(-1.0); });
+  expect_refused(
+      decode_changed_verdict([](auto& m) { m.mutable_answer_time()->set_usual_ms(std::nan("")); }),
+      ErrorCode::kNotFinite, "update.answer_time.usual_ms: is not finite");
 }
 
 TEST(VerdictRefusal, StrengthsOfUnknownMissingOrRepeatedParts) {

@@ -161,6 +161,11 @@ UpdateMessage update_from(const json& value) {
   const json& timings = value["timings"];
   update.timings = {timings["register_ms"], timings["invert_ms"], timings["rebuild_ms"],
                     timings["encode_ms"], timings["journal_ms"]};
+  if (value.contains("answer_time")) {
+    const json& time = value["answer_time"];
+    update.answer_time = {time["ms"], time["usual_ms"]};
+    EXPECT_EQ(time["late"] == 1, update.answer_time.late());
+  }
   if (value["status"] == "failed") {
     EXPECT_EQ(value["error_code"], "empty_set");
     message.error = Error{ErrorCode::kEmptySet, value["reason"]};
@@ -248,7 +253,8 @@ DaemonReport report_from(const json& value) {
                       value["owner"],      value["max_age_s"],
                       value["working_ms"], value["limit_ms"],
                       value["usable"],     value["unusable"],
-                      value["failures"],   value["iterates"]};
+                      value["late"],       value["failures"],
+                      value["iterates"]};
   for (const json& counts : value["sources"]) {
     report.sources.push_back({counts["source"], counts["received"], counts["answered"],
                               counts["failed"], counts["replaced"], counts["skipped"],

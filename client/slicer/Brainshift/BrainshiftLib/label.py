@@ -172,8 +172,13 @@ def may_be_shown(field: Optional[Label], state: Optional[Label], pinned_model: s
         return Verdict(Light.AMBER, "the next field is on its way")
     if state.currency != "current":
         return Verdict(Light.AMBER, state.reason or state.currency)
+    reasons = []
+    if "late" in field.flags.split("+"):
+        reasons.append("answered late: it took more than three times what is usual")
     if "caution" in (field.quality, state.quality):
-        return Verdict(Light.AMBER, state.reason or field.reason or state.flags or "to be used with caution")
+        reasons.append(state.reason or field.reason or state.flags or "to be used with caution")
+    if reasons:
+        return Verdict(Light.AMBER, "; ".join(reasons))
     return Verdict(Light.GREEN, "")
 
 

@@ -100,12 +100,15 @@ TEST(ShownState, TheStatusIsOkForACurrentUsableFieldAlone) {
 }
 
 TEST(ShownState, NamesEveryFlag) {
-  QualityFlags flags;
-  EXPECT_EQ(flag_names(flags), "");
-  flags.set(QualityFlag::kDeadline);
-  flags.set(QualityFlag::kInvertedElements);
-  EXPECT_EQ(flag_names(flags), std::string(to_string(QualityFlag::kDeadline)) + "+" +
-                                   std::string(to_string(QualityFlag::kInvertedElements)));
+  Update update;
+  EXPECT_EQ(flag_names(update), "");
+  update.estimate.quality.flags.set(QualityFlag::kDeadline);
+  update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
+  EXPECT_EQ(flag_names(update), "deadline+inverted_elements");
+  update.answer_time = {301.0, 100.0};
+  EXPECT_EQ(flag_names(update), "deadline+inverted_elements+late");
+  update.estimate.quality.flags = {};
+  EXPECT_EQ(flag_names(update), "late");
 }
 
 }  // namespace

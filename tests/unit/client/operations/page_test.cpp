@@ -38,10 +38,11 @@ TEST(Page, HoldsWhatTheReportHolds) {
   for (const char* part :
        {"1.2.3 at tcp://127.0.0.1:5555, up 1 h 2 min", "verdict   well",
         "case colin27, model 0123456789abcdef", "tracking, session 3, owner 00ab12cd34",
-        "update 812, 0.2 s old", "812 usable, 1 unusable, 3 failed", "2 connected, 1 of them view",
-        "window 1, sent 800, received 799, owed 1", "recording", "/j/colin27-3.surgery, 8.0 MiB",
-        "2500 records, 0 lost", "0 lines lost", "120.0 MiB resident, 140.0 MiB at most",
-        "31 of 1024 descriptors, 9 threads", "(not known)"}) {
+        "update 812, 0.2 s old", "812 usable, 1 unusable, 3 failed, 6 late",
+        "2 connected, 1 of them view", "window 1, sent 800, received 799, owed 1", "recording",
+        "/j/colin27-3.surgery, 8.0 MiB", "2500 records, 0 lost", "0 lines lost",
+        "120.0 MiB resident, 140.0 MiB at most", "31 of 1024 descriptors, 9 threads",
+        "(not known)"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
   EXPECT_THAT(text, testing::ContainsRegex("total +31.50 +40.25 +55.00 +90.12 +31.00 +40.00"));

@@ -23,6 +23,7 @@ inline wire::DaemonReport sample_report() {
   report.limit_ms = 13'000.0;
   report.usable = 812;
   report.unusable = 1;
+  report.late = 6;
   report.failures = 3;
   report.sources = {{"ius", 900, 813, 3, 80, 0, 4, 0, 0, 33.0}, {"", 2, 0, 0, 0, 0, 2, 0, 0, 9e4}};
   report.clients = 2;

@@ -16,7 +16,9 @@ namespace brainshift::client {
 namespace {
 
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 using wire::MessageType;
 
@@ -70,6 +72,19 @@ TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   EXPECT_TRUE(json.at("age_s").is_null());
   EXPECT_TRUE(json.at("tumour_mm").is_null());
   EXPECT_EQ(json.at("received_nodes"), 2);
+}
+
+TEST(Watch, ALateAnswerIsMarked) {
+  wire::UpdateMessage message = update(12, 3);
+  message.update.answer_time = {250.0, 50.0};
+  WatchedUpdate told = watched(message, {}, 3);
+  EXPECT_THAT(watch_line(told, false),
+              EndsWith("  LATE: answered 250 ms after its observation came, usually 50 ms"));
+  EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), true);
+  message.update.answer_time = {150.0, 50.0};
+  told = watched(message, {}, 3);
+  EXPECT_THAT(watch_line(told, false), Not(HasSubstr("LATE")));
+  EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), false);
 }
 
 TEST(Watch, AFailureSaysWhy) {

@@ -87,12 +87,14 @@ TEST_F(CountersTest, StagesAreThoseOfTheUpdateAndItsWay) {
   passage.usable = true;
   counters_.answered(passage);
   passage.usable = false;
+  passage.late = true;
   counters_.answered(passage);
   counters_.failed();
   counters_.iterate();
   const auto result = report();
   EXPECT_EQ(result.usable, 1u);
   EXPECT_EQ(result.unusable, 1u);
+  EXPECT_EQ(result.late, 1u);
   EXPECT_EQ(result.failures, 1u);
   EXPECT_EQ(result.iterates, 1u);
   const std::vector<std::pair<std::string, double>> expected = {

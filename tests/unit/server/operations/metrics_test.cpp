@@ -35,6 +35,7 @@ wire::DaemonReport sample_report() {
     passage.published = passage.arrived + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                               std::chrono::duration<double, std::milli>(total_ms));
     passage.usable = true;
+    passage.late = total_ms > 100.0;
     counters.answered(passage);
   }
   counters.report(report, now);
@@ -53,6 +54,7 @@ TEST(Metrics, CarryWhatTheReportSaysInSecondsAndBytes) {
   EXPECT_EQ(read.value("brainshift_session_phase{phase=\"tracking\"}"), 0.0);
   EXPECT_EQ(read.value("brainshift_field_age_seconds"), 1.25);
   EXPECT_EQ(read.value("brainshift_updates_total{result=\"usable\"}"), 4.0);
+  EXPECT_EQ(read.value("brainshift_updates_late_total"), 1.0);
   EXPECT_EQ(read.value("brainshift_observations_received_total{source=\"ius\"}"), 2.0);
   EXPECT_EQ(read.value("brainshift_observations_total{source=\"ius\",outcome=\"refused\"}"), 1.0);
   EXPECT_EQ(read.value("brainshift_observations_waiting{source=\"a \\\"quoted\\\\\\\" one\"}"),

@@ -3,16 +3,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "common/core/stopwatch.hpp"
 #include "common/wire/decision.hpp"
+#include "server/operations/usual_time.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -31,6 +36,52 @@ MakeSessionModel second_update_fails() {
             }),
         request);
   };
+}
+
+// An inversion that lasts for at least as long as `at_least` says.
+MakeSessionModel lasting(const std::shared_ptr<std::atomic<double>>& at_least_ms) {
+  return [at_least_ms](const wire::SessionRequest& request, const std::stop_token&) {
+    return fake_session(
+        std::make_unique<FakeInverter>(
+            [at_least_ms](int, const SparseData& data, const auto&, Estimate& estimate) -> Status {
+              const Stopwatch watch;
+              while (watch.milliseconds() < *at_least_ms) std::this_thread::yield();
+              return follow_the_data(data, estimate, 4);
+            }),
+        request);
+  };
+}
+
+TEST_F(TransportTest, AnAnswerThatTookThreeTimesAsLongAsUsualIsMarkedLate) {
+  const auto at_least_ms = std::make_shared<std::atomic<double>>(0.0);
+  ServiceOptions options = with_model();
+  options.make_model = lasting(at_least_ms);
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  subscribe(peer);
+  const auto answer = [&](std::uint64_t sequence) {
+    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    return next_update(peer).update.answer_time;
+  };
+  double longest_ms = 0.0;
+  for (std::uint64_t sequence = 1; sequence <= UsualTime::kFew; ++sequence) {
+    const AnswerTime time = answer(sequence);
+    EXPECT_GT(time.ms, 0.0);
+    EXPECT_EQ(time.usual_ms, 0.0);
+    EXPECT_FALSE(time.late()) << "nothing is usual yet";
+    longest_ms = std::max(longest_ms, time.ms);
+  }
+  *at_least_ms = 3.1 * longest_ms;
+  const AnswerTime late = answer(UsualTime::kFew + 1);
+  EXPECT_GT(late.ms, 3.1 * longest_ms);
+  EXPECT_GT(late.usual_ms, 0.0);
+  EXPECT_LE(late.usual_ms, 1.01 * longest_ms);
+  EXPECT_TRUE(late.late());
+  // Another session begins with nothing usual, whatever the one before took.
+  start_session(peer);
+  peer.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
+  EXPECT_EQ(next_update(peer).update.answer_time.usual_ms, 0.0);
 }
 
 TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {

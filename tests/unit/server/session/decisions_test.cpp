@@ -28,7 +28,7 @@ class Decisions : public testing::Test {
                                                     const std::stop_token&) {
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
-    hooks.publish = [this](const wire::UpdateMessage& message) {
+    hooks.publish = [this](const wire::UpdateMessage& message, const Handled&) {
       const std::lock_guard lock(mutex_);
       told_.push_back("update " + std::to_string(message.update.sequence));
       changed_.notify_all();

@@ -130,7 +130,9 @@ TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
     return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
   };
   std::promise<wire::UpdateMessage> published;
-  hooks.publish = [&](wire::UpdateMessage message) { published.set_value(std::move(message)); };
+  hooks.publish = [&](wire::UpdateMessage message, const Handled&) {
+    published.set_value(std::move(message));
+  };
   Session session("toy", std::move(hooks), kBootId, kModelId);
   wire::SessionRequest request;
   request.case_id = "toy";

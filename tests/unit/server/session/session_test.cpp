@@ -66,7 +66,9 @@ class SessionTest : public testing::Test {
       prepared_boundaries_.push_back(request.boundary);
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
-    hooks.publish = [this](wire::UpdateMessage message) { published_.push(std::move(message)); };
+    hooks.publish = [this](wire::UpdateMessage message, const Handled&) {
+      published_.push(std::move(message));
+    };
     return hooks;
   }
 
