@@ -194,9 +194,11 @@ struct AnswerTime {
   double usual_ms = 0.0;  // median over the answers of the session before it; 0: too few yet
 
   // Later after its observation than navigation may take for granted: the brain may have moved
-  // since. Says nothing about the field itself, which its verdict is for.
+  // since. Says nothing about the field itself, which its verdict is for. Twice, so that no field
+  // that reaches its viewer later than three times the median of the whole session goes unmarked:
+  // delivery adds to the time, and the median moves.
   bool late() const { return usual_ms > 0.0 && ms > kLate * usual_ms; }
-  static constexpr double kLate = 3.0;
+  static constexpr double kLate = 2.0;
 };
 // "answered 812 ms after its observation came, usually 34 ms"
 std::string sentence(const AnswerTime& time);

@@ -77,7 +77,7 @@ void add_session(Families& out, const wire::DaemonReport& report) {
   add(updates, number(report.unusable), {{"result", "unusable"}});
   add(updates, number(report.failures), {{"result", "failed"}});
   out.counter("updates_late_total", number(report.late),
-              "Updates that took more than three times what is usual in their session.");
+              "Updates that took more than twice what is usual in their session.");
   out.counter("iterates_total", number(report.iterates), "Intermediate iterates published.");
 }
 

@@ -251,7 +251,7 @@ class AnswerTime:
 
     ms: float
     usual_ms: float  # median over the earlier answers of the session; 0: too few yet
-    late: bool  # ms > 3 usual_ms: the brain may have moved since
+    late: bool  # ms > 2 usual_ms: the brain may have moved since
 
 
 @dataclass(frozen=True)

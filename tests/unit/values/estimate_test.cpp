@@ -38,9 +38,9 @@ TEST(Estimate, HasNotRunByDefault) {
   EXPECT_TRUE(std::isnan(Estimate{}.min_volume_ratio));
 }
 
-TEST(AnswerTime, IsLateBeyondThreeTimesTheUsual) {
-  EXPECT_FALSE((AnswerTime{300.0, 100.0}.late()));
-  EXPECT_TRUE((AnswerTime{300.5, 100.0}.late()));
+TEST(AnswerTime, IsLateBeyondTwiceTheUsual) {
+  EXPECT_FALSE((AnswerTime{200.0, 100.0}.late()));
+  EXPECT_TRUE((AnswerTime{200.5, 100.0}.late()));
   EXPECT_FALSE((AnswerTime{1e6, 0.0}.late())) << "nothing is usual yet";
   EXPECT_FALSE(AnswerTime{}.late());
   EXPECT_EQ(sentence({812.4, 34.25}),

@@ -53,7 +53,7 @@ TEST(VerdictRefusal, AMarkThatDoesNotFollowFromItsTimes) {
   expect("update.answer_time.late: does not follow",
          [](auto& m) { m.mutable_answer_time()->set_late(false); });
   expect("update.answer_time.late: does not follow",
-         [](auto& m) { m.mutable_answer_time()->set_ms(3.0 * 34.25); });
+         [](auto& m) { m.mutable_answer_time()->set_ms(2.0 * 34.25); });
   expect("update.answer_time.ms: -1", [](auto& m) { m.mutable_answer_time()->set_ms(-1.0); });
   expect_refused(
       decode_changed_verdict([](auto& m) { m.mutable_answer_time()->set_usual_ms(std::nan("")); }),

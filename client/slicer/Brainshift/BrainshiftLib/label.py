@@ -174,7 +174,7 @@ def may_be_shown(field: Optional[Label], state: Optional[Label], pinned_model: s
         return Verdict(Light.AMBER, state.reason or state.currency)
     reasons = []
     if "late" in field.flags.split("+"):
-        reasons.append("answered late: it took more than three times what is usual")
+        reasons.append("answered late: it took more than twice what is usual")
     if "caution" in (field.quality, state.quality):
         reasons.append(state.reason or field.reason or state.flags or "to be used with caution")
     if reasons:

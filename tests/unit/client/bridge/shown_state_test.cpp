@@ -105,7 +105,7 @@ TEST(ShownState, NamesEveryFlag) {
   update.estimate.quality.flags.set(QualityFlag::kDeadline);
   update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
   EXPECT_EQ(flag_names(update), "deadline+inverted_elements");
-  update.answer_time = {301.0, 100.0};
+  update.answer_time = {201.0, 100.0};
   EXPECT_EQ(flag_names(update), "deadline+inverted_elements+late");
   update.estimate.quality.flags = {};
   EXPECT_EQ(flag_names(update), "late");

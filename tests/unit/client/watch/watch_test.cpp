@@ -81,7 +81,7 @@ TEST(Watch, ALateAnswerIsMarked) {
   EXPECT_THAT(watch_line(told, false),
               EndsWith("  LATE: answered 250 ms after its observation came, usually 50 ms"));
   EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), true);
-  message.update.answer_time = {150.0, 50.0};
+  message.update.answer_time = {100.0, 50.0};
   told = watched(message, {}, 3);
   EXPECT_THAT(watch_line(told, false), Not(HasSubstr("LATE")));
   EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), false);
