@@ -95,6 +95,17 @@ void surfaces(const Seeds& seeds) {
   seeds.write("surface", "text.stl",
               "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
               "vertex 0 1 0\nendloop\nendfacet\nendsolid s\n");
+  seeds.write("surface", "lps.stl",
+              "solid 3D Slicer output. SPACE=LPS\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"
+              "vertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+  seeds.write(
+      "surface", "lps.vtp",
+      "<VTKFile type=\"PolyData\"><PolyData><FieldData><Array type=\"String\" Name=\"SPACE\" "
+      "NumberOfTuples=\"1\" format=\"ascii\">76 80 83 0</Array></FieldData><Piece "
+      "NumberOfPoints=\"3\" NumberOfPolys=\"1\"><Points><DataArray type=\"Float32\" "
+      "NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0</DataArray></Points><Polys><DataArray "
+      "type=\"Int32\" Name=\"connectivity\">0 1 2</DataArray><DataArray type=\"Int32\" "
+      "Name=\"offsets\">3</DataArray></Polys></Piece></PolyData></VTKFile>\n");
   std::string binary(80, ' ');
   const std::uint32_t count = 1;
   const float facet[12] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};

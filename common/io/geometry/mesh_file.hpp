@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes and surfaces from files, by the extension of the name; everything in mm RAS.
+// Meshes and surfaces from files, by the extension of the name; everything in mm RAS. A VTK file
+// whose array SPACE, or an STL, PLY or OBJ file whose heading or comment (SPACE=LPS, as 3D Slicer
+// writes it) says LPS is turned into RAS; a file that says nothing is taken for RAS; kUnreadable
+// names any other value.
 #pragma once
 
 #include <filesystem>
@@ -33,7 +36,8 @@ Result<TriangleSurface> read_surface(const std::filesystem::path& path);
 Result<TriangleSurface> read_surface_or_points(const std::filesystem::path& path);
 
 // A VTU's mesh with all of its point arrays that are float or double, in file order. Keeps
-// unreferenced nodes, so that node i is the file's point i.
+// unreferenced nodes, so that node i is the file's point i. An array of three components is taken
+// for vectors, which turn with the points.
 Result<MeshWithFields> read_vtu(const std::filesystem::path& path);
 
 // Lower-case, with its dot.

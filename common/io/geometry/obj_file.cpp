@@ -5,6 +5,8 @@
 #include <sstream>
 #include <vector>
 
+#include "common/io/files/point_space.hpp"
+
 namespace brainshift::io {
 namespace {
 
@@ -24,12 +26,17 @@ Result<TriangleSurface> parse_obj(const std::string& content) {
   std::istringstream lines(content);
   std::vector<double> coordinates;
   std::vector<int> corners;
+  PointSpace space = PointSpace::kUnsaid;
   std::string text;
   for (int line = 1; std::getline(lines, text); ++line) {
     std::istringstream words(text);
     std::string first;
     words >> first;
-    if (first == "v") {
+    if (!first.empty() && first.front() == '#' && space == PointSpace::kUnsaid) {
+      const Result<PointSpace> said = point_space_in(text);
+      if (!said) return at_line(line, said.error().message);
+      space = *said;
+    } else if (first == "v") {
       double x = 0.0;
       double y = 0.0;
       double z = 0.0;
@@ -56,6 +63,7 @@ Result<TriangleSurface> parse_obj(const std::string& content) {
   TriangleSurface surface;
   surface.vertices = Eigen::Map<const Points>(coordinates.data(), 3,
                                               static_cast<Eigen::Index>(coordinates.size() / 3));
+  turn_to_ras(space, surface.vertices);
   surface.triangles = Eigen::Map<const Eigen::Matrix<int, 3, Eigen::Dynamic>>(
       corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
   return surface;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/io/files/binary_codec.hpp"
+#include "common/io/files/point_space.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -34,6 +35,7 @@ struct Element {
 
 struct Header {
   std::string format;
+  PointSpace space = PointSpace::kUnsaid;
   std::vector<Element> elements;
 };
 
@@ -51,6 +53,11 @@ Header read_header(std::string_view& rest) {
     std::string first;
     words >> first;
     if (first == "format") words >> header.format;
+    if (first == "comment" && header.space == PointSpace::kUnsaid) {
+      const Result<PointSpace> said = point_space_in(line);
+      if (!said) refuse(said.error().message);
+      header.space = *said;
+    }
     if (first == "element") {
       Element element;
       if (!(words >> element.name >> element.count)) refuse("element without a count: " + line);
@@ -166,6 +173,7 @@ TriangleSurface read_ply(std::string_view rest) {
       }
     }
   }
+  turn_to_ras(header.space, surface.vertices);
   return surface;
 }
 

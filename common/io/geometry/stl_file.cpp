@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/io/files/binary_codec.hpp"
+#include "common/io/files/point_space.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -108,15 +109,28 @@ Result<TriangleSurface> parse_ascii(std::string_view text) {
   return builder.surface();
 }
 
+Result<TriangleSurface> as_ras(Result<TriangleSurface> surface, std::string_view heading) {
+  if (!surface) return surface;
+  const Result<PointSpace> space = point_space_in(heading.substr(0, heading.find('\0')));
+  if (!space) return tl::unexpected(space.error());
+  turn_to_ras(*space, surface->vertices);
+  return surface;
+}
+
 }  // namespace
 
 Result<TriangleSurface> parse_stl(const std::string& content) {
+  const std::string_view text(content);
   // A binary file may begin with "solid" too, so the size decides.
   if (content.size() >= kHeader) {
     const std::size_t triangles = load_number<std::uint32_t>(content.data() + 80, false);
-    if (content.size() == kHeader + triangles * kTriangle) return parse_binary(content, triangles);
+    if (content.size() == kHeader + triangles * kTriangle) {
+      return as_ras(parse_binary(content, triangles), text.substr(0, 80));
+    }
   }
-  if (content.rfind("solid", 0) == 0) return parse_ascii(content);
+  if (content.rfind("solid", 0) == 0) {
+    return as_ras(parse_ascii(content), text.substr(0, text.find('\n')));
+  }
   return fail(ErrorCode::kUnreadable,
               "is neither an ASCII STL nor a binary one of the promised size");
 }

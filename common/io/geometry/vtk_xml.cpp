@@ -121,6 +121,7 @@ Result<std::string> read_block(ByteSource& source, const Encoding& encoding) {
 struct VtkXmlFile::Impl {
   std::string content;
   pugi::xml_document xml;
+  pugi::xml_node grid;
   pugi::xml_node piece;
   Encoding encoding;
   std::string_view appended;  // after the underscore
@@ -134,10 +135,11 @@ struct VtkXmlFile::Impl {
     return nodes;
   }
   Result<std::string> bytes_of(const pugi::xml_node& node) const;
+  Result<std::string> text_of(const pugi::xml_node& node) const;
   Status fill(const pugi::xml_node& node, VtkArray& array) const;
   // Raw appended data are no XML, so they are cut out before parsing.
   Status cut_appended();
-  Status find_piece(const std::string& grid);
+  Status find_piece(const std::string& grid_name);
 };
 
 Status VtkXmlFile::Impl::cut_appended() {
@@ -154,12 +156,12 @@ Status VtkXmlFile::Impl::cut_appended() {
   return {};
 }
 
-Status VtkXmlFile::Impl::find_piece(const std::string& grid) {
+Status VtkXmlFile::Impl::find_piece(const std::string& grid_name) {
   const pugi::xml_node root = xml.child("VTKFile");
   if (!root) return unreadable("is not a VTK XML file");
-  if (root.attribute("type").as_string() != grid) {
+  if (root.attribute("type").as_string() != grid_name) {
     return unreadable("holds '" + std::string(root.attribute("type").as_string()) + "': must be '" +
-                      grid + "'");
+                      grid_name + "'");
   }
   const std::string compressor = root.attribute("compressor").as_string();
   if (!compressor.empty() && compressor != "vtkZLibDataCompressor") {
@@ -170,7 +172,8 @@ Status VtkXmlFile::Impl::find_piece(const std::string& grid) {
   encoding.swap = big == (std::endian::native == std::endian::little);
   encoding.wide_header = std::string(root.attribute("header_type").as_string("UInt32")) == "UInt64";
   encoding.compressed = !compressor.empty();
-  piece = root.child(grid.c_str()).child("Piece");
+  grid = root.child(grid_name.c_str());
+  piece = grid.child("Piece");
   if (!piece) return unreadable("has no Piece");
   if (piece.next_sibling("Piece")) return unreadable("has several pieces: must have one");
   return {};
@@ -192,6 +195,30 @@ Result<std::string> VtkXmlFile::Impl::bytes_of(const pugi::xml_node& node) const
   }
   Base64Source source(from);
   return read_block(source, encoding);
+}
+
+// VTK writes a text as the codes of its characters and a 0: as numbers (ascii) or as bytes.
+Result<std::string> VtkXmlFile::Impl::text_of(const pugi::xml_node& node) const {
+  const std::string type = node.attribute("type").as_string();
+  if (type != "String") return unreadable("has type '" + type + "': must be String");
+  std::string text;
+  if (std::string(node.attribute("format").as_string("ascii")) == "ascii") {
+    std::vector<int> codes;
+    if (!parse_numbers(std::string_view(node.text().get()), codes)) {
+      return unreadable("holds something that is not the code of a character");
+    }
+    for (const int code : codes) {
+      if (code < 0 || code > 255) return unreadable("holds a code that is no character");
+      text.push_back(static_cast<char>(code));
+    }
+  } else {
+    Result<std::string> bytes = bytes_of(node);
+    if (!bytes) return bytes;
+    text = std::move(*bytes);
+  }
+  if (!text.empty() && text.back() == '\0') text.pop_back();
+  if (text.find('\0') != std::string::npos) return unreadable("holds several texts: must be one");
+  return text;
 }
 
 Status VtkXmlFile::Impl::fill(const pugi::xml_node& node, VtkArray& array) const {
@@ -226,6 +253,16 @@ Result<VtkXmlFile> VtkXmlFile::parse(std::string content, const std::string& gri
   if (!parsed) return unreadable(std::string("is not well-formed XML: ") + parsed.description());
   if (Status found = impl->find_piece(grid); !found) return tl::unexpected(found.error());
   return VtkXmlFile(std::move(impl));
+}
+
+Result<std::optional<std::string>> VtkXmlFile::field_text(const std::string& name) const {
+  for (const pugi::xml_node& node : impl_->grid.child("FieldData").children()) {
+    if (node.attribute("Name").as_string() != name) continue;
+    Result<std::string> text = impl_->text_of(node);
+    if (!text) return unreadable("FieldData array '" + name + "' " + text.error().message);
+    return std::move(*text);
+  }
+  return std::nullopt;
 }
 
 Result<std::int64_t> VtkXmlFile::count(const std::string& attribute) const {

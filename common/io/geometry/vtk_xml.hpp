@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,10 @@ class VtkXmlFile {
   static Result<VtkXmlFile> parse(std::string content, const std::string& grid);
   VtkXmlFile(VtkXmlFile&&) noexcept;
   ~VtkXmlFile();
+
+  // The text of a string array of the field data; none without the array. kUnreadable for an array
+  // that is no text, or of several texts.
+  Result<std::optional<std::string>> field_text(const std::string& name) const;
 
   // An integer attribute of the piece, e.g. "NumberOfPoints"; 0 when absent, kUnreadable if no
   // count.

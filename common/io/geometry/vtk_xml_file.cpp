@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "common/io/files/point_space.hpp"
 #include "common/io/geometry/vtk_xml.hpp"
 
 namespace brainshift::io {
@@ -15,6 +16,12 @@ tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
 }
 
+Result<PointSpace> read_space(const VtkXmlFile& file) {
+  const Result<std::optional<std::string>> text = file.field_text("SPACE");
+  if (!text) return tl::unexpected(text.error());
+  return *text ? parse_point_space(**text) : PointSpace::kUnsaid;
+}
+
 Result<Points> read_points(const VtkXmlFile& file) {
   const Result<std::int64_t> count = file.count("NumberOfPoints");
   if (!count) return tl::unexpected(count.error());
@@ -23,7 +30,11 @@ Result<Points> read_points(const VtkXmlFile& file) {
   if (array->components != 3 || !array->is_real()) {
     return unreadable("Points must have three real components");
   }
-  return Points(Eigen::Map<const Points>(array->reals.data(), 3, *count));
+  const Result<PointSpace> space = read_space(file);
+  if (!space) return tl::unexpected(space.error());
+  Points points = Eigen::Map<const Points>(array->reals.data(), 3, *count);
+  turn_to_ras(*space, points);
+  return points;
 }
 
 // Cells as ranges of a connectivity list.
@@ -132,14 +143,17 @@ Result<MeshWithFields> parse_vtu(std::string content, bool with_fields) {
   if (!grouped) return tl::unexpected(grouped.error());
   MeshWithFields result{std::move(grouped->mesh), {}};
   if (!with_fields) return result;
+  const Result<PointSpace> space = read_space(*file);
+  if (!space) return tl::unexpected(space.error());
   const std::size_t arrays = file->array_names("PointData").size();
   for (std::size_t i = 0; i < arrays; ++i) {
     if (!file->is_real_array("PointData", i)) continue;
     const Result<VtkArray> array = file->array("PointData", i, result.mesh.num_nodes());
     if (!array) return tl::unexpected(array.error());
-    result.node_fields.push_back(
-        {array->name, Eigen::Map<const Eigen::MatrixXd>(array->reals.data(), array->components,
-                                                        result.mesh.num_nodes())});
+    Eigen::MatrixXd values = Eigen::Map<const Eigen::MatrixXd>(
+        array->reals.data(), array->components, result.mesh.num_nodes());
+    if (values.rows() == 3) turn_to_ras(*space, values);
+    result.node_fields.push_back({array->name, std::move(values)});
   }
   return result;
 }

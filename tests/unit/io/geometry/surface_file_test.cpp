@@ -238,5 +238,56 @@ TEST_F(BadSurface, UnknownExtensionAndMissingFileAreNamed) {
   EXPECT_EQ(absent.error().code, ErrorCode::kNotFound);
 }
 
+// The text with what 3D Slicer puts into its models: a heading (STL), a comment (PLY, OBJ).
+std::string with_heading(const std::string& file, std::string text, const std::string& space) {
+  const std::string words = "3D Slicer output. SPACE=" + space;
+  if (file == "binary.stl") return text.replace(0, words.size() + 1, words + std::string(1, '\0'));
+  if (file == "ascii.stl") return text.replace(text.find(" test"), 5, " " + words);
+  if (file == "s.obj") return "# wavefront obj file\n# " + words + "\n" + text;
+  return text.insert(text.find("element vertex"), "comment SPACE=" + space + "\n");
+}
+
+const std::vector<std::pair<std::string, std::string>>& slicer_files() {
+  static const std::vector<std::pair<std::string, std::string>> kFiles = {
+      {"ascii.stl", stl_ascii()},
+      {"binary.stl", stl_binary()},
+      {"ascii.ply", ply_ascii()},
+      {"binary.ply", ply_binary()},
+      {"s.obj", obj(false)}};
+  return kFiles;
+}
+
+TEST(SurfaceSpace, ModelThatSaysLpsIsTurnedIntoRas) {
+  const TemporaryFolder folder;
+  const Eigen::DiagonalMatrix<double, 3> turn(-1.0, -1.0, 1.0);
+  for (const auto& [file, text] : slicer_files()) {
+    const auto unsaid = read_surface(folder.write(file, text));
+    const auto ras = read_surface(folder.write(file, with_heading(file, text, "RAS")));
+    const auto lps = read_surface(folder.write(file, with_heading(file, text, "LPS")));
+    ASSERT_TRUE(unsaid && ras && lps) << file;
+    EXPECT_EQ(ras->vertices, unsaid->vertices) << file;
+    EXPECT_EQ(lps->vertices, Points(turn * unsaid->vertices)) << file;
+    EXPECT_EQ(lps->triangles, unsaid->triangles) << file;
+  }
+}
+
+TEST(SurfaceSpace, AnotherSpaceIsRefusedByFileAndValue) {
+  const TemporaryFolder folder;
+  for (const auto& [file, text] : slicer_files()) {
+    const auto read = read_surface(folder.write(file, with_heading(file, text, "LAS")));
+    ASSERT_FALSE(read) << file;
+    EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+    EXPECT_THAT(read.error().message, HasSubstr(file));
+    EXPECT_THAT(read.error().message, HasSubstr("SPACE is 'LAS': must be RAS or LPS"));
+  }
+}
+
+TEST(SurfaceSpace, WordThatOnlyEndsLikeTheKeySaysNothing) {
+  const TemporaryFolder folder;
+  const auto read = read_surface(folder.write("s.obj", "# COLOURSPACE=sRGB\n" + obj(false)));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->vertices.col(1), Vec3(10.5, 0, 0));
+}
+
 }  // namespace
 }  // namespace brainshift::io

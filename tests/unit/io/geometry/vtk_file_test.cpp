@@ -372,6 +372,107 @@ TEST(VtpFile, SaysThatItsPointsAreRasAndIsReadBack) {
 // Files of other programs and of earlier versions of this one have none: TrianglesAreReadIn...
 // and KnownMeshIsReadWithItsFields read such.
 
+// SPACE as VTK's own writer puts it into a file of this encoding: a text is its characters and 0.
+std::string with_space(const Encoding& encoding, const std::string& text) {
+  Writer out(encoding);
+  std::string array =
+      out.array("SPACE", "Int8", std::vector<std::int8_t>(text.begin(), text.end()));
+  array.replace(array.find("Int8"), 4, "String");
+  for (std::size_t at = 0; (at = array.find("DataArray", at)) != std::string::npos;) {
+    array.replace(at, 9, "Array");
+  }
+  std::string piece = "<FieldData>\n" + array + "</FieldData>\n";
+  piece += "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
+  piece += out.array("u", "Float64", kPoints, 3);
+  piece += out.array("p", "Float32", std::vector<float>{1, 2, 3, 4, 5, 6.5f});
+  piece += "</PointData>\n<Points>\n" + out.array("Points", "Float64", kPoints, 3) +
+           "</Points>\n<Cells>\n" + out.array("connectivity", "Int64", kConnectivity) +
+           out.array("offsets", "Int64", kOffsets) + out.array("types", "UInt8", kTypes) +
+           "</Cells>\n</Piece>\n";
+  return out.file("UnstructuredGrid", piece);
+}
+
+std::string ended(const std::string& text) { return text + std::string(1, '\0'); }
+
+TEST_P(VtuEncoding, PointsAndVectorsInLpsAreTurnedIntoRas) {
+  const Eigen::Map<const Points> as_written(kPoints.data(), 3, 6);
+  const Eigen::DiagonalMatrix<double, 3> turn(-1.0, -1.0, 1.0);
+  const auto ras = read_vtu(folder_.write("r.vtu", with_space(GetParam(), ended("RAS"))));
+  ASSERT_TRUE(ras) << ras.error().message;
+  EXPECT_EQ(ras->mesh.nodes, as_written);
+  EXPECT_EQ(ras->node_fields[0].values, as_written);
+  const auto lps = read_vtu(folder_.write("l.vtu", with_space(GetParam(), ended("LPS"))));
+  ASSERT_TRUE(lps) << lps.error().message;
+  EXPECT_EQ(lps->mesh.nodes, Points(turn * as_written));
+  EXPECT_EQ(lps->mesh.tets, ras->mesh.tets);
+  EXPECT_EQ(lps->node_fields[0].values, Points(turn * as_written));
+  EXPECT_EQ(lps->node_fields[1].values, ras->node_fields[1].values) << "scalars have no frame";
+  const auto grouped = read_tet_mesh(folder_ / "l.vtu");
+  ASSERT_TRUE(grouped);
+  EXPECT_EQ(grouped->nodes.col(1), Vec3(-1.5, 0, 0));
+}
+
+TEST_P(VtuEncoding, AnotherSpaceIsRefusedByFileAndValue) {
+  const auto read = read_vtu(folder_.write("m.vtu", with_space(GetParam(), ended("LAS"))));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+  EXPECT_THAT(read.error().message, HasSubstr("m.vtu: SPACE is 'LAS': must be RAS or LPS"));
+}
+
+TEST_F(VtuFile, MalformedSpaceIsNamed) {
+  const Encoding ascii{.name = "", .ascii = true};
+  const std::string whole = with_space(ascii, ended("RAS"));
+  const std::string codes = "82\n 65\n 83\n 0\n";
+  const auto refused = [&](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    const auto read = read_vtu(folder_.write("m.vtu", text.replace(at, from.size(), to)));
+    EXPECT_FALSE(read) << to;
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_THAT(refused(codes, ""), HasSubstr("m.vtu: SPACE is '': must be RAS or LPS"));
+  EXPECT_THAT(refused(codes, "RAS"), HasSubstr("'SPACE' holds something that is not the code"));
+  EXPECT_THAT(refused(codes, "82 65 400"), HasSubstr("'SPACE' holds a code that is no character"));
+  EXPECT_THAT(refused(codes, "82 65 83 0 76 80 83 0"), HasSubstr("several texts: must be one"));
+  EXPECT_THAT(refused("type=\"String\"", "type=\"Int8\""), HasSubstr("must be String"));
+  EXPECT_THAT(refused(codes, "27 10 200 0"), HasSubstr("SPACE is '???'")) << "one printable line";
+  EXPECT_TRUE(read_vtu(folder_.write(
+      "m.vtu", std::string(whole).replace(whole.find(codes), codes.size(), "82 65 83"))))
+      << "the ending 0 may be missing";
+}
+
+TEST_F(VtuFile, LpsTwinOfAWrittenMeshLoadsEqual) {
+  const TetMesh mesh = large_mesh();
+  TetMesh turned = mesh;
+  turned.nodes.topRows<2>() *= -1.0;
+  ASSERT_TRUE(write_vtu(folder_ / "ras.vtu", mesh, {{"u", mesh.nodes}}));
+  ASSERT_TRUE(write_vtu(folder_ / "lps.vtu", turned, {{"u", turned.nodes}}));
+  std::string text = test_support::content_of(folder_ / "lps.vtu");
+  text.replace(text.find("82 65 83 0"), 10, "76 80 83 0");
+  const auto ras = read_vtu(folder_ / "ras.vtu"), lps = read_vtu(folder_.write("lps.vtu", text));
+  ASSERT_TRUE(ras && lps);
+  EXPECT_EQ(lps->mesh.nodes, ras->mesh.nodes);
+  EXPECT_EQ(lps->node_fields[0].values, ras->node_fields[0].values);
+}
+
+TEST(VtpFile, LpsTwinOfAWrittenSurfaceLoadsEqual) {
+  const TemporaryFolder folder;
+  TriangleSurface surface;
+  surface.vertices = Points::Random(3, 3);
+  surface.triangles = Eigen::Vector3i(0, 1, 2);
+  ASSERT_TRUE(write_surface(folder / "ras.vtp", surface));
+  surface.vertices.topRows<2>() *= -1.0;
+  ASSERT_TRUE(write_surface(folder / "lps.vtp", surface));
+  std::string text = test_support::content_of(folder / "lps.vtp");
+  text.replace(text.find("82 65 83 0"), 10, "76 80 83 0");
+  const auto ras = read_surface(folder / "ras.vtp");
+  const auto lps = read_surface(folder.write("lps.vtp", text));
+  ASSERT_TRUE(ras && lps);
+  EXPECT_EQ(lps->vertices, ras->vertices);
+  EXPECT_EQ(lps->triangles, ras->triangles);
+}
+
 std::string vtp(const Encoding& encoding, const std::vector<std::int32_t>& offsets,
                 const std::string& attributes) {
   Writer out(encoding);
