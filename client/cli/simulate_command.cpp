@@ -17,7 +17,11 @@ struct Arguments {
 
 void print_scenarios() {
   for (const ScenarioInfo& scenario : scenarios()) {
-    std::printf("%-12s %s\n", scenario.name.c_str(), scenario.description.c_str());
+    std::printf("%-16s %s\n", scenario.name.c_str(), scenario.description.c_str());
+  }
+  std::printf("\nAdverse ingredients (--adverse):\n");
+  for (const ScenarioInfo& ingredient : adverse_ingredients()) {
+    std::printf("%-16s %s\n", ingredient.name.c_str(), ingredient.description.c_str());
   }
 }
 
@@ -46,11 +50,15 @@ void add_simulate(CLI::App& app, Status& status) {
   SimulateOptions& options = arguments->options;
   command->add_option("--case", options.case_file, "case file (YAML)");
   command->add_option("--scenario", options.scenario, "what happens; --list shows the names");
+  command->add_option("--adverse", options.adverse,
+                      "what the truth has and the estimate does not believe: names separated by "
+                      "commas, or all; --list shows them");
   command->add_option("--seed", options.seed, "seed of noise and point selection")
       ->check(CLI::NonNegativeNumber)  // CLI11 would let a negative one wrap
       ->capture_default_str();
   command->add_option("--out", options.out, "surgery file to make; must not exist yet");
-  command->add_flag("--list", arguments->list, "list the scenarios and exit");
+  command->add_flag("--list", arguments->list,
+                    "list the scenarios and the adverse ingredients, and exit");
   command->footer(
       "Example: the paper's section 2.6 (sagging head, 200 of about 2,541 tumour points, 0.51 mm "
       "noise):\n"

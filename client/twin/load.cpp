@@ -34,14 +34,19 @@ Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& 
   });
 }
 
-Points volume_change_load(const TetMesh& mesh, const Material& material, const Vec3& tumour,
-                          const VolumeChange& change) {
+std::function<double(const Vec3&)> volume_change_field(const TetMesh& mesh, const Vec3& tumour,
+                                                       const VolumeChange& change) {
   const double middle = 0.5 * (mesh.nodes.row(0).minCoeff() + mesh.nodes.row(0).maxCoeff());
   const double side = tumour[0] < middle ? -1.0 : 1.0;
-  return fem::swelling_load(mesh, material, [&](const Vec3& x) {
+  return [middle, side, change](const Vec3& x) {
     if (!change.one_hemisphere) return change.strain;
     return 0.5 * change.strain * (1.0 + std::tanh(side * (x[0] - middle) / kFalx_mm));
-  });
+  };
+}
+
+Points volume_change_load(const TetMesh& mesh, const Material& material, const Vec3& tumour,
+                          const VolumeChange& change) {
+  return fem::swelling_load(mesh, material, volume_change_field(mesh, tumour, change));
 }
 
 }  // namespace brainshift::client

@@ -3,6 +3,8 @@
 // (fem/swelling.hpp).
 #pragma once
 
+#include <functional>
+
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
 
@@ -39,6 +41,10 @@ double volume_strain_at(const Swelling& swelling, double distance_mm);
 Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
                      const Swelling& swelling);
 
+// Strain of a volume change at any place, no unit. mesh: gives the middle of the brain. tumour: a
+// place in the half that changes.
+std::function<double(const Vec3&)> volume_change_field(const TetMesh& mesh, const Vec3& tumour,
+                                                       const VolumeChange& change);
 // The same for a volume change. tumour: a place in the half that changes.
 Points volume_change_load(const TetMesh& mesh, const Material& material, const Vec3& tumour,
                           const VolumeChange& change);

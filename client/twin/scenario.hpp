@@ -8,6 +8,7 @@
 // own truth, points and noise.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,31 @@ struct CortexView {
   double track_noise_sd_mm = 0.5;  // of the noise's magnitude
 };
 
+// Errors of the ultrasound probe that no estimate is told of. 0: none.
+struct ProbeErrors {
+  // Drawn for every section: shift per axis, and turn per axis about the tumour's centre.
+  double tracker_sd_mm = 0.0, tracker_sd_deg = 0.0;
+  // Drawn once for a surgery: the same, and that of distances from the probe, no unit.
+  double calibration_sd_mm = 0.0, calibration_sd_deg = 0.0, scale_sd = 0.0;
+  // Of the tumour's extent across the sections, from a side that is drawn for each of the two
+  // sweeps. Above 0, at most 1.
+  double swept_part = 1.0;
+  std::uint64_t tracker_seed = 0, calibration_seed = 0, sweep_seed = 0;
+};
+
+// What else differs from what the case says; adverse.hpp tells what and how much.
+struct Adversity {
+  bool other_mesh = false;
+  std::optional<std::uint64_t> gap_seed;     // absent: the case's gap
+  double penalty_factor = 1.0;               // of the case's contact penalty
+  std::optional<std::uint64_t> tissue_seed;  // absent: no tissue differs from the others
+  double level_error_mm = 0.0;               // added to every fluid level
+  Vec3 gravity_error_deg = Vec3::Zero();     // gravity turns about this axis by its length
+  double segmentation_sd_mm = 0.0;           // of the outline, along its normal
+  std::uint64_t segmentation_seed = 0;
+  ProbeErrors probe;
+};
+
 struct Scenario {
   std::string name;
   std::string description;
@@ -58,6 +84,10 @@ struct Scenario {
   // A further error of the pose, after that one: gravity turns about this axis (RAS) by the
   // vector's length.
   Vec3 gravity_turn_deg = Vec3::Zero();
+  // Mean displacement of the tumour's surface. The load is multiplied by what makes it so large: a
+  // brain that is softer by this factor under the same load. Absent: the load as it is.
+  std::optional<double> tumour_displacement_mm;
+  Adversity adverse;
   // The scenario promises that no slave touches the skull. Where one does, playing it is an error.
   bool contact_free = false;
   Measurement measurement = Measurement::kDisplacements;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/simulate.hpp"
 
+#include "client/twin/adverse.hpp"
 #include "client/twin/scenario.hpp"
 #include "client/twin/surgery.hpp"
 #include "common/core/utc_time.hpp"
@@ -14,13 +15,13 @@ namespace {
 
 using patient::Patient;
 
-Status write_surgery(const SimulateOptions& options, const Patient& patient,
-                     const SimulatedSurgery& surgery) {
+Status write_surgery(const SimulateOptions& options, const std::string& scenario_name,
+                     const Patient& patient, const SimulatedSurgery& surgery) {
   io::SurgeryMeta meta;
   meta.case_id = patient.model.case_id;
   meta.model_id = patient.model.model_id;
   meta.case_file = std::filesystem::absolute(options.case_file).lexically_normal().string();
-  meta.scenario = options.scenario;
+  meta.scenario = scenario_name;
   meta.seed = options.seed;
   meta.created_utc = utc_now();
   meta.software = "brainshift twin";
@@ -47,6 +48,14 @@ std::vector<ScenarioInfo> scenarios() {
   return infos;
 }
 
+std::vector<ScenarioInfo> adverse_ingredients() {
+  std::vector<ScenarioInfo> infos;
+  for (const IngredientInfo& info : all_ingredients()) {
+    infos.push_back({info.name, info.description});
+  }
+  return infos;
+}
+
 Status simulate(const SimulateOptions& options, const Progress& progress) {
   const Scenario* scenario = find_scenario(options.scenario);
   if (scenario == nullptr) {
@@ -55,17 +64,27 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
     return fail(ErrorCode::kNotFound,
                 "scenario " + options.scenario + " is unknown; known: " + known);
   }
+  Ingredients ingredients;
+  if (!options.adverse.empty()) {
+    const auto named = ingredients_from(options.adverse);
+    if (!named) return tl::unexpected(named.error());
+    ingredients = *named;
+  }
   if (std::filesystem::exists(options.out)) {
     return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
   }
   linalg::use_single_threaded_blas();  // before the first factorisation
   const auto patient = patient::read_patient(options.case_file, progress);
   if (!patient) return tl::unexpected(patient.error());
+  const auto adverse =
+      with_ingredients(*scenario, ingredients, patient->model.gravity_direction, options.seed);
+  if (!adverse) return tl::unexpected(adverse.error());
   const auto surgery =
-      play_scenario(patient->model, patient->config, *scenario, options.seed, progress);
+      play_scenario(patient->model, patient->config, *adverse, options.seed, progress);
   if (!surgery) return tl::unexpected(surgery.error());
   report(progress, "write", 0.0);
-  return write_surgery(options, *patient, *surgery);
+  const std::string suffix = ingredients.empty() ? "" : "+" + name_of(ingredients);
+  return write_surgery(options, options.scenario + suffix, *patient, *surgery);
 }
 
 }  // namespace brainshift::client

@@ -6,9 +6,9 @@
 // goes to the truth tables of the surgery file, which only scoring reads. The observations carry
 // what an operating room would measure.
 //
-// Inverse crime, as in the paper: truth and estimate share mesh and, unless
-// the scenario varies the stiffness, material. The estimate does not know
-// the load (fluid level, swelling), the contact state and the noise.
+// Without adverse ingredients (adverse.hpp) this is the consistency truth, an inverse crime as in
+// the paper: truth and estimate share mesh and, unless the scenario varies the stiffness, material.
+// The estimate does not know the load (fluid level, swelling), the contact state and the noise.
 #pragma once
 
 #include <cstdint>
@@ -26,17 +26,20 @@ struct ScenarioInfo {
   std::string description;  // one line
 };
 std::vector<ScenarioInfo> scenarios();
+std::vector<ScenarioInfo> adverse_ingredients();
 
 struct SimulateOptions {
   std::filesystem::path case_file;
   std::string scenario;
+  std::string adverse;  // "mesh,gap" or "all" (adverse.hpp); empty: none
   std::uint64_t seed = 1;
   std::filesystem::path out;  // must not exist; nothing is left behind on failure
 };
 
-// kNotFound for an unknown scenario; the sentence lists the known
-// ones. kWriteFailed when `out` exists or cannot be written. Other
-// errors: of reading the case, building its model, and play_scenario.
+// The surgery file calls the scenario NAME, or NAME+INGREDIENT+... or NAME+all.
+// kNotFound for an unknown scenario or ingredient; the sentence lists the known ones.
+// kInvalidArgument when an ingredient does nothing (effects.hpp). kWriteFailed when `out` exists or
+// cannot be written. Other errors: of reading the case, building its model, and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 
 }  // namespace brainshift::client

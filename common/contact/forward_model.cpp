@@ -5,6 +5,7 @@
 
 #include "common/contact/tissues.hpp"
 #include "common/core/stopwatch.hpp"
+#include "common/fem/space_elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/geometry/surface.hpp"
 
@@ -82,6 +83,21 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   return ForwardModel(boundary, std::move(dofs), stiffness, std::move(*factor),
                       PenaltyContact(std::move(pairs), config.contact.penalty_n_per_mm),
                       assemble_s);
+}
+
+Result<ForwardModel> ForwardModel::assemble(const fem::DisplacementSpace& space,
+                                            const fem::MaterialMap& materials, fem::DofMap dofs,
+                                            PenaltyContact contact, const Progress& progress) {
+  const Stopwatch watch;
+  report(progress, "assemble", 0.0);
+  const linalg::SymmetricMatrix stiffness = fem::assemble_stiffness(space, materials, dofs);
+  const double assemble_s = watch.seconds();
+  report(progress, "factorise", 0.0);
+  auto factor = linalg::SparseCholesky::factorise(stiffness);
+  if (!factor) return tl::unexpected(factor.error());
+  report(progress, "factorise", 1.0);
+  return ForwardModel(Boundary::kContact, std::move(dofs), stiffness,
+                      fem::StiffnessFactor(std::move(*factor)), std::move(contact), assemble_s);
 }
 
 std::uint64_t ForwardModel::bytes() const {

@@ -22,7 +22,9 @@
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/fem/dof_map.hpp"
+#include "common/fem/poro_material.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
@@ -36,6 +38,14 @@ class ForwardModel {
   // kDegenerateMesh: as search_contact. kInvalidArgument and kEmptySet: as tissue_map.
   static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
                                     Boundary boundary, const Progress& progress = {});
+
+  // Drained elasticity on linear or quadratic elements, with the constraints and the contact of the
+  // caller. The pairs' slaves are nodes of the space, free and with the identity frame. Vertices of
+  // quadratic faces carry no load (surface_contact.hpp), so there the slaves are middles of edges.
+  // boundary() is kContact. Errors as StiffnessFactor.
+  static Result<ForwardModel> assemble(const fem::DisplacementSpace& space,
+                                       const fem::MaterialMap& materials, fem::DofMap dofs,
+                                       PenaltyContact contact, const Progress& progress = {});
 
   Boundary boundary() const { return boundary_; }
   const fem::DofMap& dofs() const { return dofs_; }

@@ -7,6 +7,7 @@
 
 #include "common/core/units.hpp"
 #include "common/fem/elasticity.hpp"
+#include "common/fem/space_elasticity.hpp"
 
 namespace brainshift::fem {
 
@@ -49,6 +50,17 @@ Points buoyancy_load(const TetMesh& mesh, const Material& material, const Vec3& 
     for (int k = 0; k < 4; ++k) load.col(mesh.tets(k, t)) += quarter;
   }
   return load;
+}
+
+Points buoyancy_load(const DisplacementSpace& space, const Material& material,
+                     const Vec3& gravity_direction, double plane_depth_mm) {
+  const double above = units::weight_density_from_kg_m3(material.tissue_density_kg_m3 -
+                                                        material.fluid_density_unsaturated_kg_m3);
+  const double below = units::weight_density_from_kg_m3(material.tissue_density_kg_m3 -
+                                                        material.fluid_density_saturated_kg_m3);
+  return body_load(space, [&](const Vec3& x) -> Vec3 {
+    return (x.dot(gravity_direction) < plane_depth_mm ? above : below) * gravity_direction;
+  });
 }
 
 }  // namespace brainshift::fem

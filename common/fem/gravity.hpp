@@ -8,6 +8,7 @@
 #pragma once
 
 #include "common/core/mesh.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
@@ -20,6 +21,11 @@ namespace brainshift::fem {
 // modes.
 Points buoyancy_load(const TetMesh& mesh, const Material& material, const Vec3& gravity_direction,
                      double plane_depth_mm, const Vec3& force_direction);
+
+// On linear or quadratic elements; of an element that the plane cuts, each point of
+// fem::fine_tet_rule counts as above or below.
+Points buoyancy_load(const DisplacementSpace& space, const Material& material,
+                     const Vec3& gravity_direction, double plane_depth_mm);
 
 // Volume fraction of a tetrahedron in which the linear function with these nodal values is
 // negative; in [0, 1].

@@ -47,6 +47,25 @@ Points swelling_load(const TetMesh& mesh, const Material& material,
       strain);
 }
 
+Points swelling_load(const DisplacementSpace& space, const Material& material,
+                     const std::function<double(const Vec3&)>& strain) {
+  const Elasticity elasticity = elasticity_from(material);
+  const double bulk = elasticity.lambda + 2.0 / 3.0 * elasticity.shear;
+  Points load = Points::Zero(3, space.num_nodes());
+  for (int e = 0; e < space.num_elements(); ++e) {
+    const TetGeometry tet = tet_geometry(space.mesh, e);
+    for (const TetPoint& point : fine_tet_rule()) {
+      Vec3 x = Vec3::Zero();
+      for (int k = 0; k < 4; ++k) x += point.l[k] * space.mesh.nodes.col(space.mesh.tets(k, e));
+      const double pressure = point.weight * tet.volume * bulk * strain(x);
+      if (pressure == 0.0) continue;
+      const ShapeGradients g = shape_gradients(space.element, tet.gradients, point.l);
+      for (int k = 0; k < g.cols(); ++k) load.col(space.elements(k, e)) += pressure * g.col(k);
+    }
+  }
+  return load;
+}
+
 Points initial_stress_load(const TetMesh& mesh, const std::function<Mat3(const Vec3&)>& stress) {
   return load_of(mesh, [&](int, const Vec3& centroid) { return stress(centroid); });
 }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "common/core/mesh.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/values/case_config.hpp"
 
@@ -28,6 +29,11 @@ Points swelling_load(const TetMesh& mesh, const std::vector<Elasticity>& of_tet,
                      const std::function<double(const Vec3&)>& strain);
 // One material for the whole mesh.
 Points swelling_load(const TetMesh& mesh, const Material& material,
+                     const std::function<double(const Vec3&)>& strain);
+
+// On linear or quadratic elements, theta at the points of fem::fine_tet_rule:
+//   f_i = int kappa theta g_i dV
+Points swelling_load(const DisplacementSpace& space, const Material& material,
                      const std::function<double(const Vec3&)>& strain);
 
 // stress: symmetric sigma0 at a tetrahedron's centroid (mm), N/mm^2, pull positive. Nodal forces,

@@ -31,6 +31,20 @@ TEST(Buoyancy, TotalForceIsTheWeightOfTheDrainedPartWhereverThePlaneCuts) {
   }
 }
 
+// Where no element is cut, the loads of linear elements are those of the mesh; of quadratic ones
+// the sum is the same.
+TEST(Buoyancy, OfASpaceIsThatOfItsMesh) {
+  const Vec3 size(30, 20, 40);
+  const Vec3 down(0, 0, -1);
+  const TetMesh mesh = box_mesh(3, 2, 4, size);
+  const Points known = buoyancy_load(mesh, Material{}, down, -20.0, down);
+  const Points linear = buoyancy_load(make_space(mesh, Element::kP1), Material{}, down, -20.0);
+  EXPECT_LT((linear - known).norm(), 1e-12 * known.norm());
+  const Points quadratic = buoyancy_load(make_space(mesh, Element::kP2), Material{}, down, -20.0);
+  EXPECT_NEAR(sum_along(quadratic, down), sum_along(known, down), 1e-12);
+  EXPECT_NEAR(sum_along(known, down), kWeight * 30.0 * 20.0 * 20.0, 1e-12);
+}
+
 TEST(Buoyancy, ObliquePlaneThroughTheCentreDrainsHalf) {
   const TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
   const Vec3 g = Vec3(-0.5, 0.3, -0.8).normalized();

@@ -25,6 +25,21 @@ TEST(Swelling, StretchesAFreeBodyByAThirdOfItsStrainInEveryDirection) {
   EXPECT_LT((force - load).norm(), 1e-13 * load.norm());
 }
 
+// The same on linear and on quadratic elements, whose loads come from quadrature.
+TEST(Swelling, StretchesLinearAndQuadraticElementsAlike) {
+  const TetMesh mesh = test_support::box_mesh(Vec3(-5, 0, 2), Vec3(7, 9, 12), 3, 0.15);
+  const Material material;
+  const double theta = 0.06;
+  const auto materials = MaterialMap::uniform(poro_material_from(material), mesh.num_tets());
+  for (const Element element : {Element::kP1, Element::kP2}) {
+    const DisplacementSpace space = make_space(mesh, element);
+    const Points load = swelling_load(space, material, [theta](const Vec3&) { return theta; });
+    const Points force = internal_force(space, materials, theta / 3.0 * space.nodes);
+    ASSERT_GT(load.norm(), 0.0);
+    EXPECT_LT((force - load).norm(), 1e-12 * load.norm());
+  }
+}
+
 // Of any strain the forces balance, and so do their moments.
 TEST(Swelling, LoadsBalance) {
   const TetMesh mesh = test_support::box_mesh(Vec3(-5, 0, 2), Vec3(7, 9, 12), 3, 0.15);

@@ -17,9 +17,11 @@ TEST(Scenarios, AreNamedOnceAndDescribedInOneLine) {
     EXPECT_FALSE(info.description.empty());
     EXPECT_EQ(info.description.find('\n'), std::string::npos);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"paper", "paper-icp", "distension", "sag-progress",
-                                          "no-contact", "joint-sag", "joint-distension",
-                                          "joint-tangential", "joint-mixed", "resection"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"paper", "paper-icp", "distension", "sag-progress", "no-contact",
+                                   "joint-sag", "joint-distension", "joint-tangential",
+                                   "joint-mixed", "resection", "patient-1", "patient-2",
+                                   "patient-3", "patient-4", "patient-5"}));
 }
 
 TEST(SagProgress, TheFluidFallsSteadilyFrom15To55InTwentyObservations) {
