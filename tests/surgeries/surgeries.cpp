@@ -73,17 +73,10 @@ std::vector<std::uint64_t> seeds_of(const Arguments& arguments, int place) {
 bool finished(const PlacePlan& plan, const RowFile& rows) {
   for (const std::uint64_t seed : plan.seeds) {
     for (const std::string& scenario : plan.scenarios) {
-      if (!rows.has({plan.head, plan.place, seed, scenario})) return false;
+      if (!rows.has(SurgeryKey{plan.head, plan.place, seed, scenario}.texts())) return false;
     }
   }
   return true;
-}
-
-std::string text_of(const Row& row, const char* column) {
-  for (const auto& [name, text] : row) {
-    if (name == column) return text;
-  }
-  return "";
 }
 
 void tell(const SurgeryKey& key, const Row& last, double seconds) {
@@ -120,7 +113,7 @@ Status run(const Arguments& arguments) {
   linalg::use_single_threaded_blas();
   const auto config = read_head(arguments.head);
   if (!config) return tl::unexpected(config.error());
-  auto rows = RowFile::open(arguments.out, arguments.resume);
+  auto rows = open_surgeries(arguments.out, arguments.resume);
   if (!rows) return tl::unexpected(rows.error());
   const auto brain = patient::build_patient(*config);
   if (!brain) return tl::unexpected(brain.error());

@@ -119,6 +119,10 @@ Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts
                               const client::Scenario& scenario, PlayedBrain& played,
                               Sessions& sessions) {
   const auto surgery = client::play_scenario(played.brain, played.solver, scenario, facts.key.seed);
+  if (!surgery && surgery.error().code == ErrorCode::kInvalidArgument) {
+    return std::vector<Row>{
+        refused_row(facts, 0, surgery.error().message)};  // it does nothing here
+  }
   if (!surgery) return tl::unexpected(surgery.error());
   sessions.reset();
   const auto& observations = surgery->observations;
@@ -154,14 +158,14 @@ Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows,
     PlayedBrains brains(head, seed);
     for (const std::string& name : plan.scenarios) {
       facts.key = {plan.head, plan.place, seed, name};
-      if (rows.has(facts.key)) continue;
+      if (rows.has(facts.key.texts())) continue;
       const Stopwatch watch;
       const client::Scenario scenario = client::vary(*client::find_scenario(name), seed);
       const auto brain = brains.of(scenario);
       if (!brain) return fail(brain.error().code, name + ": " + brain.error().message);
       const auto played = play(head, facts, scenario, **brain, **sessions);
       if (!played) return fail(played.error().code, name + ": " + played.error().message);
-      if (Status ok = rows.append(facts.key, *played); !ok) return ok;
+      if (Status ok = rows.append(*played); !ok) return ok;
       if (told) told(facts.key, played->back(), watch.seconds());
     }
   }

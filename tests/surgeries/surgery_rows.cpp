@@ -2,45 +2,21 @@
 #include "tests/surgeries/surgery_rows.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <limits>
-#include <tuple>
-
-#include "tests/benchmarks/csv_table.hpp"
 
 namespace brainshift::surgeries {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// Cells hold no commas, quotes or line breaks.
-std::string cell(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == ',' || c == '"' || c == '\n'; }, ';');
-  return text;
+void add_errors(const std::string& prefix, const FieldErrors& errors, Cells& cells) {
+  cells.add(prefix + "tumour_mm", errors.tumour_mm);
+  cells.add(prefix + "craniotomy_mm", errors.craniotomy_mm);
+  cells.add(prefix + "craniotomy_closest_mm", errors.craniotomy_closest_mm);
+  cells.add(prefix + "field_mean_mm", errors.mean_mm);
+  cells.add(prefix + "field_p50_mm", errors.p50_mm);
+  cells.add(prefix + "field_max_mm", errors.max_mm);
 }
-
-class Cells {
- public:
-  void add(const std::string& name, const std::string& text) {
-    row_.emplace_back(name, cell(text));
-  }
-  void add(const std::string& name, double value) {
-    row_.emplace_back(name, bench::csv_number(value));
-  }
-  void add(const std::string& prefix, const FieldErrors& errors) {
-    add(prefix + "tumour_mm", errors.tumour_mm);
-    add(prefix + "craniotomy_mm", errors.craniotomy_mm);
-    add(prefix + "craniotomy_closest_mm", errors.craniotomy_closest_mm);
-    add(prefix + "field_mean_mm", errors.mean_mm);
-    add(prefix + "field_p50_mm", errors.p50_mm);
-    add(prefix + "field_max_mm", errors.max_mm);
-  }
-  Row take() { return std::move(row_); }
-
- private:
-  Row row_;
-};
 
 void add_key(const SurgeryFacts& facts, int stage, Cells& cells) {
   cells.add("head", facts.key.head);
@@ -72,9 +48,9 @@ void add_truth(const SurgeryFacts& facts, const client::Scenario& scenario,
 
 void add_score(const UpdateScore& score, Cells& cells) {
   cells.add("recovered_pct", score.recovered_pct);
-  cells.add("", score.estimate);
-  cells.add("none_", score.none);
-  cells.add("rigid_", score.rigid);
+  add_errors("", score.estimate, cells);
+  add_errors("none_", score.none, cells);
+  add_errors("rigid_", score.rigid, cells);
   cells.add("worse_nodes", score.worse_nodes);
   cells.add("worst_excess_mm", score.worst_excess_mm);
   cells.add("coverage_90", score.coverage_90);
@@ -126,18 +102,10 @@ void add_prior(const Estimate& estimate, Cells& cells) {
   }
 }
 
-std::string line_of(const Row& row, bool heading) {
-  std::string line;
-  for (const auto& [name, text] : row) line += (heading ? name : text) + ",";
-  line.back() = '\n';
-  return line;
-}
-
 }  // namespace
 
-bool SurgeryKey::operator<(const SurgeryKey& other) const {
-  return std::tie(head, place, seed, scenario) <
-         std::tie(other.head, other.place, other.seed, other.scenario);
+RowFile::Key SurgeryKey::texts() const {
+  return {head, std::to_string(place), std::to_string(seed), scenario};
 }
 
 std::string stage_name(int update) {
@@ -166,7 +134,7 @@ Row refused_row(const SurgeryFacts& facts, int stage, const std::string& reason)
   Row row = row_of(facts, {}, {}, stage, {}, {}, kNaN);
   for (auto& [name, text] : row) {
     if (name == "status") text = "refused";
-    if (name == "reason") text = cell(reason);
+    if (name == "reason") text = cell_text(reason);
   }
   const auto after =
       std::find_if(row.begin(), row.end(), [](const auto& one) { return one.first == "reason"; });
@@ -174,40 +142,8 @@ Row refused_row(const SurgeryFacts& facts, int stage, const std::string& reason)
   return row;
 }
 
-Result<RowFile> RowFile::open(const std::filesystem::path& path, bool resume) {
-  RowFile file;
-  file.path_ = path;
-  const std::string heading = line_of(refused_row({}, 0, ""), true);
-  if (resume && std::filesystem::exists(path)) {
-    const auto table = bench::CsvTable::read(path);
-    if (!table) return tl::unexpected(table.error());
-    std::ifstream stream(path);
-    std::string first;
-    std::getline(stream, first);
-    if (first + "\n" != heading) {
-      return fail(ErrorCode::kUnreadable,
-                  path.string() + ": its columns are those of another version");
-    }
-    for (std::size_t row = 0; row < table->rows(); ++row) {
-      file.done_.insert({table->text(row, "head"), static_cast<int>(table->number(row, "place")),
-                         std::stoull(table->text(row, "seed")), table->text(row, "scenario")});
-    }
-    return file;
-  }
-  std::ofstream stream(path, std::ios::trunc);
-  stream << heading << std::flush;
-  if (!stream) return fail(ErrorCode::kWriteFailed, path.string() + ": cannot be written");
-  return file;
-}
-
-Status RowFile::append(const SurgeryKey& key, const std::vector<Row>& rows) {
-  std::string text;
-  for (const Row& row : rows) text += line_of(row, false);
-  std::ofstream stream(path_, std::ios::app);
-  stream << text << std::flush;
-  if (!stream) return fail(ErrorCode::kWriteFailed, path_.string() + ": cannot be written");
-  done_.insert(key);
-  return {};
+Result<RowFile> open_surgeries(const std::filesystem::path& path, bool resume) {
+  return RowFile::open(path, refused_row({}, 0, ""), kSurgeryKey, resume);
 }
 
 }  // namespace brainshift::surgeries

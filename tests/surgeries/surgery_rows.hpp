@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The table that `surgeries` writes: one row per update, all rows of a surgery at once, so that an
-// interrupted run keeps whole surgeries.
+// The table that `surgeries` writes: one row per update, all rows of a surgery at once.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/twin/scenario.hpp"
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/estimate.hpp"
+#include "tests/surgeries/row_file.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
 namespace brainshift::surgeries {
-
-// Heading and cell, in the order of the columns.
-using Row = std::vector<std::pair<std::string, std::string>>;
 
 // Which surgery a row belongs to.
 struct SurgeryKey {
@@ -27,8 +22,9 @@ struct SurgeryKey {
   int place = 0;     // from 1: tumour and opening
   std::uint64_t seed = 0;
   std::string scenario;
-  bool operator<(const SurgeryKey& other) const;
+  RowFile::Key texts() const;  // of the columns kSurgeryKey
 };
+inline const std::vector<std::string> kSurgeryKey = {"head", "place", "seed", "scenario"};
 
 // What an update used: "tumour", "tumour+cortex", "tumour+cortex+tracks".
 std::string stage_name(int update);  // from 0
@@ -48,18 +44,7 @@ Row row_of(const SurgeryFacts& facts, const client::Scenario& scenario,
 // An update that was refused: the columns of row_of, empty but for key, stage and reason.
 Row refused_row(const SurgeryFacts& facts, int stage, const std::string& reason);
 
-class RowFile {
- public:
-  // Starts an empty table, or with `resume` goes on with one that is there. kUnreadable when that
-  // one has other columns or ends within a row.
-  static Result<RowFile> open(const std::filesystem::path& path, bool resume);
-  bool has(const SurgeryKey& key) const { return done_.count(key) > 0; }
-  // All rows of one surgery, by one write.
-  Status append(const SurgeryKey& key, const std::vector<Row>& rows);
-
- private:
-  std::filesystem::path path_;
-  std::set<SurgeryKey> done_;
-};
+// The table of these rows (row_file.hpp), with kSurgeryKey.
+Result<RowFile> open_surgeries(const std::filesystem::path& path, bool resume);
 
 }  // namespace brainshift::surgeries

@@ -38,7 +38,7 @@ Row row(const SurgeryFacts& of) {
 class RowTable : public testing::Test {
  protected:
   RowFile open(bool resume) {
-    auto file = RowFile::open(path, resume);
+    auto file = open_surgeries(path, resume);
     EXPECT_TRUE(file) << file.error().message;
     return *file;
   }
@@ -49,7 +49,7 @@ class RowTable : public testing::Test {
 TEST_F(RowTable, ReadsBackWhatAnUpdateWas) {
   RowFile file = open(false);
   const SurgeryFacts one = facts(7, "paper");
-  ASSERT_TRUE(file.append(one.key, {row(one), refused_row(one, 1, "no data, no estimate")}));
+  ASSERT_TRUE(file.append({row(one), refused_row(one, 1, "no data, no estimate")}));
   const auto table = bench::CsvTable::read(path);
   ASSERT_TRUE(table) << table.error().message;
   ASSERT_EQ(table->rows(), 2u);
@@ -74,23 +74,23 @@ TEST_F(RowTable, ARunThatGoesOnKnowsWhatIsThere) {
   const SurgeryFacts one = facts(7, "paper"), other = facts(8, "paper");
   {
     RowFile file = open(true);
-    EXPECT_FALSE(file.has(one.key));
-    ASSERT_TRUE(file.append(one.key, {row(one)}));
-    EXPECT_TRUE(file.has(one.key));
+    EXPECT_FALSE(file.has(one.key.texts()));
+    ASSERT_TRUE(file.append({row(one)}));
+    EXPECT_TRUE(file.has(one.key.texts()));
   }
   RowFile again = open(true);
-  EXPECT_TRUE(again.has(one.key));
-  EXPECT_FALSE(again.has(other.key));
-  EXPECT_FALSE(again.has(facts(7, "joint-sag").key));
-  ASSERT_TRUE(again.append(other.key, {row(other)}));
+  EXPECT_TRUE(again.has(one.key.texts()));
+  EXPECT_FALSE(again.has(other.key.texts()));
+  EXPECT_FALSE(again.has(facts(7, "joint-sag").key.texts()));
+  ASSERT_TRUE(again.append({row(other)}));
   EXPECT_EQ(bench::CsvTable::read(path)->rows(), 2u);
-  EXPECT_FALSE(open(false).has(one.key));
+  EXPECT_FALSE(open(false).has(one.key.texts()));
   EXPECT_EQ(bench::CsvTable::read(path)->rows(), 0u);
 }
 
 TEST_F(RowTable, ATableOfOtherColumnsIsNotContinued) {
   std::ofstream(path) << "head,place\nx,1\n";
-  const auto file = RowFile::open(path, true);
+  const auto file = open_surgeries(path, true);
   ASSERT_FALSE(file);
   EXPECT_EQ(file.error().code, ErrorCode::kUnreadable);
   EXPECT_THAT(file.error().message, HasSubstr("rows.csv"));
@@ -100,16 +100,16 @@ TEST_F(RowTable, ARowThatWasCutOffIsReported) {
   {
     RowFile file = open(false);
     const SurgeryFacts one = facts(7, "paper");
-    ASSERT_TRUE(file.append(one.key, {row(one)}));
+    ASSERT_TRUE(file.append({row(one)}));
   }
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 60);
-  const auto file = RowFile::open(path, true);
+  const auto file = open_surgeries(path, true);
   ASSERT_FALSE(file);
   EXPECT_THAT(file.error().message, HasSubstr("line 2"));
 }
 
 TEST_F(RowTable, AFolderThatIsNotThereIsReported) {
-  const auto file = RowFile::open(folder.path() / "none" / "rows.csv", false);
+  const auto file = open_surgeries(folder.path() / "none" / "rows.csv", false);
   ASSERT_FALSE(file);
   EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
 }

@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# evidence.sh BUILD_DIR [OUT_DIR]: twins of the paper's five patients, against truths that share the
+# estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
+# out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
+# tables.md, summary.json. Exit status 0 only if every check holds.
+#   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
+#   HEADS="..."      case files of heads (default: colin27; mni152 needs BRAINSHIFT_EXTERNAL_DATA)
+#   SEEDS=N          surgeries per patient and truth (default: 2)
+#   QUICK=1          patients 1 and 2, consistency, mesh, gap and all, one seed (1001), 6 thousand nodes;
+#                    into out/evidence-quick
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+build=${1:?usage: evidence.sh BUILD_DIR [OUT_DIR]}
+bin=$build/bin
+out=${2:-out/evidence}
+name=evidence
+. cmake/scripts/steps.sh
+
+options=(--resume --seeds "${SEEDS:-2}")
+if [ "${QUICK:-0}" = 1 ]; then
+  out=${2:-out/evidence-quick}
+  options=(--resume --seeds 1 --first-seed 1001 --thousand-nodes 6 --patients 1 2
+    --truths consistency mesh gap all)
+fi
+kept=$(mktemp -d)
+if [ "${RESUME:-1}" = 1 ]; then
+  cp "$out"/rows-*.csv "$kept" 2>/dev/null || true
+fi
+empty_study "$out"
+cp "$kept"/rows-*.csv "$out" 2>/dev/null || true
+rm -rf "$kept"
+BRAINSHIFT_STUDY_DIR=$(realpath "$out")
+export BRAINSHIFT_STUDY_DIR
+
+status=0
+for head in ${HEADS:-colin27}; do
+  step "$head" "$bin/evidence" --head "$head" --out "$out/rows-$head.csv" "${options[@]}" || status=1
+done
+step summary "$bin/evidence_summary" "$out"/rows-*.csv || status=1
+current=summary
+"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make evidence" \
+  --title Evidence || status=1
+exit "$status"

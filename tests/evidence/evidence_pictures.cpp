@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/evidence/evidence_pictures.hpp"
+
+#include <functional>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "client/plot/chart.hpp"
+
+namespace brainshift::evidence {
+namespace {
+
+using surgeries::Rows;
+namespace palette = client::palette;
+
+struct Picture {
+  const char* file;
+  const char* title;
+  const char* data;
+  client::Axis y;
+  std::function<double(const Rows&, std::size_t)> value;
+  std::vector<double> bounds;  // dashed
+};
+
+struct Dots {
+  const char* boundary;
+  const char* legend;
+  double left, right;  // ends within a truth's column, which is 1 wide
+  cv::Scalar colour;
+  client::Marker marker;
+};
+
+client::Series dots_of(const Rows& rows, const std::vector<std::string>& truths, const Dots& dots,
+                       const Picture& picture) {
+  client::Series series;
+  series.legend = dots.legend;
+  series.colour = dots.colour;
+  series.marker = dots.marker;
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const Rows of = rows.where("truth", truths[t]).where("boundary", dots.boundary);
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      const double at =
+          of.size() > 1 ? static_cast<double>(i) / static_cast<double>(of.size() - 1) : 0.5;
+      series.points.push_back({static_cast<double>(t) + dots.left + at * (dots.right - dots.left),
+                               picture.value(of, i), ""});
+    }
+  }
+  return series;
+}
+
+client::Series bound_line(double bound, std::size_t truths, bool first) {
+  client::Series series;
+  series.legend = first ? "bounds of the means (docs/evidence.md)" : "";
+  series.colour = palette::kInk;
+  series.marker = client::Marker::kNone;
+  series.line = true;
+  series.dash_px = 10.0;
+  series.points = {{-0.5, bound, ""}, {static_cast<double>(truths) - 0.5, bound, ""}};
+  return series;
+}
+
+Status draw(const Rows& all, const Picture& picture, const std::filesystem::path& folder) {
+  const std::vector<std::string> truths = all.values("truth");
+  const Rows rows = all.where("data", picture.data);
+  client::ChartSpec spec;
+  spec.title = picture.title;
+  spec.subtitle = "a dot per simulated surgery, patient after patient";
+  spec.x.label = "what the truth has and the estimate does not believe";
+  spec.x.names = truths;
+  spec.x.from_zero = false;
+  spec.y = picture.y;
+  spec.size = {3000, 1000};  // room for the names
+  for (const Dots& dots :
+       {Dots{"contact", "contact", -0.36, -0.04, palette::kBlue, client::Marker::kCircle},
+        Dots{"fixed", "fixed", 0.04, 0.36, palette::kVermillion, client::Marker::kTriangle}}) {
+    spec.series.push_back(dots_of(rows, truths, dots, picture));
+  }
+  for (std::size_t i = 0; i < picture.bounds.size(); ++i) {
+    spec.series.push_back(bound_line(picture.bounds[i], truths.size(), i == 0));
+  }
+  const std::filesystem::path file = folder / picture.file;
+  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
+  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+}
+
+}  // namespace
+
+Status draw_evidence(const Rows& rows, const std::filesystem::path& folder) {
+  const auto column = [](const char* name) {
+    return [name](const Rows& of, std::size_t i) { return of.number(i, name); };
+  };
+  const Picture pictures[] = {
+      {"evidence-tumour.png",
+       "Left of the tumour's motion, updates from the tumour alone",
+       "tumour",
+       {.label = "error / motion (%)", .log = true},
+       [](const Rows& of, std::size_t i) { return 100.0 - of.number(i, "recovered_pct"); },
+       {5.0, 12.0, 20.0}},
+      {"evidence-craniotomy.png",
+       "Closest point distance at the craniotomy, updates from the tumour alone",
+       "tumour",
+       {.label = "CPPD (mm)", .log = true},
+       column("cppd_mm"),
+       {1.0}},
+      {"evidence-coverage.png",
+       "Coverage of the 90 % interval, updates from tumour and cortex",
+       "tumour+cortex",
+       {.label = "share of true components inside"},
+       column("coverage_90"),
+       {0.75, 0.97}}};
+  for (const Picture& picture : pictures) {
+    if (Status ok = draw(rows, picture, folder); !ok) return ok;
+  }
+  return {};
+}
+
+}  // namespace brainshift::evidence

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// evidence_summary TABLE...: checks and pictures from the tables of `evidence`, one per head, into
+// $BRAINSHIFT_STUDY_DIR (tests/support/study_record.hpp). Measures nothing; whether the checks hold
+// is for study_summary to say.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <vector>
+
+#include "tests/evidence/evidence_checks.hpp"
+#include "tests/evidence/evidence_pictures.hpp"
+
+namespace brainshift::evidence {
+namespace {
+
+Status run(const std::vector<std::filesystem::path>& files) {
+  const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
+  if (folder == nullptr) {
+    return fail(ErrorCode::kInvalidArgument, "BRAINSHIFT_STUDY_DIR is not set");
+  }
+  bench::CsvTable all;
+  for (const auto& file : files) {
+    const auto table = bench::CsvTable::read(file);
+    if (!table) return tl::unexpected(table.error());
+    if (Status ok = all.append(*table); !ok) {
+      return fail(ok.error().code, file.string() + ": " + ok.error().message);
+    }
+  }
+  const surgeries::Rows rows(all);
+  if (rows.empty()) return fail(ErrorCode::kEmptySet, "no surgery in the tables");
+  for (const std::string& head : rows.values("head")) check_evidence(rows.where("head", head));
+  return draw_evidence(rows, folder);
+}
+
+}  // namespace
+}  // namespace brainshift::evidence
+
+int main(int argc, char** argv) {
+  std::vector<std::filesystem::path> tables;
+  CLI::App app{"Checks and pictures of the evidence study.", "evidence_summary"};
+  app.add_option("tables", tables, "tables of evidence")->required();
+  app.footer("Exit status: 0 summarised, 1 failure, 2 bad usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "evidence_summary: %s (see evidence_summary --help)\n", error.what());
+    return 2;
+  }
+  const auto ok = brainshift::evidence::run(tables);
+  if (ok) return 0;
+  std::fprintf(stderr, "evidence_summary: %s\n", ok.error().message.c_str());
+  return 1;
+}

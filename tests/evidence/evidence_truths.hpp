@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The truths of the study: consistency, each adverse ingredient alone, all of them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/twin/adverse.hpp"
+
+namespace brainshift::evidence {
+
+struct TruthKind {
+  std::string name;  // "consistency", "mesh", ..., "all"
+  client::Ingredients ingredients;
+};
+
+// In this order.
+const std::vector<TruthKind>& truth_kinds();
+const TruthKind* find_truth(const std::string& name);  // nullptr when unknown
+bool is_adverse_alone(const std::string& name);
+
+}  // namespace brainshift::evidence
