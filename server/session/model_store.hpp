@@ -15,9 +15,9 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "server/pipeline/scene_plan.hpp"
 #include "server/session/session.hpp"
 

@@ -10,9 +10,9 @@
 #include "common/core/progress.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 
 namespace brainshift::bench {

@@ -47,7 +47,7 @@ class Brains {
         window_{0, operators_.num_modes()},
         factor_(operators_, head.config.contact.penalty_n_per_mm, team_),
         contact_(operators_, window_, head.config.contact.penalty_n_per_mm, true, factor_, team_),
-        rebuild_(operators_, window_),
+        rebuild_(operators_, window_, team_),
         check_(head.model->mesh.nodes, head.model->mesh.tets, team_),
         places_(places_of(*head.model, *head.locator)),
         outward_(outward_of(*head.model)) {}

@@ -41,14 +41,11 @@ constexpr double kModelError = 0.1;
 // Standard deviation of a displacement component that the modes of `part` stand for, mm; 0 without
 // modes.
 double displacement_sd_mm(const CondensedOperators& operators, PriorPart part) {
-  int first = 0;
-  for (int g = 0; g < static_cast<int>(part); ++g) {
-    first += operators.part_columns[static_cast<std::size_t>(g)];
-  }
-  const int count = operators.part_columns[static_cast<std::size_t>(part)];
+  const int first = operators.first_column(part), count = operators.columns(part);
   if (count == 0) return 0.0;
-  const double squares = operators.modes.middleCols(first, count).cast<double>().squaredNorm();
-  return std::sqrt(squares / static_cast<double>(operators.modes.rows()));
+  double squares = 0.0;
+  for (int j = first; j < first + count; ++j) squares += operators.responses.squared_norm(j);
+  return std::sqrt(squares / static_cast<double>(3 * operators.num_nodes()));
 }
 
 // Into memory that `reason` has already.
@@ -147,7 +144,7 @@ struct CondensedInverter::Impl {
                   config.prior.estimate_scales, team),
         descent(*operators, window, config.contact.penalty_n_per_mm, options.contact, team,
                 profile),
-        rebuild(*operators, window, options.region_of_interest),
+        rebuild(*operators, window, team, options.region_of_interest),
         robust(config.sensing.robust_weights),
         medium_sd_mm(displacement_sd_mm(*operators, PriorPart::kMedium)) {
     for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
@@ -436,7 +433,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
     rebuild.displacement(team, descent.z(), contact, estimate.displacement);
   }
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
-                                      estimate.displacement);
+                                      estimate.displacement, rebuild.storage_error_mm());
       !status) {
     return status;
   }
@@ -515,8 +512,8 @@ Result<CondensedInverter> CondensedInverter::build(
     std::shared_ptr<const CondensedOperators> operators,
     std::shared_ptr<const geometry::TetLocator> locator, const CaseConfig& config,
     const CondensedOptions& options) {
-  if (operators->modes.rows() != 3 * operators->control_neighbours.cols() ||
-      operators->slave_modes.cols() != operators->modes.cols()) {
+  if (operators->num_nodes() != operators->control_neighbours.cols() ||
+      operators->responses.num_columns() != operators->num_modes() + operators->num_slaves()) {
     return fail(ErrorCode::kInvalidArgument,
                 "condensed operators: the arrays do not belong to one mesh");
   }

@@ -39,8 +39,8 @@
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
 #include "common/inversion/contract/omission_errors.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
 

@@ -4,14 +4,21 @@
 #include <algorithm>
 #include <numeric>
 
+#include "common/operators/encode_columns.hpp"
+
 namespace brainshift::inversion {
 namespace {
 
 // Variance of each node's interpolation error under the prior, mm^2.
-VecX interpolation_variance(const CondensedOperators& operators, ModeWindow window) {
+VecX interpolation_variance(const CondensedOperators& operators, ModeWindow window,
+                            ThreadTeam& team) {
+  std::vector<NodeIndex> all(static_cast<std::size_t>(operators.num_nodes()));
+  std::iota(all.begin(), all.end(), 0);
+  const Eigen::MatrixXf modes =
+      decode_rows(operators.responses, all, column_range(window.first, window.count), team);
   VecX variance = VecX::Zero(operators.num_nodes());
   for (int j = 0; j < window.count; ++j) {
-    const auto mode = operators.modes.col(window.first + j);
+    const auto mode = modes.col(j);
     for (int i = 0; i < operators.num_nodes(); ++i) {
       Eigen::Vector3f error = mode.segment<3>(3 * i);
       for (int c = 0; c < 4; ++c) {
@@ -32,7 +39,7 @@ bool same_neighbours(const CondensedOperators& operators, NodeIndex a, NodeIndex
 }  // namespace
 
 FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
-                        const std::vector<NodeIndex>& region) {
+                        const std::vector<NodeIndex>& region, ThreadTeam& team) {
   FarField plan;
   if (region.empty()) return plan;
   const auto nodes = static_cast<std::size_t>(operators.num_nodes());
@@ -40,7 +47,7 @@ FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
   for (const NodeIndex node : region) exact[static_cast<std::size_t>(node)] = 1;
   for (const NodeIndex node : operators.control) exact[static_cast<std::size_t>(node)] = 1;
 
-  const VecX variance = interpolation_variance(operators, window);
+  const VecX variance = interpolation_variance(operators, window, team);
   std::vector<NodeIndex> worst(nodes);
   std::iota(worst.begin(), worst.end(), 0);
   std::stable_sort(worst.begin(), worst.end(),

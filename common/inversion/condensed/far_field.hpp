@@ -14,8 +14,9 @@
 
 #include <vector>
 
+#include "common/core/thread_team.hpp"
 #include "common/inversion/skull/mode_window.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -35,6 +36,6 @@ struct FarField {
 
 // region: sorted nodes that must be exact; empty: every node, and the result is empty.
 FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
-                        const std::vector<NodeIndex>& region);
+                        const std::vector<NodeIndex>& region, ThreadTeam& team);
 
 }  // namespace brainshift::inversion

@@ -4,15 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/inversion/condensed/gather_rows.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {
 namespace {
-
-// Rows summed at a time: 16 KB of the result, which stays in the first cache while columns stream
-// past.
-constexpr long kChunk = 4096;
 
 // out += sum over j of factor[j] column[j], for `rows` numbers from `first` on. Plain loops in the
 // place of BLAS: its kernels round the last numbers of an array otherwise than the others, so that
@@ -38,15 +34,16 @@ void add_columns(const std::vector<const float*>& column, const std::vector<floa
 
 }  // namespace
 
-FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow window,
+FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow window, ThreadTeam& team,
                            const std::vector<NodeIndex>& region)
     : operators_(operators),
       window_(window),
-      far_(plan_far_field(operators, window, region)),
-      field_(far_.empty() ? operators.modes.rows()
-                          : 3 * static_cast<Eigen::Index>(far_.rebuilt.size())),
-      control_modes_(gather_rows(operators.modes, operators.control)),
-      control_contact_(gather_rows(operators.contact_columns, operators.control)),
+      far_(plan_far_field(operators, window, region, team)),
+      control_modes_(decode_rows(operators.responses, operators.control,
+                                 column_range(0, operators.num_modes()), team)),
+      control_contact_(
+          decode_rows(operators.responses, operators.control,
+                      column_range(operators.contact_column(0), operators.num_slaves()), team)),
       response_(operators.num_slaves(), window.count),
       factor_(window.count, window.count),
       conditioned_(control_modes_.rows(), window.count),
@@ -55,62 +52,113 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       control_variance_(static_cast<Eigen::Index>(operators.control.size())) {
   const auto most =
       static_cast<std::size_t>(window.count) + static_cast<std::size_t>(operators.num_slaves());
+  terms_.reserve(most);
+  const CompactColumns& responses = operators.responses;
+  has_block_.assign(static_cast<std::size_t>(responses.num_blocks()), far_.empty() ? 1 : 0);
+  for (const NodeIndex node : region) {
+    has_block_[static_cast<std::size_t>(responses.place(node).block)] = 1;
+  }
+  for (int b = 0; b < responses.num_blocks(); ++b) {
+    if (has_block_[static_cast<std::size_t>(b)]) blocks_.push_back(b);
+  }
+  some_blocks_.reserve(has_block_.size());
+  std::vector<NodeIndex> spare;
+  for (const NodeIndex node : far_.rebuilt) {
+    const bool summed = has_block_[static_cast<std::size_t>(responses.place(node).block)];
+    place_.push_back(summed ? place(node)
+                            : 3 * static_cast<Eigen::Index>(operators.num_nodes() + spare.size()));
+    if (!summed) spare.push_back(node);
+  }
+  field_.resize(3 * static_cast<Eigen::Index>(operators.num_nodes() + spare.size()));
+  if (spare.empty()) return;
   columns_.reserve(most);
   factors_.reserve(most);
-  if (far_.empty()) return;
-  near_modes_ = gather_rows(operators.modes, far_.rebuilt);
-  near_contact_ = gather_rows(operators.contact_columns, far_.rebuilt);
+  spare_modes_ = decode_rows(responses, spare, column_range(0, operators.num_modes()), team);
+  spare_contact_ = decode_rows(
+      responses, spare, column_range(operators.contact_column(0), operators.num_slaves()), team);
 }
 
-void FieldRebuild::sum_columns(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact) {
-  const Eigen::MatrixXf& modes = far_.empty() ? operators_.modes : near_modes_;
-  const Eigen::MatrixXf& contacts = far_.empty() ? operators_.contact_columns : near_contact_;
+Eigen::Index FieldRebuild::place(NodeIndex node) const {
+  const CompactColumns::Place at = operators_.responses.place(node);
+  return 3 * static_cast<Eigen::Index>(operators_.responses.first_node(at.block) + at.node);
+}
+
+void FieldRebuild::gather_terms(const VecX& z, const ContactAtLoads& contact) {
+  terms_.clear();
   columns_.clear();
   factors_.clear();
+  const bool spare = spare_modes_.rows() > 0;
   for (int j = 0; j < window_.count; ++j) {
-    columns_.push_back(modes.col(window_.first + j).data());
-    factors_.push_back(static_cast<float>(z[j]));
+    terms_.push_back({window_.first + j, static_cast<float>(z[j])});
+    if (spare) columns_.push_back(spare_modes_.col(window_.first + j).data());
+    if (spare) factors_.push_back(static_cast<float>(z[j]));
   }
   for (int j = 0; j < contact.size(); ++j) {
-    columns_.push_back(contacts.col(contact.active()[static_cast<std::size_t>(j)]).data());
-    factors_.push_back(static_cast<float>(contact.forces()[j]));
+    const int slave = contact.active()[static_cast<std::size_t>(j)];
+    const auto force = static_cast<float>(contact.forces()[j]);
+    terms_.push_back({operators_.contact_column(slave), force});
+    if (spare) columns_.push_back(spare_contact_.col(slave).data());
+    if (spare) factors_.push_back(force);
   }
-  team.split(field_.size(), [&](long begin, long end) {
-    for (long first = begin; first < end; first += kChunk) {
-      const long rows = std::min(kChunk, end - first);
-      float* out = field_.data() + first;
-      std::fill(out, out + rows, 0.0F);
-      add_columns(columns_, factors_, first, rows, out);
+}
+
+void FieldRebuild::sum_blocks(ThreadTeam& team, const std::vector<int>& blocks) {
+  team.split(static_cast<long>(blocks.size()), [&](long begin, long end) {
+    for (long i = begin; i < end; ++i) {
+      const int block = blocks[static_cast<std::size_t>(i)];
+      operators_.responses.sum(block, terms_,
+                               field_.data() + 3L * operators_.responses.first_node(block));
     }
+  });
+}
+
+void FieldRebuild::sum_spare(ThreadTeam& team) {
+  const long start = 3L * operators_.num_nodes();
+  team.split(spare_modes_.rows(), [&](long begin, long end) {
+    float* out = field_.data() + start + begin;
+    std::fill(out, out + (end - begin), 0.0F);
+    add_columns(columns_, factors_, begin, end - begin, out);
   });
 }
 
 void FieldRebuild::displacement_at(ThreadTeam& team, const std::vector<NodeIndex>& nodes,
-                                   const VecX& z, const ContactAtLoads& contact, Points& u) const {
-  u.setZero(3, static_cast<Eigen::Index>(nodes.size()));
-  team.split(u.cols(), [&](long begin, long end) {
-    const auto add = [&](const auto& column, double factor) {
-      for (long i = begin; i < end; ++i) {
-        const NodeIndex node = nodes[static_cast<std::size_t>(i)];
-        u.col(i) += factor * column.template segment<3>(3L * node).template cast<double>();
-      }
-    };
-    for (int j = 0; j < window_.count; ++j) add(operators_.modes.col(window_.first + j), z[j]);
-    for (int j = 0; j < contact.size(); ++j) {
-      add(operators_.contact_columns.col(contact.active()[static_cast<std::size_t>(j)]),
-          contact.forces()[j]);
-    }
-  });
+                                   const VecX& z, const ContactAtLoads& contact, Points& u) {
+  u.resize(3, static_cast<Eigen::Index>(nodes.size()));
+  gather_terms(z, contact);
+  std::fill(has_block_.begin(), has_block_.end(), char{0});
+  some_blocks_.clear();
+  for (const NodeIndex node : nodes) {
+    const int block = operators_.responses.place(node).block;
+    char& has = has_block_[static_cast<std::size_t>(block)];
+    if (!has) some_blocks_.push_back(block);
+    has = 1;
+  }
+  sum_blocks(team, some_blocks_);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    u.col(static_cast<Eigen::Index>(i)) = field_.segment<3>(place(nodes[i])).cast<double>();
+  }
 }
 
 void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact,
                                 Points& u) {
   u.resize(3, operators_.num_nodes());
-  sum_columns(team, z, contact);
+  gather_terms(z, contact);
+  sum_blocks(team, blocks_);
+  const auto& steps = operators_.responses.parts().steps;
+  double squares = 0.0;
+  for (const CompactColumns::Term& term : terms_) {
+    squares += std::pow(static_cast<double>(steps[term.column] * term.factor), 2);
+  }
+  storage_error_mm_ = kStorageSafety * std::sqrt(squares);
   far_field_error_mm_ = 0.0;
-  if (!far_.empty()) return interpolate_far(team, contact, u);
-  team.split(field_.size(), [&](long begin, long end) {
-    for (long i = begin; i < end; ++i) u.data()[i] = static_cast<double>(field_[i]);
+  if (!far_.empty()) {
+    sum_spare(team);
+    return interpolate_far(team, contact, u);
+  }
+  team.split(u.cols(), [&](long begin, long end) {
+    for (long i = begin; i < end; ++i) {
+      u.col(i) = field_.segment<3>(place(static_cast<NodeIndex>(i))).cast<double>();
+    }
   });
 }
 
@@ -120,7 +168,9 @@ Vec3 FieldRebuild::interpolated(NodeIndex node) const {
     const NodeIndex from =
         operators_.control[static_cast<std::size_t>(operators_.control_neighbours(c, node))];
     u += static_cast<double>(operators_.control_weights(c, node)) *
-         field_.segment<3>(3L * far_.row[static_cast<std::size_t>(from)]).cast<double>();
+         field_
+             .segment<3>(place_[static_cast<std::size_t>(far_.row[static_cast<std::size_t>(from)])])
+             .cast<double>();
   }
   return u;
 }
@@ -130,7 +180,7 @@ void FieldRebuild::interpolate_far(ThreadTeam& team, const ContactAtLoads& conta
     for (long i = begin; i < end; ++i) {
       const int row = far_.row[static_cast<std::size_t>(i)];
       if (row >= 0) {
-        u.col(i) = field_.segment<3>(3L * row).cast<double>();
+        u.col(i) = field_.segment<3>(place_[static_cast<std::size_t>(row)]).cast<double>();
       } else {
         u.col(i) = interpolated(static_cast<NodeIndex>(i));
       }

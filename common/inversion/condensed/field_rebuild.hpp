@@ -8,11 +8,13 @@
 // sd of a node: root mean square of its three components' standard deviations. Given the active
 // set: which slaves touch is taken as known.
 //
-// Reads (r + k) columns of 3n floats once, split over the team by rows. Results do not depend on
-// timing. With a region of interest only its rows are read, gathered by the constructor, and the
-// other nodes are interpolated (far_field.hpp). For the same z and f the rebuilt nodes then have
-// the displacement that they have in the whole field, within 1e-9 mm (with the loops as they are,
-// to the bit). Does not allocate after construction, but for outputs of the wrong size.
+// Reads r + k compact columns once (compact_columns.hpp), split over the team by blocks of nodes.
+// Results do not depend on timing. With a region of interest only blocks with a node of it are
+// summed, beside control and probe nodes, whose rows the constructor unpacks; the other nodes are
+// interpolated (far_field.hpp). For the same z and f the nodes of the region then have the
+// displacement that they have in the whole field, within 1e-9 mm (with the loops as they are, to
+// the bit), control and probe nodes within 1e-6 of their largest term. Does not allocate after
+// construction, but for outputs of the wrong size.
 #pragma once
 
 #include <memory>
@@ -25,21 +27,28 @@
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
+// The typical error is 0.3 steps; the largest of some ten thousand is five times as large.
+inline constexpr double kStorageSafety = 3.0;
+
 class FieldRebuild {
  public:
-  // Keeps a reference to the operators. region: sorted nodes that are rebuilt; empty: all.
-  FieldRebuild(const CondensedOperators& operators, ModeWindow window,
+  // Keeps a reference to the operators. region: sorted nodes that are rebuilt; empty: all. team:
+  // of the constructor's work.
+  FieldRebuild(const CondensedOperators& operators, ModeWindow window, ThreadTeam& team,
                const std::vector<NodeIndex>& region = {});
 
   // u: 3 x n, mm.
   void displacement(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact, Points& u);
   // u: 3 x nodes, mm, at these nodes only.
   void displacement_at(ThreadTeam& team, const std::vector<NodeIndex>& nodes, const VecX& z,
-                       const ContactAtLoads& contact, Points& u) const;
+                       const ContactAtLoads& contact, Points& u);
+  // Upper estimate of what the rounding of compact columns did to a component of the last
+  // displacement(), mm: kStorageSafety sqrt(sum (step_j x_j)^2) over its columns and their factors.
+  double storage_error_mm() const { return storage_error_mm_; }
   // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was
   // rebuilt.
   double far_field_error_mm() const { return far_field_error_mm_; }
@@ -55,18 +64,27 @@ class FieldRebuild {
  private:
   const CondensedOperators& operators_;
   ModeWindow window_;
-  // field_ = sum of columns, for all nodes or those of far_.rebuilt
-  void sum_columns(ThreadTeam& team, const VecX& z, const ContactAtLoads& contact);
+  // terms_ and, for rows that are unpacked, columns_ and factors_: what is summed.
+  void gather_terms(const VecX& z, const ContactAtLoads& contact);
+  void sum_blocks(ThreadTeam& team, const std::vector<int>& blocks);
+  void sum_spare(ThreadTeam& team);
   void interpolate_far(ThreadTeam& team, const ContactAtLoads& contact, Points& u);
   Vec3 interpolated(NodeIndex node) const;
+  // Where a node's displacement stands in field_ if its block is summed.
+  Eigen::Index place(NodeIndex node) const;
 
   FarField far_;
-  Eigen::MatrixXf near_modes_, near_contact_;  // rows of U and G of far_.rebuilt
-  double far_field_error_mm_ = 0.0;
-  // What sum_columns adds up: columns of U and G with their z and f.
+  std::vector<int> blocks_;          // that are summed by displacement()
+  std::vector<Eigen::Index> place_;  // where the nodes of far_.rebuilt stand in field_
+  // Control and probe nodes in other blocks: their number, rows of U and G.
+  Eigen::MatrixXf spare_modes_, spare_contact_;
+  double far_field_error_mm_ = 0.0, storage_error_mm_ = 0.0;
+  std::vector<CompactColumns::Term> terms_;
   std::vector<const float*> columns_;
   std::vector<float> factors_;
-  Eigen::VectorXf field_;
+  Eigen::VectorXf field_;         // in the order of the blocks, then the spare nodes
+  std::vector<int> some_blocks_;  // of displacement_at()
+  std::vector<char> has_block_;
   // Control nodes: rows of U and G, V, and what a set needs of them.
   Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
   std::unique_ptr<float[]> contact_storage_;

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "common/inversion/condensed/gather_rows.hpp"
 #include "common/inversion/contract/data_check.hpp"
+#include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {
 SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> operators,
@@ -21,8 +21,6 @@ SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> ope
       outside_(outside),
       team_(team),
       region_row_(static_cast<std::size_t>(operators_->num_nodes()), -1),
-      region_modes_(gather_rows(operators_->modes, operators_->region)),
-      region_contact_(gather_rows(operators_->contact_columns, operators_->region)),
       has_column_(static_cast<std::size_t>(operators_->num_slaves()), 0) {
   for (std::size_t i = 0; i < operators_->region.size(); ++i) {
     region_row_[static_cast<std::size_t>(operators_->region[i])] = static_cast<int>(i);
@@ -86,13 +84,29 @@ Status SampledOperators::locate(const SparseData& data) {
                     "use it");
     }
   }
-  if (outside_region_ > 0) return {};
+  if (outside_region_ > 0) {
+    unpack_outside();
+    return {};
+  }
   for (int i = 0; i < size_; ++i) {
     for (int k = 0; k < 4; ++k) {  // a node outside has weight 0 here: any row will do
       rows_(k, i) = std::max(0, region_row_[static_cast<std::size_t>(rows_(k, i))]);
     }
   }
   return {};
+}
+
+void SampledOperators::unpack_outside() {
+  outside_nodes_.assign(rows_.data(), rows_.data() + 4 * size_);
+  std::sort(outside_nodes_.begin(), outside_nodes_.end());
+  outside_nodes_.erase(std::unique(outside_nodes_.begin(), outside_nodes_.end()),
+                       outside_nodes_.end());
+  for (int& row : rows_.leftCols(size_).reshaped()) {
+    row = static_cast<int>(std::lower_bound(outside_nodes_.begin(), outside_nodes_.end(), row) -
+                           outside_nodes_.begin());
+  }
+  outside_modes_ = decode_rows(operators_->responses, outside_nodes_,
+                               column_range(0, window_.first + window_.count), team_);
 }
 
 bool SampledOperators::truncated_variance(const geometry::TetLocation& location,
@@ -121,7 +135,8 @@ void SampledOperators::sample(const SparseData& data, const RemainderVariances& 
     weights_.col(i) = barycentric_.col(i) / sd_[i];
     row_weights_.segment(first_row(i), first_row(i + 1) - first_row(i)).setConstant(1.0 / sd_[i]);
   }
-  const Eigen::MatrixXf& modes = outside_region_ == 0 ? region_modes_ : operators_->modes;
+  const Eigen::MatrixXf& modes =
+      outside_region_ == 0 ? operators_->region_responses : outside_modes_;
   team_.split(window_.first + window_.count, [&](long begin, long end) {
     for (long j = begin; j < end; ++j) {
       const bool left_out = j < window_.first;
@@ -170,12 +185,20 @@ void SampledOperators::sample_contact(const std::vector<int>& slaves) {
     has = 1;
   }
   if (missing_.empty()) return;
-  const Eigen::MatrixXf& columns =
-      outside_region_ == 0 ? region_contact_ : operators_->contact_columns;
+  Eigen::MatrixXf outside;  // a column for each missing slave
+  if (outside_region_ > 0) {
+    std::vector<int> which = missing_;
+    for (int& column : which) column = operators_->contact_column(column);
+    outside = decode_rows(operators_->responses, outside_nodes_, which, team_);
+  }
   team_.split(static_cast<long>(missing_.size()), [&](long begin, long end) {
     for (long j = begin; j < end; ++j) {
       const int slave = missing_[static_cast<std::size_t>(j)];
-      sample_column(columns.col(slave).data(), barycentric_,
+      const float* column =
+          outside_region_ > 0
+              ? outside.col(j).data()
+              : operators_->region_responses.col(operators_->contact_column(slave)).data();
+      sample_column(column, barycentric_,
                     contact_columns_.get() + static_cast<std::ptrdiff_t>(rows()) * slave);
     }
   });

@@ -4,11 +4,11 @@
 //   free_body   R^-1/2 [common error | A U | d]     rows x (q + r + 1)
 //   contact     R^-1/2 A G_A         rows x k
 // A whole displacement has three rows, a datum along a direction n one, n . (A U) and so on; R
-// holds sd^2 / weight. Rows of U and G near the data region are kept in arrays of their own, small
-// enough for the cache. A datum that touches another node is sampled from the full arrays, and what
-// the modes leave out of the prior there is added to its variance
+// holds sd^2 / weight. Rows of U and G in the data region are at hand. Where a datum
+// touches another node, the rows of all nodes that data touch are unpacked when they are located,
+// and what the modes leave out of the prior there is added to the datum's variance
 // (CondensedOperators::truncated_variance_mm2), so that it is not believed too much. Does not
-// allocate after reserve().
+// allocate after reserve() as long as data lie in the region.
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
@@ -72,8 +72,10 @@ class SampledOperators {
   // The rows of one datum in a column of rows().
   void put(const Vec3& value, int datum, double* column) const;
   using NodeWeights = Eigen::Matrix<double, 4, Eigen::Dynamic>;  // 4 x m
-  // out = A (array column), each datum's rows with its weights; `array` has 3n rows when any datum
-  // lies outside the region, else 3e rows.
+  // Unpacks the rows of all nodes that data touch.
+  void unpack_outside();
+  // out = A (array column), each datum's rows with its weights; `array` has the rows of
+  // outside_nodes_ when any datum lies outside the region, else those of the region.
   void sample_column(const float* array, const NodeWeights& weights, double* out) const;
   // A G of these slaves, in contact_columns_ from now on.
   void sample_contact(const std::vector<int>& slaves);
@@ -85,9 +87,10 @@ class SampledOperators {
   std::shared_ptr<const geometry::TetLocator> locator_;
   ModeWindow window_;
   OutsideRegion outside_;
-  ThreadTeam& team_;             // shares the work
-  std::vector<int> region_row_;  // per node, -1 outside the region
-  Eigen::MatrixXf region_modes_, region_contact_;
+  ThreadTeam& team_;                      // shares the work
+  std::vector<int> region_row_;           // per node, -1 outside the region
+  std::vector<NodeIndex> outside_nodes_;  // sorted; with a datum outside the region
+  Eigen::MatrixXf outside_modes_;         // 3 outside_nodes_.size() x (window.first + count)
   int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
   NodeWeights barycentric_, weights_;           // 4 x m; weights_: / sd

@@ -19,21 +19,23 @@
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/deformation.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {
 
 // Two ways to the same penetration: in double at the slaves, and by the rebuilt field, a sum of
-// single-precision columns with 6e-8 of rounding in each of the terms, which cancel. `make
-// stability` has no point that fails this.
+// compact columns in single precision with 6e-8 of rounding in each of the terms, which cancel.
+// `make stability` has no point that fails this.
 inline constexpr double kEquilibriumTolerance_mm = 1e-3;
 inline constexpr double kEquilibriumRelative = 2e-5;
 
 // penetration: one per slave, as contact was solved. slaves: indices of the slaves to look at.
+// storage_mm: what the rounding of compact columns may do to the field
+// (FieldRebuild::storage_error_mm).
 Status check_equilibrium(const CondensedOperators& operators, const std::vector<int>& slaves,
-                         const VecX& penetration, const Points& displacement);
+                         const VecX& penetration, const Points& displacement, double storage_mm);
 
 // Fills min_volume_ratio and inverted_elements. kNotFinite when the displacement is not finite.
 Status check_deformation(const fem::Deformation& deformation, Estimate& estimate);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <mutex>
+#include <numeric>
 #include <vector>
 
 #include "common/core/random.hpp"
@@ -14,6 +15,7 @@
 #include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/memory_limit.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/operators/encode_columns.hpp"
 #include "common/values/quality.hpp"
 
 namespace brainshift::inversion {
@@ -39,11 +41,11 @@ constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
 // Step 1: G and Phi.
 Status contact_columns(const PreparedModel& model, const CondenseOptions& options,
-                       BlockRunner& runner, CondensedOperators& result) {
+                       BlockRunner& runner, MatrixXf& all_columns, CondensedOperators& result) {
   const auto& pairs = model.forward().contact().pairs();
   const int s = static_cast<int>(pairs.size());
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
-  result.contact_columns.resize(rows, s);
+  all_columns.resize(rows, s);
   result.compliance.resize(s, s);
   result.slave_normals.resize(3, s);
   result.initial_penetration_mm.resize(s);
@@ -81,7 +83,7 @@ Status contact_columns(const PreparedModel& model, const CondenseOptions& option
         options.store.save(first / kBlock, columns, compliance);
       }
     }
-    result.contact_columns.middleCols(first, count) = columns;
+    all_columns.middleCols(first, count) = columns;
     result.compliance.middleCols(first, count) = compliance;
     return {};
   });
@@ -157,7 +159,8 @@ Result<MatrixXd> leading_modes(const MatrixXd& omega, const MatrixXd& sketch, in
 }
 
 // Steps 2 and 3: U.
-Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOperators& result) {
+Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& all_modes,
+                   CondensedOperators& result) {
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   const prior::ForcePrior& prior = model.prior();
   const int loads = prior.num_modes();
@@ -205,7 +208,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
     modes.conservativeResize(rows, modes.cols() + leading->cols());
     modes.rightCols(leading->cols()) = *leading;
   }
-  result.modes = modes.cast<float>();
+  all_modes = modes.cast<float>();
   result.slave_modes.resize(static_cast<Eigen::Index>(result.slaves.size()), modes.cols());
   for (std::size_t i = 0; i < result.slaves.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
@@ -216,7 +219,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, CondensedOpe
 }
 
 // Step 4: what the modes leave out of the prior variance, at the control nodes.
-Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
+Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const MatrixXf& modes,
                          CondensedOperators& result) {
   const Points& nodes = model.model().mesh.nodes;
   const std::vector<NodeIndex> spread =
@@ -244,7 +247,7 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner,
     for (int g = 0; g < kRemainders; ++g) {
       const auto part = static_cast<PriorPart>(kLoadParts + g);
       const double carried =
-          result.modes.block(3 * node, result.first_column(part), 3, result.columns(part))
+          modes.block(3 * node, result.first_column(part), 3, result.columns(part))
               .cast<double>()
               .squaredNorm();
       left_out(i, g) = std::max(0.0, variance.col(g).segment<3>(3 * i).sum() - carried) / 3.0;
@@ -281,12 +284,14 @@ std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& con
   const auto s = static_cast<std::uint64_t>(slaves);
   const auto q = static_cast<std::uint64_t>(config.condensed.max_rank) + kOversampling;
   const std::uint64_t blocks = 8 * n3 * kBlock * 6 * static_cast<std::uint64_t>(threads);
-  // G; Phi; test vectors, sketches, modes (double) and modes (float)
-  return 4 * n3 * s + 8 * s * s + ((2 + kRemainders) * 8 + 4) * n3 * q + blocks;
+  // G, also compact; Phi; test vectors, sketches, modes (double) and modes (float)
+  return 6 * n3 * s + 8 * s * s + ((2 + kRemainders) * 8 + 4) * n3 * q + blocks;
 }
 
-double largest_motion_sd_mm(const CondensedOperators& operators) {
-  const VecX squares = operators.modes.rowwise().squaredNorm().cast<double>();
+namespace {
+
+double largest_motion_sd_mm(const MatrixXf& modes) {
+  const VecX squares = modes.rowwise().squaredNorm().cast<double>();
   double largest = 0.0;
   for (Eigen::Index i = 0; i + 2 < squares.size(); i += 3) {
     largest = std::max(largest, squares.segment<3>(i).sum());
@@ -294,12 +299,10 @@ double largest_motion_sd_mm(const CondensedOperators& operators) {
   return std::sqrt(largest);
 }
 
-namespace {
-
 // Against a prior in other units, or with every part switched off.
-Status check_motion(const CondensedOperators& operators) {
+Status check_motion(const MatrixXf& modes) {
   constexpr double kMost_mm = 10.0 * kMostMotion_mm;
-  const double sd_mm = largest_motion_sd_mm(operators);
+  const double sd_mm = largest_motion_sd_mm(modes);
   if (sd_mm > 0.0 && sd_mm <= kMost_mm) return {};
   char text[160];
   std::snprintf(text, sizeof text,
@@ -309,7 +312,26 @@ Status check_motion(const CondensedOperators& operators) {
   return fail(ErrorCode::kInvalidArgument, text);
 }
 
+// Rows of [U G] at the given nodes.
+MatrixXf region_rows(const std::vector<NodeIndex>& nodes, const MatrixXf& modes,
+                     const MatrixXf& columns) {
+  MatrixXf rows(3 * static_cast<Eigen::Index>(nodes.size()), modes.cols() + columns.cols());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    auto own = rows.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+    own << modes.middleRows<3>(3L * nodes[i]), columns.middleRows<3>(3L * nodes[i]);
+  }
+  return rows;
+}
+
 }  // namespace
+
+double largest_motion_sd_mm(const CondensedOperators& operators) {
+  std::vector<NodeIndex> all(static_cast<std::size_t>(operators.num_nodes()));
+  std::iota(all.begin(), all.end(), 0);
+  ThreadTeam team(1);
+  return largest_motion_sd_mm(
+      decode_rows(operators.responses, all, column_range(0, operators.num_modes()), team));
+}
 
 Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOptions& options) {
   const int slaves = model.forward().contact().num_slaves();
@@ -324,20 +346,27 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
   result.model_id = model.model().model_id;
   result.region = data_region(model.model());
   BlockRunner runner(model, options.progress, options.stop, options.threads);
-  if (auto status = contact_columns(model, options, runner, result); !status) {
+  MatrixXf columns, modes;  // G, U
+  if (auto status = contact_columns(model, options, runner, columns, result); !status) {
     return tl::unexpected(status.error());
   }
   if (!result.compliance.allFinite()) {
     return fail(ErrorCode::kNotFinite,
                 "contact columns: the compliance of the slaves is not finite");
   }
-  if (auto status = prior_modes(model, runner, result); !status) {
+  if (auto status = prior_modes(model, runner, modes, result); !status) {
     return tl::unexpected(status.error());
   }
-  if (auto status = check_motion(result); !status) return tl::unexpected(status.error());
-  if (auto status = left_out_variance(model, runner, result); !status) {
+  if (auto status = check_motion(modes); !status) return tl::unexpected(status.error());
+  if (auto status = left_out_variance(model, runner, modes, result); !status) {
     return tl::unexpected(status.error());
   }
+  ThreadTeam team(options.threads);
+  auto responses = encode_columns(model.model().mesh.nodes, {&modes, &columns}, team,
+                                  options.progress, options.stop);
+  if (!responses) return tl::unexpected(responses.error());
+  result.region_responses = region_rows(result.region, modes, columns);
+  result.responses = std::move(*responses);
   return result;
 }
 

@@ -10,6 +10,7 @@
 //      K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading columns
 //   3. load modes K^-1 M
 //   4. diag(C_g) at the control nodes: |Sigma_g^1/2 K^-1 e|^2 by one more solve per control dof
+//   5. [U G] made small (encode_columns.hpp)
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -33,7 +34,8 @@ struct BlockStore {
 };
 
 struct CondenseOptions {
-  Progress progress;     // stages "contact columns", "prior modes", "load modes", "uncertainty"
+  Progress progress;     // stages "contact columns", "prior modes", "load modes", "uncertainty",
+                         // "compact columns"
   std::stop_token stop;  // checked between blocks
   BlockStore store;      // both empty: nothing is kept
   int threads = 0;       // 0: as many as cores

@@ -20,7 +20,7 @@
 #include "common/inversion/skull/contact_factor.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/growing_matrix.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 

@@ -25,7 +25,7 @@
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/linalg/blas.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 

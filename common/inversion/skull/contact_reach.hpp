@@ -13,7 +13,7 @@
 #include "common/core/thread_team.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/inversion/skull/mode_window.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 

@@ -113,8 +113,8 @@ bool are_slaves(std::vector<NodeIndex> list, std::vector<NodeIndex> slaves) {
 std::optional<std::string> incompatibility_of(const CondensedOperators& operators,
                                               const BrainModel& model) {
   const Eigen::Index n = model.mesh.num_nodes();
-  const Eigen::Index r = operators.modes.cols();
   const auto s = static_cast<Eigen::Index>(operators.slaves.size());
+  const Eigen::Index r = operators.responses.num_columns() - s;
   const auto c = static_cast<Eigen::Index>(operators.control.size());
   Check check(operators.boundary);
   check.that(operators.model_id == model.model_id, "model_id",
@@ -125,7 +125,14 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
              "names a node that is no slave of the model");
   check.nodes("region", operators.region, n, true);
   check.nodes("control", operators.control, n, true);
-  check.matrix("modes", operators.modes, 3 * n, r);
+  check.that(
+      operators.num_nodes() == n, "responses",
+      "has " + std::to_string(operators.num_nodes()) + " nodes: must have " + std::to_string(n));
+  check.that(
+      r >= 0, "responses",
+      "has " + std::to_string(r + s) + " columns: fewer than the " + std::to_string(s) + " slaves");
+  check.matrix("region_responses", operators.region_responses,
+               3 * static_cast<Eigen::Index>(operators.region.size()), r + s);
   int left = static_cast<int>(r);
   for (int part = 0; part < kPriorParts; ++part) {
     const int columns = operators.part_columns[static_cast<std::size_t>(part)];
@@ -135,13 +142,15 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
                    " modes that the parts before it leave");
     left -= std::max(0, columns);
   }
-  check.that(left == 0, "modes",
+  check.that(left == 0, "responses",
              "has " + std::to_string(left) + " columns of no part of the prior");
-  check.matrix("contact_columns", operators.contact_columns, 3 * n, s);
   check.matrix("compliance", operators.compliance, s, s);
   if (!check.found()) {
     check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
   }
+  check.that(
+      operators.num_modes() == r, "slave_modes",
+      "has " + std::to_string(operators.num_modes()) + " columns: must have " + std::to_string(r));
   check.matrix("slave_modes", operators.slave_modes, s, r);
   check.matrix("slave_normals", operators.slave_normals, 3, s);
   check.matrix("initial_penetration_mm", operators.initial_penetration_mm, s, 1);

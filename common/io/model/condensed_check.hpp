@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::io {
 

@@ -53,6 +53,36 @@ std::string modes_of(int part) {
   return std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
 }
 
+void write_compact(Hdf5Writer& out, const std::string& group, const CompactParts& parts) {
+  const std::string in_group = group + "/";
+  out.group(group);
+  out.list(in_group + "steps", parts.steps);
+  out.list(in_group + "order", parts.order);
+  out.matrix(in_group + "blocks", parts.blocks);
+  out.list(in_group + "wide_basis", parts.wide_basis);
+  out.list(in_group + "basis", parts.basis);
+  out.list(in_group + "basis_scales", parts.basis_scales);
+  out.list(in_group + "words", parts.words);
+  out.list(in_group + "bytes", parts.bytes);
+}
+
+// The numbers are read to where they stay.
+CompactColumns read_compact(const Hdf5Reader& in, const std::string& group) {
+  const std::string in_group = group + "/";
+  CompactParts parts;
+  in.matrix(in_group + "steps", parts.steps);
+  parts.order = in.list<int>(in_group + "order");
+  in.matrix(in_group + "blocks", parts.blocks);
+  in.matrix(in_group + "wide_basis", parts.wide_basis);
+  in.matrix(in_group + "basis", parts.basis);
+  in.matrix(in_group + "basis_scales", parts.basis_scales);
+  in.matrix(in_group + "words", parts.words);
+  in.matrix(in_group + "bytes", parts.bytes);
+  auto columns = CompactColumns::from_parts(std::move(parts));
+  if (!columns) throw Hdf5Problem{in_group + columns.error().message};
+  return std::move(*columns);
+}
+
 void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
   const std::string group = group_of(operators.boundary);
   const std::string in_group = group + "/";
@@ -62,14 +92,14 @@ void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
     out.number(group, modes_of(part), operators.part_columns[static_cast<std::size_t>(part)]);
   }
   out.number(group, "prepare_s", operators.prepare_s);
-  out.matrix(in_group + "modes", operators.modes);
-  out.matrix(in_group + "contact_columns", operators.contact_columns);
+  write_compact(out, in_group + "responses", operators.responses.parts());
   out.list(in_group + "compliance_lower", packed_lower(operators.compliance));
   out.matrix(in_group + "slave_modes", operators.slave_modes);
   out.matrix(in_group + "slave_normals", operators.slave_normals);
   out.list(in_group + "initial_penetration_mm", operators.initial_penetration_mm);
   out.list(in_group + "slaves", operators.slaves);
   out.list(in_group + "region", operators.region);
+  out.matrix(in_group + "region_responses", operators.region_responses);
   out.list(in_group + "control", operators.control);
   out.matrix(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
   out.matrix(in_group + "control_neighbours", operators.control_neighbours);
@@ -86,8 +116,7 @@ CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
     operators.part_columns[static_cast<std::size_t>(part)] = in.number<int>(group, modes_of(part));
   }
   operators.prepare_s = in.number<double>(group, "prepare_s");
-  in.matrix(in_group + "modes", operators.modes);
-  in.matrix(in_group + "contact_columns", operators.contact_columns);
+  operators.responses = read_compact(in, in_group + "responses");
   operators.slaves = in.list<int>(in_group + "slaves");
   read_symmetric(in, in_group + "compliance_lower",
                  static_cast<Eigen::Index>(operators.slaves.size()), operators.compliance);
@@ -95,6 +124,7 @@ CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
   in.matrix(in_group + "slave_normals", operators.slave_normals);
   in.matrix(in_group + "initial_penetration_mm", operators.initial_penetration_mm);
   operators.region = in.list<int>(in_group + "region");
+  in.matrix(in_group + "region_responses", operators.region_responses);
   operators.control = in.list<int>(in_group + "control");
   in.matrix(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
   in.matrix(in_group + "control_neighbours", operators.control_neighbours);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/io/model/hdf5_access.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::io {
 

@@ -90,6 +90,16 @@ struct Hdf5Type<int> {
   static hid_t file() { return H5T_STD_I32LE; }
 };
 template <>
+struct Hdf5Type<std::int16_t> {
+  static hid_t memory() { return H5T_NATIVE_INT16; }
+  static hid_t file() { return H5T_STD_I16LE; }
+};
+template <>
+struct Hdf5Type<std::int8_t> {
+  static hid_t memory() { return H5T_NATIVE_INT8; }
+  static hid_t file() { return H5T_STD_I8LE; }
+};
+template <>
 struct Hdf5Type<char> {
   static hid_t memory() { return H5T_NATIVE_UCHAR; }
   static hid_t file() { return H5T_STD_U8LE; }

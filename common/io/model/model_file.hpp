@@ -3,13 +3,13 @@
 // to a temporary name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
-//   brainshift model file\nformat 4\nbytes N\ncrc32 XXXXXXXX\n
+//   brainshift model file\nformat 5\nbytes N\ncrc32 XXXXXXXX\n
 // N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is
 // checked first, because the HDF5 library itself is not safe against damaged files.
 //
 // HDF5 layout. Shapes are rows x columns of the data set; n nodes, r modes, s slaves, c control
-// nodes. Points are n x 3 float64, indices int32, text uint8, all little-endian; data sets are
-// contiguous, not compressed.
+// nodes, e nodes of the region. Points are n x 3 float64, indices int32, text uint8, all
+// little-endian; data sets are contiguous, not compressed.
 //   root attributes  case_id, model_id, gravity_direction, fluid_plane_depth_mm,
 //                    slave_plane_depth_mm
 //   /case/{yaml, file}  the case as case_config_text gives it and the path of its file. The text is
@@ -23,14 +23,22 @@
 //   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, prepare_s
 //                                         (float64, s), PART_modes (int32) for each part of the
 //                                         prior (to_string(PriorPart))
-//     modes                   r x 3n      float32  mm     U, one mode per row
-//     contact_columns         s x 3n      float32  mm/N   G, one slave per row
+//     responses/              group: [U G] with r + s columns, operators/compact_columns.hpp
+//       steps                 r + s       float32         mm, then mm/N
+//       order                 n           int32
+//       blocks                any x 4     int32
+//       wide_basis            any         float32
+//       basis                 any         int16
+//       basis_scales          any         float32
+//       words                 any         int16
+//       bytes                 any         int8
 //     compliance_lower        s(s+1)/2    float64  mm/N   Phi: lower triangle, by columns
 //     slave_modes             r x s       float64  mm     N^T U, one mode per row
 //     slave_normals           s x 3       float64
 //     initial_penetration_mm  s           float64
 //     slaves                  s           int32
-//     region                  any         int32    sorted
+//     region                  e           int32    sorted
+//     region_responses        r + s x 3e  float32         rows of [U G] at the region, by columns
 //     control                 c           int32    sorted
 //     truncated_variance_mm2  3 x c       float64           one remainder per row
 //     control_neighbours      n x 4       int32    into control; 0 x 4 without control nodes
@@ -45,9 +53,9 @@
 
 #include "common/core/error.hpp"
 #include "common/io/model/model_inputs.hpp"
+#include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/case_config.hpp"
-#include "common/values/condensed_operators.hpp"
 
 namespace brainshift::io {
 

@@ -7,7 +7,7 @@
 
 #include "common/core/random.hpp"
 #include "common/inversion/skull/mode_window.hpp"
-#include "common/values/condensed_operators.hpp"
+#include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
 
@@ -32,8 +32,6 @@ inline CondensedOperators skull_operators(double gap_mm) {
     result.slave_modes.data()[i] = random.normal() - 0.5;
   }
   result.initial_penetration_mm = VecX::Constant(kSlaves, -gap_mm);
-  result.contact_columns.resize(3, kSlaves);
-  result.modes.resize(3, kModes);
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "common/inversion/invert.hpp"
+#include "common/operators/encode_columns.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -54,7 +55,11 @@ TEST_F(EstimateCheck, AFieldThatContradictsItsContactForcesIsRefused) {
   const auto slave =
       std::find(wrong->slaves.begin(), wrong->slaves.end(), estimate.active_slaves.front()) -
       wrong->slaves.begin();
-  wrong->contact_columns.col(slave) *= 1.5F;
+  ThreadTeam team(1);
+  Eigen::MatrixXf columns = decode_rows(wrong->responses, column_range(0, wrong->num_nodes()),
+                                        column_range(0, wrong->responses.num_columns()), team);
+  columns.col(wrong->contact_column(static_cast<int>(slave))) *= 1.5F;
+  wrong->responses = *encode_columns(patient()->mesh.nodes, {&columns}, team);
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
   auto broken = CondensedInverter::build(wrong, locator, config(), {});
   ASSERT_TRUE(broken.has_value());
@@ -72,7 +77,17 @@ TEST_F(EstimateCheck, AFieldThatIsNotFiniteIsRefused) {
          std::count(wrong->slaves.begin(), wrong->slaves.end(), hidden) > 0) {
     ++hidden;
   }
-  wrong->modes(3 * hidden, 0) = std::numeric_limits<float>::infinity();
+  // Its row of the basis: finite, as a file's must be, but no sum with it is.
+  CompactParts parts = wrong->responses.parts();
+  const CompactColumns::Place place = wrong->responses.place(hidden);
+  const auto sizes = [&](int block) { return Eigen::Vector2i(parts.blocks.col(block).head<2>()); };
+  Eigen::Index at = 3 * place.node;
+  for (int b = 0; b < place.block; ++b) at += 3 * sizes(b)[0] * sizes(b)[1];
+  ASSERT_GT(sizes(place.block)[1], 0);
+  for (int j = 0; j < sizes(place.block)[1]; ++j, at += 3 * sizes(place.block)[0]) {
+    parts.wide_basis[at] = std::numeric_limits<float>::max();
+  }
+  wrong->responses = *CompactColumns::from_parts(std::move(parts));
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
   auto broken = CondensedInverter::build(wrong, locator, config(), {});
   ASSERT_TRUE(broken.has_value());

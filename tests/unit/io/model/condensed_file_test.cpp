@@ -22,14 +22,14 @@ void expect_equal(const CondensedOperators& a, const CondensedOperators& b) {
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.model_id, b.model_id);
   EXPECT_EQ(a.part_columns, b.part_columns);
-  EXPECT_EQ(a.modes, b.modes);
-  EXPECT_EQ(a.contact_columns, b.contact_columns);
+  EXPECT_TRUE(a.responses.parts() == b.responses.parts());
   EXPECT_EQ(a.compliance, b.compliance);
   EXPECT_EQ(a.slave_modes, b.slave_modes);
   EXPECT_EQ(a.slave_normals, b.slave_normals);
   EXPECT_EQ(a.initial_penetration_mm, b.initial_penetration_mm);
   EXPECT_EQ(a.slaves, b.slaves);
   EXPECT_EQ(a.region, b.region);
+  EXPECT_EQ(a.region_responses, b.region_responses);
   EXPECT_EQ(a.control, b.control);
   EXPECT_EQ(a.truncated_variance_mm2, b.truncated_variance_mm2);
   EXPECT_EQ(a.control_neighbours, b.control_neighbours);
@@ -92,10 +92,9 @@ TEST(CondensedFile, PackedComplianceOfManySlavesIsReadBackBitForBit) {
     file.model.model_id = content_hash(file.model);
     CondensedOperators operators;
     operators.model_id = file.model.model_id;
-    operators.modes = Eigen::MatrixXf::Random(600, 2);
+    operators.responses = test_example::silent_responses(200, 2 + slaves);
     operators.part_columns[0] = 2;
     operators.slaves = file.model.slaves;
-    operators.contact_columns = Eigen::MatrixXf::Random(600, slaves);
     operators.compliance = Eigen::MatrixXd::Random(slaves, slaves);
     operators.compliance = (operators.compliance + operators.compliance.transpose()).eval();
     operators.slave_modes = Eigen::MatrixXd::Random(slaves, 2);
@@ -122,20 +121,23 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
   const Misfit cases[] = {
       {"model_id is 'abc': the operators belong to another model than '",
        [](Operators& o) { o.model_id = "abc"; }},
-      {"modes is 12 x 3: must be 15 x 3", [](Operators& o) { o.modes.conservativeResize(12, 3); }},
+      {"responses has 4 nodes: must have 5",
+       [](Operators& o) { o.responses = test_example::silent_responses(4, 5); }},
+      {"responses has 1 columns: fewer than the 2 slaves",
+       [](Operators& o) { o.responses = test_example::silent_responses(5, 1); }},
       {"along_gravity_modes = 4: must be from 0 to the 3 modes",
        [](Operators& o) { o.part_columns[0] = 4; }},
       {"along_gravity_modes = -1: must", [](Operators& o) { o.part_columns[0] = -1; }},
       {"fine_modes = 2: must be from 0 to the 1 modes",
        [](Operators& o) { o.part_columns[6] = 2; }},
-      {"modes has 1 columns of no part", [](Operators& o) { o.part_columns[6] = 0; }},
-      {"contact_columns is 15 x 1: must be 15 x 2",
-       [](Operators& o) { o.contact_columns.conservativeResize(15, 1); }},
+      {"responses has 1 columns of no part", [](Operators& o) { o.part_columns[6] = 0; }},
       {"compliance is 2 x 1: must be 2 x 2",
        [](Operators& o) { o.compliance.conservativeResize(2, 1); }},
       {"compliance is not symmetric", [](Operators& o) { o.compliance(0, 1) += 1e-9; }},
-      {"slave_modes is 2 x 2: must be 2 x 3",
+      {"slave_modes has 2 columns: must have 3",
        [](Operators& o) { o.slave_modes.conservativeResize(2, 2); }},
+      {"slave_modes is 1 x 3: must be 2 x 3",
+       [](Operators& o) { o.slave_modes.conservativeResize(1, 3); }},
       {"slave_normals is 3 x 3: must be 3 x 2",
        [](Operators& o) { o.slave_normals.setZero(3, 3); }},
       {"initial_penetration_mm is 1 x 1: must be 2 x 1",
@@ -155,6 +157,12 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
        [](Operators& o) {
          o.region = {0, 9};
        }},
+      {"region_responses is 9 x 4: must be 9 x 5",
+       [](Operators& o) { o.region_responses.conservativeResize(9, 4); }},
+      {"region_responses is 6 x 5: must be 9 x 5",
+       [](Operators& o) { o.region_responses.conservativeResize(6, 5); }},
+      {"region_responses holds a number that is not finite",
+       [](Operators& o) { o.region_responses(8, 4) = std::numeric_limits<float>::quiet_NaN(); }},
       {"control is not sorted",
        [](Operators& o) {
          o.control = {1, 1};
@@ -169,9 +177,6 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
        [](Operators& o) { o.control_neighbours(0, 0) = -1; }},
       {"control_weights is 4 x 6: must be 4 x 5",
        [](Operators& o) { o.control_weights.setZero(4, 6); }},
-      {"modes holds a number that is not finite", [&](Operators& o) { o.modes(14, 2) = -inf; }},
-      {"contact_columns holds a number that is not finite",
-       [&](Operators& o) { o.contact_columns(0, 1) = std::numeric_limits<float>::quiet_NaN(); }},
       {"compliance holds a number that is not finite",
        [&](Operators& o) { o.compliance(1, 1) = nan; }},
       {"slave_modes holds a number that is not finite",
@@ -200,7 +205,7 @@ TEST(CondensedFile, LargestAndTinyNumbersAreFinite) {
   ModelFile file = condensed_file();
   using Float = std::numeric_limits<float>;
   using Double = std::numeric_limits<double>;
-  file.condensed[0].modes.col(0).head(4) << Float::max(), Float::lowest(), Float::denorm_min(),
+  file.condensed[0].control_weights.col(0) << Float::max(), Float::lowest(), Float::denorm_min(),
       -0.0f;
   file.condensed[0].slave_modes.row(0) << Double::max(), Double::lowest(), Double::denorm_min();
   ASSERT_TRUE(write_model(folder / "m.h5", file));
@@ -245,8 +250,38 @@ class AlteredOperators : public testing::Test {
 };
 
 TEST_F(AlteredOperators, NotFiniteNumberIsRefused) {
-  replace(200.125f, std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/contact_columns holds a number that is not"));
+  replace(800.125f, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/control_weights holds a number that is not"));
+}
+
+TEST_F(AlteredOperators, ScaleThatIsNotFiniteIsRefused) {
+  replace(220.125f, std::numeric_limits<float>::infinity());
+  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/responses/basis_scales holds a number that"));
+}
+
+TEST_F(AlteredOperators, StepThatIsNotAboveZeroIsRefused) {
+  replace(210.125f, -210.125f);
+  EXPECT_THAT(refusal(), HasSubstr("condensed/contact/responses/steps holds a number that is not "
+                                   "above 0"));
+}
+
+TEST_F(AlteredOperators, BlocksThatDoNotFitTheirArraysAreRefused) {
+  const std::array<int, 4> stored = {5, 1, 1, 1};
+  const std::string intact = bytes_;
+  replace(stored, {5, 1, 2, 1});
+  EXPECT_THAT(refusal(), HasSubstr("responses/basis has 30 numbers: must be 45"));
+  bytes_ = intact;
+  replace(stored, {4, 1, 1, 1});
+  EXPECT_THAT(refusal(), HasSubstr("responses/order has 5 numbers: must be 4"));
+  bytes_ = intact;
+  replace(stored, {5, 1, 1, -1});
+  EXPECT_THAT(refusal(), HasSubstr("responses/blocks: block 0 has 5 nodes and 1 + 1 + -1"));
+}
+
+TEST_F(AlteredOperators, NodeThatStandsTwiceInTheOrderIsRefused) {
+  const std::array<int, 5> stored = {4, 2, 0, 1, 3};
+  replace(stored, {4, 2, 0, 1, 4});
+  EXPECT_THAT(refusal(), HasSubstr("responses/order does not name every node once"));
 }
 
 TEST_F(AlteredOperators, OtherModelIdIsRefused) {

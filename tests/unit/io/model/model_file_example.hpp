@@ -68,6 +68,30 @@ void count_up(Matrix& values, Eigen::Index rows, Eigen::Index columns, double fr
   }
 }
 
+// Valid, with a coefficient of each width per column.
+inline CompactColumns responses(Eigen::Index columns, double from) {
+  CompactParts parts;
+  count_up(parts.steps, columns, 1, from + 10.0);
+  parts.order = {4, 2, 0, 1, 3};
+  parts.blocks = Eigen::Vector4i(5, 1, 1, 1);
+  count_up(parts.wide_basis, 15, 1, from);
+  count_up(parts.basis, 30, 1, from);
+  count_up(parts.basis_scales, 2, 1, from + 20.0);
+  count_up(parts.words, 2 * columns, 1, from);
+  count_up(parts.bytes, 2 * columns, 1, -100.0);
+  return CompactColumns::from_parts(std::move(parts)).value();
+}
+
+// Columns of zeroes.
+inline CompactColumns silent_responses(int nodes, Eigen::Index columns) {
+  CompactParts parts;
+  parts.steps.setOnes(columns);
+  for (int i = 0; i < nodes; ++i) parts.order.push_back(i);
+  parts.blocks.setZero(4, nodes);
+  parts.blocks.row(0).setOnes();
+  return CompactColumns::from_parts(std::move(parts)).value();
+}
+
 // Fits model_file(): 5 nodes, 3 modes, 2 slaves (the other way round than in the model), 2
 // control nodes.
 inline CondensedOperators operators(Boundary boundary) {
@@ -77,14 +101,14 @@ inline CondensedOperators operators(Boundary boundary) {
   result.part_columns = {2, 0, 0, 0, 0, 0, 1, 0, 0};
   result.slaves = boundary == Boundary::kContact ? std::vector<int>{3, 2} : std::vector<int>{};
   const auto s = static_cast<Eigen::Index>(result.slaves.size());
-  count_up(result.modes, 15, 3, boundary == Boundary::kContact ? 100 : -100);
-  count_up(result.contact_columns, 15, s, 200);
+  result.responses = responses(3 + s, boundary == Boundary::kContact ? 200 : 100);
   count_up(result.compliance, s, s, 300);
   result.compliance = (result.compliance + result.compliance.transpose()).eval();
   count_up(result.slave_modes, s, 3, 400);
   count_up(result.slave_normals, 3, s, 500);
   count_up(result.initial_penetration_mm, s, 1, -600);
   result.region = {0, 2, 4};
+  count_up(result.region_responses, 9, 3 + s, 900);
   result.control = {1, 3};
   count_up(result.truncated_variance_mm2, 2, kRemainders, 700);
   result.control_neighbours.resize(4, 5);
@@ -107,7 +131,7 @@ inline std::string with_header(const std::string& bytes) {
   const auto crc =
       crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
   std::ostringstream header;
-  header << "brainshift model file\nformat 4\nbytes " << bytes.size() << "\ncrc32 " << std::hex
+  header << "brainshift model file\nformat 5\nbytes " << bytes.size() << "\ncrc32 " << std::hex
          << std::setw(8) << std::setfill('0') << crc << "\n";
   std::string block = header.str();
   block.resize(512, '\0');

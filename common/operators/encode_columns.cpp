@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/operators/encode_columns.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "common/linalg/blas.hpp"
+#include "common/linalg/blas_threads.hpp"
+
+namespace brainshift {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+
+// Root mean square, over the columns, of a row that the basis may leave out: as much as rounding.
+constexpr double kLeft = 0.29;
+constexpr double kWord = 256.0;
+constexpr double kMostByte = 127.0, kMostWord = 32767.0;
+
+// Halves [begin, end) of `order` across its longest extent until every part is small enough.
+void split(const Points& nodes, std::vector<NodeIndex>& order, Index begin, Index end,
+           std::vector<int>& sizes) {
+  const Index count = end - begin;
+  if (count <= CompactColumns::kBlockNodes) {
+    if (count > 0) sizes.push_back(static_cast<int>(count));
+    return;
+  }
+  Vec3 low = nodes.col(order[static_cast<std::size_t>(begin)]), high = low;
+  for (Index i = begin; i < end; ++i) {
+    low = low.cwiseMin(nodes.col(order[static_cast<std::size_t>(i)]));
+    high = high.cwiseMax(nodes.col(order[static_cast<std::size_t>(i)]));
+  }
+  Index axis = 0;
+  (high - low).maxCoeff(&axis);
+  // Parts of whole blocks, so that all blocks are about as large.
+  const Index blocks = (count + CompactColumns::kBlockNodes - 1) / CompactColumns::kBlockNodes;
+  const Index middle = begin + count * (blocks / 2) / blocks;
+  std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
+                   [&](NodeIndex a, NodeIndex b) {
+                     return nodes(axis, a) != nodes(axis, b) ? nodes(axis, a) < nodes(axis, b)
+                                                             : a < b;
+                   });
+  split(nodes, order, begin, middle, sizes);
+  split(nodes, order, middle, end, sizes);
+}
+
+// What one block adds to the arrays of CompactParts.
+struct Block {
+  int wide = 0, middle = 0, narrow = 0;
+  std::vector<float> wide_basis, basis_scales;
+  std::vector<std::int16_t> basis, words;
+  std::vector<std::int8_t> bytes;
+};
+
+// Cholesky of W with pivoting, in place: the columns of L until no diagonal element that is left
+// exceeds `least`.
+MatrixXd pivoted_cholesky(MatrixXd& w, double least) {
+  const Index n = w.rows();
+  VecX left = w.diagonal();
+  const double noise = 1e-14 * (n > 0 ? left.maxCoeff() : 0.0);
+  MatrixXd factor(n, n);
+  Index rank = 0;
+  for (; rank < n; ++rank) {
+    Index pivot = 0;
+    const double largest = left.maxCoeff(&pivot);
+    if (!(largest > std::max(least, noise))) break;
+    auto column = factor.col(rank);
+    column = w.col(pivot);
+    column.noalias() -= factor.leftCols(rank) * factor.row(pivot).head(rank).transpose();
+    column /= std::sqrt(largest);
+    left = (left - column.cwiseAbs2()).cwiseMax(0.0);
+    left[pivot] = 0.0;
+  }
+  return factor.leftCols(rank);
+}
+
+// Puts rows of coefficients in the order wide, middle, narrow: the place of each in that order, and
+// how many there are of each kind in `block`.
+std::vector<Index> sort_by_width(const MatrixXd& coefficients, Block& block) {
+  std::vector<Index> wide, middle, narrow;
+  for (Index i = 0; i < coefficients.cols(); ++i) {
+    const double largest = coefficients.col(i).cwiseAbs().maxCoeff();
+    (largest > kMostWord ? wide : largest > kMostByte ? middle : narrow).push_back(i);
+  }
+  block.wide = static_cast<int>(wide.size());
+  block.middle = static_cast<int>(middle.size());
+  block.narrow = static_cast<int>(narrow.size());
+  wide.insert(wide.end(), middle.begin(), middle.end());
+  wide.insert(wide.end(), narrow.begin(), narrow.end());
+  return wide;
+}
+
+// Encodes whole-numbered coefficients (columns x rank) in a basis (3m x rank); `decoded` (3m x
+// columns) receives what the block stands for, in steps.
+void fill(const MatrixXd& basis, const MatrixXd& coefficients, Block& block, MatrixXd& decoded) {
+  const std::vector<Index> order = sort_by_width(coefficients, block);
+  MatrixXd kept(basis.rows(), basis.cols()), sorted(coefficients.rows(), coefficients.cols());
+  for (std::size_t j = 0; j < order.size(); ++j) {
+    const auto to = static_cast<Index>(j);
+    const auto column = basis.col(order[j]);
+    sorted.col(to) = coefficients.col(order[j]);
+    if (to < block.wide) {
+      const Eigen::VectorXf single = column.cast<float>();
+      block.wide_basis.insert(block.wide_basis.end(), single.begin(), single.end());
+      kept.col(to) = single.cast<double>();
+      continue;
+    }
+    const auto scale = static_cast<float>(column.cwiseAbs().maxCoeff() / kMostWord);
+    block.basis_scales.push_back(scale);
+    for (Index i = 0; i < column.size(); ++i) {
+      const double whole =
+          std::clamp(std::rint(column[i] / static_cast<double>(scale)), -kMostWord, kMostWord);
+      block.basis.push_back(static_cast<std::int16_t>(whole));
+      kept(i, to) = static_cast<double>(scale) * whole;
+    }
+  }
+  const auto columns = static_cast<std::size_t>(sorted.rows());
+  block.words.reserve(columns * static_cast<std::size_t>(block.wide + block.middle));
+  block.bytes.reserve(columns * static_cast<std::size_t>(block.wide + block.narrow));
+  for (Index c = 0; c < sorted.rows(); ++c) {
+    for (Index i = 0; i < sorted.cols(); ++i) {
+      const double value = sorted(c, i), word = std::floor((value + kWord / 2.0) / kWord);
+      if (i < block.wide) block.bytes.push_back(static_cast<std::int8_t>(value - kWord * word));
+      if (i < block.wide) block.words.push_back(static_cast<std::int16_t>(word));
+      if (i >= block.wide && i < block.wide + block.middle) {
+        block.words.push_back(static_cast<std::int16_t>(value));
+      }
+      if (i >= block.wide + block.middle) block.bytes.push_back(static_cast<std::int8_t>(value));
+    }
+  }
+  linalg::blas::multiply_by_transposed(1.0, kept, sorted, 0.0, decoded);
+}
+
+class Encoder {
+ public:
+  Encoder(const std::vector<const MatrixXf*>& groups, const Eigen::VectorXf& steps)
+      : groups_(groups), steps_(steps) {}
+
+  Result<Block> encode(std::span<const NodeIndex> nodes) const {
+    const MatrixXd rows = in_steps(nodes);
+    MatrixXd w = MatrixXd::Zero(rows.rows(), rows.rows()), decoded(rows.rows(), rows.cols());
+    linalg::blas::subtract_outer(rows, w);
+    w = (-w).eval();
+    w.triangularView<Eigen::StrictlyUpper>() = w.transpose();
+    double least = kLeft * kLeft * static_cast<double>(rows.cols());
+    for (;;) {
+      const MatrixXd factor = pivoted_cholesky(w, least);
+      Block block;
+      if (factor.cols() == 0) {
+        decoded.setZero();
+      } else {
+        const Eigen::HouseholderQR<MatrixXd> qr(factor);
+        const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(factor.rows(), factor.cols());
+        MatrixXd coefficients(rows.cols(), basis.cols());
+        linalg::blas::multiply_transposed(1.0, rows, basis, 0.0, coefficients);
+        coefficients = coefficients.array().rint().matrix();
+        fill(basis, coefficients, block, decoded);
+      }
+      const double worst = rows.size() > 0 ? (rows - decoded).cwiseAbs().maxCoeff() : 0.0;
+      if (worst <= kMostErrorSteps) return block;
+      if (factor.cols() == rows.rows() || least == 0.0) {
+        return fail(ErrorCode::kInternal,
+                    "compact columns: a number is off by " + std::to_string(worst) + " steps");
+      }
+      least = least > 1e-6 ? least / 4.0 : 0.0;
+    }
+  }
+
+ private:
+  MatrixXd in_steps(std::span<const NodeIndex> nodes) const {
+    MatrixXd rows(3 * static_cast<Index>(nodes.size()), steps_.size());
+    Index to = 0;
+    for (const MatrixXf* group : groups_) {
+      for (Index j = 0; j < group->cols(); ++j, ++to) {
+        const double per_step = 1.0 / static_cast<double>(steps_[to]);
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+          const auto at = static_cast<Index>(3 * i);
+          rows.col(to).segment<3>(at) =
+              per_step * group->col(j).segment<3>(3L * nodes[i]).cast<double>();
+        }
+      }
+    }
+    return rows;
+  }
+
+  const std::vector<const MatrixXf*>& groups_;
+  const Eigen::VectorXf& steps_;
+};
+
+template <typename T, typename List>
+void append(const std::vector<T>& values, List& list, Index& at) {
+  std::copy(values.begin(), values.end(), list.data() + at);
+  at += static_cast<Index>(values.size());
+}
+
+// Frees every block as it is taken over.
+void join(std::vector<Block>& blocks, CompactParts& parts) {
+  Index wide_basis = 0, basis = 0, scales = 0, words = 0, bytes = 0;
+  for (const Block& block : blocks) {
+    wide_basis += static_cast<Index>(block.wide_basis.size());
+    basis += static_cast<Index>(block.basis.size());
+    scales += static_cast<Index>(block.basis_scales.size());
+    words += static_cast<Index>(block.words.size());
+    bytes += static_cast<Index>(block.bytes.size());
+  }
+  parts.wide_basis.resize(wide_basis);
+  parts.basis.resize(basis);
+  parts.basis_scales.resize(scales);
+  parts.words.resize(words);
+  parts.bytes.resize(bytes);
+  wide_basis = basis = scales = words = bytes = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const Block block = std::move(blocks[b]);
+    parts.blocks.col(static_cast<Index>(b)).tail<3>() << block.wide, block.middle, block.narrow;
+    append(block.wide_basis, parts.wide_basis, wide_basis);
+    append(block.basis, parts.basis, basis);
+    append(block.basis_scales, parts.basis_scales, scales);
+    append(block.words, parts.words, words);
+    append(block.bytes, parts.bytes, bytes);
+  }
+}
+
+// A step for every column of a group; above 0 also where the group has no other numbers than 0.
+Status append_steps(const MatrixXf& group, Eigen::VectorXf& steps) {
+  if (!group.allFinite()) {
+    return fail(ErrorCode::kNotFinite, "compact columns: a number is not finite");
+  }
+  const float greatest = group.size() > 0 ? group.cwiseAbs().maxCoeff() : 0.0F;
+  const Index before = steps.size();
+  steps.conservativeResize(before + group.cols());
+  steps.tail(group.cols())
+      .setConstant(std::max(greatest / kStepsPerGreatest, std::numeric_limits<float>::min()));
+  return {};
+}
+
+}  // namespace
+
+Result<CompactColumns> encode_columns(const Points& nodes,
+                                      const std::vector<const MatrixXf*>& groups, ThreadTeam& team,
+                                      const Progress& progress, const std::stop_token& stop) {
+  linalg::use_single_threaded_blas();
+  CompactParts parts;
+  for (const MatrixXf* group : groups) {
+    if (auto status = append_steps(*group, parts.steps); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
+  parts.order.resize(static_cast<std::size_t>(nodes.cols()));
+  std::iota(parts.order.begin(), parts.order.end(), 0);
+  std::vector<int> sizes;
+  split(nodes, parts.order, 0, nodes.cols(), sizes);
+  parts.blocks.setZero(4, static_cast<Index>(sizes.size()));
+  std::vector<int> first(sizes.size() + 1, 0);
+  std::partial_sum(sizes.begin(), sizes.end(), first.begin() + 1);
+
+  std::vector<Block> blocks(sizes.size());
+  std::vector<Status> statuses(static_cast<std::size_t>(team.size()));
+  std::atomic<std::size_t> done{0};
+  const Encoder encoder(groups, parts.steps);
+  auto task = [&](int member) {
+    for (auto b = static_cast<std::size_t>(member); b < blocks.size();
+         b += static_cast<std::size_t>(team.size())) {
+      if (stop.stop_requested()) return;
+      auto made =
+          encoder.encode({parts.order.data() + first[b], static_cast<std::size_t>(sizes[b])});
+      if (!made) {
+        statuses[static_cast<std::size_t>(member)] = tl::unexpected(made.error());
+        return;
+      }
+      blocks[b] = std::move(*made);
+      ++done;
+      if (member == 0) {
+        report(progress, "compact columns",
+               static_cast<double>(done) / static_cast<double>(blocks.size()));
+      }
+    }
+  };
+  report(progress, "compact columns", 0.0);
+  team.run(task);
+  report(progress, "compact columns", 1.0);
+  for (const Status& status : statuses) {
+    if (!status) return tl::unexpected(status.error());
+  }
+  if (done != blocks.size()) return fail(ErrorCode::kUnavailable, "preparation was stopped");
+  for (std::size_t b = 0; b < sizes.size(); ++b) parts.blocks(0, static_cast<Index>(b)) = sizes[b];
+  join(blocks, parts);
+  return CompactColumns::from_parts(std::move(parts));
+}
+
+std::vector<int> column_range(int first, int count) {
+  std::vector<int> range(static_cast<std::size_t>(count));
+  std::iota(range.begin(), range.end(), first);
+  return range;
+}
+
+MatrixXf decode_rows(const CompactColumns& columns, const std::vector<NodeIndex>& nodes,
+                     const std::vector<int>& which, ThreadTeam& team) {
+  const auto count = static_cast<Index>(which.size());
+  MatrixXf out(3 * static_cast<Index>(nodes.size()), count);
+  std::vector<std::vector<Index>> wanted(static_cast<std::size_t>(columns.num_blocks()));
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    wanted[static_cast<std::size_t>(columns.place(nodes[i]).block)].push_back(
+        static_cast<Index>(i));
+  }
+  std::vector<int> blocks;
+  for (int b = 0; b < columns.num_blocks(); ++b) {
+    if (!wanted[static_cast<std::size_t>(b)].empty()) blocks.push_back(b);
+  }
+  const auto decode = [&](int block) {
+    const std::vector<Index>& own = wanted[static_cast<std::size_t>(block)];
+    const Index rank = columns.rank(block);
+    MatrixXf basis(3 * static_cast<Index>(columns.nodes(block).size()), rank);
+    MatrixXf coefficients(rank, count), rows(3 * static_cast<Index>(own.size()), rank);
+    columns.basis(block, basis.data());
+    for (Index j = 0; j < count; ++j) {
+      columns.coefficients(block, which[static_cast<std::size_t>(j)],
+                           coefficients.data() + j * rank);
+    }
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      const int at = columns.place(nodes[static_cast<std::size_t>(own[i])]).node;
+      rows.middleRows<3>(3 * static_cast<Index>(i)) = basis.middleRows<3>(3L * at);
+    }
+    MatrixXf values = MatrixXf::Zero(rows.rows(), count);
+    if (rank > 0 && count > 0) linalg::blas::multiply(1.0F, rows, coefficients, 0.0F, values);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      out.middleRows<3>(3 * own[i]) = values.middleRows<3>(3 * static_cast<Index>(i));
+    }
+  };
+  team.split(static_cast<long>(blocks.size()), [&](long begin, long end) {
+    for (long b = begin; b < end; ++b) decode(blocks[static_cast<std::size_t>(b)]);
+  });
+  return out;
+}
+
+}  // namespace brainshift

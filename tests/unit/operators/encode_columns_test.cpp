@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/operators/encode_columns.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <numeric>
+
+#include "common/core/random.hpp"
+
+namespace brainshift {
+namespace {
+
+using Eigen::MatrixXf;
+
+Points scattered(int n, Random& random) {
+  Points nodes(3, n);
+  for (int i = 0; i < n; ++i) nodes.col(i) = 80.0 * random.uniform() * random.direction();
+  return nodes;
+}
+
+// Columns as point forces make them: a peak at a node and a long tail.
+MatrixXf peaks(const Points& nodes, int columns, Random& random) {
+  MatrixXf fields(nodes.size(), columns);
+  for (int j = 0; j < columns; ++j) {
+    const Vec3 source = 80.0 * random.direction(), force = random.direction();
+    for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+      const Vec3 d = nodes.col(i) - source;
+      const double r = std::sqrt(d.squaredNorm() + 4.0);
+      const Vec3 u = 40.0 * (force / r + d * d.dot(force) / (r * r * r));
+      fields.col(j).segment<3>(3 * i) = u.cast<float>();
+    }
+  }
+  return fields;
+}
+
+MatrixXf noise(Eigen::Index rows, int columns, float size, Random& random) {
+  MatrixXf fields(rows, columns);
+  for (float& value : fields.reshaped()) value = size * static_cast<float>(random.normal());
+  return fields;
+}
+
+std::vector<NodeIndex> all_nodes(const CompactColumns& columns) {
+  std::vector<NodeIndex> all(static_cast<std::size_t>(columns.num_nodes()));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+CompactColumns encoded(const Points& nodes, const std::vector<const MatrixXf*>& groups,
+                       int threads = 1) {
+  ThreadTeam team(threads);
+  auto made = encode_columns(nodes, groups, team);
+  EXPECT_TRUE(made.has_value()) << made.error().message;
+  return std::move(*made);
+}
+
+MatrixXf decoded(const CompactColumns& columns) {
+  ThreadTeam team(2);
+  return decode_rows(columns, all_nodes(columns), column_range(0, columns.num_columns()), team);
+}
+
+// Greatest difference in steps of the group. Decoding rounds too, in single precision.
+double error_in_steps(const MatrixXf& given, const CompactColumns& columns, int first) {
+  if (given.size() == 0) return 0.0;
+  const MatrixXf found = decoded(columns).middleCols(first, given.cols());
+  const double step = columns.parts().steps[first];
+  return (found.cast<double>() - given.cast<double>()).cwiseAbs().maxCoeff() / step;
+}
+
+TEST(EncodeColumns, EveryNumberIsWithinTheStatedErrorForEveryShape) {
+  Random random(1);
+  for (const int n : {0, 1, 2, 7, 127, 128, 129, 300, 641}) {
+    const Points nodes = scattered(n, random);
+    for (const int columns : {0, 1, 5, 33}) {
+      const MatrixXf smooth = peaks(nodes, columns, random);
+      const MatrixXf rough = noise(3 * n, 3, 1e-3F, random);
+      const CompactColumns made = encoded(nodes, {&smooth, &rough});
+      ASSERT_EQ(made.num_nodes(), n);
+      ASSERT_EQ(made.num_columns(), columns + 3);
+      // Half a step of room for the rounding of single precision.
+      EXPECT_LT(error_in_steps(smooth, made, 0), kMostErrorSteps + 0.5) << n << ", " << columns;
+      EXPECT_LT(error_in_steps(rough, made, columns), kMostErrorSteps + 0.5)
+          << n << ", " << columns;
+    }
+  }
+}
+
+TEST(EncodeColumns, AStepIsAPartOfTheGreatestNumberOfTheGroup) {
+  Random random(2);
+  const Points nodes = scattered(50, random);
+  const MatrixXf large = noise(150, 4, 100.0F, random), small = noise(150, 6, 1e-6F, random);
+  const CompactColumns made = encoded(nodes, {&large, &small});
+  for (int j = 0; j < 10; ++j) {
+    const float greatest = (j < 4 ? large : small).cwiseAbs().maxCoeff();
+    EXPECT_EQ(made.parts().steps[j], greatest / kStepsPerGreatest);
+  }
+}
+
+// Errors of many columns add up as if by chance: the typical error is a third of a step.
+TEST(EncodeColumns, SumsAreOffByAboutAThirdOfAStepTimesTheNormOfTheFactors) {
+  Random random(3);
+  const Points nodes = scattered(700, random);
+  const MatrixXf fields = peaks(nodes, 400, random);
+  const CompactColumns made = encoded(nodes, {&fields});
+  VecX factors(400);
+  std::vector<CompactColumns::Term> terms;
+  for (int j = 0; j < 400; ++j) {
+    factors[j] = static_cast<double>(static_cast<float>(random.normal()));
+    terms.push_back({j, static_cast<float>(factors[j])});
+  }
+  const VecX exact = fields.cast<double>() * factors;
+  double squares = 0.0, worst = 0.0;
+  for (int b = 0; b < made.num_blocks(); ++b) {
+    Eigen::VectorXf out(CompactColumns::kBlockRows);
+    made.sum(b, terms, out.data());
+    for (std::size_t i = 0; i < made.nodes(b).size(); ++i) {
+      const Vec3 error = out.segment<3>(3 * static_cast<Eigen::Index>(i)).cast<double>() -
+                         exact.segment<3>(3L * made.nodes(b)[i]);
+      squares += error.squaredNorm();
+      worst = std::max(worst, error.cwiseAbs().maxCoeff());
+    }
+  }
+  const double unit = static_cast<double>(made.parts().steps[0]) * factors.norm();
+  const double rms = std::sqrt(squares / static_cast<double>(exact.size()));
+  EXPECT_LT(rms, 0.5 * unit);
+  EXPECT_GT(rms, 0.1 * unit) << "more bits are kept than the step says";
+  EXPECT_LT(worst, 3.0 * unit);
+}
+
+// A mesh of a head, with more columns for the same bases, takes a quarter (decision 0028).
+TEST(EncodeColumns, SmoothFieldsTakeLessThanHalfOfSinglePrecision) {
+  Random random(4);
+  const Points nodes = scattered(2000, random);
+  const MatrixXf fields = peaks(nodes, 900, random);
+  const CompactColumns made = encoded(nodes, {&fields}, 2);
+  EXPECT_LT(static_cast<double>(made.bytes()), 2.0 * static_cast<double>(fields.size()));
+  EXPECT_LT(error_in_steps(fields, made, 0), kMostErrorSteps + 0.5);
+}
+
+TEST(EncodeColumns, ZeroesStayZeroes) {
+  Random random(5);
+  const Points nodes = scattered(200, random);
+  const MatrixXf nothing = MatrixXf::Zero(600, 3);
+  const CompactColumns made = encoded(nodes, {&nothing});
+  EXPECT_TRUE(decoded(made) == nothing);
+  EXPECT_EQ(made.parts().words.size(), 0);
+  // A column of zeroes among others.
+  MatrixXf some = peaks(nodes, 5, random);
+  some.col(2).setZero();
+  EXPECT_TRUE((decoded(encoded(nodes, {&some})).col(2).array() == 0.0F).all());
+}
+
+TEST(EncodeColumns, TinyNumbersKeepTheErrorOfTheSmallestStep) {
+  Random random(6);
+  const Points nodes = scattered(20, random);
+  const MatrixXf tiny = noise(60, 2, 1e-40F, random);  // below the smallest normal number
+  const CompactColumns made = encoded(nodes, {&tiny});
+  EXPECT_EQ(made.parts().steps[0], std::numeric_limits<float>::min());
+  EXPECT_LT(error_in_steps(tiny, made, 0), kMostErrorSteps);
+}
+
+TEST(EncodeColumns, NumbersThatAreNotFiniteAreRefused) {
+  Random random(7);
+  const Points nodes = scattered(20, random);
+  for (const float bad :
+       {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+        std::numeric_limits<float>::quiet_NaN()}) {
+    MatrixXf fields = noise(60, 2, 1.0F, random);
+    fields(31, 1) = bad;
+    ThreadTeam team(1);
+    const auto refused = encode_columns(nodes, {&fields}, team);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
+  }
+}
+
+TEST(EncodeColumns, TheNumberOfThreadsDoesNotChangeABit) {
+  Random random(8);
+  const Points nodes = scattered(900, random);
+  const MatrixXf fields = peaks(nodes, 60, random);
+  EXPECT_TRUE(encoded(nodes, {&fields}, 1).parts() == encoded(nodes, {&fields}, 3).parts());
+}
+
+TEST(EncodeColumns, DecodedRowsAreThoseOfTheNodesAskedFor) {
+  Random random(9);
+  const Points nodes = scattered(400, random);
+  const MatrixXf fields = peaks(nodes, 12, random);
+  const CompactColumns made = encoded(nodes, {&fields});
+  const MatrixXf whole = decoded(made);
+  ThreadTeam team(2);
+  const std::vector<NodeIndex> some = {399, 0, 17, 250};
+  const std::vector<int> which = {11, 3};
+  const MatrixXf rows = decode_rows(made, some, which, team);
+  ASSERT_EQ(rows.rows(), 12);
+  ASSERT_EQ(rows.cols(), 2);
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    for (std::size_t j = 0; j < which.size(); ++j) {
+      const auto there = whole.col(which[j]).segment<3>(3L * some[i]);
+      const auto here =
+          rows.col(static_cast<Eigen::Index>(j)).segment<3>(3 * static_cast<Eigen::Index>(i));
+      EXPECT_LT((here - there).norm(), 1e-6F * whole.col(which[j]).cwiseAbs().maxCoeff());
+    }
+  }
+}
+
+TEST(EncodeColumns, SquaredNormsAreThoseOfTheColumns) {
+  Random random(10);
+  const Points nodes = scattered(400, random);
+  const MatrixXf fields = peaks(nodes, 4, random);
+  const CompactColumns made = encoded(nodes, {&fields});
+  for (int j = 0; j < 4; ++j) {
+    const double exact = fields.col(j).cast<double>().squaredNorm();
+    EXPECT_NEAR(made.squared_norm(j), exact, 1e-4 * exact);
+  }
+}
+
+TEST(EncodeColumns, CanBeStopped) {
+  Random random(11);
+  const Points nodes = scattered(20, random);
+  const MatrixXf fields = noise(60, 2, 1.0F, random);
+  std::stop_source stop;
+  stop.request_stop();
+  ThreadTeam team(1);
+  const auto stopped = encode_columns(nodes, {&fields}, team, {}, stop.get_token());
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+}
+
+}  // namespace
+}  // namespace brainshift
