@@ -436,7 +436,8 @@ TEST_F(VtuFile, MalformedSpaceIsNamed) {
   EXPECT_THAT(refused(codes, "82 65 400"), HasSubstr("'SPACE' holds a code that is no character"));
   EXPECT_THAT(refused(codes, "82 65 83 0 76 80 83 0"), HasSubstr("several texts: must be one"));
   EXPECT_THAT(refused("type=\"String\"", "type=\"Int8\""), HasSubstr("must be String"));
-  EXPECT_THAT(refused(codes, "27 10 200 0"), HasSubstr("SPACE is '???'")) << "one printable line";
+  EXPECT_THAT(refused(codes, "27 10 200 0"), HasSubstr("SPACE is '" + std::string(3, '?') + "'"))
+      << "one printable line";
   EXPECT_TRUE(read_vtu(folder_.write(
       "m.vtu", std::string(whole).replace(whole.find(codes), codes.size(), "82 65 83"))))
       << "the ending 0 may be missing";
