@@ -26,12 +26,12 @@ export PATH=$bin:$PATH
 # blocks PAGE LANGUAGE: writes $out/PAGE-LANGUAGE-1, -2, … from the fenced blocks of docs/PAGE.md.
 blocks() {
   awk -v prefix="$out/$1-$2-" -v fence="\`\`\`$2" '
-    $0 == fence { inside = 1; file = prefix ++count; next }
+    $0 == fence { inside = 1; file = prefix (++count); next }
     /^```/ { inside = 0 }
     inside { print > file }' "docs/$1.md"
 }
 
-# has LINES FILE: as many blocks as this script knows what to do with.
+# expect_blocks PAGE LANGUAGE COUNT: the page has as many as this script knows what to do with.
 expect_blocks() {
   local found
   found=$(find "$out" -maxdepth 1 -name "$1-$2-[0-9]" | wc -l)
@@ -86,7 +86,7 @@ serve() {
   )
   local tries
   for tries in $(seq 100); do
-    if brainshift status --endpoint tcp://127.0.0.1:5555 >/dev/null 2>&1; then break; fi
+    if brainshiftd health --endpoint tcp://127.0.0.1:5555 >/dev/null 2>&1; then break; fi
     if ! kill -0 $(cat "$out/pids"); then cat "$out/served.log" >&2; return 1; fi
     sleep 0.3
   done
