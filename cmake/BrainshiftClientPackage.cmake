@@ -25,9 +25,10 @@ install(FILES ${CMAKE_SOURCE_DIR}/client/lib/client.hpp ${CMAKE_SOURCE_DIR}/clie
   DESTINATION include/brainshift/client/lib COMPONENT client)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSES/Apache-2.0.txt DESTINATION share/doc/libbrainshift-client-dev COMPONENT client)
 
+# Not in the build's top folder: with its bin/ in PATH, find_package would take the files there for an installed package.
+set(package_files ${CMAKE_BINARY_DIR}/for_installation)
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/brainshift_client-config.cmake.in
-  ${CMAKE_BINARY_DIR}/brainshift_client-config.cmake INSTALL_DESTINATION ${package_dir})
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/brainshift_client-config-version.cmake
-  COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/brainshift_client-config.cmake ${CMAKE_BINARY_DIR}/brainshift_client-config-version.cmake
+  ${package_files}/brainshift_client-config.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${package_files}/brainshift_client-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${package_files}/brainshift_client-config.cmake ${package_files}/brainshift_client-config-version.cmake
   DESTINATION ${package_dir} COMPONENT client)

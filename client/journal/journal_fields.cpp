@@ -37,7 +37,7 @@ std::string flags_text(const QualityVerdict& verdict) {
 
 Result<BrainModel> recorded_model(const io::SurgeryFile& file, const fs::path& path,
                                   const fs::path& model_file) {
-  auto model = io::read_model(model_file);
+  auto model = io::read_model(model_file, {});
   if (!model) return tl::unexpected(model.error());
   if (model->model.model_id != file.meta().model_id) {
     return io::file_error(

@@ -131,7 +131,7 @@ Result<geometry::CheckedSurface> checked_surface(const ObserveJob& job, const Br
 
 Result<ObserveSummary> observe_surface(const ObserveJob& job) {
   if (Status ok = check(job); !ok) return tl::unexpected(ok.error());
-  const auto model = io::read_model(job.model);
+  const auto model = io::read_model(job.model, {});
   if (!model) return tl::unexpected(model.error());
   auto checked = checked_surface(job, model->model);
   if (!checked) return tl::unexpected(checked.error());

@@ -43,7 +43,7 @@ Status check_one_case(const fs::path& case_file, const fs::path& model) {
 Result<ImportCase> load_import_case(const fs::path& case_file, const fs::path& model,
                                     const Progress& progress) {
   if (!model.empty()) {
-    auto file = io::read_model(model);
+    auto file = io::read_model(model, {});
     if (!file) return tl::unexpected(file.error());
     return of(std::move(file->model), file->config.file);
   }

@@ -8,8 +8,6 @@
 namespace brainshift {
 namespace {
 
-constexpr float kWord = 256.0F;  // a wide coefficient is so many times its word, plus its byte
-
 // The loops are compiled twice: for any processor, and for those with AVX2, which take the whole
 // numbers eight at a time. Both do the same operations on every number in the same order, and
 // neither has fused ones, so that the bits agree.
@@ -25,32 +23,13 @@ bool have_avx2() { return false; }
 #endif
 #define BRAINSHIFT_INLINE [[gnu::always_inline]] inline
 
-// sum = sum over terms of factor * step * column, for `rows` whole numbers per column. Four columns
-// in one pass take less time than four passes.
+// sum += factor * values, for a whole number of kTogether; -> the place behind.
 template <typename T>
-BRAINSHIFT_INLINE void sum_columns(const T* values, int rows, const float* steps,
-                                   std::span<const CompactColumns::Term> terms,
-                                   float* __restrict sum) {
-  std::fill(sum, sum + rows, 0.0F);
-  const auto column = [&](std::size_t t) {
-    return values + static_cast<std::ptrdiff_t>(terms[t].column) * rows;
-  };
-  const auto factor = [&](std::size_t t) { return terms[t].factor * steps[terms[t].column]; };
-  std::size_t t = 0;
-  for (; t + 4 <= terms.size(); t += 4) {
-    const T *a = column(t), *b = column(t + 1), *c = column(t + 2), *d = column(t + 3);
-    const float fa = factor(t), fb = factor(t + 1), fc = factor(t + 2), fd = factor(t + 3);
-    for (int i = 0; i < rows; ++i) {
-      sum[i] = (((sum[i] + fa * static_cast<float>(a[i])) + fb * static_cast<float>(b[i])) +
-                fc * static_cast<float>(c[i])) +
-               fd * static_cast<float>(d[i]);
-    }
-  }
-  for (; t < terms.size(); ++t) {
-    const T* a = column(t);
-    const float fa = factor(t);
-    for (int i = 0; i < rows; ++i) sum[i] += fa * static_cast<float>(a[i]);
-  }
+BRAINSHIFT_INLINE float* add_scaled(const T* values, int together, float factor,
+                                    float* __restrict sum) {
+  const int count = CompactColumns::kTogether * together;
+  for (int i = 0; i < count; ++i) sum[i] += factor * static_cast<float>(values[i]);
+  return sum + count;
 }
 
 // out += basis * x; `basis` has rows x count numbers.
@@ -76,21 +55,20 @@ BRAINSHIFT_INLINE void add_product(const T* basis, int rows, int count, const fl
 
 BRAINSHIFT_INLINE void sum_block(const CompactColumns::BlockArrays& block,
                                  std::span<const CompactColumns::Term> terms, float* out) {
-  const int words = block.wide + block.middle, bytes = block.wide + block.narrow;
-  float word_sum[CompactColumns::kBlockRows], byte_sum[CompactColumns::kBlockRows];
-  sum_columns(block.words, words, block.steps, terms, word_sum);
-  sum_columns(block.bytes, bytes, block.steps, terms, byte_sum);
-  for (int i = 0; i < block.wide; ++i) word_sum[i] = kWord * word_sum[i] + byte_sum[i];
-  const float* narrow_scales = block.scales + block.middle;
-  for (int i = 0; i < block.middle; ++i) word_sum[block.wide + i] *= block.scales[i];
-  for (int i = 0; i < block.narrow; ++i) byte_sum[block.wide + i] *= narrow_scales[i];
-
-  const std::int16_t* narrow_basis =
-      block.basis + static_cast<std::ptrdiff_t>(block.rows) * block.middle;
+  float sum[CompactColumns::kBlockRows];
+  std::fill(sum, sum + CompactColumns::kBlockRows, 0.0F);
+  for (const CompactColumns::Term& term : terms) {
+    const float factor = term.factor * block.steps[term.column];
+    const std::int8_t* length = block.lengths + 3 * static_cast<std::ptrdiff_t>(term.column);
+    const CompactColumns::Start& start = block.starts[term.column];
+    float* next = add_scaled(block.longs + start.longs, length[0], factor, sum);
+    next = add_scaled(block.words + start.words, length[1], factor, next);
+    add_scaled(block.bytes + start.bytes, length[2], factor, next);
+  }
+  for (int i = 0; i < block.others; ++i) sum[block.wide + i] *= block.scales[i];
   std::fill(out, out + block.rows, 0.0F);
-  add_product(block.wide_basis, block.rows, block.wide, word_sum, out);
-  add_product(block.basis, block.rows, block.middle, word_sum + block.wide, out);
-  add_product(narrow_basis, block.rows, block.narrow, byte_sum + block.wide, out);
+  add_product(block.wide_basis, block.rows, block.wide, sum, out);
+  add_product(block.basis, block.rows, block.others, sum + block.wide, out);
 }
 BRAINSHIFT_AVX2 void sum_block_avx2(const CompactColumns::BlockArrays& block,
                                     std::span<const CompactColumns::Term> terms, float* out) {
@@ -122,7 +100,8 @@ bool operator==(const CompactParts& a, const CompactParts& b) {
   };
   return a.order == b.order && same(a.steps, b.steps) && same(a.blocks, b.blocks) &&
          same(a.wide_basis, b.wide_basis) && same(a.basis, b.basis) &&
-         same(a.basis_scales, b.basis_scales) && same(a.words, b.words) && same(a.bytes, b.bytes);
+         same(a.basis_scales, b.basis_scales) && same(a.lengths, b.lengths) &&
+         same(a.longs, b.longs) && same(a.words, b.words) && same(a.bytes, b.bytes);
 }
 
 Result<CompactColumns> CompactColumns::from_parts(CompactParts parts) {
@@ -144,40 +123,66 @@ Result<CompactColumns> CompactColumns::from_parts(CompactParts parts) {
 
 Status CompactColumns::check_sizes() {
   Offsets next;
-  const auto columns = static_cast<std::ptrdiff_t>(parts_.steps.size());
+  const Eigen::Index columns = parts_.steps.size();
+  if (auto status = check_size("lengths", parts_.lengths, 3 * columns * parts_.blocks.cols());
+      !status) {
+    return status;
+  }
+  starts_.reserve(static_cast<std::size_t>(columns * parts_.blocks.cols()));
   for (Eigen::Index b = 0; b < parts_.blocks.cols(); ++b) {
-    const Eigen::Vector4i block = parts_.blocks.col(b);
+    const Eigen::Vector3i block = parts_.blocks.col(b);
     const int most = 3 * std::clamp(block[0], 0, kBlockNodes);
     if (next.node > num_nodes()) break;  // reported below
     if (block[0] < 1 || block[0] > kBlockNodes || block.minCoeff() < 0 ||
-        block.tail<3>().maxCoeff() > most || block.tail<3>().sum() > most) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "blocks: block " + std::to_string(b) + " has " + std::to_string(block[0]) +
-                      " nodes and " + std::to_string(block[1]) + " + " + std::to_string(block[2]) +
-                      " + " + std::to_string(block[3]) + " coefficients");
+        block.tail<2>().maxCoeff() > most || block.tail<2>().sum() > most) {
+      return fail(ErrorCode::kInvalidArgument, "blocks: block " + std::to_string(b) + " has " +
+                                                   std::to_string(block[0]) + " nodes and " +
+                                                   std::to_string(block[1]) + " + " +
+                                                   std::to_string(block[2]) + " directions");
     }
     next.rows = 3 * block[0];
     next.wide = block[1];
-    next.middle = block[2];
-    next.narrow = block[3];
-    next.rank = block.tail<3>().sum();
+    next.others = block[2];
+    next.rank = next.wide + next.others;
     offsets_.push_back(next);
-    const std::ptrdiff_t coarse = next.middle + next.narrow;
     next.node += block[0];
     next.wide_basis += static_cast<std::ptrdiff_t>(next.rows) * next.wide;
-    next.basis += next.rows * coarse;
-    next.scales += coarse;
-    next.words += columns * (next.wide + next.middle);
-    next.bytes += columns * (next.wide + next.narrow);
+    next.basis += static_cast<std::ptrdiff_t>(next.rows) * next.others;
+    next.scales += next.others;
+    if (auto status = check_lengths(b, next); !status) return status;
   }
   for (const Status& status : {check_size("order", parts_.order, next.node),
                                check_size("wide_basis", parts_.wide_basis, next.wide_basis),
                                check_size("basis", parts_.basis, next.basis),
                                check_size("basis_scales", parts_.basis_scales, next.scales),
+                               check_size("longs", parts_.longs, next.longs),
                                check_size("words", parts_.words, next.words),
                                check_size("bytes", parts_.bytes, next.bytes)}) {
     if (!status) return status;
   }
+  return {};
+}
+
+Status CompactColumns::check_lengths(Eigen::Index block, Offsets& next) {
+  const int columns = num_columns(), most = (next.rank + kTogether - 1) / kTogether;
+  const std::int8_t* own = parts_.lengths.data() + 3 * columns * block;
+  Start start;
+  for (int j = 0; j < columns; ++j, own += 3) {
+    if (own[0] < 0 || own[1] < 0 || own[2] < 0 || own[0] + own[1] + own[2] > most) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "lengths: column " + std::to_string(j) + " of block " + std::to_string(block) +
+                      " has " + std::to_string(own[0]) + " + " + std::to_string(own[1]) + " + " +
+                      std::to_string(own[2]) + " eights of coefficients, the block " +
+                      std::to_string(next.rank) + " directions");
+    }
+    starts_.push_back(start);
+    start.longs += static_cast<std::uint32_t>(kTogether * own[0]);
+    start.words += static_cast<std::uint32_t>(kTogether * own[1]);
+    start.bytes += static_cast<std::uint32_t>(kTogether * own[2]);
+  }
+  next.longs += start.longs;
+  next.words += start.words;
+  next.bytes += start.bytes;
   return {};
 }
 
@@ -201,20 +206,23 @@ std::uint64_t CompactColumns::bytes() const {
     return static_cast<std::uint64_t>(list.size()) * sizeof(*list.data());
   };
   return of(parts_.steps) + of(parts_.order) + of(parts_.blocks) + of(parts_.wide_basis) +
-         of(parts_.basis) + of(parts_.basis_scales) + of(parts_.words) + of(parts_.bytes) +
-         of(offsets_) + of(places_);
+         of(parts_.basis) + of(parts_.basis_scales) + of(parts_.lengths) + of(parts_.longs) +
+         of(parts_.words) + of(parts_.bytes) + of(offsets_) + of(starts_) + of(places_);
 }
 
 CompactColumns::BlockArrays CompactColumns::arrays(int block) const {
   const Offsets& own = at(block);
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(num_columns()) * block;
   return {own.rows,
           own.wide,
-          own.middle,
-          own.narrow,
+          own.others,
           parts_.steps.data(),
           parts_.wide_basis.data() + own.wide_basis,
           parts_.basis.data() + own.basis,
           parts_.basis_scales.data() + own.scales,
+          parts_.lengths.data() + 3 * first,
+          starts_.data() + first,
+          parts_.longs.data() + own.longs,
           parts_.words.data() + own.words,
           parts_.bytes.data() + own.bytes};
 }
@@ -233,7 +241,7 @@ void CompactColumns::basis(int block, float* out) const {
   const std::int16_t* next = own.basis;
   out = std::copy(own.wide_basis, own.wide_basis + static_cast<std::ptrdiff_t>(own.rows) * own.wide,
                   out);
-  for (int j = 0; j < own.middle + own.narrow; ++j) {
+  for (int j = 0; j < own.others; ++j) {
     for (int i = 0; i < own.rows; ++i) *out++ = own.scales[j] * static_cast<float>(*next++);
   }
 }
@@ -241,14 +249,13 @@ void CompactColumns::basis(int block, float* out) const {
 void CompactColumns::coefficients(int block, int column, float* out) const {
   const BlockArrays own = arrays(block);
   const float step = own.steps[column];
-  const std::int16_t* word =
-      own.words + static_cast<std::ptrdiff_t>(own.wide + own.middle) * column;
-  const std::int8_t* byte = own.bytes + static_cast<std::ptrdiff_t>(own.wide + own.narrow) * column;
-  for (int i = 0; i < own.wide; ++i) {
-    *out++ = step * (kWord * static_cast<float>(word[i]) + static_cast<float>(byte[i]));
-  }
-  for (int i = 0; i < own.middle; ++i) *out++ = step * static_cast<float>(word[own.wide + i]);
-  for (int i = 0; i < own.narrow; ++i) *out++ = step * static_cast<float>(byte[own.wide + i]);
+  const std::int8_t* length = own.lengths + 3 * static_cast<std::ptrdiff_t>(column);
+  const Start& start = own.starts[column];
+  float all[kBlockRows] = {};
+  float* next = add_scaled(own.longs + start.longs, length[0], step, all);
+  next = add_scaled(own.words + start.words, length[1], step, next);
+  add_scaled(own.bytes + start.bytes, length[2], step, next);
+  std::copy(all, all + rank(block), out);
 }
 
 double CompactColumns::squared_norm(int column) const {

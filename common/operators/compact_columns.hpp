@@ -3,15 +3,22 @@
 // a quarter of the memory of single precision, ready to be summed up without being unpacked.
 //
 // Neighbours move alike. The nodes stand in blocks of kBlockNodes at most that lie close together.
-// Each block has an orthonormal basis q_1, q_2, ... of what its 3m rows do, and each column has
-// whole-numbered coefficients in it:
+// Each block has an orthonormal basis q_1, q_2, ... of what its 3m rows do, the most needed
+// direction first, and each column has whole-numbered coefficients in it:
 //
-//   M_bj = step_j ( sum over wide i    q_i     (256 w_ij + y_ij)
-//                 + sum over middle i  s_i p_i  w_ij
-//                 + sum over narrow i  s_i p_i  y_ij )
+//   M_bj = step_j sum over i  q_i c_ij
 //
-//   w_ij  16 bits ("words"),  y_ij  8 bits ("bytes");  q_i  single precision;  s_i p_i ~ q_i with
-//   p_i in 16 bits. A coefficient has three, two or one bytes, by the largest of its row.
+// A column that is quiet in a block needs few directions, and small coefficients in the most of
+// them. So each column has, in each block, coefficients of four bytes, then of two, then of one,
+// then none; how many of each is counted in eights (kTogether):
+//
+//   c_ij  = longs   i in [0, 8 l_1)                  |c| < 2^31
+//           words   i in [8 l_1, 8 (l_1 + l_2))      |c| < 2^15
+//           bytes   the next 8 l_3                   |c| < 2^7
+//           0       beyond
+//
+// q_i is kept in single precision where a column has a coefficient beyond 2^15 (the block's first
+// `wide` directions), and as s_i p_i with p_i in 16 bits elsewhere.
 //
 // step_j has the unit of column j. A coefficient is rounded by at most half a step; what else is
 // lost is bounded by who encodes (operators/encode_columns.hpp). Rounding errors of
@@ -38,13 +45,15 @@ struct CompactParts {
 
   List<float> steps;                             // c, above 0
   std::vector<NodeIndex> order;                  // every node once, block after block
-  Eigen::Matrix<int, 4, Eigen::Dynamic> blocks;  // 4 x b: nodes, wide, middle, narrow
-  // Block after block, each column-major:
-  List<float> wide_basis;    // 3m x wide: q
-  List<std::int16_t> basis;  // 3m x (middle + narrow): p
-  List<float> basis_scales;  // middle + narrow: s
-  List<std::int16_t> words;  // (wide + middle) x c: w
-  List<std::int8_t> bytes;   // (wide + narrow) x c: y
+  Eigen::Matrix<int, 3, Eigen::Dynamic> blocks;  // 3 x b: nodes, wide, other directions
+  // Block after block:
+  List<float> wide_basis;     // 3m x wide, column-major: q
+  List<std::int16_t> basis;   // 3m x others, column-major: p
+  List<float> basis_scales;   // others: s
+  List<std::int8_t> lengths;  // 3 x c, column-major: l_1, l_2, l_3
+  List<std::int32_t> longs;   // column after column, as the next two
+  List<std::int16_t> words;
+  List<std::int8_t> bytes;
 };
 // Bit for bit, but for -0 = 0.
 bool operator==(const CompactParts& a, const CompactParts& b);
@@ -53,6 +62,7 @@ class CompactColumns {
  public:
   static constexpr int kBlockNodes = 128;
   static constexpr int kBlockRows = 3 * kBlockNodes;
+  static constexpr int kTogether = 8;  // coefficients of one width
 
   CompactColumns() = default;  // no nodes, no columns
   // kInvalidArgument, with the array, for sizes that do not fit each other, nodes that do not stand
@@ -81,12 +91,19 @@ class CompactColumns {
     int column = 0;
     float factor = 0.0F;
   };
+  // Where the coefficients of a column in a block begin, counted from the block's first ones.
+  struct Start {
+    std::uint32_t longs = 0, words = 0, bytes = 0;
+  };
   // A block's part of every array, for the loops.
   struct BlockArrays {
-    int rows = 0, wide = 0, middle = 0, narrow = 0;
+    int rows = 0, wide = 0, others = 0;
     const float *steps = nullptr, *wide_basis = nullptr;
     const std::int16_t* basis = nullptr;
     const float* scales = nullptr;
+    const std::int8_t* lengths = nullptr;
+    const Start* starts = nullptr;
+    const std::int32_t* longs = nullptr;
     const std::int16_t* words = nullptr;
     const std::int8_t* bytes = nullptr;
   };
@@ -102,16 +119,19 @@ class CompactColumns {
  private:
   // Where a block begins in each array.
   struct Offsets {
-    int node = 0, rows = 0, wide = 0, middle = 0, narrow = 0, rank = 0;
-    std::ptrdiff_t wide_basis = 0, basis = 0, scales = 0, words = 0, bytes = 0;
+    int node = 0, rows = 0, wide = 0, others = 0, rank = 0;
+    std::ptrdiff_t wide_basis = 0, basis = 0, scales = 0, longs = 0, words = 0, bytes = 0;
   };
   BlockArrays arrays(int block) const;
   const Offsets& at(int block) const { return offsets_[static_cast<std::size_t>(block)]; }
   Status check_sizes();
+  // Fills starts_ for one block and moves `next` behind its coefficients.
+  Status check_lengths(Eigen::Index block, Offsets& next);
   Status check_order();
 
   CompactParts parts_;
   std::vector<Offsets> offsets_;
+  std::vector<Start> starts_;  // b x c, a block's together
   std::vector<Place> places_;
 };
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <type_traits>
+#include <utility>
 
 #include "common/linalg/blas.hpp"
 #include "common/linalg/blas_threads.hpp"
@@ -20,7 +22,6 @@ using Eigen::MatrixXf;
 
 // Root mean square, over the columns, of a row that the basis may leave out: as much as rounding.
 constexpr double kLeft = 0.29;
-constexpr double kWord = 256.0;
 constexpr double kMostByte = 127.0, kMostWord = 32767.0;
 
 // Halves [begin, end) of `order` across its longest extent until every part is small enough.
@@ -52,10 +53,11 @@ void split(const Points& nodes, std::vector<NodeIndex>& order, Index begin, Inde
 
 // What one block adds to the arrays of CompactParts.
 struct Block {
-  int wide = 0, middle = 0, narrow = 0;
+  int wide = 0, others = 0;
   std::vector<float> wide_basis, basis_scales;
   std::vector<std::int16_t> basis, words;
-  std::vector<std::int8_t> bytes;
+  std::vector<std::int8_t> lengths, bytes;
+  std::vector<std::int32_t> longs;
 };
 
 // Cholesky of W with pivoting, in place: the columns of L until no diagonal element that is left
@@ -80,66 +82,85 @@ MatrixXd pivoted_cholesky(MatrixXd& w, double least) {
   return factor.leftCols(rank);
 }
 
-// Puts rows of coefficients in the order wide, middle, narrow: the place of each in that order, and
-// how many there are of each kind in `block`.
-std::vector<Index> sort_by_width(const MatrixXd& coefficients, Block& block) {
-  std::vector<Index> wide, middle, narrow;
-  for (Index i = 0; i < coefficients.cols(); ++i) {
-    const double largest = coefficients.col(i).cwiseAbs().maxCoeff();
-    (largest > kMostWord ? wide : largest > kMostByte ? middle : narrow).push_back(i);
+// Directions in the order in which the block keeps them: first those with a coefficient beyond
+// kMostWord (`wide` of them), and of each kind those first that the columns need most, so that what
+// comes last can be left out of quiet columns. coefficients: columns x rank.
+std::vector<Index> by_need(const MatrixXd& coefficients, int& wide) {
+  std::vector<Index> order(static_cast<std::size_t>(coefficients.cols()));
+  std::iota(order.begin(), order.end(), 0);
+  const VecX squares = coefficients.colwise().squaredNorm();
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return squares[a] > squares[b]; });
+  const auto middle = std::stable_partition(order.begin(), order.end(), [&](Index i) {
+    return coefficients.col(i).cwiseAbs().maxCoeff() > kMostWord;
+  });
+  wide = static_cast<int>(middle - order.begin());
+  return order;
+}
+
+// Appends a direction to the block; -> what it now stands for.
+VecX keep_direction(const VecX& direction, bool wide, Block& block) {
+  if (wide) {
+    const Eigen::VectorXf single = direction.cast<float>();
+    block.wide_basis.insert(block.wide_basis.end(), single.begin(), single.end());
+    return single.cast<double>();
   }
-  block.wide = static_cast<int>(wide.size());
-  block.middle = static_cast<int>(middle.size());
-  block.narrow = static_cast<int>(narrow.size());
-  wide.insert(wide.end(), middle.begin(), middle.end());
-  wide.insert(wide.end(), narrow.begin(), narrow.end());
-  return wide;
+  const auto scale = static_cast<float>(direction.cwiseAbs().maxCoeff() / kMostWord);
+  block.basis_scales.push_back(scale);
+  VecX kept(direction.size());
+  for (Index i = 0; i < direction.size(); ++i) {
+    const double whole =
+        std::clamp(std::rint(direction[i] / static_cast<double>(scale)), -kMostWord, kMostWord);
+    block.basis.push_back(static_cast<std::int16_t>(whole));
+    kept[i] = static_cast<double>(scale) * whole;
+  }
+  return kept;
+}
+
+// Eights that reach beyond the last coefficient of a column above `limit`.
+int eights_above(const VecX& coefficients, double limit) {
+  Index end = coefficients.size();
+  while (end > 0 && std::abs(coefficients[end - 1]) <= limit) --end;
+  return static_cast<int>((end + CompactColumns::kTogether - 1) / CompactColumns::kTogether);
+}
+
+// Appends a column's whole-numbered coefficients.
+void keep_coefficients(const VecX& coefficients, Block& block) {
+  const int longs = eights_above(coefficients, kMostWord);
+  const int words = std::max(longs, eights_above(coefficients, kMostByte));
+  const int bytes = std::max(words, eights_above(coefficients, 0.0));
+  for (const int length : {longs, words - longs, bytes - words}) {
+    block.lengths.push_back(static_cast<std::int8_t>(length));
+  }
+  const auto append = [&](auto& list, int begin, int end) {
+    for (Index i = CompactColumns::kTogether * begin; i < CompactColumns::kTogether * end; ++i) {
+      const double value = i < coefficients.size() ? coefficients[i] : 0.0;
+      list.push_back(static_cast<typename std::decay_t<decltype(list)>::value_type>(value));
+    }
+  };
+  append(block.longs, 0, longs);
+  append(block.words, longs, words);
+  append(block.bytes, words, bytes);
 }
 
 // Encodes whole-numbered coefficients (columns x rank) in a basis (3m x rank); `decoded` (3m x
 // columns) receives what the block stands for, in steps.
 void fill(const MatrixXd& basis, const MatrixXd& coefficients, Block& block, MatrixXd& decoded) {
-  const std::vector<Index> order = sort_by_width(coefficients, block);
+  const std::vector<Index> order = by_need(coefficients, block.wide);
+  block.others = static_cast<int>(basis.cols()) - block.wide;
   MatrixXd kept(basis.rows(), basis.cols()), sorted(coefficients.rows(), coefficients.cols());
   for (std::size_t j = 0; j < order.size(); ++j) {
     const auto to = static_cast<Index>(j);
-    const auto column = basis.col(order[j]);
     sorted.col(to) = coefficients.col(order[j]);
-    if (to < block.wide) {
-      const Eigen::VectorXf single = column.cast<float>();
-      block.wide_basis.insert(block.wide_basis.end(), single.begin(), single.end());
-      kept.col(to) = single.cast<double>();
-      continue;
-    }
-    const auto scale = static_cast<float>(column.cwiseAbs().maxCoeff() / kMostWord);
-    block.basis_scales.push_back(scale);
-    for (Index i = 0; i < column.size(); ++i) {
-      const double whole =
-          std::clamp(std::rint(column[i] / static_cast<double>(scale)), -kMostWord, kMostWord);
-      block.basis.push_back(static_cast<std::int16_t>(whole));
-      kept(i, to) = static_cast<double>(scale) * whole;
-    }
+    kept.col(to) = keep_direction(basis.col(order[j]), to < block.wide, block);
   }
-  const auto columns = static_cast<std::size_t>(sorted.rows());
-  block.words.reserve(columns * static_cast<std::size_t>(block.wide + block.middle));
-  block.bytes.reserve(columns * static_cast<std::size_t>(block.wide + block.narrow));
-  for (Index c = 0; c < sorted.rows(); ++c) {
-    for (Index i = 0; i < sorted.cols(); ++i) {
-      const double value = sorted(c, i), word = std::floor((value + kWord / 2.0) / kWord);
-      if (i < block.wide) block.bytes.push_back(static_cast<std::int8_t>(value - kWord * word));
-      if (i < block.wide) block.words.push_back(static_cast<std::int16_t>(word));
-      if (i >= block.wide && i < block.wide + block.middle) {
-        block.words.push_back(static_cast<std::int16_t>(value));
-      }
-      if (i >= block.wide + block.middle) block.bytes.push_back(static_cast<std::int8_t>(value));
-    }
-  }
+  for (Index c = 0; c < sorted.rows(); ++c) keep_coefficients(sorted.row(c).transpose(), block);
   linalg::blas::multiply_by_transposed(1.0, kept, sorted, 0.0, decoded);
 }
 
 class Encoder {
  public:
-  Encoder(const std::vector<const MatrixXf*>& groups, const Eigen::VectorXf& steps)
+  Encoder(const std::vector<ColumnGroup>& groups, const Eigen::VectorXf& steps)
       : groups_(groups), steps_(steps) {}
 
   Result<Block> encode(std::span<const NodeIndex> nodes) const {
@@ -154,6 +175,7 @@ class Encoder {
       Block block;
       if (factor.cols() == 0) {
         decoded.setZero();
+        block.lengths.assign(3 * static_cast<std::size_t>(rows.cols()), 0);
       } else {
         const Eigen::HouseholderQR<MatrixXd> qr(factor);
         const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(factor.rows(), factor.cols());
@@ -162,7 +184,7 @@ class Encoder {
         coefficients = coefficients.array().rint().matrix();
         fill(basis, coefficients, block, decoded);
       }
-      const double worst = rows.size() > 0 ? (rows - decoded).cwiseAbs().maxCoeff() : 0.0;
+      const double worst = worst_error(rows, decoded);
       if (worst <= kMostErrorSteps) return block;
       if (factor.cols() == rows.rows() || least == 0.0) {
         return fail(ErrorCode::kInternal,
@@ -173,81 +195,91 @@ class Encoder {
   }
 
  private:
+  // In steps, or in those of kFinest where a column's are finer.
+  double worst_error(const MatrixXd& rows, const MatrixXd& decoded) const {
+    double worst = 0.0;
+    Index first = 0;
+    for (const ColumnGroup& group : groups_) {
+      const Index count = group.columns->cols();
+      if (rows.rows() > 0 && count > 0) {
+        const double apart = (rows.middleCols(first, count) - decoded.middleCols(first, count))
+                                 .cwiseAbs()
+                                 .maxCoeff();
+        worst = std::max(worst, apart * static_cast<double>(std::min(1.0F, group.step / kFinest)));
+      }
+      first += count;
+    }
+    return worst;
+  }
+
   MatrixXd in_steps(std::span<const NodeIndex> nodes) const {
     MatrixXd rows(3 * static_cast<Index>(nodes.size()), steps_.size());
     Index to = 0;
-    for (const MatrixXf* group : groups_) {
-      for (Index j = 0; j < group->cols(); ++j, ++to) {
+    for (const ColumnGroup& group : groups_) {
+      for (Index j = 0; j < group.columns->cols(); ++j, ++to) {
         const double per_step = 1.0 / static_cast<double>(steps_[to]);
         for (std::size_t i = 0; i < nodes.size(); ++i) {
           const auto at = static_cast<Index>(3 * i);
           rows.col(to).segment<3>(at) =
-              per_step * group->col(j).segment<3>(3L * nodes[i]).cast<double>();
+              per_step * group.columns->col(j).segment<3>(3L * nodes[i]).cast<double>();
         }
       }
     }
     return rows;
   }
 
-  const std::vector<const MatrixXf*>& groups_;
+  const std::vector<ColumnGroup>& groups_;
   const Eigen::VectorXf& steps_;
 };
 
-template <typename T, typename List>
-void append(const std::vector<T>& values, List& list, Index& at) {
-  std::copy(values.begin(), values.end(), list.data() + at);
-  at += static_cast<Index>(values.size());
-}
-
-// Frees every block as it is taken over.
+// Frees every array as it is taken over.
 void join(std::vector<Block>& blocks, CompactParts& parts) {
-  Index wide_basis = 0, basis = 0, scales = 0, words = 0, bytes = 0;
-  for (const Block& block : blocks) {
-    wide_basis += static_cast<Index>(block.wide_basis.size());
-    basis += static_cast<Index>(block.basis.size());
-    scales += static_cast<Index>(block.basis_scales.size());
-    words += static_cast<Index>(block.words.size());
-    bytes += static_cast<Index>(block.bytes.size());
-  }
-  parts.wide_basis.resize(wide_basis);
-  parts.basis.resize(basis);
-  parts.basis_scales.resize(scales);
-  parts.words.resize(words);
-  parts.bytes.resize(bytes);
-  wide_basis = basis = scales = words = bytes = 0;
+  const auto take = [&](auto& list, auto member) {
+    Index size = 0;
+    for (const Block& block : blocks) size += static_cast<Index>((block.*member).size());
+    list.resize(size);
+    Index at = 0;
+    for (Block& block : blocks) {
+      const auto own = std::exchange(block.*member, {});
+      std::copy(own.begin(), own.end(), list.data() + at);
+      at += static_cast<Index>(own.size());
+    }
+  };
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const Block block = std::move(blocks[b]);
-    parts.blocks.col(static_cast<Index>(b)).tail<3>() << block.wide, block.middle, block.narrow;
-    append(block.wide_basis, parts.wide_basis, wide_basis);
-    append(block.basis, parts.basis, basis);
-    append(block.basis_scales, parts.basis_scales, scales);
-    append(block.words, parts.words, words);
-    append(block.bytes, parts.bytes, bytes);
+    parts.blocks.col(static_cast<Index>(b)).tail<2>() << blocks[b].wide, blocks[b].others;
   }
+  take(parts.wide_basis, &Block::wide_basis);
+  take(parts.basis, &Block::basis);
+  take(parts.basis_scales, &Block::basis_scales);
+  take(parts.lengths, &Block::lengths);
+  take(parts.longs, &Block::longs);
+  take(parts.words, &Block::words);
+  take(parts.bytes, &Block::bytes);
 }
 
-// A step for every column of a group; above 0 also where the group has no other numbers than 0.
-Status append_steps(const MatrixXf& group, Eigen::VectorXf& steps) {
-  if (!group.allFinite()) {
+// A step for every column of a group; above 0 also where it has no other numbers than 0.
+Status append_steps(const ColumnGroup& group, Eigen::VectorXf& steps) {
+  const MatrixXf& columns = *group.columns;
+  if (!columns.allFinite()) {
     return fail(ErrorCode::kNotFinite, "compact columns: a number is not finite");
   }
-  const float greatest = group.size() > 0 ? group.cwiseAbs().maxCoeff() : 0.0F;
+  const float greatest = columns.size() > 0 ? columns.cwiseAbs().maxCoeff() : 0.0F;
   const Index before = steps.size();
-  steps.conservativeResize(before + group.cols());
-  steps.tail(group.cols())
-      .setConstant(std::max(greatest / kStepsPerGreatest, std::numeric_limits<float>::min()));
+  steps.conservativeResize(before + columns.cols());
+  steps.tail(columns.cols())
+      .setConstant(std::max(group.step * greatest, std::numeric_limits<float>::min()));
   return {};
 }
 
 }  // namespace
 
-Result<CompactColumns> encode_columns(const Points& nodes,
-                                      const std::vector<const MatrixXf*>& groups, ThreadTeam& team,
-                                      const Progress& progress, const std::stop_token& stop) {
+Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<ColumnGroup>& groups,
+                                      ThreadTeam& team, const Progress& progress,
+                                      const std::stop_token& stop) {
   linalg::use_single_threaded_blas();
   CompactParts parts;
-  for (const MatrixXf* group : groups) {
-    if (auto status = append_steps(*group, parts.steps); !status) {
+  for (const ColumnGroup& group : groups) {
+    if (auto status = append_steps(group, parts.steps); !status) {
       return tl::unexpected(status.error());
     }
   }
@@ -255,7 +287,7 @@ Result<CompactColumns> encode_columns(const Points& nodes,
   std::iota(parts.order.begin(), parts.order.end(), 0);
   std::vector<int> sizes;
   split(nodes, parts.order, 0, nodes.cols(), sizes);
-  parts.blocks.setZero(4, static_cast<Index>(sizes.size()));
+  parts.blocks.setZero(3, static_cast<Index>(sizes.size()));
   std::vector<int> first(sizes.size() + 1, 0);
   std::partial_sum(sizes.begin(), sizes.end(), first.begin() + 1);
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // MatrixXf -> CompactColumns: fields of one mesh, [U G] of a patient, made small.
 //
-// Every group of columns (U, G) has one step: its greatest number / kStepsPerGreatest. A number is
-// off by kMostErrorSteps at most (checked against the numbers given), by 0.3 steps typically.
+// The columns of a group (U, G) have one step. A number is off by kMostErrorSteps at most (checked
+// against the numbers given), by 0.4 steps typically. Steps of less than kFinest of the greatest
+// number are finer than sums in single precision: the limit is then that of kFinest.
 // docs/decisions/0028 says what that does to fields.
 //
 // Blocks: nodes are halved across the longest extent until a part has kBlockNodes at most. With M_b
@@ -24,14 +25,18 @@
 
 namespace brainshift {
 
-inline constexpr float kStepsPerGreatest = 262144.0F;  // 2^18
-inline constexpr double kMostErrorSteps = 4.0;         // steps
+inline constexpr double kMostErrorSteps = 4.0;     // steps
+inline constexpr float kFinest = 1.0F / 16777216;  // 2^-24
 
-// groups: matrices of 3n rows, one after the other. nodes: 3 x n, mm. Dealt to the team by blocks;
-// the result does not depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
+struct ColumnGroup {
+  const Eigen::MatrixXf* columns = nullptr;  // 3n rows
+  float step = 0.0F;  // of their greatest number; at least 2^-26: coefficients fit 31 bits
+};
+
+// groups: one after the other. nodes: 3 x n, mm. Dealt to the team by blocks; the result does not
+// depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
 // kMostErrorSteps is not kept. progress: stage "compact columns".
-Result<CompactColumns> encode_columns(const Points& nodes,
-                                      const std::vector<const Eigen::MatrixXf*>& groups,
+Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<ColumnGroup>& groups,
                                       ThreadTeam& team, const Progress& progress = {},
                                       const std::stop_token& stop = {});
 

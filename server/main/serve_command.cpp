@@ -2,6 +2,7 @@
 #include "server/main/serve_command.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -63,7 +64,8 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.blas_kernel = linalg::blas_kernel();
   options.journal_dir = config.journal_dir;
   if (config.model.empty()) return options;
-  auto file = io::read_model(config.model);
+  // Sessions with a fixed boundary are rare: their operators are read when one starts.
+  auto file = io::read_model(config.model, {Boundary::kContact});
   if (!file) return tl::unexpected(file.error());
   const auto notes = io::check_inputs(file->inputs);
   if (!notes) {
@@ -75,9 +77,16 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.model = model;
   options.case_file = file->config.file;
   auto store =
-      std::make_shared<ModelStore>(model, std::move(file->config), std::move(file->condensed));
+      std::make_shared<ModelStore>(model, std::move(file->config), std::move(file->condensed),
+                                   [path = config.model, model](Boundary boundary) {
+                                     return io::read_operators(path, *model, boundary);
+                                   });
+  // Reading and preparing leave free places in the heap, tens of MiB together.
+  ::malloc_trim(0);
   options.make_model = [store](const wire::SessionRequest& request, const std::stop_token& stop) {
-    return store->make(request, stop);
+    auto made = store->make(request, stop);
+    ::malloc_trim(0);
+    return made;
   };
   return options;
 }

@@ -34,14 +34,19 @@ tl::unexpected<Error> stopped() {
 }  // namespace
 
 ModelStore::ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
-                       std::vector<CondensedOperators> operators)
+                       std::vector<CondensedOperators> operators, ReadOperators read)
     : model_(std::move(model)),
       config_(std::move(config)),
+      read_(std::move(read)),
       locator_(std::make_shared<const geometry::TetLocator>(model_->mesh)) {
-  for (CondensedOperators& one : operators) {
-    const Boundary boundary = one.boundary;
-    condensed_.emplace(boundary, std::make_shared<const CondensedOperators>(std::move(one)));
-  }
+  for (CondensedOperators& one : operators) keep(std::move(one));
+}
+
+std::shared_ptr<const CondensedOperators> ModelStore::keep(CondensedOperators operators) {
+  const Boundary boundary = operators.boundary;
+  auto shared = std::make_shared<const CondensedOperators>(std::move(operators));
+  condensed_.emplace(boundary, shared);
+  return shared;
 }
 
 Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary boundary,
@@ -63,6 +68,12 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
   if (const auto found = condensed_.find(boundary); found != condensed_.end()) {
     return found->second;
   }
+  if (read_) {
+    spdlog::info("reading boundary={}", to_string(boundary));
+    auto read = read_(boundary);
+    if (!read) return tl::unexpected(read.error());
+    if (*read) return keep(std::move(**read));
+  }
   const auto factor = factorised(boundary, stop);
   if (!factor) return tl::unexpected(factor.error());
   spdlog::info("condensing boundary={}: the model file holds no operators for it",
@@ -73,9 +84,7 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
   auto made = inversion::condense(**factor, options);
   if (!made) return tl::unexpected(made.error());
   made->prepare_s = (*factor)->timings().total_s + watch.seconds();
-  auto shared = std::make_shared<const CondensedOperators>(std::move(*made));
-  condensed_.emplace(boundary, shared);
-  return shared;
+  return keep(std::move(*made));
 }
 
 Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ModelStore: one loaded model, and what sessions on it share. It is made piece by piece, when a
-// session first asks: the condensed method needs the operators of the model file only, the others
-// factorise.
+// session first asks: the condensed method needs the operators of its boundary condition only, from
+// the model file, the other methods factorise.
 //
 // Belongs to one thread, the session's preparer.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -25,12 +27,16 @@ namespace brainshift::server {
 
 class ModelStore {
  public:
-  // Operators may be missing; a session that needs them makes them.
+  // The operators that the model file has for a boundary condition; empty: none.
+  using ReadOperators = std::function<Result<std::optional<CondensedOperators>>(Boundary)>;
+
+  // operators: those at hand. read: asked for the others when a session needs them; empty: there
+  // are none. A session whose operators are nowhere makes them.
   ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
-             std::vector<CondensedOperators> operators);
+             std::vector<CondensedOperators> operators, ReadOperators read = {});
 
   // For the request's method and boundary, with the parts that the scene carries. full_solve_ms of
-  // the info is measured when the request asks for it. Errors as plan_scene,
+  // the info is measured when the request asks for it. Errors as plan_scene, `read`,
   // PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable when stopped, which
   // is asked for between a factorisation and the next, and between blocks of columns.
   Result<std::unique_ptr<SessionModel>> make(const wire::SessionRequest& request,
@@ -41,12 +47,14 @@ class ModelStore {
                                                                      const std::stop_token& stop);
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary,
                                                               const std::stop_token& stop);
+  std::shared_ptr<const CondensedOperators> keep(CondensedOperators operators);
   Result<std::unique_ptr<inversion::Inverter>> inverter(const wire::SessionRequest& request,
                                                         const ScenePlan& plan,
                                                         const std::stop_token& stop);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;
+  ReadOperators read_;
   std::shared_ptr<const geometry::TetLocator> locator_;
   std::map<Boundary, std::shared_ptr<const inversion::PreparedModel>> factorised_;
   std::map<Boundary, std::shared_ptr<const CondensedOperators>> condensed_;

@@ -54,8 +54,7 @@ void run(const std::string& out, const std::string& case_file) {
   std::iota(slaves.begin(), slaves.end(), 0);
   const VecX penetration = prepared.forward().contact().penetration(estimate.displacement);
   const double equilibrium_ms = median_ms([&] {
-    if (!inversion::check_equilibrium(*operators, slaves, penetration, estimate.displacement,
-                                      0.0)) {
+    if (!inversion::check_equilibrium(*operators, slaves, penetration, estimate.displacement)) {
       std::exit(1);
     }
   });

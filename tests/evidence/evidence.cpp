@@ -5,64 +5,46 @@
 //
 // The published run begins at seed 1. While the estimate is being worked on, runs begin at 1001, so
 // that nothing is fitted to what is published. The patients' cases are config/cases/patient-N.yaml;
-// another head (--head) lends its images and its brainstem. A file that a case names and that is
-// not there is looked for below $BRAINSHIFT_EXTERNAL_DATA, by its path relative to the case file.
+// another head (--head) lends its images and its brainstem (study_program.hpp says where images are
+// looked for).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "tests/evidence/evidence_patient.hpp"
 #include "tests/evidence/paper_tables.hpp"
+#include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::evidence {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct Arguments : surgeries::StudyArguments {
   fs::path cases = BRAINSHIFT_CASES;
   std::string head = "colin27";
   std::vector<int> patients = {1, 2, 3, 4, 5};
   std::vector<std::string> truths;  // none: all
   int seeds = 2;
-  std::uint64_t first_seed = 1;
-  double thousand_nodes = 18.0;
-  fs::path out = "rows.csv";
-  bool resume = false;
 };
-
-void find_external(fs::path& file, const fs::path& folder) {
-  const char* external = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
-  if (file.empty() || external == nullptr || fs::exists(file)) return;
-  const fs::path elsewhere = fs::path(external) / file.lexically_relative(folder);
-  if (fs::exists(elsewhere)) file = elsewhere;
-}
 
 // The patient's tumour, opening and gravity in the wanted head.
 Result<CaseConfig> read_patient(const Arguments& arguments, int patient) {
-  auto config =
-      io::read_case_config(arguments.cases / ("patient-" + std::to_string(patient) + ".yaml"));
-  if (!config) return config;
-  if (arguments.head != "colin27") {
-    const auto head = io::read_case_config(arguments.cases / (arguments.head + ".yaml"));
-    if (!head) return head;
-    config->file = head->file;
-    config->mri = head->mri;
-    config->brain = head->brain;
-    config->mesh = head->mesh;
-    config->brainstem = head->brainstem;
-  }
-  const fs::path folder = config->file.parent_path();
-  find_external(config->mri, folder);
-  find_external(config->brain, folder);
+  const auto file = [&](const std::string& name) { return arguments.cases / (name + ".yaml"); };
+  auto config = surgeries::read_head(file("patient-" + std::to_string(patient)));
+  if (!config || arguments.head == "colin27") return config;
+  const auto head = surgeries::read_head(file(arguments.head));
+  if (!head) return head;
+  config->file = head->file;
+  config->mri = head->mri;
+  config->brain = head->brain;
+  config->mesh = head->mesh;
+  config->brainstem = head->brainstem;
   return config;
 }
 
@@ -89,7 +71,6 @@ void tell(const std::vector<surgeries::Row>& rows, double seconds) {
 }
 
 Status run(const Arguments& arguments) {
-  linalg::use_single_threaded_blas();
   auto rows = open_evidence(arguments.out, arguments.resume);
   if (!rows) return tl::unexpected(rows.error());
   for (const int patient : arguments.patients) {
@@ -139,23 +120,7 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.seeds, "surgeries per patient and truth")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  app.add_option("--first-seed", arguments.first_seed, "1001 for a trial")->capture_default_str();
-  app.add_option("--thousand-nodes", arguments.thousand_nodes,
-                 "size of the mesh; 18: the cases' own edge length")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0));
-  app.add_option("--out", arguments.out, "table to write")->capture_default_str();
-  app.add_flag("--resume", arguments.resume, "keep the surgeries that the table has");
-  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "evidence: %s (see evidence --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::evidence::run(arguments);
-  if (ok) return 0;
-  std::fprintf(stderr, "evidence: %s\n", ok.error().message.c_str());
-  return 1;
+  brainshift::surgeries::add_study_options(app, arguments);
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::evidence::run(arguments); });
 }

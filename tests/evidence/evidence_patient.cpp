@@ -14,26 +14,18 @@
 #include "common/registration/icp.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/benchmarks/bench_head.hpp"
+#include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
 namespace brainshift::evidence {
 namespace {
 
+using surgeries::PlayedBrain;
 using surgeries::Row;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // What an update finds must not depend on what else the machine does; how long it took is a column.
 constexpr double kNoDeadline_ms = 1e6;
-
-// A brain and the factor of its stiffness.
-struct PlayedBrain {
-  client::TruthBrain brain;
-  contact::ForwardModel forward;
-  client::TruthSolver solver;
-
-  PlayedBrain(client::TruthBrain of, contact::ForwardModel model)
-      : brain(std::move(of)), forward(std::move(model)), solver(forward) {}
-};
 
 // The true brains of one patient. Those that no seed changes are kept.
 class PlayedBrains {
@@ -58,9 +50,9 @@ class PlayedBrains {
     kept.reset();  // before the next one takes memory
     auto brain = client::truth_brain(*head_.model, head_.config, scenario, seed, other);
     if (!brain) return tl::unexpected(brain.error());
-    auto forward = client::truth_forward(*brain);
-    if (!forward) return tl::unexpected(forward.error());
-    kept = std::make_unique<PlayedBrain>(std::move(*brain), std::move(*forward));
+    auto made = surgeries::factorised(std::move(*brain));
+    if (!made) return tl::unexpected(made.error());
+    kept = std::move(*made);
     return kept.get();
   }
 

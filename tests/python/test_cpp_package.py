@@ -14,8 +14,9 @@ import brainshift
 BUILD = pathlib.Path(os.environ["BRAINSHIFT_BUILD"])
 
 
-def cmake(*arguments):
-    done = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True, timeout=240)
+def cmake(*arguments, path=os.environ["PATH"]):
+    done = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True, timeout=240,
+                          env=os.environ | {"PATH": path})
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -31,8 +32,10 @@ def prefix(tmp_path_factory):
 def program(prefix, tmp_path_factory):
     build = tmp_path_factory.mktemp("example")
     flags = os.environ.get("BRAINSHIFT_CXX_FLAGS", "")
-    cmake("-S", SOURCE / "client" / "examples" / "send_boundary", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}",
-          f"-DCMAKE_CXX_FLAGS={flags}")
+    # Found by PATH, as CMake does it for every folder named bin. The build's own comes first, as with
+    # those who have its programs in PATH: nothing there may look like an installed package.
+    cmake("-S", SOURCE / "client" / "examples" / "send_boundary", "-B", build, f"-DCMAKE_CXX_FLAGS={flags}",
+          path=f"{BUILD / 'bin'}:{prefix / 'bin'}:{os.environ['PATH']}")
     cmake("--build", build)
     return build / "send_boundary"
 

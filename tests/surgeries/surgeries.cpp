@@ -7,21 +7,18 @@
 // (client/twin/variation.hpp). The run that is published begins at seed 1. While the estimate is
 // being worked on, runs begin at 1001, so that nothing is fitted to what is published.
 //
-// A file that the case names and that is not there is looked for below $BRAINSHIFT_EXTERNAL_DATA,
-// by its path relative to the case file.
+// study_program.hpp says where the images of the case are looked for.
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "client/twin/varied_patient.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
+#include "tests/surgeries/study_program.hpp"
 #include "tests/surgeries/surgery_place.hpp"
 
 namespace brainshift::surgeries {
@@ -34,32 +31,12 @@ const std::vector<std::string> kScenarios = {"paper",     "paper-icp",        "d
                                              "joint-sag", "joint-tangential", "joint-mixed",
                                              "resection"};
 
-struct Arguments {
+struct Arguments : StudyArguments {
   fs::path head = BRAINSHIFT_DEFAULT_CASE;
   int places = 5;
   int seeds = 4;  // per place
-  std::uint64_t first_seed = 1;
-  double thousand_nodes = 18.0;
   std::vector<std::string> scenarios = kScenarios;
-  fs::path out = "rows.csv";
-  bool resume = false;
 };
-
-void find_external(fs::path& file, const fs::path& folder) {
-  const char* external = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
-  if (file.empty() || external == nullptr || fs::exists(file)) return;
-  const fs::path elsewhere = fs::path(external) / file.lexically_relative(folder);
-  if (fs::exists(elsewhere)) file = elsewhere;
-}
-
-Result<CaseConfig> read_head(const fs::path& path) {
-  auto config = io::read_case_config(path);
-  if (!config) return config;
-  const fs::path folder = config->file.parent_path();
-  find_external(config->mri, folder);
-  find_external(config->brain, folder);
-  return config;
-}
 
 std::vector<std::uint64_t> seeds_of(const Arguments& arguments, int place) {
   std::vector<std::uint64_t> seeds;
@@ -110,7 +87,6 @@ Status run_place(const Arguments& arguments, const CaseConfig& config, const Tet
 }
 
 Status run(const Arguments& arguments) {
-  linalg::use_single_threaded_blas();
   const auto config = read_head(arguments.head);
   if (!config) return tl::unexpected(config.error());
   auto rows = open_surgeries(arguments.out, arguments.resume);
@@ -144,28 +120,11 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.seeds, "surgeries per place and scenario")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  app.add_option("--first-seed", arguments.first_seed, "of places and surgeries; 1001 for a trial")
-      ->capture_default_str();
-  app.add_option("--thousand-nodes", arguments.thousand_nodes,
-                 "size of the mesh; 18: the case's own edge length")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces")
       ->check([](const std::string& name) {
         return brainshift::client::find_scenario(name) ? "" : name + " is unknown";
       });
-  app.add_option("--out", arguments.out, "table to write")->capture_default_str();
-  app.add_flag("--resume", arguments.resume, "keep the surgeries that the table has");
-  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "surgeries: %s (see surgeries --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::surgeries::run(arguments);
-  if (ok) return 0;
-  std::fprintf(stderr, "surgeries: %s\n", ok.error().message.c_str());
-  return 1;
+  brainshift::surgeries::add_study_options(app, arguments);
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::surgeries::run(arguments); });
 }

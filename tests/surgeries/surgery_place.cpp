@@ -11,6 +11,7 @@
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/full_solve.hpp"
 #include "server/pipeline/pipeline.hpp"
+#include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/sleeping_inverter.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
@@ -18,16 +19,6 @@ namespace brainshift::surgeries {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-// A brain that several scenarios of one seed share, and the factor of its stiffness.
-struct PlayedBrain {
-  client::TruthBrain brain;
-  contact::ForwardModel forward;
-  client::TruthSolver solver;
-
-  PlayedBrain(client::TruthBrain of, contact::ForwardModel model)
-      : brain(std::move(of)), forward(std::move(model)), solver(forward) {}
-};
 
 // The brains of one seed. They differ by the resection alone: every variation has the same
 // stiffness.
@@ -40,9 +31,9 @@ class PlayedBrains {
     if (place) return place.get();
     auto brain = client::truth_brain(*head_.model, head_.config, scenario, seed_);
     if (!brain) return tl::unexpected(brain.error());
-    auto forward = contact::ForwardModel::build(brain->model, brain->config, Boundary::kContact);
-    if (!forward) return tl::unexpected(forward.error());
-    place = std::make_unique<PlayedBrain>(std::move(*brain), std::move(*forward));
+    auto made = factorised(std::move(*brain));
+    if (!made) return tl::unexpected(made.error());
+    place = std::move(*made);
     return place.get();
   }
 

@@ -433,7 +433,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
     rebuild.displacement(team, descent.z(), contact, estimate.displacement);
   }
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
-                                      estimate.displacement, rebuild.storage_error_mm());
+                                      estimate.displacement);
       !status) {
     return status;
   }

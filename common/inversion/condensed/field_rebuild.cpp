@@ -144,12 +144,6 @@ void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAt
   u.resize(3, operators_.num_nodes());
   gather_terms(z, contact);
   sum_blocks(team, blocks_);
-  const auto& steps = operators_.responses.parts().steps;
-  double squares = 0.0;
-  for (const CompactColumns::Term& term : terms_) {
-    squares += std::pow(static_cast<double>(steps[term.column] * term.factor), 2);
-  }
-  storage_error_mm_ = kStorageSafety * std::sqrt(squares);
   far_field_error_mm_ = 0.0;
   if (!far_.empty()) {
     sum_spare(team);

@@ -31,9 +31,6 @@
 
 namespace brainshift::inversion {
 
-// The typical error is 0.3 steps; the largest of some ten thousand is five times as large.
-inline constexpr double kStorageSafety = 3.0;
-
 class FieldRebuild {
  public:
   // Keeps a reference to the operators. region: sorted nodes that are rebuilt; empty: all. team:
@@ -46,9 +43,6 @@ class FieldRebuild {
   // u: 3 x nodes, mm, at these nodes only.
   void displacement_at(ThreadTeam& team, const std::vector<NodeIndex>& nodes, const VecX& z,
                        const ContactAtLoads& contact, Points& u);
-  // Upper estimate of what the rounding of compact columns did to a component of the last
-  // displacement(), mm: kStorageSafety sqrt(sum (step_j x_j)^2) over its columns and their factors.
-  double storage_error_mm() const { return storage_error_mm_; }
   // Upper estimate of what interpolation did to the last displacement(), mm; 0 when every node was
   // rebuilt.
   double far_field_error_mm() const { return far_field_error_mm_; }
@@ -78,7 +72,7 @@ class FieldRebuild {
   std::vector<Eigen::Index> place_;  // where the nodes of far_.rebuilt stand in field_
   // Control and probe nodes in other blocks: their number, rows of U and G.
   Eigen::MatrixXf spare_modes_, spare_contact_;
-  double far_field_error_mm_ = 0.0, storage_error_mm_ = 0.0;
+  double far_field_error_mm_ = 0.0;
   std::vector<CompactColumns::Term> terms_;
   std::vector<const float*> columns_;
   std::vector<float> factors_;

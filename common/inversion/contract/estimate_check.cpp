@@ -9,7 +9,7 @@
 namespace brainshift::inversion {
 
 Status check_equilibrium(const CondensedOperators& operators, const std::vector<int>& slaves,
-                         const VecX& penetration, const Points& displacement, double storage_mm) {
+                         const VecX& penetration, const Points& displacement) {
   double worst = 0.0, largest = 0.0, there = 0.0;
   int worst_slave = -1;
   for (const int slave : slaves) {
@@ -23,7 +23,7 @@ Status check_equilibrium(const CondensedOperators& operators, const std::vector<
     worst_slave = slave;
     there = field;
   }
-  if (worst <= kEquilibriumTolerance_mm + kEquilibriumRelative * largest + storage_mm) return {};
+  if (worst <= kEquilibriumTolerance_mm + kEquilibriumRelative * largest) return {};
   char text[200];
   std::snprintf(
       text, sizeof text,

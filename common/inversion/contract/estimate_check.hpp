@@ -32,10 +32,8 @@ inline constexpr double kEquilibriumTolerance_mm = 1e-3;
 inline constexpr double kEquilibriumRelative = 2e-5;
 
 // penetration: one per slave, as contact was solved. slaves: indices of the slaves to look at.
-// storage_mm: what the rounding of compact columns may do to the field
-// (FieldRebuild::storage_error_mm).
 Status check_equilibrium(const CondensedOperators& operators, const std::vector<int>& slaves,
-                         const VecX& penetration, const Points& displacement, double storage_mm);
+                         const VecX& penetration, const Points& displacement);
 
 // Fills min_volume_ratio and inverted_elements. kNotFinite when the displacement is not finite.
 Status check_deformation(const fem::Deformation& deformation, Estimate& estimate);

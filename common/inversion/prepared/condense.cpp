@@ -362,8 +362,9 @@ Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOp
     return tl::unexpected(status.error());
   }
   ThreadTeam team(options.threads);
-  auto responses = encode_columns(model.model().mesh.nodes, {&modes, &columns}, team,
-                                  options.progress, options.stop);
+  auto responses =
+      encode_columns(model.model().mesh.nodes, {{&modes, kModeStep}, {&columns, kContactStep}},
+                     team, options.progress, options.stop);
   if (!responses) return tl::unexpected(responses.error());
   result.region_responses = region_rows(result.region, modes, columns);
   result.responses = std::move(*responses);

@@ -33,6 +33,11 @@ struct BlockStore {
       save;
 };
 
+// Steps of compact columns (docs/decisions/0028): of the greatest number of G and of U. An extreme
+// field is a sum of modes with factors of hundreds, which cancel; they are few, and finer.
+inline constexpr float kContactStep = 1.0F / 8388608;  // 2^-23
+inline constexpr float kModeStep = 1.0F / 33554432;    // 2^-25
+
 struct CondenseOptions {
   Progress progress;     // stages "contact columns", "prior modes", "load modes", "uncertainty",
                          // "compact columns"

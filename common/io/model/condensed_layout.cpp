@@ -8,8 +8,6 @@
 namespace brainshift::io {
 namespace {
 
-constexpr Boundary kBoundaries[] = {Boundary::kContact, Boundary::kFixed};
-
 std::string group_of(Boundary boundary) { return "condensed/" + std::string(to_string(boundary)); }
 
 Eigen::Index packed_size(Eigen::Index n) { return n * (n + 1) / 2; }
@@ -62,6 +60,8 @@ void write_compact(Hdf5Writer& out, const std::string& group, const CompactParts
   out.list(in_group + "wide_basis", parts.wide_basis);
   out.list(in_group + "basis", parts.basis);
   out.list(in_group + "basis_scales", parts.basis_scales);
+  out.list(in_group + "lengths", parts.lengths);
+  out.list(in_group + "longs", parts.longs);
   out.list(in_group + "words", parts.words);
   out.list(in_group + "bytes", parts.bytes);
 }
@@ -76,6 +76,8 @@ CompactColumns read_compact(const Hdf5Reader& in, const std::string& group) {
   in.matrix(in_group + "wide_basis", parts.wide_basis);
   in.matrix(in_group + "basis", parts.basis);
   in.matrix(in_group + "basis_scales", parts.basis_scales);
+  in.matrix(in_group + "lengths", parts.lengths);
+  in.matrix(in_group + "longs", parts.longs);
   in.matrix(in_group + "words", parts.words);
   in.matrix(in_group + "bytes", parts.bytes);
   auto columns = CompactColumns::from_parts(std::move(parts));
@@ -139,9 +141,10 @@ void write_condensed(Hdf5Writer& out, const std::vector<CondensedOperators>& ope
   for (const CondensedOperators& each : operators) write_one(out, each);
 }
 
-std::vector<CondensedOperators> read_condensed(const Hdf5Reader& in, const BrainModel& model) {
+std::vector<CondensedOperators> read_condensed(const Hdf5Reader& in, const BrainModel& model,
+                                               const std::vector<Boundary>& wanted) {
   std::vector<CondensedOperators> all;
-  for (const Boundary boundary : kBoundaries) {
+  for (const Boundary boundary : wanted) {
     if (!in.has(group_of(boundary))) continue;
     all.push_back(read_one(in, boundary));
     if (const auto problem = incompatibility_of(all.back(), model)) throw Hdf5Problem{*problem};

@@ -12,7 +12,9 @@
 namespace brainshift::io {
 
 void write_condensed(Hdf5Writer& out, const std::vector<CondensedOperators>& operators);
-// Throws also when the operators do not fit the model.
-std::vector<CondensedOperators> read_condensed(const Hdf5Reader& in, const BrainModel& model);
+// Those of the wanted boundary conditions that the file has. Throws also when they do not fit the
+// model.
+std::vector<CondensedOperators> read_condensed(const Hdf5Reader& in, const BrainModel& model,
+                                               const std::vector<Boundary>& wanted);
 
 }  // namespace brainshift::io

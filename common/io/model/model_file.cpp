@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kHeaderSize = 512;  // the smallest user block that HDF5 knows
 constexpr std::string_view kMagic = "brainshift model file\n";
-constexpr std::string_view kFormat = "format 5\n";
+constexpr std::string_view kFormat = "format 6\n";
 
 // The file's first block; see model_file.hpp.
 std::string header_text(const FileChecksum& body) {
@@ -61,7 +61,7 @@ Status check_header(const fs::path& path) {
   }
   if (std::string_view(header).substr(kMagic.size(), kFormat.size()) != kFormat) {
     return refuse("is a model file of " + quoted_line(header, kMagic.size()) +
-                  ": must be 'format 5', run brainshiftd prepare again");
+                  ": must be 'format 6', run brainshiftd prepare again");
   }
   FileChecksum written;
   unsigned long long bytes = 0;
@@ -138,25 +138,17 @@ std::string free_space(const fs::path& path) {
   return error ? "" : ", with " + std::to_string(space.available >> 20) + " MiB free there";
 }
 
-ModelFile read_hdf5(const fs::path& path) {
-  const Hdf5Handle h5(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose,
-                      "HDF5 cannot open it");
-  hsize_t size = 0;
-  check_hdf5(H5Fget_filesize(h5.get(), &size), "its size is unknown");
-  const Hdf5Reader in(h5.get(), size);
-  ModelFile file;
-  file.model = read_brain_model(in);
-  file.config = read_case(in);
-  file.inputs = read_inputs(in);
-  file.condensed = read_condensed(in, file.model);
-  return file;
-}
-
-Result<ModelFile> read_once(const fs::path& path) {
+// read: Hdf5Reader -> T.
+template <typename T, typename Read>
+Result<T> read_once(const fs::path& path, const Read& read) {
   if (Status whole = check_header(path); !whole) return tl::unexpected(whole.error());
   const QuietHdf5 quiet;
   try {
-    return read_hdf5(path);
+    const Hdf5Handle h5(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose,
+                        "HDF5 cannot open it");
+    hsize_t size = 0;
+    check_hdf5(H5Fget_filesize(h5.get(), &size), "its size is unknown");
+    return read(Hdf5Reader(h5.get(), size));
   } catch (const Hdf5Problem& problem) {
     return file_error(ErrorCode::kUnreadable, path, "is no usable model file: " + problem.message);
   }
@@ -170,6 +162,19 @@ bool is_still(const fs::path& path, const Descriptor& held) {
   struct stat then {};
   return ::stat(path.c_str(), &now) == 0 && ::fstat(held.get(), &then) == 0 &&
          now.st_dev == then.st_dev && now.st_ino == then.st_ino;
+}
+
+template <typename T, typename Read>
+Result<T> read_file(const fs::path& path, const Read& read) {
+  constexpr int kAttempts = 20;  // against a file replaced faster than it can be read
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
+    const Descriptor held(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (held.get() < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+    Result<T> value = read_once<T>(path, read);
+    if (is_still(path, held)) return value;
+  }
+  return file_error(ErrorCode::kUnreadable, path, "is replaced all the time while it is read");
 }
 
 }  // namespace
@@ -189,16 +194,26 @@ Status write_model(const fs::path& path, const ModelFile& file) {
   return pending->commit();
 }
 
-Result<ModelFile> read_model(const fs::path& path) {
-  constexpr int kAttempts = 20;  // against a file replaced faster than it can be read
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
-    const Descriptor held(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (held.get() < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
-    Result<ModelFile> file = read_once(path);
-    if (is_still(path, held)) return file;
-  }
-  return file_error(ErrorCode::kUnreadable, path, "is replaced all the time while it is read");
+Result<ModelFile> read_model(const fs::path& path, const std::vector<Boundary>& operators) {
+  return read_file<ModelFile>(path, [&](const Hdf5Reader& in) {
+    ModelFile file;
+    file.model = read_brain_model(in);
+    file.config = read_case(in);
+    file.inputs = read_inputs(in);
+    file.condensed = read_condensed(in, file.model, operators);
+    return file;
+  });
+}
+
+Result<std::optional<CondensedOperators>> read_operators(const fs::path& path,
+                                                         const BrainModel& model,
+                                                         Boundary boundary) {
+  using Operators = std::optional<CondensedOperators>;
+  return read_file<Operators>(path, [&](const Hdf5Reader& in) -> Operators {
+    auto found = read_condensed(in, model, {boundary});
+    if (found.empty()) return std::nullopt;
+    return std::move(found.front());
+  });
 }
 
 }  // namespace brainshift::io

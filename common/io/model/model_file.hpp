@@ -3,7 +3,7 @@
 // to a temporary name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
-//   brainshift model file\nformat 5\nbytes N\ncrc32 XXXXXXXX\n
+//   brainshift model file\nformat 6\nbytes N\ncrc32 XXXXXXXX\n
 // N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is
 // checked first, because the HDF5 library itself is not safe against damaged files.
 //
@@ -26,10 +26,12 @@
 //     responses/              group: [U G] with r + s columns, operators/compact_columns.hpp
 //       steps                 r + s       float32         mm, then mm/N
 //       order                 n           int32
-//       blocks                any x 4     int32
+//       blocks                any x 3     int32
 //       wide_basis            any         float32
 //       basis                 any         int16
 //       basis_scales          any         float32
+//       lengths               any         int8
+//       longs                 any         int32
 //       words                 any         int16
 //       bytes                 any         int8
 //     compliance_lower        s(s+1)/2    float64  mm/N   Phi: lower triangle, by columns
@@ -49,6 +51,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -72,7 +75,15 @@ struct ModelFile {
 Status write_model(const std::filesystem::path& path, const ModelFile& file);
 // kNotFound; kUnreadable, with the reason, for a file that is no model file, of another format,
 // truncated, altered, whose content does not hash to its model_id or whose operators do not fit
-// the model.
-Result<ModelFile> read_model(const std::filesystem::path& path);
+// the model. operators: the boundary conditions whose operators are read; what the file lacks is
+// not missed.
+Result<ModelFile> read_model(const std::filesystem::path& path,
+                             const std::vector<Boundary>& operators = {Boundary::kContact,
+                                                                       Boundary::kFixed});
+// The operators of this model for one boundary condition; empty: the file has none. Errors as
+// above, also when the file holds another model by now.
+Result<std::optional<CondensedOperators>> read_operators(const std::filesystem::path& path,
+                                                         const BrainModel& model,
+                                                         Boundary boundary);
 
 }  // namespace brainshift::io

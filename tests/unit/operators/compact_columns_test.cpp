@@ -12,25 +12,37 @@ namespace {
 
 using testing::HasSubstr;
 
-// Two nodes in one block, node 1 first, and node 2 in another; two columns. The first block has a
-// coefficient of each width, the second one narrow one.
+// Seven nodes in one block, node 1 first, and node 7 in another; two columns. Direction i of the
+// first block is row i, times 1.5 at i = 8: column 0 has eight coefficients of each width, column 1
+// eight words and eight bytes. In the second block column 0 has a coefficient and column 1 none.
 CompactParts example() {
   CompactParts parts;
   parts.steps.resize(2);
   parts.steps << 0.5F, 0.25F;
-  parts.order = {1, 0, 2};
-  parts.blocks.resize(4, 2);
-  parts.blocks << 2, 1, 1, 0, 1, 0, 1, 1;
-  parts.wide_basis.resize(6);
-  parts.wide_basis << 1, 0, 0, 0, 0, 0;
-  parts.basis.resize(15);
-  parts.basis << 0, 2, 0, 0, 0, 0, /**/ 0, 0, 0, 0, 0, 4, /**/ 0, 3, 0;
-  parts.basis_scales.resize(3);
-  parts.basis_scales << 0.5F, 0.25F, 2.0F;
-  parts.words.resize(4);
-  parts.words << 1000, -300, -20000, 7;
-  parts.bytes.resize(6);
-  parts.bytes << -128, 9, 127, -5, 11, -100;
+  parts.order = {1, 0, 2, 3, 4, 5, 6, 7};
+  parts.blocks.resize(3, 2);
+  parts.blocks << 7, 1, 8, 0, 13, 1;
+  Eigen::MatrixXf wide = Eigen::MatrixXf::Zero(21, 8);
+  Eigen::Matrix<std::int16_t, 21, 13> others = decltype(others)::Zero();
+  for (int i = 0; i < 8; ++i) wide(i, i) = 1.0F;
+  for (int i = 0; i < 13; ++i) others(8 + i, i) = i == 0 ? 6 : 4;
+  parts.wide_basis = wide.reshaped();
+  parts.basis.resize(21 * 13 + 3);
+  parts.basis << others.reshaped(), 0, 3, 0;
+  parts.basis_scales.resize(14);
+  parts.basis_scales << Eigen::VectorXf::Constant(13, 0.25F), 2.0F;
+  parts.lengths.resize(12);
+  parts.lengths << 1, 1, 1, /**/ 0, 1, 1, /**/ 0, 0, 1, /**/ 0, 0, 0;
+  parts.longs.setZero(8);
+  parts.longs.head(2) << 16777216, -5;
+  parts.words.setZero(16);
+  parts.words[0] = -300;  // column 0, direction 8
+  parts.words[8] = 7;     // column 1, direction 0
+  parts.words[15] = -32768;
+  parts.bytes.setZero(24);
+  parts.bytes[4] = 127;   // column 0, direction 20, the last
+  parts.bytes[8] = -128;  // column 1, direction 8
+  parts.bytes[16] = 11;
   return parts;
 }
 
@@ -42,19 +54,21 @@ CompactColumns made(CompactParts parts = example()) {
 
 TEST(CompactColumns, NumbersFollowTheFormulaOfTheHeader) {
   const CompactColumns columns = made();
-  ASSERT_EQ(columns.num_nodes(), 3);
+  ASSERT_EQ(columns.num_nodes(), 8);
   ASSERT_EQ(columns.num_columns(), 2);
   ASSERT_EQ(columns.num_blocks(), 2);
-  float out[6];
+  float out[21];
   const CompactColumns::Term both[] = {{0, 2.0F}, {1, -1.0F}};
   columns.sum(0, both, out);
   // Column 0: step 0.5; column 1: step 0.25.
-  EXPECT_EQ(out[0], 2.0F * 0.5F * (256 * 1000 - 128) - 0.25F * (256 * -20000 + 127));
-  EXPECT_EQ(out[1], 2.0F * 0.5F * -300 - 0.25F * 7);
-  EXPECT_EQ(out[5], 2.0F * 0.5F * 9 - 0.25F * -5);
+  EXPECT_EQ(out[0], 2.0F * 0.5F * 16777216 - 0.25F * 7);
+  EXPECT_EQ(out[1], 2.0F * 0.5F * -5);
   EXPECT_EQ(out[2], 0.0F);
+  EXPECT_EQ(out[7], -0.25F * -32768);
+  EXPECT_EQ(out[8], 1.5F * (2.0F * 0.5F * -300 - 0.25F * -128));
+  EXPECT_EQ(out[20], 2.0F * 0.5F * 127);
   columns.sum(1, both, out);
-  EXPECT_EQ(out[1], 6.0F * (2.0F * 0.5F * 11 - 0.25F * -100));
+  EXPECT_EQ(out[1], 6.0F * (2.0F * 0.5F * 11));
   columns.sum(1, {}, out);
   EXPECT_EQ(out[1], 0.0F);
 }
@@ -64,8 +78,8 @@ TEST(CompactColumns, NodesHaveOnePlaceEach) {
   EXPECT_EQ(columns.place(0).block, 0);
   EXPECT_EQ(columns.place(0).node, 1);
   EXPECT_EQ(columns.place(1).node, 0);
-  EXPECT_EQ(columns.place(2).block, 1);
-  EXPECT_EQ(columns.first_node(1), 2);
+  EXPECT_EQ(columns.place(7).block, 1);
+  EXPECT_EQ(columns.first_node(1), 7);
   EXPECT_EQ(columns.nodes(0)[0], 1);
 }
 
@@ -89,10 +103,12 @@ TEST(CompactColumns, NoNodesAndNoColumnsAreValid) {
   EXPECT_EQ(made({}).num_nodes(), 0);
   CompactParts still = example();
   still.steps.resize(0);
+  still.lengths.resize(0);
+  still.longs.resize(0);
   still.words.resize(0);
   still.bytes.resize(0);
   const CompactColumns columns = made(still);
-  float out[6] = {1, 1, 1, 1, 1, 1};
+  float out[21] = {1};
   columns.sum(0, {}, out);
   EXPECT_EQ(out[0], 0.0F);
 }
@@ -114,22 +130,33 @@ TEST(CompactColumns, PartsThatDoNotFitAreRefused) {
        [=](CompactParts& p) { p.basis_scales[0] = inf; }},
       {"blocks: block 0 has 0 nodes", [](CompactParts& p) { p.blocks(0, 0) = 0; }},
       {"blocks: block 0 has 129 nodes", [](CompactParts& p) { p.blocks(0, 0) = 129; }},
-      {"blocks: block 1 has 1 nodes and -1 + 0 + 1", [](CompactParts& p) { p.blocks(1, 1) = -1; }},
-      {"blocks: block 1 has 1 nodes and 0 + 3 + 1", [](CompactParts& p) { p.blocks(2, 1) = 3; }},
-      {"blocks: block 1 has 1 nodes and 0 + 0 + 2147483647",
-       [](CompactParts& p) { p.blocks(3, 1) = std::numeric_limits<int>::max(); }},
-      {"order has 2 numbers: must be 3", [](CompactParts& p) { p.order.pop_back(); }},
+      {"blocks: block 1 has 1 nodes and -1 + 1", [](CompactParts& p) { p.blocks(1, 1) = -1; }},
+      {"blocks: block 1 has 1 nodes and 3 + 1", [](CompactParts& p) { p.blocks(1, 1) = 3; }},
+      {"blocks: block 1 has 1 nodes and 0 + 2147483647",
+       [](CompactParts& p) { p.blocks(2, 1) = std::numeric_limits<int>::max(); }},
+      {"order has 7 numbers: must be 8", [](CompactParts& p) { p.order.pop_back(); }},
       {"order does not name every node once", [](CompactParts& p) { p.order[2] = 1; }},
-      {"order does not name every node once", [](CompactParts& p) { p.order[2] = 3; }},
+      {"order does not name every node once", [](CompactParts& p) { p.order[2] = 8; }},
       {"order does not name every node once", [](CompactParts& p) { p.order[2] = -1; }},
-      {"wide_basis has 5 numbers: must be 6",
-       [](CompactParts& p) { p.wide_basis.conservativeResize(5); }},
-      {"basis has 16 numbers: must be 15", [](CompactParts& p) { p.basis.setZero(16); }},
-      {"basis_scales has 2 numbers: must be 3",
+      {"wide_basis has 167 numbers: must be 168",
+       [](CompactParts& p) { p.wide_basis.conservativeResize(167); }},
+      {"basis has 300 numbers: must be 276", [](CompactParts& p) { p.basis.setZero(300); }},
+      {"basis_scales has 2 numbers: must be 14",
        [](CompactParts& p) { p.basis_scales.conservativeResize(2); }},
-      {"words has 0 numbers: must be 4", [](CompactParts& p) { p.words.resize(0); }},
-      {"bytes has 5 numbers: must be 6", [](CompactParts& p) { p.bytes.conservativeResize(5); }},
-      {"words has 4 numbers: must be 6", [](CompactParts& p) { p.steps.setOnes(3); }},
+      {"lengths has 11 numbers: must be 12",
+       [](CompactParts& p) { p.lengths.conservativeResize(11); }},
+      {"lengths has 12 numbers: must be 18", [](CompactParts& p) { p.steps.setOnes(3); }},
+      {"lengths: column 1 of block 0 has -1 + 1 + 1 eights",
+       [](CompactParts& p) { p.lengths[3] = -1; }},
+      {"lengths: column 1 of block 0 has 0 + -128 + 1 eights",
+       [](CompactParts& p) { p.lengths[4] = -128; }},
+      {"lengths: column 0 of block 0 has 1 + 1 + 2 eights of coefficients, the block 21 directions",
+       [](CompactParts& p) { p.lengths[2] = 2; }},
+      {"lengths: column 1 of block 1 has 0 + 2 + 0 eights of coefficients, the block 1 directions",
+       [](CompactParts& p) { p.lengths[10] = 2; }},
+      {"longs has 0 numbers: must be 8", [](CompactParts& p) { p.longs.resize(0); }},
+      {"words has 0 numbers: must be 16", [](CompactParts& p) { p.words.resize(0); }},
+      {"bytes has 23 numbers: must be 24", [](CompactParts& p) { p.bytes.conservativeResize(23); }},
   };
   for (const Misfit& misfit : cases) {
     CompactParts parts = example();
@@ -142,11 +169,12 @@ TEST(CompactColumns, PartsThatDoNotFitAreRefused) {
 
 TEST(CompactColumns, MoreBlocksThanNodesAreRefused) {
   CompactParts parts = example();
-  parts.blocks.setZero(4, 1000);
+  parts.blocks.setZero(3, 1000);
+  parts.lengths.setZero(6000);
   parts.blocks.row(0).setConstant(CompactColumns::kBlockNodes);
   const auto refused = CompactColumns::from_parts(parts);
   ASSERT_FALSE(refused.has_value());
-  EXPECT_THAT(refused.error().message, HasSubstr("order has 3 numbers"));
+  EXPECT_THAT(refused.error().message, HasSubstr("order has 8 numbers"));
 }
 
 }  // namespace

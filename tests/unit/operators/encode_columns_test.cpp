@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::MatrixXf;
 
+constexpr float kStep = 1.0F / 262144;  // of the greatest number
+
 Points scattered(int n, Random& random) {
   Points nodes(3, n);
   for (int i = 0; i < n; ++i) nodes.col(i) = 80.0 * random.uniform() * random.direction();
@@ -47,9 +49,11 @@ std::vector<NodeIndex> all_nodes(const CompactColumns& columns) {
 }
 
 CompactColumns encoded(const Points& nodes, const std::vector<const MatrixXf*>& groups,
-                       int threads = 1) {
+                       int threads = 1, float step = kStep) {
   ThreadTeam team(threads);
-  auto made = encode_columns(nodes, groups, team);
+  std::vector<ColumnGroup> given;
+  for (const MatrixXf* group : groups) given.push_back({group, step});
+  auto made = encode_columns(nodes, given, team);
   EXPECT_TRUE(made.has_value()) << made.error().message;
   return std::move(*made);
 }
@@ -59,12 +63,16 @@ MatrixXf decoded(const CompactColumns& columns) {
   return decode_rows(columns, all_nodes(columns), column_range(0, columns.num_columns()), team);
 }
 
-// Greatest difference in steps of the group. Decoding rounds too, in single precision.
+// Greatest difference in steps of its column. Decoding rounds too, in single precision.
 double error_in_steps(const MatrixXf& given, const CompactColumns& columns, int first) {
-  if (given.size() == 0) return 0.0;
   const MatrixXf found = decoded(columns).middleCols(first, given.cols());
-  const double step = columns.parts().steps[first];
-  return (found.cast<double>() - given.cast<double>()).cwiseAbs().maxCoeff() / step;
+  double worst = 0.0;
+  for (Eigen::Index j = 0; j < given.cols() && given.rows() > 0; ++j) {
+    const VecX apart = found.col(j).cast<double>() - given.col(j).cast<double>();
+    const double step = columns.parts().steps[first + j];
+    worst = std::max(worst, apart.cwiseAbs().maxCoeff() / step);
+  }
+  return worst;
 }
 
 TEST(EncodeColumns, EveryNumberIsWithinTheStatedErrorForEveryShape) {
@@ -85,6 +93,15 @@ TEST(EncodeColumns, EveryNumberIsWithinTheStatedErrorForEveryShape) {
   }
 }
 
+// Steps so small that single precision is what limits the sums.
+TEST(EncodeColumns, TheFinestStepsAreAsGoodAsSinglePrecision) {
+  Random random(13);
+  const Points nodes = scattered(300, random);
+  const MatrixXf fields = peaks(nodes, 60, random);
+  const MatrixXf found = decoded(encoded(nodes, {&fields}, 1, kStep / 256.0F));
+  EXPECT_LT((found - fields).cwiseAbs().maxCoeff(), 1e-6F * fields.cwiseAbs().maxCoeff());
+}
+
 TEST(EncodeColumns, AStepIsAPartOfTheGreatestNumberOfTheGroup) {
   Random random(2);
   const Points nodes = scattered(50, random);
@@ -92,7 +109,7 @@ TEST(EncodeColumns, AStepIsAPartOfTheGreatestNumberOfTheGroup) {
   const CompactColumns made = encoded(nodes, {&large, &small});
   for (int j = 0; j < 10; ++j) {
     const float greatest = (j < 4 ? large : small).cwiseAbs().maxCoeff();
-    EXPECT_EQ(made.parts().steps[j], greatest / kStepsPerGreatest);
+    EXPECT_EQ(made.parts().steps[j], greatest * kStep);
   }
 }
 
@@ -120,7 +137,7 @@ TEST(EncodeColumns, SumsAreOffByAboutAThirdOfAStepTimesTheNormOfTheFactors) {
       worst = std::max(worst, error.cwiseAbs().maxCoeff());
     }
   }
-  const double unit = static_cast<double>(made.parts().steps[0]) * factors.norm();
+  const double unit = made.parts().steps.cast<double>().cwiseProduct(factors).norm();
   const double rms = std::sqrt(squares / static_cast<double>(exact.size()));
   EXPECT_LT(rms, 0.5 * unit);
   EXPECT_GT(rms, 0.1 * unit) << "more bits are kept than the step says";
@@ -137,13 +154,39 @@ TEST(EncodeColumns, SmoothFieldsTakeLessThanHalfOfSinglePrecision) {
   EXPECT_LT(error_in_steps(fields, made, 0), kMostErrorSteps + 0.5);
 }
 
+// A column costs little in a block far from where it peaks, and nothing where it rests.
+TEST(EncodeColumns, QuietColumnsHaveFewCoefficients) {
+  Random random(12);
+  Points nodes(3, 256);
+  for (int i = 0; i < 256; ++i) {
+    nodes.col(i) = random.direction() + Vec3(i < 128 ? 0.0 : 50.0, 0.0, 0.0);
+  }
+  MatrixXf fields = noise(768, 40, 1.0F, random);
+  fields.col(7).tail(384) *= 2e-5F;  // about a step
+  fields.col(8).tail(384).setZero();
+  const CompactColumns made = encoded(nodes, {&fields});
+  ASSERT_EQ(made.num_blocks(), 2);
+  const int there = made.place(255).block;
+  ASSERT_NE(made.place(0).block, there);
+  const auto length = [&](int block, int column) {
+    return Eigen::Vector3i(made.parts().lengths.segment<3>(3L * (40 * block + column)).cast<int>());
+  };
+  EXPECT_GT(length(there, 6).head<2>().sum(), 0);
+  EXPECT_EQ(length(there, 7).head<2>().sum(), 0);
+  EXPECT_GT(length(there, 7)[2], 0);
+  EXPECT_EQ(length(there, 8).sum(), 0);
+  EXPECT_GT(length(1 - there, 8).sum(), 0);
+  EXPECT_LT(error_in_steps(fields, made, 0), kMostErrorSteps + 0.5);
+}
+
 TEST(EncodeColumns, ZeroesStayZeroes) {
   Random random(5);
   const Points nodes = scattered(200, random);
   const MatrixXf nothing = MatrixXf::Zero(600, 3);
   const CompactColumns made = encoded(nodes, {&nothing});
   EXPECT_TRUE(decoded(made) == nothing);
-  EXPECT_EQ(made.parts().words.size(), 0);
+  EXPECT_EQ(made.parts().basis.size(), 0);
+  EXPECT_EQ(made.parts().bytes.size(), 0);
   // A column of zeroes among others.
   MatrixXf some = peaks(nodes, 5, random);
   some.col(2).setZero();
@@ -168,7 +211,7 @@ TEST(EncodeColumns, NumbersThatAreNotFiniteAreRefused) {
     MatrixXf fields = noise(60, 2, 1.0F, random);
     fields(31, 1) = bad;
     ThreadTeam team(1);
-    const auto refused = encode_columns(nodes, {&fields}, team);
+    const auto refused = encode_columns(nodes, {{&fields, kStep}}, team);
     ASSERT_FALSE(refused.has_value());
     EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
   }
@@ -221,7 +264,7 @@ TEST(EncodeColumns, CanBeStopped) {
   std::stop_source stop;
   stop.request_stop();
   ThreadTeam team(1);
-  const auto stopped = encode_columns(nodes, {&fields}, team, {}, stop.get_token());
+  const auto stopped = encode_columns(nodes, {{&fields, kStep}}, team, {}, stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
 }

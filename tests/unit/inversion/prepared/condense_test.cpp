@@ -39,9 +39,7 @@ TEST_F(Condensed, ContactColumnsAreTheResponsesToUnitForces) {
     ASSERT_GT(expected.cwiseAbs().maxCoeff(), 0.0);
     const int column = ops->contact_column(j);
     const VecX found = rows_of(*ops, all_nodes(*ops), column, 1);
-    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(),
-              kFloat * expected.cwiseAbs().maxCoeff() +
-                  kMostErrorSteps * static_cast<double>(ops->responses.parts().steps[column]));
+    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), kFloat * expected.cwiseAbs().maxCoeff());
     EXPECT_NEAR(ops->compliance(j, j), pair.normal.dot(u.col(pair.slave)),
                 1e-12 * ops->compliance(j, j));
   }
@@ -58,7 +56,7 @@ TEST_F(Condensed, RegionHasTheRowsOfTheCompactColumns) {
   for (int j = 0; j < columns; ++j) {
     const double step = static_cast<double>(ops->responses.parts().steps[j]);
     EXPECT_LT((unpacked.col(j) - ops->region_responses.col(j).cast<double>()).cwiseAbs().maxCoeff(),
-              kMostErrorSteps * step * (1.0 + 0.1))
+              kMostErrorSteps * step + kFloat * unpacked.col(j).cwiseAbs().maxCoeff())
         << j;
   }
 }

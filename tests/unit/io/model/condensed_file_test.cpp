@@ -66,6 +66,42 @@ TEST(CondensedFile, OneBoundaryConditionMayBeMissing) {
   expect_equal(read->condensed[0], file.condensed[0]);
 }
 
+TEST(CondensedFile, OperatorsMayBeReadByThemselvesAndLater) {
+  const TemporaryFolder folder;
+  const ModelFile original = condensed_file();
+  ASSERT_TRUE(write_model(folder / "m.h5", original));
+  const auto bare = read_model(folder / "m.h5", {});
+  ASSERT_TRUE(bare) << bare.error().message;
+  EXPECT_TRUE(bare->condensed.empty());
+  EXPECT_EQ(bare->model.model_id, original.model.model_id);
+  const auto fixed = read_operators(folder / "m.h5", bare->model, Boundary::kFixed);
+  ASSERT_TRUE(fixed) << fixed.error().message;
+  ASSERT_TRUE(fixed->has_value());
+  expect_equal(**fixed, original.condensed[1]);
+
+  ModelFile without = original;
+  without.condensed.pop_back();
+  ASSERT_TRUE(write_model(folder / "m.h5", without));
+  const auto none = read_operators(folder / "m.h5", bare->model, Boundary::kFixed);
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_FALSE(none->has_value());
+}
+
+TEST(CondensedFile, OperatorsOfAnotherModelAreRefused) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_model(folder / "m.h5", condensed_file()));
+  BrainModel other = condensed_file().model;
+  other.model_id = std::string(other.model_id.size(), '0');
+  const auto refused = read_operators(folder / "m.h5", other, Boundary::kContact);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnreadable);
+  EXPECT_THAT(refused.error().message,
+              HasSubstr("the operators belong to another model than '" + other.model_id));
+  const auto missing = read_operators(folder / "gone.h5", other, Boundary::kContact);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+}
+
 TEST(CondensedFile, OperatorsWithoutControlNodesAreReadBack) {
   const TemporaryFolder folder;
   ModelFile file = condensed_file();
@@ -266,16 +302,16 @@ TEST_F(AlteredOperators, StepThatIsNotAboveZeroIsRefused) {
 }
 
 TEST_F(AlteredOperators, BlocksThatDoNotFitTheirArraysAreRefused) {
-  const std::array<int, 4> stored = {5, 1, 1, 1};
+  const std::array<int, 3> stored = {5, 1, 2};
   const std::string intact = bytes_;
-  replace(stored, {5, 1, 2, 1});
+  replace(stored, {5, 1, 3});
   EXPECT_THAT(refusal(), HasSubstr("responses/basis has 30 numbers: must be 45"));
   bytes_ = intact;
-  replace(stored, {4, 1, 1, 1});
+  replace(stored, {4, 1, 2});
   EXPECT_THAT(refusal(), HasSubstr("responses/order has 5 numbers: must be 4"));
   bytes_ = intact;
-  replace(stored, {5, 1, 1, -1});
-  EXPECT_THAT(refusal(), HasSubstr("responses/blocks: block 0 has 5 nodes and 1 + 1 + -1"));
+  replace(stored, {5, 1, -2});
+  EXPECT_THAT(refusal(), HasSubstr("responses/blocks: block 0 has 5 nodes and 1 + -2"));
 }
 
 TEST_F(AlteredOperators, NodeThatStandsTwiceInTheOrderIsRefused) {

@@ -68,17 +68,19 @@ void count_up(Matrix& values, Eigen::Index rows, Eigen::Index columns, double fr
   }
 }
 
-// Valid, with a coefficient of each width per column.
+// Valid; even columns have bytes, odd ones longs.
 inline CompactColumns responses(Eigen::Index columns, double from) {
   CompactParts parts;
   count_up(parts.steps, columns, 1, from + 10.0);
   parts.order = {4, 2, 0, 1, 3};
-  parts.blocks = Eigen::Vector4i(5, 1, 1, 1);
+  parts.blocks = Eigen::Vector3i(5, 1, 2);
   count_up(parts.wide_basis, 15, 1, from);
   count_up(parts.basis, 30, 1, from);
   count_up(parts.basis_scales, 2, 1, from + 20.0);
-  count_up(parts.words, 2 * columns, 1, from);
-  count_up(parts.bytes, 2 * columns, 1, -100.0);
+  parts.lengths.setZero(3 * columns);
+  for (Eigen::Index j = 0; j < columns; ++j) parts.lengths[3 * j + (j % 2 == 0 ? 2 : 0)] = 1;
+  count_up(parts.longs, 8 * (columns / 2), 1, 1e6 * from);
+  count_up(parts.bytes, 8 * ((columns + 1) / 2), 1, -100.0);
   return CompactColumns::from_parts(std::move(parts)).value();
 }
 
@@ -87,7 +89,8 @@ inline CompactColumns silent_responses(int nodes, Eigen::Index columns) {
   CompactParts parts;
   parts.steps.setOnes(columns);
   for (int i = 0; i < nodes; ++i) parts.order.push_back(i);
-  parts.blocks.setZero(4, nodes);
+  parts.blocks.setZero(3, nodes);
+  parts.lengths.setZero(3 * columns * nodes);
   parts.blocks.row(0).setOnes();
   return CompactColumns::from_parts(std::move(parts)).value();
 }
@@ -131,7 +134,7 @@ inline std::string with_header(const std::string& bytes) {
   const auto crc =
       crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
   std::ostringstream header;
-  header << "brainshift model file\nformat 5\nbytes " << bytes.size() << "\ncrc32 " << std::hex
+  header << "brainshift model file\nformat 6\nbytes " << bytes.size() << "\ncrc32 " << std::hex
          << std::setw(8) << std::setfill('0') << crc << "\n";
   std::string block = header.str();
   block.resize(512, '\0');

@@ -189,12 +189,12 @@ TEST_F(ModelFileTest, HeaderWithoutHdf5IsRefused) {
 
 TEST_F(ModelFileTest, OtherFormatIsNamedWithTheWayOut) {
   std::string bytes = content_of(written());
-  bytes.replace(bytes.find("format 5"), 8, "format 4");
+  bytes.replace(bytes.find("format 6"), 8, "format 5");
   const auto read = read_bytes(bytes);
   ASSERT_FALSE(read);
   EXPECT_THAT(
       read.error().message,
-      HasSubstr("is a model file of 'format 4': must be 'format 5', run brainshiftd prepare "
+      HasSubstr("is a model file of 'format 5': must be 'format 6', run brainshiftd prepare "
                 "again"));
 }
 

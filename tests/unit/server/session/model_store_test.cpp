@@ -82,6 +82,44 @@ TEST(ModelStore, CondensesWhenTheModelFileHoldsNoOperators) {
   EXPECT_EQ(update->estimate.status, EstimateStatus::kConverged);
 }
 
+// Until a session needs them, operators of the other boundary condition stay in the file.
+TEST(ModelStore, ReadsOperatorsWhenASessionFirstNeedsThem) {
+  int reads = 0;
+  ModelStore store(patient(), config(), {},
+                   [&](Boundary boundary) -> Result<std::optional<CondensedOperators>> {
+                     ++reads;
+                     EXPECT_EQ(boundary, Boundary::kContact);
+                     return operators();
+                   });
+  EXPECT_EQ(reads, 0);
+  for (int session = 0; session < 2; ++session) {
+    const auto made = store.make({});
+    ASSERT_TRUE(made.has_value()) << made.error().message;
+    EXPECT_EQ(reads, 1);
+    EXPECT_EQ((*made)->info.factor_s, 0.0) << "nothing had to be factorised";
+  }
+}
+
+TEST(ModelStore, OperatorsThatCannotBeReadEndThePreparation) {
+  ModelStore store(patient(), config(), {},
+                   [](Boundary) -> Result<std::optional<CondensedOperators>> {
+                     return fail(ErrorCode::kUnreadable, "toy.h5: is altered");
+                   });
+  const auto made = store.make({});
+  ASSERT_FALSE(made.has_value());
+  EXPECT_EQ(made.error().message, "toy.h5: is altered");
+}
+
+TEST(ModelStore, OperatorsThatTheFileLacksAreMade) {
+  ModelStore store(patient(), config(), {},
+                   [](Boundary) -> Result<std::optional<CondensedOperators>> {
+                     return std::optional<CondensedOperators>();
+                   });
+  const auto made = store.make({});
+  ASSERT_TRUE(made.has_value()) << made.error().message;
+  EXPECT_GT((*made)->info.prepare_s, 0.0);
+}
+
 // Waits for the stop that only a new session requests, then lets the real inverter run with it.
 class StoppedOnTheWay final : public inversion::Inverter {
  public:
