@@ -24,15 +24,7 @@ if [ "${QUICK:-0}" = 1 ]; then
   options=(--resume --seeds 1 --first-seed 1001 --thousand-nodes 6 --patients 1 2
     --truths consistency mesh gap all)
 fi
-kept=$(mktemp -d)
-if [ "${RESUME:-1}" = 1 ]; then
-  cp "$out"/rows-*.csv "$kept" 2>/dev/null || true
-fi
-empty_study "$out"
-cp "$kept"/rows-*.csv "$out" 2>/dev/null || true
-rm -rf "$kept"
-BRAINSHIFT_STUDY_DIR=$(realpath "$out")
-export BRAINSHIFT_STUDY_DIR
+resume_study "$out" "${RESUME:-1}"
 
 status=0
 for head in ${HEADS:-colin27}; do

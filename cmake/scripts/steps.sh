@@ -45,6 +45,19 @@ empty_study() {
   echo "study,reason" >"$1/left_out.csv"
 }
 
+# resume_study DIR RESUME: the same, but with RESUME=1 the rows-*.csv that DIR has stay. Programs find it as
+# BRAINSHIFT_STUDY_DIR.
+resume_study() {
+  local kept
+  kept=$(mktemp -d)
+  if [ "$2" = 1 ]; then cp "$1"/rows-*.csv "$kept" 2>/dev/null || true; fi
+  empty_study "$1"
+  cp "$kept"/rows-*.csv "$1" 2>/dev/null || true
+  rm -rf "$kept"
+  BRAINSHIFT_STUDY_DIR=$(realpath "$1")
+  export BRAINSHIFT_STUDY_DIR
+}
+
 # commit_name: for tables; "-dirty" when files differ from the commit.
 commit_name() { git describe --always --dirty 2>/dev/null || echo unknown; }
 

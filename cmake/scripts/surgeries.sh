@@ -25,15 +25,7 @@ if [ "${QUICK:-0}" = 1 ]; then
   options+=(--places 2 --seeds 2 --thousand-nodes 6)
   first=1001
 fi
-kept=$(mktemp -d)
-if [ "${RESUME:-0}" = 1 ]; then
-  cp "$out"/rows-*.csv "$kept" 2>/dev/null || true
-fi
-empty_study "$out"
-cp "$kept"/rows-*.csv "$out" 2>/dev/null || true
-rm -rf "$kept"
-BRAINSHIFT_STUDY_DIR=$(realpath "$out")
-export BRAINSHIFT_STUDY_DIR
+resume_study "$out" "${RESUME:-0}"
 
 status=0
 head_of() {  # CASE FIRST_SEED
