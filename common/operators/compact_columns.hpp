@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CompactColumns: many displacement fields of one mesh (columns of 3n numbers, node-major) in about
-// a quarter of the memory of single precision, ready to be summed up without being unpacked.
+// CompactColumns: many displacement fields of one mesh (columns of 3n numbers, node-major) in less
+// than half of the memory of single precision, ready to be summed up without being unpacked.
 //
 // Neighbours move alike. The nodes stand in blocks of kBlockNodes at most that lie close together.
 // Each block has an orthonormal basis q_1, q_2, ... of what its 3m rows do, the most needed
@@ -84,7 +84,7 @@ class CompactColumns {
   std::span<const NodeIndex> nodes(int block) const;
   // Position of the block's first node in the order of all blocks.
   int first_node(int block) const { return at(block).node; }
-  // Coefficients of a column in this block.
+  // Directions of this block.
   int rank(int block) const { return at(block).rank; }
 
   struct Term {
