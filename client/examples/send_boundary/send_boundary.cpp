@@ -52,6 +52,6 @@ int main(int argc, char** argv) {
   if (!shown) return complain({ErrorCode::kUnavailable, "the field is not usable"});
   const Points& u = shown->update.estimate.displacement;  // 3 x nodes, mm
   std::printf("%d nodes, largest displacement %.6f mm, %s\n", static_cast<int>(u.cols()),
-              u.colwise().norm().maxCoeff(), client->field_status().reason.c_str());
+              u.colwise().norm().maxCoeff(), to_string(client->field_status().currency).data());
   return 0;
 }
