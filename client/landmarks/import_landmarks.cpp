@@ -162,7 +162,8 @@ std::vector<std::string> report_lines(const LandmarkReport& report) {
         report.rigid->rotation_deg, report.rigid->translation_mm, report.rigid->residual_mm));
     lines.emplace_back(
         "note: a misregistration of the second image would be such a rigid part; it is kept, and "
-        "the daemon takes it for motion of the tissue");
+        "the daemon takes it for motion of the tissue unless the case says how well that image is "
+        "registered (sensing.landmark_pose_sd_mm, sensing.landmark_pose_sd_deg)");
   } else {
     lines.emplace_back("note: no rigid part can be told: " + report.no_rigid);
   }

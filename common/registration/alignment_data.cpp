@@ -2,6 +2,7 @@
 #include "common/registration/alignment_data.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -73,6 +74,26 @@ SparseData sparse_data_from_alignment(const Points& points, const IcpResult& icp
         Eigen::Map<const VecX>(field.data(), field.size());
   }
   return data;
+}
+
+Eigen::MatrixXd pose_errors(const Points& places, double sd_mm, double sd_deg) {
+  const bool shifts = sd_mm > 0.0, turns = sd_deg > 0.0;
+  const Eigen::Index columns = (shifts ? 3 : 0) + (turns ? 3 : 0);
+  if (columns == 0 || places.cols() == 0) return {};
+  const Vec3 centre = places.rowwise().mean();
+  const double turn_sd = sd_deg * std::numbers::pi / 180.0;
+  Eigen::MatrixXd errors(3 * places.cols(), columns);
+  for (Eigen::Index i = 0; i < places.cols(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 unit = Vec3::Unit(axis);
+      if (shifts) errors.block<3, 1>(3 * i, axis) = sd_mm * unit;
+      if (turns) {
+        errors.block<3, 1>(3 * i, columns - 3 + axis) =
+            turn_sd * unit.cross(places.col(i) - centre);
+      }
+    }
+  }
+  return errors;
 }
 
 }  // namespace brainshift::registration

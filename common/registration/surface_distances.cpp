@@ -3,41 +3,18 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "common/core/random.hpp"
+#include "common/registration/alignment_data.hpp"
 
 namespace brainshift::registration {
 namespace {
 
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
-
-// Errors of all points together when the instrument's pose is wrong: three shifts, and three turns
-// about the centre.
-Eigen::MatrixXd pose_errors(const Points& places, const SurfaceDistanceOptions& options) {
-  const bool shifts = options.pose_sd_mm > 0.0, turns = options.pose_sd_deg > 0.0;
-  const Eigen::Index columns = (shifts ? 3 : 0) + (turns ? 3 : 0);
-  if (columns == 0 || places.cols() == 0) return {};
-  const Vec3 centre = places.rowwise().mean();
-  const double turn_sd = options.pose_sd_deg * std::numbers::pi / 180.0;
-  Eigen::MatrixXd errors(3 * places.cols(), columns);
-  for (Eigen::Index i = 0; i < places.cols(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vec3 unit = Vec3::Unit(axis);
-      if (shifts) errors.block<3, 1>(3 * i, axis) = options.pose_sd_mm * unit;
-      if (turns) {
-        errors.block<3, 1>(3 * i, columns - 3 + axis) =
-            turn_sd * unit.cross(places.col(i) - centre);
-      }
-    }
-  }
-  return errors;
-}
 
 }  // namespace
 
@@ -120,7 +97,7 @@ SparseData SurfaceDistances::measure(Points vertices, const Points& measured,
   data.displacements.conservativeResize(3, count);
   data.directions.conservativeResize(3, count);
   data.sd_mm = VecX::Constant(count, options_.sd_mm);
-  data.common_error = pose_errors(data.positions, options_);
+  data.common_error = pose_errors(data.positions, options_.pose_sd_mm, options_.pose_sd_deg);
   return data;
 }
 

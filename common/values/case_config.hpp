@@ -161,6 +161,10 @@ struct SensingConfig {
   // (docs/decisions/0020).
   double probe_pose_sd_mm = 0.0;
   double probe_pose_sd_deg = 0.0;
+  // How well the image that landmarks were found in during surgery is registered: an error that all
+  // pairs of an observation share.
+  double landmark_pose_sd_mm = 0.0;
+  double landmark_pose_sd_deg = 0.0;
 };
 
 // What becomes of data outside the region that was prepared (method condensed).

@@ -308,6 +308,13 @@ void visit(A& a, V& v) {
     v.probe_pose_sd_mm, between(0.0, 100.0));
   a({"probe_pose_sd_deg", "degrees", "The same for the probe's direction", "docs/decisions/0020"},
     v.probe_pose_sd_deg, between(0.0, 45.0));
+  a({"landmark_pose_sd_mm", "mm",
+     "How well the image that landmarks were found in during surgery is registered: standard "
+     "deviation of a shift that all pairs of an observation share",
+     "", "Method condensed. 0: a shift of all landmarks is motion of the tissue."},
+    v.landmark_pose_sd_mm, between(0.0, 100.0));
+  a({"landmark_pose_sd_deg", "degrees", "The same for a turn about the landmarks' centroid"},
+    v.landmark_pose_sd_deg, between(0.0, 45.0));
 }
 
 template <typename A, Of<CondensedConfig> V>

@@ -189,8 +189,8 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   return registered;
 }
 
-Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
-                                             const InversionConfig& config, Method method) {
+Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const CaseConfig& config,
+                                             Method method) {
   if (pairs.undeformed.cols() != pairs.deformed.cols()) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("landmark_pairs: {} undeformed but {} deformed points",
@@ -205,7 +205,9 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs,
   registered.data.positions = pairs.undeformed;
   registered.data.displacements = pairs.deformed - pairs.undeformed;
   registered.data.sd_mm =
-      VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config, method));
+      VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config.inversion, method));
+  registered.data.common_error = registration::pose_errors(
+      pairs.undeformed, config.sensing.landmark_pose_sd_mm, config.sensing.landmark_pose_sd_deg);
   return registered;
 }
 
@@ -216,7 +218,7 @@ Result<RegisteredObservation> register_body(const Observation& observation,
     return from_boundary(*boundary, targets, config, method);
   }
   if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
-    return from_landmarks(*pairs, config.inversion, method);
+    return from_landmarks(*pairs, config, method);
   }
   if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
     if (config.scene.surface == Carry::kOff) {

@@ -10,7 +10,8 @@
 //                               estimate (registration/surface_distances.hpp; method condensed).
 //                               The pose is where they start; it tells gross outliers too
 //                    rigid      displacements by the pose, with its errors (other methods)
-//   LandmarkPairs    displacement = deformed - undeformed, all pairs
+//   LandmarkPairs    displacement = deformed - undeformed, all pairs. sensing.landmark_pose_sd_mm
+//                    and _deg are a common error: misregistration of the image during surgery
 //   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise,
 //                    and by sensing.surface:
 //                    distances  along the normal of the model's cortex, made anew for every

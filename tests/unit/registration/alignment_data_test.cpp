@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <numbers>
 
 #include "common/core/random.hpp"
@@ -46,6 +47,45 @@ TEST(SparseDataFromAlignment, ItsCommonErrorsHaveTheVarianceOfPoseAndStrain) {
   const Mat3 between =
       data.common_error.topRows<3>() * data.common_error.bottomRows<3>().transpose();
   EXPECT_NEAR(between(1, 1), 0.04 - 100.0 * (turn * turn + 0.5 * s * s), 1e-12);
+}
+
+Points places() {
+  Points p(3, 4);
+  p << 10, 14, 10, 12, 0, 0, 6, 3, 5, 5, 5, 9;
+  return p;
+}
+
+TEST(PoseErrors, AreThreeShiftsAndThreeTurnsAboutTheCentroid) {
+  const Eigen::MatrixXd errors = pose_errors(places(), 0.5, 2.0);
+  ASSERT_EQ(errors.rows(), 12);
+  ASSERT_EQ(errors.cols(), 6);
+  const Vec3 centre = places().rowwise().mean();
+  const VecX amplitudes = VecX::Random(6);
+  const Vec3 shift = 0.5 * amplitudes.head<3>();
+  const Vec3 turn = 2.0 * std::numbers::pi / 180.0 * amplitudes.tail<3>();
+  const VecX together = errors * amplitudes;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 expected = shift + turn.cross(places().col(i) - centre);
+    EXPECT_LT((together.segment<3>(3 * i) - expected).norm(), 1e-14);
+  }
+}
+
+// What the header says of turns.
+TEST(PoseErrors, AreARotationButForItsSecondOrder) {
+  Points far(3, 2);
+  far << -50, 50, 0, 0, 0, 0;
+  const Eigen::MatrixXd errors = pose_errors(far, 0.0, 1.0);
+  ASSERT_EQ(errors.cols(), 3);
+  const double angle = std::numbers::pi / 180.0;
+  const Vec3 turned = Eigen::AngleAxisd(angle, Vec3::UnitZ()) * Vec3(far.col(1));
+  EXPECT_NEAR((turned - far.col(1)).norm(), 0.87, 0.005);
+  EXPECT_NEAR((far.col(1) + errors.block<3, 1>(3, 2) - turned).norm(), 0.0076, 1e-4);
+}
+
+TEST(PoseErrors, ThatAreNotThereHaveNoColumn) {
+  EXPECT_EQ(pose_errors(places(), 0.0, 0.0).size(), 0);
+  EXPECT_EQ(pose_errors(places(), 0.3, 0.0).cols(), 3);
+  EXPECT_EQ(pose_errors(Points(3, 0), 0.3, 0.3).size(), 0);
 }
 
 }  // namespace

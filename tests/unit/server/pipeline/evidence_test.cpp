@@ -229,6 +229,17 @@ TEST_F(Sources, ATumourBoundaryIsMeasuredAnewForTheEstimate) {
   EXPECT_EQ(data.common_error.cols(), 6);  // the probe's pose
 }
 
+TEST_F(Sources, LandmarksShareTheErrorOfTheirImagesRegistration) {
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
+  EXPECT_EQ(inversion_.seen.common_error.size(), 0);
+  config_.sensing.landmark_pose_sd_mm = 2.0;
+  config_.sensing.landmark_pose_sd_deg = 1.0;
+  pipeline_ = pipeline(Method::kCondensed);
+  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
+  ASSERT_EQ(inversion_.seen.common_error.cols(), 6);
+  EXPECT_EQ(inversion_.seen.common_error(0, 0), 2.0);
+}
+
 TEST_F(Sources, TheNodesOfSeveralSurfacesAreAskedForTogether) {
   ASSERT_TRUE(run(boundary(1, 0, Vec3(0, 0, -1))));
   const std::vector<NodeIndex> of_tumour = inversion_.nodes;

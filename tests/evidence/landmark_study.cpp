@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/evidence/landmark_study.hpp"
+
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "common/inversion/inverter.hpp"
+#include "common/registration/fiducials.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "tests/evidence/landmark_maps.hpp"
+
+namespace brainshift::evidence {
+namespace {
+
+constexpr Eigen::Index kLeastPairs = 5;
+
+struct Pairs {
+  Points before, during;  // 3 x n, mm
+};
+
+Pairs without(const Pairs& all, Eigen::Index one) {
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < all.before.cols(); ++i) {
+    if (i != one) others.push_back(i);
+  }
+  return {all.before(Eigen::all, others), all.during(Eigen::all, others)};
+}
+
+class Foreteller {
+ public:
+  static Result<Foreteller> build(const bench::Head& head, double sd_mm) {
+    CaseConfig config = head.config;
+    config.sensing.landmark_pose_sd_mm = kLeftPose_mm;
+    config.sensing.landmark_pose_sd_deg = kLeftPose_deg;
+    auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
+    if (!inverter) return tl::unexpected(inverter.error());
+    auto pipeline = server::Pipeline::build(head.model, config, Method::kCondensed,
+                                            Boundary::kContact, std::move(*inverter));
+    if (!pipeline) return tl::unexpected(pipeline.error());
+    return Foreteller(head, sd_mm, std::move(*pipeline));
+  }
+
+  // Where the estimate from `others` has the landmark, and what it says of itself.
+  Result<Vec3> foretell(const Pairs& others, const Vec3& before, LeftOutLandmark& out) {
+    const auto first = registration::register_fiducials(others.before, others.during);
+    if (!first) return tl::unexpected(first.error());
+    Observation observation;
+    observation.case_id = head_->model->case_id;
+    observation.source = "landmarks";
+    observation.sequence = 1;
+    observation.body =
+        LandmarkPairs{others.before, first->T_image_measured.inverse() * others.during, sd_mm_};
+    pipeline_.reset();
+    const auto update = pipeline_.run(observation);
+    if (!update) return tl::unexpected(update.error());
+    const auto moved = [&](const Vec3& x) -> Vec3 {
+      return x + geometry::value_at(head_->locator->locate(x), update->estimate.displacement);
+    };
+    Points places = others.before;
+    for (auto place : places.colwise()) place = moved(place);
+    const auto pose = registration::register_fiducials(places, others.during);
+    if (!pose) return tl::unexpected(pose.error());
+    out.motion_mm = (moved(before) - before).norm();
+    out.quality = std::string(to_string(update->estimate.quality.quality));
+    return Vec3(pose->T_image_measured * moved(before));
+  }
+
+ private:
+  Foreteller(const bench::Head& head, double sd_mm, server::Pipeline pipeline)
+      : head_(&head), sd_mm_(sd_mm), pipeline_(std::move(pipeline)) {}
+
+  const bench::Head* head_;
+  double sd_mm_;
+  server::Pipeline pipeline_;
+};
+
+}  // namespace
+
+Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
+                                                   const io::NamedPairs& pairs, double sd_mm) {
+  const Pairs all{io::columns_of(pairs.first), io::columns_of(pairs.second)};
+  const Eigen::Index count = all.before.cols();
+  if (count < kLeastPairs) {
+    return fail(ErrorCode::kInvalidArgument, "landmarks: " + std::to_string(count) +
+                                                 " pairs; at least 5 are needed to leave one out");
+  }
+  auto foreteller = Foreteller::build(head, sd_mm);
+  if (!foreteller) return tl::unexpected(foreteller.error());
+  std::vector<LeftOutLandmark> result;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Vec3 before = all.before.col(i), during = all.during.col(i);
+    const Pairs others = without(all, i);
+    LeftOutLandmark& out = result.emplace_back();
+    out.name = pairs.names[static_cast<std::size_t>(i)];
+    const auto failed = [&](const Error& error) {
+      return fail(error.code, "landmark " + out.name + ": " + error.message);
+    };
+    out.none = (during - before).norm();
+    for (const auto& [make, distance] : {std::pair{&rigid_map, &LeftOutLandmark::rigid},
+                                         {&affine_map, &LeftOutLandmark::affine},
+                                         {&thin_plate_map, &LeftOutLandmark::thin_plate}}) {
+      const auto map = make(others.before, others.during);
+      if (!map) return failed(map.error());
+      out.*distance = ((*map)(before)-during).norm();
+    }
+    const auto foretold = foreteller->foretell(others, before, out);
+    if (!foretold) return failed(foretold.error());
+    out.estimate = (*foretold - during).norm();
+  }
+  return result;
+}
+
+double rms_of(const std::vector<LeftOutLandmark>& landmarks, double LeftOutLandmark::*distance) {
+  double squares = 0.0;
+  for (const LeftOutLandmark& one : landmarks) squares += one.*distance * (one.*distance);
+  return std::sqrt(squares / static_cast<double>(landmarks.size()));
+}
+
+}  // namespace brainshift::evidence
