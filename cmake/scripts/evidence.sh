@@ -3,7 +3,8 @@
 # evidence.sh BUILD_DIR [OUT_DIR]: twins of the paper's five patients, against truths that share the
 # estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
 # out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
-# tables.md, summary.json; landmarks.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks. Exit status 0 only if every check holds.
+# tables.md, summary.json; landmarks.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks. Exit status 0
+# only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
 #   HEADS="..."      case files of heads (default: colin27; mni152 needs BRAINSHIFT_EXTERNAL_DATA)
 #   SEEDS=N          surgeries per patient and truth (default: 2)
@@ -32,10 +33,10 @@ for head in ${HEADS:-colin27}; do
 done
 pairs=${BRAINSHIFT_EXTERNAL_DATA:-}/resect_case4/Case4-MRI-beforeUS.csv
 if [ -f "$pairs" ]; then
-  step landmarks "$bin/evidence_landmarks" --pairs "$pairs" --case config/cases/resect-4.yaml --out "$out/landmarks.csv" ||
-    status=1
+  step landmarks "$bin/evidence_landmarks" --pairs "$pairs" --case config/cases/resect-4.yaml \
+    --out "$out/landmarks.csv" || status=1
 else
-  echo "landmarks,BRAINSHIFT_EXTERNAL_DATA has no landmarks of a real operation" >> "$out/left_out.csv"
+  echo "landmarks,BRAINSHIFT_EXTERNAL_DATA has no landmarks of a real operation" >>"$out/left_out.csv"
 fi
 step summary "$bin/evidence_summary" "$out"/rows-*.csv || status=1
 current=summary

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sparse data from an alignment (paper 2.7), with the errors that all its points share.
+// Sparse data from an alignment (paper 2.7), with the errors that all its points share; and the
+// errors of points that are used as they were measured (pose_errors).
 //
 //   x_i = T p_i         undeformed place of boundary point i, by the alignment
 //   d_i = p_i - x_i     its displacement: deformed place minus undeformed place, mm

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// evidence_landmarks: landmarks of a real operation, leave-one-out (landmark_study.hpp). Writes a
-// row per landmark; checks and a picture go to $BRAINSHIFT_STUDY_DIR
-// (tests/support/study_record.hpp).
+// evidence_landmarks: landmarks of a real operation, leave-one-out (landmark_study.hpp), with the
+// standard deviation that `brainshift import --landmarks` gives a landmark. Writes a row per
+// landmark; checks and a picture go to $BRAINSHIFT_STUDY_DIR (tests/support/study_record.hpp).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "client/landmarks/import_landmarks.hpp"
 #include "client/plot/chart.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/io/landmarks/pair_file.hpp"
@@ -28,7 +29,6 @@ namespace palette = client::palette;
 struct Arguments {
   fs::path pairs, case_file, out = "landmarks.csv";
   double thousand_nodes = 18.0;
-  double sd_mm = 0.5;
 };
 
 constexpr const char* kHeading =
@@ -124,7 +124,7 @@ Status run(const Arguments& arguments) {
   const auto head = bench::make_head(*config, wish);
   if (!head) return tl::unexpected(head.error());
   const Stopwatch watch;
-  const auto landmarks = leave_one_out(*head, *pairs, arguments.sd_mm);
+  const auto landmarks = leave_one_out(*head, *pairs, client::LandmarkOptions{}.sd_mm);
   if (!landmarks) return tl::unexpected(landmarks.error());
   for (const Method& method : methods()) {
     std::fprintf(stderr, "  %-18s %.3f mm rms\n", method.name, rms_of(*landmarks, method.distance));
@@ -150,9 +150,6 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("--case", arguments.case_file, "case file of a head in the landmarks' frame")
       ->required();
-  app.add_option("--sd-mm", arguments.sd_mm, "standard deviation of a landmark, mm")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 10.0));
   app.add_option("--thousand-nodes", arguments.thousand_nodes,
                  "size of the mesh; 18: the case's own edge length")
       ->capture_default_str()
