@@ -161,6 +161,10 @@ struct SensingConfig {
   // (docs/decisions/0020).
   double probe_pose_sd_mm = 0.0;
   double probe_pose_sd_deg = 0.0;
+  // What a point of a tumour boundary is off by along the normal, beside the noise that its
+  // observation states. The default is what optical trackers are specified at
+  // (docs/decisions/0029).
+  double boundary_error_sd_mm = 0.3;
   // How well the image that landmarks were found in during surgery is registered: an error that all
   // pairs of an observation share.
   double landmark_pose_sd_mm = 0.0;

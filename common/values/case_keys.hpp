@@ -308,6 +308,11 @@ void visit(A& a, V& v) {
     v.probe_pose_sd_mm, between(0.0, 100.0));
   a({"probe_pose_sd_deg", "degrees", "The same for the probe's direction", "docs/decisions/0020"},
     v.probe_pose_sd_deg, between(0.0, 45.0));
+  a({"boundary_error_sd_mm", "mm",
+     "What a point of a tumour boundary is off by along the normal, beside the noise that its "
+     "observation states: standard deviation of the tracker's errors and the like",
+     "docs/decisions/0029", "Used with tumour: distances."},
+    v.boundary_error_sd_mm, between(0.0, 100.0));
   a({"landmark_pose_sd_mm", "mm",
      "How well the image that landmarks were found in during surgery is registered: standard "
      "deviation of a shift that all pairs of an observation share",

@@ -142,7 +142,7 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   }
   registration::SurfaceDistanceOptions options;
   options.points = config.inversion.sparse_points;
-  options.sd_mm = sd_mm;
+  options.sd_mm = std::hypot(sd_mm, config.sensing.boundary_error_sd_mm);
   options.pose_sd_mm = config.sensing.probe_pose_sd_mm;
   options.pose_sd_deg = config.sensing.probe_pose_sd_deg;
   options.fewest = 3;

@@ -23,7 +23,8 @@
 //   PatientPose      rejected: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the
-// observation's own where that is larger. The paper's method and its variants take the former
+// observation's own where that is larger. Distances of a tumour boundary add
+// sensing.boundary_error_sd_mm to its square. The paper's method and its variants take the former
 // whatever the observation says. Points that ICP takes for outliers guide nothing. Errors that
 // aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once

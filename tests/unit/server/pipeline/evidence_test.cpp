@@ -229,6 +229,24 @@ TEST_F(Sources, ATumourBoundaryIsMeasuredAnewForTheEstimate) {
   EXPECT_EQ(data.common_error.cols(), 6);  // the probe's pose
 }
 
+TEST_F(Sources, ATrackersErrorsAddToTheNoiseOfABoundary) {
+  const auto sd = [this] {
+    pipeline_ = pipeline(Method::kCondensed);
+    EXPECT_TRUE(run(boundary(1, 0, Vec3(0, 0, -1))));
+    return VecX(inversion_.seen.sd_mm);
+  };
+  config_.sensing.boundary_error_sd_mm = 0.0;
+  const VecX without = sd();
+  config_.sensing.boundary_error_sd_mm = 0.4;
+  const VecX with = sd();
+  ASSERT_EQ(with.size(), without.size());
+  ASSERT_GT(with.size(), 0);
+  EXPECT_NEAR((with.cwiseAbs2() - without.cwiseAbs2() - VecX::Constant(with.size(), 0.16))
+                  .cwiseAbs()
+                  .maxCoeff(),
+              0.0, 1e-12);
+}
+
 TEST_F(Sources, LandmarksShareTheErrorOfTheirImagesRegistration) {
   ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
   EXPECT_EQ(inversion_.seen.common_error.size(), 0);
