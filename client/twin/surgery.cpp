@@ -177,7 +177,7 @@ Status keeps_promise(const Scenario& scenario, const Truth& truth) {
 // The true displacement under the load times moment.load_scale. With a displacement that the
 // tumour must have, the scale is sought by secants through the logarithms of scale and
 // displacement: without contact they lie on a line of slope 1, and contact bends it.
-Status solve_moment(const TruthBrain& brain, TruthSolver& solver, const Scenario& scenario,
+Status solve_moment(const TruthBrain& brain, TruthSource& solver, const Scenario& scenario,
                     const Points& load, Moment& moment) {
   constexpr int kSteps = 20;
   constexpr double kClose = 0.005;  // relative
@@ -225,7 +225,7 @@ std::vector<int> crossed(const TruthBrain& brain, const ProbeError& error) {
   return kept;
 }
 
-Result<Moment> play_moment(const TruthBrain& brain, TruthSolver& solver, const Scenario& scenario,
+Result<Moment> play_moment(const TruthBrain& brain, TruthSource& solver, const Scenario& scenario,
                            const Points& swelling, std::size_t index, const ProbeError& error,
                            Random& random) {
   Moment moment;
@@ -246,7 +246,7 @@ Result<Moment> play_moment(const TruthBrain& brain, TruthSolver& solver, const S
 
 }  // namespace
 
-Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSolver& solver,
+Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSource& solver,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress) {
   if (Status ok = check_gravity(brain, scenario); !ok) return tl::unexpected(ok.error());

@@ -47,9 +47,9 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 // The same with a brain and a solver that exist already, for several scenarios on one brain.
-// Precondition: truth_brain() made the brain for the same stiffness, resection and seed; the
-// solver's forward model was built for it with the contact boundary.
-Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSolver& solver,
+// Precondition: truth_brain() made the brain for the same stiffness, resection and seed; what the
+// solver says is of this brain with the contact boundary.
+Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSource& solver,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 

@@ -23,14 +23,22 @@ struct Truth {
   int iterations = 0;  // sets solved for
 };
 
-class TruthSolver {
+// What the brain does under a load.
+class TruthSource {
+ public:
+  virtual ~TruthSource() = default;
+  // load: 3 x nodes of the body, N.
+  virtual Result<Truth> solve(const Points& load) = 0;
+};
+
+class TruthSolver final : public TruthSource {
  public:
   // Keeps a reference to `forward`, which must outlive it.
   explicit TruthSolver(const contact::ForwardModel& forward) : system_(forward) {}
 
   // load: 3 x n, N. kNotConverged: the set has not repeated after kMaxIterations solves.
   // Otherwise errors as contact::WoodburySystem.
-  Result<Truth> solve(const Points& load);
+  Result<Truth> solve(const Points& load) override;
 
   static constexpr int kMaxIterations = 40;
 

@@ -3,10 +3,11 @@
 # evidence.sh BUILD_DIR [OUT_DIR]: twins of the paper's five patients, against truths that share the
 # estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
 # out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
-# tables.md, summary.json; landmarks.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks. Exit status 0
-# only if every check holds.
+# patients-HEAD.md (the paper's Tables 3 to 6 beside ours), tables.md, summary.json; landmarks.csv
+# where BRAINSHIFT_EXTERNAL_DATA has landmarks. Exit status 0 only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
-#   HEADS="..."      case files of heads (default: colin27; mni152 needs BRAINSHIFT_EXTERNAL_DATA)
+#   HEADS="..."      case files of heads (default: colin27; mni152 needs BRAINSHIFT_EXTERNAL_DATA;
+#                    the truth `calculix` is of colin27 alone)
 #   SEEDS=N          surgeries per patient and truth (default: 2)
 #   QUICK=1          patients 1 and 2, consistency, mesh, gap and all, one seed (1001), 6 thousand nodes;
 #                    into out/evidence-quick

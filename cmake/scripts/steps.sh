@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Sourced by demo.sh, bench.sh, verify.sh, stability.sh, sensing.sh, interchange.sh, surgeries.sh,
-# evidence.sh and prior.sh: timed steps, the daemon, and the end of a script. They set before: `name`, the first word
-# of messages; `bin`, the folder of the programs; `out`, the folder of results. They set
-# `current=summary` before a last command whose own output tells what failed.
+# evidence.sh, calculix.sh and prior.sh: timed steps, the daemon, and the end of a script. They set
+# before: `name`, the first word of messages; `bin`, the folder of the programs; `out`, the folder of
+# results. They set `current=summary` before a last command whose own output tells what failed.
 
 # A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1

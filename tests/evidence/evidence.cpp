@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments : surgeries::StudyArguments {
-  fs::path cases = BRAINSHIFT_CASES;
+  fs::path cases = BRAINSHIFT_CASES, calculix = BRAINSHIFT_CALCULIX;
   std::string head = "colin27";
   std::vector<int> patients = {1, 2, 3, 4, 5};
   std::vector<std::string> truths;  // none: all
@@ -78,6 +78,7 @@ Status run(const Arguments& arguments) {
     plan.head = arguments.head;
     plan.patient = patient;
     plan.thousand_nodes = arguments.thousand_nodes;
+    plan.calculix = arguments.calculix;
     for (const TruthKind& truth : truth_kinds()) {
       const auto& wanted = arguments.truths;
       if (wanted.empty() || std::find(wanted.begin(), wanted.end(), truth.name) != wanted.end()) {
@@ -108,6 +109,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Twins of the paper's patients against harder and harder truths: a row per update.",
                "evidence"};
   app.add_option("--cases", arguments.cases, "folder with patient-N.yaml and the heads")
+      ->capture_default_str();
+  app.add_option("--calculix", arguments.calculix, "folder with the fields that CalculiX found")
       ->capture_default_str();
   app.add_option("--head", arguments.head, "colin27, or another case file there: mni152")
       ->capture_default_str();

@@ -14,6 +14,7 @@
 #include "common/registration/icp.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/benchmarks/bench_head.hpp"
+#include "tests/evidence/calculix_truth.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
@@ -164,8 +165,9 @@ class Patient {
     if (!scenario) return tl::unexpected(scenario.error());
     const auto played = brains_.of(*scenario, seed);
     if (!played) return tl::unexpected(played.error());
-    const auto surgery =
-        client::play_scenario((*played)->brain, (*played)->solver, *scenario, seed);
+    const auto surgery = truth.calculix ? play_calculix(**played, *scenario, seed)
+                                        : client::play_scenario((*played)->brain, (*played)->solver,
+                                                                *scenario, seed);
     if (!surgery) {
       if (surgery.error().code != ErrorCode::kInvalidArgument) {
         return tl::unexpected(surgery.error());
@@ -184,6 +186,16 @@ class Patient {
   }
 
  private:
+  // What instruments see of the displacement that CalculiX found under the patient's load.
+  Result<client::SimulatedSurgery> play_calculix(const PlayedBrain& played,
+                                                 client::Scenario scenario, std::uint64_t seed) {
+    auto displacement = read_calculix_truth(plan_.calculix, plan_.patient, head_.model->mesh.nodes);
+    if (!displacement) return tl::unexpected(displacement.error());
+    GivenTruth given(std::move(*displacement), played.forward.contact());
+    scenario.tumour_displacement_mm.reset();  // the load is what it was
+    return client::play_scenario(played.brain, given, scenario, seed);
+  }
+
   const PatientPlan& plan_;
   const bench::Head& head_;
   PlayedBrains brains_;

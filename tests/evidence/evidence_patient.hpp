@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ struct PatientPlan {
   std::string head;
   int patient = 1;
   double thousand_nodes = 18.0;
+  std::filesystem::path calculix;  // folder of another code's fields
   std::vector<TruthKind> truths;
   std::vector<std::uint64_t> seeds;
 };
@@ -29,7 +31,8 @@ struct PatientPlan {
 using Told = std::function<void(const std::vector<surgeries::Row>&, double seconds)>;
 
 // Surgeries that `rows` has are skipped. A refused update is a row, not an error; so is an
-// ingredient that does nothing on this patient, with what says so as its reason. Errors: of meshing
+// ingredient that does nothing on this patient, and a head that CalculiX's fields are not of, with
+// what says so as its reason. Errors: of meshing
 // and preparing, of the twin, of scoring, of writing.
 Status play_patient(const PatientPlan& plan, surgeries::RowFile& rows, const Told& told);
 

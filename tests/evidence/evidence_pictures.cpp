@@ -7,6 +7,9 @@
 #include <vector>
 
 #include "client/plot/chart.hpp"
+#include "tests/evidence/evidence_checks.hpp"
+#include "tests/evidence/evidence_truths.hpp"
+#include "tests/surgeries/surgery_score.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -84,6 +87,58 @@ Status draw(const Rows& all, const Picture& picture, const std::filesystem::path
   return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
 }
 
+// Mean over the patients' means, as the checks have it.
+client::Series reliability_of(const Rows& rows, const char* legend, const cv::Scalar& colour,
+                              client::Marker marker) {
+  client::Series series;
+  series.legend = legend;
+  series.colour = colour;
+  series.marker = marker;
+  series.line = true;
+  for (const surgeries::Interval& interval : surgeries::kIntervals) {
+    const std::string column = "coverage_" + std::to_string(interval.percent);
+    series.points.push_back(
+        {static_cast<double>(interval.percent), 100.0 * patient_mean(rows, column.c_str()), ""});
+  }
+  return series;
+}
+
+Status draw_reliability(const Rows& all, const std::filesystem::path& folder) {
+  const Rows joint = all.where("boundary", "contact").where("data", "tumour+cortex");
+  const auto of = [&](auto wanted) {
+    return joint.where(
+        [&](const Rows& rows, std::size_t i) { return wanted(rows.text(i, "truth")); });
+  };
+  client::ChartSpec spec;
+  spec.title = "How often the truth lies in the published intervals";
+  spec.subtitle = "contact, updates from tumour and cortex; mean over patients, all nodes";
+  spec.x = {.label = "share that the interval promises (%)", .from_zero = false};
+  spec.y = {.label = "share of true components inside (%)", .from_zero = false};
+  spec.size = {1400, 1100};
+  client::Series promised;
+  promised.legend = "as promised";
+  promised.colour = palette::kInk;
+  promised.marker = client::Marker::kNone;
+  promised.line = true;
+  promised.dash_px = 10.0;
+  promised.points = {{50.0, 50.0, ""}, {99.0, 99.0, ""}};
+  spec.series = {promised};
+  const auto add = [&](const Rows& rows, const char* legend, const cv::Scalar& colour,
+                       client::Marker marker) {
+    if (!rows.empty()) spec.series.push_back(reliability_of(rows, legend, colour, marker));
+  };
+  add(of([](const std::string& truth) { return truth == "consistency"; }), "consistency",
+      palette::kBlue, client::Marker::kCircle);
+  add(of(is_adverse_alone), "one adverse ingredient", palette::kGreen, client::Marker::kSquare);
+  add(of([](const std::string& truth) { return truth == "all"; }), "all of them",
+      palette::kVermillion, client::Marker::kTriangle);
+  add(of([](const std::string& truth) { return truth == "calculix"; }), "CalculiX",
+      palette::kPurple, client::Marker::kSquare);
+  const std::filesystem::path file = folder / "evidence-reliability.png";
+  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
+  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+}
+
 }  // namespace
 
 Status draw_evidence(const Rows& rows, const std::filesystem::path& folder) {
@@ -112,7 +167,7 @@ Status draw_evidence(const Rows& rows, const std::filesystem::path& folder) {
   for (const Picture& picture : pictures) {
     if (Status ok = draw(rows, picture, folder); !ok) return ok;
   }
-  return {};
+  return draw_reliability(rows, folder);
 }
 
 }  // namespace brainshift::evidence

@@ -24,7 +24,9 @@ void add_errors(const surgeries::UpdateScore& score, double shift_tumour_mm, Cel
   cells.add("field_max_mm", score.estimate.max_mm);
   cells.add("worse_nodes", score.worse_nodes);
   cells.add("worst_excess_mm", score.worst_excess_mm);
-  cells.add("coverage_90", score.coverage_90);
+  for (std::size_t i = 0; i < surgeries::kIntervals.size(); ++i) {
+    cells.add("coverage_" + std::to_string(surgeries::kIntervals[i].percent), score.coverage[i]);
+  }
   cells.add("mean_sd_mm", score.mean_sd_mm);
 }
 

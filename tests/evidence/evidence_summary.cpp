@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// evidence_summary TABLE...: checks and pictures from the tables of `evidence`, one per head, into
-// $BRAINSHIFT_STUDY_DIR (tests/support/study_record.hpp). Measures nothing; whether the checks hold
-// is for study_summary to say.
+// evidence_summary TABLE...: checks, pictures and the paper's tables from the tables of `evidence`,
+// one per head, into $BRAINSHIFT_STUDY_DIR (tests/support/study_record.hpp). Measures nothing;
+// whether the checks hold is for study_summary to say.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -10,6 +10,7 @@
 
 #include "tests/evidence/evidence_checks.hpp"
 #include "tests/evidence/evidence_pictures.hpp"
+#include "tests/evidence/patient_tables.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -29,7 +30,12 @@ Status run(const std::vector<std::filesystem::path>& files) {
   }
   const surgeries::Rows rows(all);
   if (rows.empty()) return fail(ErrorCode::kEmptySet, "no surgery in the tables");
-  for (const std::string& head : rows.values("head")) check_evidence(rows.where("head", head));
+  for (const std::string& head : rows.values("head")) {
+    const surgeries::Rows own = rows.where("head", head);
+    check_evidence(own);
+    const auto file = std::filesystem::path(folder) / ("patients-" + head + ".md");
+    if (Status ok = write_patient_tables(own, file); !ok) return ok;
+  }
   return draw_evidence(rows, folder);
 }
 

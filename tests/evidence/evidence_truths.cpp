@@ -10,6 +10,7 @@ const std::vector<TruthKind>& truth_kinds() {
       all.push_back({info.name, {info.ingredient}});
     }
     all.push_back({"all", *client::ingredients_from("all")});
+    all.push_back({"calculix", {}, true});
     return all;
   }();
   return kinds;

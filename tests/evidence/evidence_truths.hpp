@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The truths of the study: consistency, each adverse ingredient alone, all of them.
+// The truths of the study: consistency, each adverse ingredient alone, all of them, and another
+// code's.
 #pragma once
 
 #include <string>
@@ -10,8 +11,9 @@
 namespace brainshift::evidence {
 
 struct TruthKind {
-  std::string name;  // "consistency", "mesh", ..., "all"
+  std::string name;  // "consistency", "mesh", ..., "all", "calculix"
   client::Ingredients ingredients;
+  bool calculix = false;  // the displacement is one that CalculiX found (calculix_truth.hpp)
 };
 
 // In this order.

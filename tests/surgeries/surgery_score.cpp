@@ -71,6 +71,7 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
                      const Estimate& estimate, UpdateScore& score) {
   const bool has_sd = estimate.sd_mm.size() == estimate.displacement.cols();
   long inside = 0;
+  std::array<long, kIntervals.size()> within = {};
   double sum = 0.0;
   score.worst_excess_mm = -std::numeric_limits<double>::infinity();
   for (const int node : nodes) {
@@ -80,10 +81,16 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
     score.worse_nodes += excess > 0.0 ? 1 : 0;
     score.worst_excess_mm = std::max(score.worst_excess_mm, excess);
     inside += (error.array().abs() <= kNormalQuantile90 * sd).count();
+    for (std::size_t i = 0; i < within.size(); ++i) {
+      within[i] += (error.array().abs() <= kIntervals[i].radius * sd).count();
+    }
     sum += sd;
   }
   const auto count = static_cast<double>(nodes.size());
   score.coverage_90 = has_sd ? static_cast<double>(inside) / (3.0 * count) : kNaN;
+  for (std::size_t i = 0; i < within.size(); ++i) {
+    score.coverage[i] = has_sd ? static_cast<double>(within[i]) / (3.0 * count) : kNaN;
+  }
   score.mean_sd_mm = has_sd ? sum / count : kNaN;
 }
 

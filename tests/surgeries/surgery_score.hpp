@@ -6,6 +6,8 @@
 // out of everything that is said of nodes.
 #pragma once
 
+#include <array>
+
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/brain_model.hpp"
@@ -20,6 +22,15 @@ struct FieldErrors {
   double mean_mm = 0.0, p50_mm = 0.0, max_mm = 0.0;  // over all nodes
 };
 
+// Central intervals of a Gaussian: the share that each holds, and its half width in standard
+// deviations.
+struct Interval {
+  int percent;
+  double radius;
+};
+inline constexpr std::array<Interval, 6> kIntervals = {
+    {{50, 0.6745}, {68, 0.9945}, {80, 1.2816}, {90, 1.6449}, {95, 1.9600}, {99, 2.5758}}};
+
 struct UpdateScore {
   FieldErrors estimate;
   FieldErrors none;  // of no correction
@@ -32,7 +43,8 @@ struct UpdateScore {
   int worse_nodes = 0;
   double worst_excess_mm = 0.0;
   double coverage_90 = 0.0;  // of nodal components within 1.6449 sd; NaN without sd
-  double mean_sd_mm = 0.0;   // NaN without sd
+  std::array<double, kIntervals.size()> coverage = {};  // the same for each of kIntervals
+  double mean_sd_mm = 0.0;                              // NaN without sd
 };
 
 // Radius of the ball that holds 90 % of an isotropic Gaussian in three dimensions, in standard

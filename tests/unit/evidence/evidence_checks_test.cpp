@@ -94,10 +94,12 @@ void set(std::vector<Texts>& rows, const char* boundary, const char* data, const
   }
 }
 
-TEST(TruthKinds, AreConsistencyEachIngredientAndAll) {
-  ASSERT_EQ(truth_kinds().size(), client::all_ingredients().size() + 2);
+TEST(TruthKinds, AreConsistencyEachIngredientAllAndAnotherCode) {
+  ASSERT_EQ(truth_kinds().size(), client::all_ingredients().size() + 3);
   EXPECT_TRUE(truth_kinds().front().ingredients.empty());
-  EXPECT_EQ(truth_kinds().back().ingredients.size(), client::all_ingredients().size());
+  EXPECT_EQ(find_truth("all")->ingredients.size(), client::all_ingredients().size());
+  EXPECT_TRUE(find_truth("calculix")->calculix);
+  EXPECT_FALSE(is_adverse_alone("calculix"));
   EXPECT_TRUE(is_adverse_alone("gap"));
   EXPECT_FALSE(is_adverse_alone("consistency"));
   EXPECT_FALSE(is_adverse_alone("all"));
@@ -105,8 +107,8 @@ TEST(TruthKinds, AreConsistencyEachIngredientAndAll) {
 }
 
 TEST_F(EvidenceTable, TheBoundOfTheTumourDependsOnTheTruth) {
-  for (const auto& [truth, least] :
-       {std::pair{"consistency", 95}, std::pair{"gap", 88}, std::pair{"all", 80}}) {
+  for (const auto& [truth, least] : {std::pair{"consistency", 95}, std::pair{"gap", 88},
+                                     std::pair{"all", 80}, std::pair{"calculix", 80}}) {
     auto rows = good(truth);
     const std::string name = std::string(truth) + ": tumour recovered";
     set(rows, "contact", "tumour", "recovered_pct", std::to_string(least));
@@ -160,6 +162,14 @@ TEST_F(EvidenceTable, CoverageIsBoundOverTheAdverseTruthsAlone) {
   EXPECT_EQ(verdict(rows, name), "1");
   for (Texts& row : rows) row["coverage_90"] = "0.7";
   EXPECT_EQ(verdict(rows, name), "0");
+}
+
+TEST_F(EvidenceTable, FieldsOfAnotherMeshAreLeftOut) {
+  auto rows = good("calculix");
+  for (Texts& row : rows) row["status"] = "refused";
+  EXPECT_EQ(verdict(rows, "calculix: tumour recovered"), "none");
+  rows.front()["status"] = "converged";
+  EXPECT_NE(verdict(rows, "calculix: tumour recovered"), "none");
 }
 
 TEST_F(EvidenceTable, AnUpdateWorseThanARigidShiftIsCounted) {

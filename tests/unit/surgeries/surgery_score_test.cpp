@@ -52,6 +52,20 @@ TEST_F(Score, OfTheTruthIsPerfect) {
   EXPECT_LT(of.worst_excess_mm, -kRadius90 * 0.1);
 }
 
+// Errors of one standard deviation along x and of two along y: inside some of the intervals.
+TEST_F(Score, CountsTheComponentsInsideEveryInterval) {
+  estimate.displacement.row(0).array() += 0.1;
+  estimate.displacement.row(1).array() -= 0.2;
+  const UpdateScore of = score();
+  const std::array<double, 6> inside = {1, 1, 2, 2, 2, 3};  // of three
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    EXPECT_DOUBLE_EQ(of.coverage[i], inside[i] / 3.0) << kIntervals[i].percent;
+  }
+  EXPECT_DOUBLE_EQ(of.coverage_90, of.coverage[3]);
+  estimate.sd_mm.resize(0);
+  EXPECT_TRUE(std::isnan(score().coverage[0]));
+}
+
 TEST_F(Score, TheRigidMotionOfATruthThatIsRigidLeavesNothing) {
   const UpdateScore of = score();
   EXPECT_GT(of.none.mean_mm, 1.5);
