@@ -4,10 +4,15 @@
 //
 // Sources are used together. An update that the tumour's boundary asks for also uses the newest
 // view of the cortex, as long as that view is not older than sensing.max_age_s by the observations'
-// own clock. Not thread-safe.
+// own clock.
+//
+// An observation whose own update was unusable is *suspect*: it may be wrong, or other sources may
+// be missing. The next update tries with it. If that one is usable, it is trusted again; else it is
+// forgotten, and the update is made without it. Not thread-safe.
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,10 +26,17 @@ class Evidence {
  public:
   explicit Evidence(double max_age_s) : max_age_s_(max_age_s) {}
   void clear();
-  // Replaces the earlier observation of the same source.
+  // Replaces the earlier observation of the same source, suspect or not.
   void put(RegisteredObservation observation);
-  // Forgets the source's observation: no usable estimate could be made with it.
+  // Forgets the source's observation: no estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
+  // No usable estimate could be made with the source's observation and the others.
+  void suspect(const std::string& source);
+  // A usable estimate was made with all that are fresh.
+  void trust();
+  // Forgets the suspects that are fresh, but not that of `source`. Who they were and why they are
+  // not used, for Update::left_out; empty when there was none.
+  std::vector<Omission> drop_suspects(const std::string& source, std::int64_t now_ns);
 
   // Observations to use together with one of this time, in the order of their sources' names.
   std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
@@ -36,6 +48,7 @@ class Evidence {
 
   double max_age_s_;
   std::map<std::string, RegisteredObservation> newest_;
+  std::set<std::string> suspects_;  // sources
 };
 
 // Data of several observations as one. Data that follow the deformation begin where their

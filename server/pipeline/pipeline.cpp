@@ -79,9 +79,35 @@ Status Pipeline::register_into(const Observation& observation, Update& update) {
   return {};
 }
 
-// The evidence's SparseData -> Estimate.
+// The evidence's SparseData -> Estimate; once more without suspects where they spoil it.
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
                                Update& update) {
+  const Stopwatch watch;
+  Status status = try_estimate(observation, options, update);
+  Estimate& estimate = update.estimate;
+  if ((!status || !estimate.quality.usable()) && !options.stop.stop_requested()) {
+    auto dropped = evidence_.drop_suspects(observation.source, observation.acquired_ns);
+    if (!dropped.empty()) {
+      append(std::move(dropped), update);
+      status = try_estimate(observation, options, update);
+    }
+  }
+  if (!status) return status;
+  if (estimate.quality.usable()) {
+    evidence_.trust();
+  } else {
+    evidence_.suspect(observation.source);
+  }
+  if (const auto errors = inverter_->omission_errors()) {
+    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
+  }
+  update.timings.rebuild_ms = estimate.rebuild_ms;
+  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
+  return {};
+}
+
+Status Pipeline::try_estimate(const Observation& observation, const RunOptions& options,
+                              Update& update) {
   const Stopwatch watch;
   const CombinedData combined(evidence_.fresh(observation.acquired_ns));
   inversion::InversionOptions asked;
@@ -99,12 +125,6 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
   Estimate& estimate = update.estimate;
   if (auto status = inverter_->update(combined.data(), asked, estimate); !status) return status;
   combined.describe(observation.acquired_ns, estimate.sources);
-  if (!estimate.quality.usable()) evidence_.drop(observation.source);
-  if (const auto errors = inverter_->omission_errors()) {
-    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
-  }
-  update.timings.rebuild_ms = estimate.rebuild_ms;
-  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
   return {};
 }
 

@@ -42,8 +42,9 @@ class Pipeline {
 
   // Fills everything of an Update except its sequence number and the encode and journal times,
   // which belong to later stages. The inverter writes into the update's own estimate. Errors of
-  // registration and inversion pass through unchanged; an observation without a usable estimate
-  // (values/quality.hpp) is not used again, and no later update starts from an unusable field.
+  // registration and inversion pass through unchanged; such an observation is not used again. One
+  // without a usable estimate (values/quality.hpp) is tried once more beside the next
+  // (evidence.hpp), and no later update starts from an unusable field.
   // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
 
@@ -56,6 +57,8 @@ class Pipeline {
            RegistrationTargets targets);
   Status register_into(const Observation& observation, Update& update);
   Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
+  // From what the evidence holds now.
+  Status try_estimate(const Observation& observation, const RunOptions& options, Update& update);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;

@@ -124,8 +124,8 @@ class EvidenceChecks {
            fmt::format("shown (from the tumour alone {:.2f})", alone));
   }
 
-  // After an unusable field the daemon does not use its observation again, so that "tumour+cortex"
-  // is then an update from the cortex alone.
+  // Where an update from the tumour and one beside the cortex are both unusable, the daemon makes
+  // the latter again from the cortex alone.
   void unusable(const std::string& truth) {
     const Rows contact = all_.where("truth", truth).where("boundary", "contact");
     const Rows fixed = all_.where("truth", truth).where("boundary", "fixed");

@@ -75,13 +75,18 @@ struct FakeInversion {
   std::vector<NodeIndex> nodes;  // that the data asked for
   bool fails = false;
   double motion_mm = 1.0;
+  std::string spoiler;  // a source with which no brain could move so
+  int calls = 0;
   Status operator()(int, const SparseData& data, const inversion::InversionOptions& options,
                     Estimate& estimate) {
     if (fails) return fail(ErrorCode::kNotConverged, "no");
+    ++calls;
     first = seen = data;
+    const bool spoilt = std::any_of(data.sources.begin(), data.sources.end(),
+                                    [this](const DataSource& s) { return s.name == spoiler; });
+    const double sunk_mm = spoilt ? 2.0 * kMostMotion_mm : motion_mm;
     if (options.moving != nullptr) nodes = options.moving->nodes;
-    estimate.displacement =
-        Points(Vec3(0, 0, -motion_mm).replicate(1, patient()->mesh.num_nodes()));
+    estimate.displacement = Points(Vec3(0, 0, -sunk_mm).replicate(1, patient()->mesh.num_nodes()));
     if (options.moving != nullptr) {
       const Points u = estimate.displacement(Eigen::all, options.moving->nodes);
       while (options.moving->relocate(u, seen)) {
@@ -163,18 +168,60 @@ TEST_F(Sources, AnObservationWithoutAnEstimateIsForgotten) {
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 
-TEST_F(Sources, AnObservationWithAnUnusableEstimateIsForgotten) {
-  ASSERT_TRUE(run(landmarks_at(1, "ius", 0)));
+TEST_F(Sources, AnObservationWithAnUnusableEstimateIsTriedBesideTheNext) {
   inversion_.motion_mm = 2.0 * kMostMotion_mm;
-  const auto unusable = run(landmarks_at(2, "pointer", 1));
+  const auto unusable = run(landmarks_at(1, "pointer", 0));
   ASSERT_TRUE(unusable) << "it is reported, with its reasons";
   EXPECT_EQ(unusable->estimate.quality.quality, Quality::kUnusable);
   EXPECT_FALSE(unusable->estimate.quality.reason.empty());
   inversion_.motion_mm = 1.0;
-  const auto after = run(landmarks_at(3, "ius", 2));
+  const auto after = run(landmarks_at(2, "ius", 1));
+  ASSERT_TRUE(after);
+  EXPECT_TRUE(after->usable());
+  EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer"}));
+  // It is as good as any other now: what spoils the next update is that one's own observation.
+  inversion_.spoiler = "stereopsis";
+  EXPECT_FALSE(run(landmarks_at(3, "stereopsis", 2))->usable());
+  inversion_.spoiler.clear();
+  ASSERT_TRUE(run(landmarks_at(4, "ius", 3)));
+  EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer", "stereopsis"}));
+}
+
+TEST_F(Sources, AnObservationThatSpoilsTheNextUpdateTooIsForgotten) {
+  inversion_.spoiler = "pointer";
+  EXPECT_FALSE(run(landmarks_at(1, "pointer", 0))->usable());
+  const auto after = run(landmarks_at(2, "ius", 1));
   ASSERT_TRUE(after);
   EXPECT_TRUE(after->usable());
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+  EXPECT_EQ(inversion_.calls, 3);  // alone, beside the next, the next without it
+  const auto told = std::find_if(after->left_out.begin(), after->left_out.end(),
+                                 [](const Omission& o) { return o.part == "source pointer"; });
+  ASSERT_NE(told, after->left_out.end());
+  EXPECT_THAT(told->reason, HasSubstr("no usable estimate could be made with observation 1"));
+  ASSERT_TRUE(run(landmarks_at(3, "ius", 2)));
+  EXPECT_EQ(inversion_.calls, 4);
+  EXPECT_EQ(used(), std::vector<std::string>{"ius"});
+}
+
+TEST_F(Sources, ANewObservationOfASuspectSourceIsNoSuspect) {
+  inversion_.spoiler = "pointer";
+  EXPECT_FALSE(run(landmarks_at(1, "pointer", 0))->usable());
+  inversion_.spoiler.clear();
+  EXPECT_TRUE(run(landmarks_at(2, "pointer", 1))->usable());
+  inversion_.spoiler = "ius";
+  EXPECT_FALSE(run(landmarks_at(3, "ius", 2))->usable());
+  EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer"}));  // and not tried without it
+  EXPECT_EQ(inversion_.calls, 3);
+}
+
+TEST_F(Sources, ASuspectThatIsTooOldSpoilsNothing) {
+  inversion_.spoiler = "pointer";
+  EXPECT_FALSE(run(landmarks_at(1, "pointer", 0))->usable());
+  const auto after = run(landmarks_at(2, "ius", config_.sensing.max_age_s + 1.0));
+  ASSERT_TRUE(after);
+  EXPECT_TRUE(after->usable());
+  EXPECT_EQ(inversion_.calls, 2);
 }
 
 TEST_F(Sources, OfAnEarlierSessionAreForgotten) {
