@@ -41,13 +41,40 @@ void include(double ratio, int tet, Deformation& deformation) {
   deformation.worst_tet = tet;
 }
 
+Corners corners_of(const Points& nodes, const Eigen::Vector4i& tet) {
+  Corners x;
+  for (int k = 0; k < 4; ++k) x.col(k) = nodes.col(tet[k]);
+  return x;
+}
+
+Corners moved_corners_of(const Points& nodes, const Eigen::Vector4i& tet, const Points& u) {
+  return corners_of(nodes, tet) + corners_of(u, tet);
+}
+
 double ratio_of(const Points& nodes, const Eigen::Vector4i& tet, const Points& u) {
-  Corners x, moved;
-  for (int k = 0; k < 4; ++k) {
-    x.col(k) = nodes.col(tet[k]);
-    moved.col(k) = x.col(k) + u.col(tet[k]);
+  return six_volumes(moved_corners_of(nodes, tet, u)) / six_volumes(corners_of(nodes, tet));
+}
+
+void add_volume(const Eigen::Vector4i& tet, double six_volumes, VecX& nodal) {
+  for (int k = 0; k < 4; ++k) nodal[tet[k]] += six_volumes;
+}
+
+// NaN where a ratio is. A node without a tetrahedron has none.
+double least_ratio(const VecX& moved, const VecX& rest) {
+  double least = 1.0;
+  bool any = false;
+  for (Eigen::Index node = 0; node < rest.size(); ++node) {
+    if (rest[node] == 0.0) continue;
+    const double ratio = moved[node] / rest[node];
+    if (std::isnan(ratio)) return ratio;
+    if (!any || ratio < least) least = ratio;
+    any = true;
   }
-  return six_volumes(moved) / six_volumes(x);
+  return least;
+}
+
+bool in_question(const Deformation& deformation) {
+  return !(deformation.min_volume_ratio >= kVolumeInQuestion);
 }
 
 }  // namespace
@@ -57,6 +84,15 @@ Deformation measure_deformation(const TetMesh& mesh, const Points& u) {
   for (int t = 0; t < mesh.num_tets(); ++t) {
     include(ratio_of(mesh.nodes, mesh.tets.col(t), u), t, deformation);
   }
+  deformation.min_nodal_volume_ratio = deformation.min_volume_ratio;
+  if (!in_question(deformation)) return deformation;
+  VecX rest = VecX::Zero(mesh.nodes.cols()), moved = rest;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    const Eigen::Vector4i tet = mesh.tets.col(t);
+    add_volume(tet, six_volumes(corners_of(mesh.nodes, tet)), rest);
+    add_volume(tet, six_volumes(moved_corners_of(mesh.nodes, tet, u)), moved);
+  }
+  deformation.min_nodal_volume_ratio = least_ratio(moved, rest);
   return deformation;
 }
 
@@ -68,15 +104,17 @@ DeformationCheck::DeformationCheck(const Points& nodes,
       tets_(tets),
       centre_(nodes.cols() > 0 ? Vec3(nodes.rowwise().mean()) : Vec3(Vec3::Zero())),
       deformed_(Eigen::Matrix<float, 4, Eigen::Dynamic>::Zero(4, nodes.cols())),
-      parts_(static_cast<std::size_t>(team.size())) {
+      parts_(static_cast<std::size_t>(team.size())),
+      nodal_volume_(VecX::Zero(nodes.cols())),
+      moved_nodal_volume_(nodes.cols()) {
   const double extent = nodes.cols() > 0 ? (nodes.colwise() - centre_).cwiseAbs().maxCoeff() : 0.0;
   // Room for a displacement as large as the body.
   const double position_error =
       2.0 * extent * static_cast<double>(std::numeric_limits<float>::epsilon());
   inverse_volume_.reserve(static_cast<std::size_t>(tets.cols()));
   for (Eigen::Index t = 0; t < tets.cols(); ++t) {
-    Corners x;
-    for (int k = 0; k < 4; ++k) x.col(k) = nodes.col(tets(k, t));
+    const Corners x = corners_of(nodes, tets.col(t));
+    add_volume(tets.col(t), six_volumes(x), nodal_volume_);
     const bool coarse = position_error * sum_inverse_heights(x) < kRatioError;
     inverse_volume_.push_back(coarse ? static_cast<float>(1.0 / six_volumes(x))
                                      : std::numeric_limits<float>::quiet_NaN());
@@ -85,6 +123,15 @@ DeformationCheck::DeformationCheck(const Points& nodes,
 
 double DeformationCheck::exact_ratio(long tet, const Points& u) const {
   return ratio_of(nodes_, tets_.col(tet), u);
+}
+
+double DeformationCheck::least_nodal_ratio(const Points& u) {
+  moved_nodal_volume_.setZero();
+  for (Eigen::Index t = 0; t < tets_.cols(); ++t) {
+    const Eigen::Vector4i tet = tets_.col(t);
+    add_volume(tet, six_volumes(moved_corners_of(nodes_, tet, u)), moved_nodal_volume_);
+  }
+  return least_ratio(moved_nodal_volume_, nodal_volume_);
 }
 
 void DeformationCheck::measure_part(long begin, long end, const Points& u,
@@ -147,6 +194,7 @@ Deformation DeformationCheck::measure(const Points& u) {
     include(part.min_volume_ratio, part.worst_tet, whole);
     whole.inverted = inverted;
   }
+  whole.min_nodal_volume_ratio = in_question(whole) ? least_nodal_ratio(u) : whole.min_volume_ratio;
   return whole;
 }
 

@@ -162,6 +162,9 @@ struct Estimate {
   // Smallest ratio of an element's volume after to before (det F). At 0 and below the element is
   // inverted, and the estimate there is no deformation of tissue. NaN: not measured.
   double min_volume_ratio = std::numeric_limits<double>::quiet_NaN();
+  // The same of the volume about a node (fem/deformation.hpp), by which lost volume is judged.
+  // NaN: not measured. Not on the wire.
+  double min_nodal_volume_ratio = std::numeric_limits<double>::quiet_NaN();
   int inverted_elements = 0;
   // In the order of the data. Empty for data without named sources.
   std::vector<SourceSummary> sources;

@@ -48,7 +48,7 @@ std::string_view sentence(QualityFlag flag) {
       return "contact holds less well than its certificate asks";
     case QualityFlag::kIterationLimit: return "the inversion ended at its limit of iterations";
     case QualityFlag::kInvertedElements: return "elements are turned inside out";
-    case QualityFlag::kVolumeLost: return "an element loses more volume than tissue can";
+    case QualityFlag::kVolumeLost: return "tissue loses more volume than it can";
     case QualityFlag::kBeyondSkull: return "the brain moves farther than a skull allows";
     case QualityFlag::kNotFinite: return "a number of the estimate is not finite";
   }

@@ -40,7 +40,7 @@ enum class QualityFlag : std::uint32_t {
   kContactNotCertified = 1u << 5,  // decrement or violation of contact above its bound
   kIterationLimit = 1u << 6,       // the stop rule did not hold
   kInvertedElements = 1u << 16,    // elements with det F <= 0
-  kVolumeLost = 1u << 17,          // the smallest det F is above 0 and below kLeastVolumeRatio
+  kVolumeLost = 1u << 17,          // a nodal volume ratio is below kLeastVolumeRatio
   kBeyondSkull = 1u << 18,         // a node moves, or a slave penetrates, farther than a skull lets
   kNotFinite = 1u << 19,           // a number of the estimate is not finite
 };

@@ -60,20 +60,28 @@ Result<RowFile> RowFile::open(const std::filesystem::path& path, const Row& colu
       for (const std::string& column : file.key_) done.push_back(table->text(row, column));
       file.done_.insert(done);
     }
+    file.bytes_ = std::filesystem::file_size(path);
     return file;
   }
   std::ofstream stream(path, std::ios::trunc);
   stream << heading << std::flush;
   if (!stream) return fail(ErrorCode::kWriteFailed, path.string() + ": cannot be written");
+  file.bytes_ = heading.size();
   return file;
 }
 
 Status RowFile::append(const std::vector<Row>& rows) {
   std::string text;
   for (const Row& row : rows) text += line_of(row, false);
+  std::error_code missing;
+  if (std::filesystem::file_size(path_, missing) != bytes_) {
+    return fail(ErrorCode::kWriteFailed,
+                path_.string() + ": another run writes to it, or it was removed");
+  }
   std::ofstream stream(path_, std::ios::app);
   stream << text << std::flush;
   if (!stream) return fail(ErrorCode::kWriteFailed, path_.string() + ": cannot be written");
+  bytes_ += text.size();
   Key done;
   for (const std::string& column : key_) done.push_back(text_of(rows.front(), column));
   done_.insert(done);

@@ -40,13 +40,15 @@ class RowFile {
                               std::vector<std::string> key, bool resume);
   // In the order of the key's columns.
   bool has(const Key& key) const { return done_.count(key) > 0; }
-  // All rows of one entry, by one write; an entry has at least one.
+  // All rows of one entry, by one write; an entry has at least one. kWriteFailed when somebody else
+  // wrote to the file since, as a second run of the study would.
   Status append(const std::vector<Row>& rows);
 
  private:
   std::filesystem::path path_;
   std::vector<std::string> key_;
   std::set<Key> done_;
+  std::uintmax_t bytes_ = 0;  // as this run left the file
 };
 
 }  // namespace brainshift::surgeries

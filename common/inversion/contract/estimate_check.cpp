@@ -38,6 +38,7 @@ Status check_deformation(const fem::Deformation& deformation, Estimate& estimate
     return fail(ErrorCode::kNotFinite, "inversion: the displacement is not finite");
   }
   estimate.min_volume_ratio = deformation.min_volume_ratio;
+  estimate.min_nodal_volume_ratio = deformation.min_nodal_volume_ratio;
   estimate.inverted_elements = deformation.inverted;
   return {};
 }

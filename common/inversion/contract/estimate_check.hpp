@@ -35,7 +35,7 @@ inline constexpr double kEquilibriumRelative = 2e-5;
 Status check_equilibrium(const CondensedOperators& operators, const std::vector<int>& slaves,
                          const VecX& penetration, const Points& displacement);
 
-// Fills min_volume_ratio and inverted_elements. kNotFinite when the displacement is not finite.
+// Fills both volume ratios and inverted_elements. kNotFinite when the displacement is not finite.
 Status check_deformation(const fem::Deformation& deformation, Estimate& estimate);
 
 // Appends one clause per warning: inverted elements, locking. Allocates only where the reason has

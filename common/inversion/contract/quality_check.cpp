@@ -49,7 +49,8 @@ bool all_finite(const Estimate& estimate) {
          finite_or_absent(contact.decrement) && finite_or_absent(contact.max_violation_mm) &&
          finite(estimate.initial_misfit_mm) && finite(estimate.misfit_mm) &&
          finite_or_absent(estimate.misfit_ratio) && finite_or_absent(estimate.min_volume_ratio) &&
-         finite(estimate.prior_scales) && finite(estimate.prior_absent) &&
+         finite_or_absent(estimate.min_nodal_volume_ratio) && finite(estimate.prior_scales) &&
+         finite(estimate.prior_absent) &&
          std::all_of(
              estimate.hypotheses.begin(), estimate.hypotheses.end(),
              [](const Hypothesis& one) { return finite(one.scales) && std::isfinite(one.weight); });
@@ -94,9 +95,9 @@ void judge_field(const Estimate& estimate, Judge& judge) {
   if (estimate.inverted_elements > 0) {
     judge.set(QualityFlag::kInvertedElements, "%d, smallest volume ratio %.2g",
               estimate.inverted_elements, estimate.min_volume_ratio);
-  } else if (estimate.min_volume_ratio < kLeastVolumeRatio) {
-    judge.set(QualityFlag::kVolumeLost, "smallest volume ratio %.2g, at least %g",
-              estimate.min_volume_ratio, kLeastVolumeRatio);
+  } else if (estimate.min_nodal_volume_ratio < kLeastVolumeRatio) {
+    judge.set(QualityFlag::kVolumeLost, "smallest volume ratio about a node %.2g, at least %g",
+              estimate.min_nodal_volume_ratio, kLeastVolumeRatio);
   }
   const Points& u = estimate.displacement;
   const double motion_mm = u.cols() > 0 ? std::sqrt(u.colwise().squaredNorm().maxCoeff()) : 0.0;

@@ -3,14 +3,15 @@
 // for it once per estimate.
 //
 // Each flag follows from members of the estimate. What a method does not compute sets no flag:
-// misfit_ratio, contact.decrement, contact.max_violation_mm and min_volume_ratio may be NaN for
+// misfit_ratio, contact.decrement, contact.max_violation_mm and the volume ratios may be NaN for
 // "not computed". A number that is infinite, or NaN elsewhere, sets kNotFinite. Motion beyond the
 // skull is measured in two ways:
 //
 //   motion   max_i |u_i| over all nodes                       above kMostMotion_mm
 //   depth    contact.max_penetration_mm, over the slaves      above kDeepestInSkull_mm
 //
-// An element that is inverted sets kInvertedElements and not kVolumeLost.
+// An element that is inverted sets kInvertedElements and not kVolumeLost. min_nodal_volume_ratio
+// judges a loss of volume.
 #pragma once
 
 #include "common/values/estimate.hpp"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -33,6 +34,62 @@ TEST(Deformation, VolumeRatioOfALinearDisplacementIsTheDeterminantOfF) {
   ThreadTeam team(2);
   EXPECT_NEAR(DeformationCheck(mesh.nodes, mesh.tets, team).measure(u).min_volume_ratio, expected,
               1e-4);
+}
+
+// Volumes about a node from triple products, node by node.
+double least_nodal_ratio(const TetMesh& mesh, const Points& u) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int node = 0; node < mesh.num_nodes(); ++node) {
+    double rest = 0.0, moved = 0.0;
+    for (int t = 0; t < mesh.num_tets(); ++t) {
+      if ((mesh.tets.col(t).array() != node).all()) continue;
+      for (double* sum : {&rest, &moved}) {
+        const Points x = sum == &rest ? mesh.nodes : Points(mesh.nodes + u);
+        Mat3 edges;
+        for (int k = 0; k < 3; ++k) {
+          edges.col(k) = x.col(mesh.tets(k + 1, t)) - x.col(mesh.tets(0, t));
+        }
+        *sum += edges.determinant();
+      }
+    }
+    least = std::min(least, moved / rest);
+  }
+  return least;
+}
+
+TEST(Deformation, NodalVolumeRatioIsThatOfTheVolumeAboutANode) {
+  const TetMesh mesh = box_mesh(3, 3, 2, Vec3(30, 30, 20));
+  ThreadTeam team(2);
+  DeformationCheck check(mesh.nodes, mesh.tets, team);
+  for (const double size : {1.5, 3.0}) {
+    const Points u = random_displacement(mesh, size);
+    const double expected = least_nodal_ratio(mesh, u);
+    ASSERT_LT(measure_deformation(mesh, u).min_volume_ratio, kVolumeInQuestion);
+    EXPECT_NEAR(measure_deformation(mesh, u).min_nodal_volume_ratio, expected, 1e-12);
+    EXPECT_NEAR(check.measure(u).min_nodal_volume_ratio, expected, 1e-12);
+    EXPECT_GT(expected, measure_deformation(mesh, u).min_volume_ratio);
+  }
+}
+
+TEST(Deformation, ABodyThatIsHalvedLosesHalfTheVolumeAboutEveryNode) {
+  const TetMesh mesh = box_mesh(2, 2, 2, Vec3(20, 20, 20));
+  Points u = Points::Zero(3, mesh.num_nodes());
+  u.row(2) = -0.5 * mesh.nodes.row(2);
+  ThreadTeam team(2);
+  EXPECT_NEAR(measure_deformation(mesh, u).min_nodal_volume_ratio, 0.5, 1e-12);
+  EXPECT_NEAR(DeformationCheck(mesh.nodes, mesh.tets, team).measure(u).min_nodal_volume_ratio, 0.5,
+              1e-12);
+}
+
+TEST(Deformation, NothingMoreIsComputedWhereNoElementIsInQuestion) {
+  const TetMesh mesh = box_mesh(2, 2, 2, Vec3(20, 20, 20));
+  const Points u = random_displacement(mesh, 0.1);
+  ThreadTeam team(2);
+  DeformationCheck check(mesh.nodes, mesh.tets, team);
+  for (const Deformation& measured : {measure_deformation(mesh, u), check.measure(u)}) {
+    ASSERT_GT(measured.min_volume_ratio, kVolumeInQuestion);
+    EXPECT_EQ(measured.min_nodal_volume_ratio, measured.min_volume_ratio);
+  }
 }
 
 TEST(Deformation, AMirroredBodyIsInvertedEverywhere) {

@@ -66,6 +66,7 @@ TEST_P(Inverters, FillEveryMemberOfAnEstimateThatHeldAnother) {
   EXPECT_NE(fresh.status, EstimateStatus::kNotRun);
   EXPECT_FALSE(fresh.reason.empty());
   EXPECT_FALSE(std::isnan(fresh.min_volume_ratio));
+  EXPECT_FALSE(std::isnan(fresh.min_nodal_volume_ratio));
   EXPECT_GT(made->bytes(), 0u);
   EXPECT_EQ(made->omission_errors().has_value(), GetParam() == Method::kCondensed);
   // Somebody else's numbers must not shine through.

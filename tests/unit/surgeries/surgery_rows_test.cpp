@@ -88,6 +88,21 @@ TEST_F(RowTable, ARunThatGoesOnKnowsWhatIsThere) {
   EXPECT_EQ(bench::CsvTable::read(path)->rows(), 0u);
 }
 
+TEST_F(RowTable, TwoRunsDoNotWriteToOneTable) {
+  RowFile first = open(true);
+  ASSERT_TRUE(first.append({row(facts(7, "paper"))}));
+  RowFile second = open(true);
+  ASSERT_TRUE(second.append({row(facts(8, "paper"))}));
+  const auto refused = first.append({row(facts(8, "paper"))});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kWriteFailed);
+  EXPECT_THAT(refused.error().message, HasSubstr("another run writes to it"));
+  ASSERT_TRUE(second.append({row(facts(9, "paper"))}));
+  std::filesystem::remove(path);
+  EXPECT_FALSE(second.append({row(facts(9, "paper"))}));
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
 TEST_F(RowTable, ATableOfOtherColumnsIsNotContinued) {
   std::ofstream(path) << "head,place\nx,1\n";
   const auto file = open_surgeries(path, true);

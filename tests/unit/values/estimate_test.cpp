@@ -36,6 +36,7 @@ TEST(Estimate, HasNotRunByDefault) {
   EXPECT_EQ(Estimate{}.status, EstimateStatus::kNotRun);
   EXPECT_EQ(Estimate{}.displacement.cols(), 0);
   EXPECT_TRUE(std::isnan(Estimate{}.min_volume_ratio));
+  EXPECT_TRUE(std::isnan(Estimate{}.min_nodal_volume_ratio));
 }
 
 TEST(AnswerTime, IsLateBeyondTwiceTheUsual) {

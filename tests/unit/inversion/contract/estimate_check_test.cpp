@@ -20,6 +20,7 @@ TEST_F(EstimateCheck, AnOrdinaryEstimateIsUprightAndHasNoWarning) {
   const auto exact = fem::measure_deformation(patient()->mesh, estimate.displacement);
   EXPECT_NEAR(estimate.min_volume_ratio, exact.min_volume_ratio, 1e-4);
   EXPECT_LT(estimate.min_volume_ratio, 1.0);
+  EXPECT_GE(estimate.min_nodal_volume_ratio, estimate.min_volume_ratio);
   EXPECT_EQ(estimate.inverted_elements, 0);
   EXPECT_EQ(estimate.reason.find("; "), std::string::npos) << estimate.reason;
 }

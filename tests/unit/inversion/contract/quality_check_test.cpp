@@ -29,7 +29,8 @@ Estimate sound() {
   estimate.contact.decrement = kMostContactDecrement;
   estimate.contact.max_violation_mm = kMostContactViolation_mm;
   estimate.misfit_ratio = kUnexplainedMisfit;
-  estimate.min_volume_ratio = kLeastVolumeRatio;
+  estimate.min_volume_ratio = 0.1;  // of a flat element
+  estimate.min_nodal_volume_ratio = kLeastVolumeRatio;
   estimate.sources.resize(2);
   estimate.hypotheses.resize(2);
   return estimate;
@@ -91,7 +92,7 @@ std::vector<Fault> faults() {
          e.min_volume_ratio = -0.25;
        }},
       {QualityFlag::kVolumeLost, "at least 0.5",
-       [](Estimate& e) { e.min_volume_ratio = std::nextafter(kLeastVolumeRatio, 0.0); }},
+       [](Estimate& e) { e.min_nodal_volume_ratio = std::nextafter(kLeastVolumeRatio, 0.0); }},
       {QualityFlag::kBeyondSkull, "motion 50.2 mm, at most 50 mm",
        [](Estimate& e) { e.displacement.col(3) = Vec3(0.0, -50.2, 0.0); }},
       {QualityFlag::kBeyondSkull, "3.5 mm deep in the skull, at most 3 mm",
@@ -107,6 +108,7 @@ std::vector<Fault> faults() {
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.initial_misfit_mm.std = kInfinity; }},
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.misfit_ratio = kInfinity; }},
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.min_volume_ratio = -kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.min_nodal_volume_ratio = -kInfinity; }},
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.prior_scales.front() = kNan; }},
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.prior_absent.back() = kNan; }},
       {QualityFlag::kNotFinite, "", [](Estimate& e) { e.hypotheses[1].weight = kNan; }},
