@@ -3,11 +3,15 @@
 # evidence.sh BUILD_DIR [OUT_DIR]: twins of the paper's five patients, against truths that share the
 # estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
 # out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
-# patients-HEAD.md (the paper's Tables 3 to 6 beside ours), tables.md, summary.json; landmarks.csv
-# where BRAINSHIFT_EXTERNAL_DATA has landmarks. Exit status 0 only if every check holds.
+# patients-HEAD.md (the paper's Tables 3 to 6 beside ours), page.md (the tables of docs/evidence.md),
+# tables.md, summary.json; landmarks.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks; patient-N/, a
+# report of patients 1 to 4 as the daemon and the client play them (the paper's Figs. 6 to 8).
+# Exit status 0 only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
-#   HEADS="..."      case files of heads (default: colin27; mni152 needs BRAINSHIFT_EXTERNAL_DATA;
-#                    the truth `calculix` is of colin27 alone)
+#   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/ and resect_case4/; without it the second head
+#                    and the landmarks are left out
+#   HEADS="..."      case files of heads (default: colin27, and mni152 where it can be had; the truth
+#                    `calculix` is of colin27 alone)
 #   SEEDS=N          surgeries per patient and truth (default: 2)
 #   QUICK=1          patients 1 and 2, consistency, mesh, gap and all, one seed (1001), 6 thousand nodes;
 #                    into out/evidence-quick
@@ -28,8 +32,38 @@ if [ "${QUICK:-0}" = 1 ]; then
 fi
 resume_study "$out" "${RESUME:-1}"
 
+# The paper's Figs. 6 and 7 (patients 1 and 4; 2 and 3), and Fig. 8 (patients 1 and 2, its own
+# method), from the tumour alone as there.
+play_patient() {
+  local patient=patient-$1 case_file=config/cases/patient-$1.yaml reports=()
+  local folder=$out/$patient
+  mkdir -p "$folder/runs" || return
+  "$bin/brainshiftd" prepare --case "$case_file" --out "$folder/model.h5" >"$folder/prepare.log" || return
+  start_daemon "$folder/model.h5" || return
+  "$bin/brainshift" simulate --case "$case_file" --scenario "$patient" --seed 1 \
+    --out "$folder/$patient.surgery" >"$folder/simulate.log" || return
+  local methods=(condensed)
+  if [ "$1" -le 2 ]; then methods+=(paper); fi
+  for method in "${methods[@]}"; do
+    "$bin/brainshift" replay "$folder/$patient.surgery" --endpoint "$endpoint" --boundary both \
+      --sources ius --method "$method" --report "$folder/runs/$method.json" >"$folder/runs/$method.log" || return
+    reports+=("$folder/runs/$method.json")
+  done
+  "$bin/brainshift" report "${reports[@]}" --out "$folder" >"$folder/report.log" || return
+  stop_daemon || return
+  rm -f "$folder/model.h5"
+}
+
 status=0
-for head in ${HEADS:-colin27}; do
+heads=colin27
+if [ "${QUICK:-0}" != 1 ]; then
+  if [ -d "${BRAINSHIFT_EXTERNAL_DATA:-}/mni152" ]; then
+    heads+=" mni152"
+  else
+    echo "mni152,BRAINSHIFT_EXTERNAL_DATA has no second head" >>"$out/left_out.csv"
+  fi
+fi
+for head in ${HEADS:-$heads}; do
   step "$head" "$bin/evidence" --head "$head" --out "$out/rows-$head.csv" "${options[@]}" || status=1
 done
 pairs=${BRAINSHIFT_EXTERNAL_DATA:-}/resect_case4/Case4-MRI-beforeUS.csv
@@ -38,6 +72,13 @@ if [ -f "$pairs" ]; then
     --out "$out/landmarks.csv" || status=1
 else
   echo "landmarks,BRAINSHIFT_EXTERNAL_DATA has no landmarks of a real operation" >>"$out/left_out.csv"
+fi
+if [ "${QUICK:-0}" = 1 ]; then
+  echo "figures,the paper's Figs. 6 to 8 are not drawn in the short form" >>"$out/left_out.csv"
+else
+  for patient in 1 2 3 4; do
+    step "patient $patient through daemon and client" play_patient "$patient" || status=1
+  done
 fi
 step summary "$bin/evidence_summary" "$out"/rows-*.csv || status=1
 current=summary

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Sourced by demo.sh, bench.sh, verify.sh, stability.sh, sensing.sh, interchange.sh, surgeries.sh,
-# evidence.sh, calculix.sh and prior.sh: timed steps, the daemon, and the end of a script. They set
-# before: `name`, the first word of messages; `bin`, the folder of the programs; `out`, the folder of
-# results. They set `current=summary` before a last command whose own output tells what failed.
+# evidence.sh, replays.sh, calculix.sh and prior.sh: timed steps, the daemon, and the end of a script.
+# They set before: `name`, the first word of messages; `bin`, the folder of the programs; `out`, the
+# folder of results. They set `current=summary` before a last command whose own output tells what failed.
 
 # A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -61,11 +61,11 @@ resume_study() {
 # commit_name: for tables; "-dirty" when files differ from the commit.
 commit_name() { git describe --always --dirty 2>/dev/null || echo unknown; }
 
-# start_daemon MODEL: starts it on a free loopback port; sets `endpoint` and `daemon`.
+# start_daemon MODEL [CONFIG]: starts it on a free loopback port; sets `endpoint` and `daemon`.
 start_daemon() {
   local pipe=$out/daemon.pipe line
   mkfifo "$pipe"
-  "$bin/brainshiftd" serve --config config/daemon.yaml --model "$1" \
+  "$bin/brainshiftd" serve --config "${2:-config/daemon.yaml}" --model "$1" \
     --endpoint 'tcp://127.0.0.1:*' >"$pipe" 2>"$out/daemon.log" &
   daemon=$!
   exec {daemon_output}<"$pipe"

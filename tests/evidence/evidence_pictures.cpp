@@ -73,7 +73,7 @@ Status draw(const Rows& all, const Picture& picture, const std::filesystem::path
   spec.x.names = truths;
   spec.x.from_zero = false;
   spec.y = picture.y;
-  spec.size = {3000, 1000};  // room for the names
+  spec.size = {3400, 1000};  // room for the names
   for (const Dots& dots :
        {Dots{"contact", "contact", -0.36, -0.04, palette::kBlue, client::Marker::kCircle},
         Dots{"fixed", "fixed", 0.04, 0.36, palette::kVermillion, client::Marker::kTriangle}}) {

@@ -1,19 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// evidence_summary TABLE...: checks, pictures and the paper's tables from the tables of `evidence`,
-// one per head, into $BRAINSHIFT_STUDY_DIR (tests/support/study_record.hpp). Measures nothing;
-// whether the checks hold is for study_summary to say.
+// evidence_summary TABLE...: checks, pictures, the paper's tables and those of docs/evidence.md from
+// the tables of `evidence`, one per head, into $BRAINSHIFT_STUDY_DIR (study_record.hpp). It measures
+// nothing; study_summary tells whether the checks hold.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <string>
 #include <vector>
 
+#include "common/io/files/file_access.hpp"
 #include "tests/evidence/evidence_checks.hpp"
 #include "tests/evidence/evidence_pictures.hpp"
+#include "tests/evidence/page_tables.hpp"
 #include "tests/evidence/patient_tables.hpp"
 
 namespace brainshift::evidence {
 namespace {
+
+// The tables of docs/evidence.md, from what the study has written so far.
+Status write_page(const surgeries::Rows& rows, const std::filesystem::path& folder) {
+  const auto checks = bench::CsvTable::read(folder / "checks.csv");
+  if (!checks) return tl::unexpected(checks.error());
+  std::string page = claims_table(*checks);
+  for (const std::string& head : rows.values("head")) {
+    page += "\n" + head + "\n\n" + truths_table(rows.where("head", head));
+  }
+  if (std::filesystem::exists(folder / "landmarks.csv")) {
+    const auto landmarks = bench::CsvTable::read(folder / "landmarks.csv");
+    if (!landmarks) return tl::unexpected(landmarks.error());
+    page += "\n" + landmarks_table(*landmarks);
+  }
+  return io::write_file(folder / "page.md", page);
+}
 
 Status run(const std::vector<std::filesystem::path>& files) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
@@ -36,6 +55,7 @@ Status run(const std::vector<std::filesystem::path>& files) {
     const auto file = std::filesystem::path(folder) / ("patients-" + head + ".md");
     if (Status ok = write_patient_tables(own, file); !ok) return ok;
   }
+  if (Status ok = write_page(rows, folder); !ok) return ok;
   return draw_evidence(rows, folder);
 }
 

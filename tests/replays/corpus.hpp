@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The corpus that `make replays` plays: five surgeries of 15 to 20 different observations each,
+// made from seeds by the twin. None is there twice: the fluid falls from moment to moment.
+//
+// Two clocks. An observation is acquired as its scenario says (moments 30 or 300 s apart), and
+// that decides how old the data of a source are (sensing.max_age_s). It is recorded, and played at
+// 1x, in time lapse: a moment's instruments kBetween_s apart, and moments so far apart that an
+// observation has kPerObservation_s on average. No operating room is faster.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/replay/play.hpp"
+#include "client/twin/scenario.hpp"
+#include "client/twin/surgery.hpp"
+#include "common/core/error.hpp"
+#include "common/io/recording/surgery_record.hpp"
+
+namespace brainshift::replays {
+
+inline constexpr double kPerObservation_s = 0.75;
+inline constexpr double kBetween_s = 0.25;
+
+struct CorpusSurgery {
+  std::string name;           // of its file
+  client::Scenario scenario;  // of the twin, with the moments of this corpus
+  std::uint64_t seed = 0;
+};
+
+// In the order in which they are played.
+const std::vector<CorpusSurgery>& corpus();
+
+// What a recorder would have kept: the observations of a played scenario, recorded in time lapse.
+// Precondition: every moment has the same number of observations, moments as many as the scenario.
+std::vector<client::RecordedObservation> record(const client::SimulatedSurgery& surgery,
+                                                std::size_t moments);
+
+// A surgery file without truth. kWriteFailed when it exists or cannot be written; nothing is left
+// behind then.
+Status write_recording(const std::filesystem::path& path, const io::SurgeryMeta& meta,
+                       const std::vector<client::RecordedObservation>& recording);
+
+struct Recording {
+  io::SurgeryMeta meta;
+  std::vector<client::RecordedObservation> observations;  // not empty
+};
+// kNotFound, kUnreadable; kEmptySet without an observation.
+Result<Recording> read_recording(const std::filesystem::path& path);
+
+}  // namespace brainshift::replays

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/replays/replay_player.hpp"
+
+namespace brainshift::replays {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kPatience{120000};  // without any answer
+constexpr double kOtherMesh_mm = 1e9;
+
+Result<wire::SessionInfo> start(client::Client& client, const std::string& endpoint,
+                                const Recording& recording, PassFacts& facts) {
+  const auto status = client.status();
+  if (!status) return tl::unexpected(status.error());
+  const io::SurgeryMeta& meta = recording.meta;
+  if (status->case_id != meta.case_id || status->model_id != meta.model_id) {
+    return fail(ErrorCode::kInvalidArgument,
+                facts.surgery + ": of case \"" + meta.case_id + "\" and model \"" + meta.model_id +
+                    "\", but the daemon at " + endpoint + " serves \"" + status->case_id +
+                    "\" and \"" + status->model_id + "\"");
+  }
+  auto info = client.start_session(
+      {.case_id = meta.case_id, .measure_full_solve = true, .recorded_clock = true});
+  if (!info) return info;
+  if (Status ok = client.subscribe(Subscription::kMaxWindow); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  facts.head = status->case_id;
+  facts.kernel = status->blas_kernel;
+  facts.nodes = info->nodes;
+  facts.t_solve_ms = info->full_solve_ms;
+  return info;
+}
+
+}  // namespace
+
+std::optional<double> KnownFields::compare(const std::string& evidence,
+                                           const Points& displacement) {
+  const auto known = fields_.find(evidence);
+  if (known == fields_.end()) {
+    fields_.emplace(evidence, displacement);
+    return std::nullopt;
+  }
+  if (known->second.cols() != displacement.cols()) return kOtherMesh_mm;
+  return (known->second - displacement).cwiseAbs().maxCoeff();
+}
+
+client::DaemonLink Tap::link() {
+  return {[this](const Observation& observation) {
+            const auto now = Clock::now();
+            if (!start_) start_ = now;
+            passed_[observation.sequence].sent_ms =
+                std::chrono::duration<double, std::milli>(now - *start_).count();
+            return link_.submit(observation);
+          },
+          [this](std::chrono::milliseconds timeout) {
+            auto message = link_.next_update(timeout);
+            if (message) note(*message);
+            return message;
+          }};
+}
+
+void Tap::note(const wire::UpdateMessage& message) {
+  const Update& update = message.update;
+  if (message.session_id != session_id_ || message.error || !update.final) return;
+  Passed& passed = passed_[update.observation_sequence];
+  passed.answer = update.answer_time;
+  passed.evidence = evidence_of(update.estimate.sources);
+  passed.difference_mm = fields_.compare(passed.evidence, update.estimate.displacement);
+}
+
+PlayedRow Tap::row_of(const client::PlayedObservation& played) const {
+  PlayedRow row;
+  row.played = played;
+  const auto found = passed_.find(played.sequence);
+  if (found == passed_.end()) return row;
+  row.sent_ms = found->second.sent_ms;
+  row.answer = found->second.answer;
+  row.evidence = found->second.evidence;
+  row.difference_mm = found->second.difference_mm;
+  return row;
+}
+
+Result<std::vector<surgeries::Row>> play_pass(const std::string& endpoint,
+                                              const Recording& recording, PassFacts facts,
+                                              KnownFields& fields) {
+  auto client = client::Client::connect(endpoint);
+  if (!client) return tl::unexpected(client.error());
+  const auto info = start(*client, endpoint, recording, facts);
+  if (!info) return tl::unexpected(info.error());
+  Tap tap({[&](const Observation& observation) { return client->submit(observation); },
+           [&](std::chrono::milliseconds timeout) { return client->next_update(timeout); }},
+          info->session_id, fields);
+  client::PlayOptions options;
+  options.session_id = info->session_id;
+  options.speed = facts.speed;
+  options.timeout = kPatience;
+  const client::PlayedSession played = client::play(tap.link(), recording.observations, options);
+
+  std::vector<surgeries::Row> rows;
+  const std::int64_t first_ns = recording.observations.front().recorded_ns;
+  for (std::size_t i = 0; i < played.observations.size(); ++i) {
+    PlayedRow row = tap.row_of(played.observations[i]);
+    row.source = recording.observations[i].observation.source;
+    row.due_ms = 1e-6 * static_cast<double>(recording.observations[i].recorded_ns - first_ns);
+    rows.push_back(replays::row_of(facts, static_cast<int>(i) + 1, row));
+  }
+  return rows;
+}
+
+}  // namespace brainshift::replays

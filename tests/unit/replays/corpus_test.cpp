@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/replays/corpus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "common/wire/convert.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace brainshift::replays {
+namespace {
+
+// As the twin makes them: two moments of three instruments, two seconds apart.
+client::SimulatedSurgery two_moments() {
+  client::SimulatedSurgery surgery;
+  for (int i = 0; i < 6; ++i) {
+    Observation observation;
+    observation.case_id = "c";
+    observation.source = i % 3 == 0 ? "ius" : i % 3 == 1 ? "stereopsis" : "tracks";
+    observation.sequence = static_cast<std::uint64_t>(i) + 1;
+    observation.acquired_ns = 300'000'000'000 * (i / 3) + 2'000'000'000 * (i % 3);
+    observation.body = TumourBoundary{Points::Constant(3, 4, i), 0.5};
+    surgery.observations.push_back(observation);
+  }
+  return surgery;
+}
+
+TEST(Corpus, IsFiveSurgeriesWhoseMomentsAllDiffer) {
+  ASSERT_EQ(corpus().size(), 5u);
+  std::set<std::string> names;
+  for (const CorpusSurgery& one : corpus()) {
+    names.insert(one.name);
+    const auto& levels = one.scenario.fluid_levels_mm;
+    EXPECT_EQ(std::set<double>(levels.begin(), levels.end()).size(), levels.size()) << one.name;
+    const std::size_t instruments = one.scenario.cortex ? 3 : 1;
+    EXPECT_GE(levels.size() * instruments, 12u) << one.name;
+    EXPECT_LE(levels.size() * instruments, 20u) << one.name;
+  }
+  EXPECT_EQ(names.size(), 5u);
+}
+
+TEST(Corpus, LeavesTheScenariosOfTheTwinAsTheyAre) {
+  (void)corpus();
+  EXPECT_EQ(client::find_scenario("joint-mixed")->fluid_levels_mm, std::vector<double>{30.0});
+}
+
+TEST(Corpus, IsRecordedInTimeLapseAndAcquiredAsTheScenarioSays) {
+  const auto surgery = two_moments();
+  const auto recording = record(surgery, 2);
+  ASSERT_EQ(recording.size(), 6u);
+  const std::int64_t expected_ms[] = {0, 250, 500, 2250, 2500, 2750};
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(recording[i].recorded_ns, 1'000'000 * expected_ms[i]);
+    EXPECT_EQ(recording[i].observation.acquired_ns, surgery.observations[i].acquired_ns);
+  }
+}
+
+TEST(Corpus, ReadsWhatItWrote) {
+  const test_support::TemporaryFolder folder;
+  const auto recording = record(two_moments(), 2);
+  io::SurgeryMeta meta;
+  meta.case_id = "c";
+  meta.model_id = "m";
+  meta.seed = 7;
+  ASSERT_TRUE(write_recording(folder / "one.surgery", meta, recording));
+  const auto read = read_recording(folder / "one.surgery");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->meta, meta);
+  ASSERT_EQ(read->observations.size(), recording.size());
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    EXPECT_EQ(read->observations[i].recorded_ns, recording[i].recorded_ns);
+    EXPECT_EQ(wire::encode(read->observations[i].observation),
+              wire::encode(recording[i].observation));
+  }
+}
+
+TEST(Corpus, RefusesAFileThatExistsAndOneWithoutObservations) {
+  const test_support::TemporaryFolder folder;
+  io::SurgeryMeta meta;
+  meta.case_id = "c";
+  ASSERT_TRUE(write_recording(folder / "one.surgery", meta, record(two_moments(), 2)));
+  const auto again = write_recording(folder / "one.surgery", meta, {});
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::kWriteFailed);
+  EXPECT_TRUE(read_recording(folder / "one.surgery")) << "the first is still there";
+
+  EXPECT_EQ(read_recording(folder / "none.surgery").error().code, ErrorCode::kNotFound);
+  ASSERT_TRUE(write_recording(folder / "empty.surgery", meta, {}));
+  EXPECT_EQ(read_recording(folder / "empty.surgery").error().code, ErrorCode::kEmptySet);
+}
+
+}  // namespace
+}  // namespace brainshift::replays
