@@ -6,13 +6,14 @@
 #include "client/plot/sheet.hpp"
 #include "client/plot/ticks.hpp"
 #include "client/report/figures.hpp"
+#include "client/report/slice_windows.hpp"
 #include "client/slices/slice_panel.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::client {
 namespace {
 
-constexpr double kWholeHead_px_per_mm = 5.0;
+constexpr double kCloseUpHalf_mm = 34.0;
 constexpr double kCloseUp_px_per_mm = 12.0;
 constexpr double kArrowSpacing_mm = 9.0;
 constexpr double kMapSpacing_mm = 1.0;
@@ -39,28 +40,6 @@ struct Scene {
   std::string scenario;
   std::string method;
 };
-
-SliceWindow whole_head(const Scene& scene, Plane plane) {
-  constexpr double kMargin_mm = 10.0;
-  const Vec3 low = scene.mesh.nodes.rowwise().minCoeff().array() - kMargin_mm;
-  const Vec3 high = scene.mesh.nodes.rowwise().maxCoeff().array() + kMargin_mm;
-  SliceWindow window{plane, 0.0, low.x(), high.x(), 0.0, 0.0, kWholeHead_px_per_mm};
-  window.offset_mm = scene.head.craniotomy_centre(window.normal_axis());
-  window.up_min = low(window.up_axis());
-  window.up_max = high(window.up_axis());
-  return window;
-}
-
-SliceWindow close_up(const Scene& scene, Plane plane) {
-  constexpr double kHalf_mm = 34.0;
-  const Vec3& centre = scene.head.tumour_centre;
-  SliceWindow window{plane, 0.0, centre.x() - kHalf_mm, centre.x() + kHalf_mm,
-                     0.0,   0.0, kCloseUp_px_per_mm};
-  window.offset_mm = centre(window.normal_axis());
-  window.up_min = centre(window.up_axis()) - kHalf_mm;
-  window.up_max = centre(window.up_axis()) + kHalf_mm;
-  return window;
-}
 
 // Longest projection on the slice: what an arrow shows of a displacement.
 double largest_in_plane(const SliceSamples& samples, const Points& field,
@@ -137,7 +116,7 @@ std::string slice_name(const Scene& scene, const SliceWindow& window, const char
 }
 
 cv::Mat shift_sheet(const Scene& scene, Plane plane) {
-  const SliceWindow window = whole_head(scene, plane);
+  const SliceWindow window = whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, plane);
   const SliceSamples samples = sample_slice(scene.locator, window, kArrowSpacing_mm);
   std::vector<const Points*> fields;
   for (const Estimated& e : scene.estimates) fields.push_back(e.displacement);
@@ -173,7 +152,8 @@ cv::Mat shift_sheet(const Scene& scene, Plane plane) {
 }
 
 cv::Mat close_up_sheet(const Scene& scene, Plane plane) {
-  const SliceWindow window = close_up(scene, plane);
+  const SliceWindow window =
+      close_up(scene.head.tumour_centre, kCloseUpHalf_mm, kCloseUp_px_per_mm, plane);
   Sheet sheet;
   sheet.title = "Tumour and brain surface: " + scene.scenario;
   sheet.subtitle = slice_name(scene, window, "tumour centre") + "; displacements at true scale";
@@ -198,7 +178,8 @@ double difference_factor(double largest_difference_mm, double largest_true_mm) {
 
 // Precondition: truth.
 cv::Mat difference_sheet(const Scene& scene) {
-  const SliceWindow window = whole_head(scene, Plane::kAxial);
+  const SliceWindow window =
+      whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, Plane::kAxial);
   const SliceSamples samples = sample_slice(scene.locator, window, kArrowSpacing_mm);
   const double largest = largest_on(samples, *scene.truth);
   const double magnification = arrow_magnification(largest_in_plane(samples, *scene.truth, window));
@@ -227,7 +208,8 @@ cv::Mat difference_sheet(const Scene& scene) {
 
 // Precondition: truth.
 cv::Mat error_sheet(const Scene& scene) {
-  const SliceWindow window = whole_head(scene, Plane::kAxial);
+  const SliceWindow window =
+      whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, Plane::kAxial);
   const SliceSamples samples = sample_slice(scene.locator, window, kMapSpacing_mm);
   double largest = 0.0;
   for (const Estimated& e : scene.estimates) {

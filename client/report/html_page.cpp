@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "client/report/verdict.hpp"
 #include "common/io/files/binary_codec.hpp"
 
 namespace brainshift::client {
@@ -31,6 +32,17 @@ tbody th { text-align: left; font-weight: normal; white-space: normal; min-width
 .paper { background: var(--paper); }
 figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; border: 1px solid var(--rule); border-radius: 6px; background: #ffffff; }
 figcaption { font-size: 0.9rem; }
+p.verdict-sentence { font-size: 1.15rem; font-weight: 600; }
+table.fits { width: 100%; font-size: 0.82rem; } table.fits th, table.fits td { white-space: normal; padding: 0.3rem 0.4rem; min-width: 0; }
+table.fits tr.paper th, table.fits tr.paper td { background: var(--paper); }
+figure.slide { display: inline-block; margin: 0.5rem 1rem 1rem 0; max-width: 33rem; vertical-align: top; }
+figure.slide input { position: absolute; opacity: 0; }
+figure.slide label { display: inline-block; cursor: pointer; border: 2px solid var(--rule); padding: 0.15rem 0.9rem; margin: 0 0 0.4rem -2px; }
+figure.slide input:checked + label { background: var(--good); color: var(--ground); border-color: var(--good); font-weight: 600; }
+figure.slide input:focus-visible + label { outline: 3px solid var(--caution); }
+.stack { display: grid; } .stack img { grid-area: 1 / 1; visibility: hidden; }
+figure.slide input.p0:checked ~ .stack img.p0, figure.slide input.p1:checked ~ .stack img.p1,
+figure.slide input.p2:checked ~ .stack img.p2 { visibility: visible; }
 .failures { color: var(--warn); }
 .words { display: inline-block; max-width: 24rem; white-space: normal; text-align: left; }
 .verdict { border: 2px solid var(--rule); border-radius: 6px; padding: 0.05rem 0.45rem; white-space: nowrap; }
@@ -83,10 +95,28 @@ std::string picture(const PagePicture& picture) {
          escape_html(picture.caption) + "</figcaption></figure>\n";
 }
 
+std::string slide(const PageSlide& slide, std::size_t number) {
+  const std::string name = "slide" + std::to_string(number);
+  std::string inputs, images;
+  for (std::size_t i = 0; i < slide.positions.size(); ++i) {
+    const std::string id = name + "-" + std::to_string(i);
+    const std::string label = escape_html(slide.positions[i].label);
+    inputs += "<input type=\"radio\" name=\"" + name + "\" id=\"" + id + "\" class=\"p" +
+              std::to_string(i) + "\"" + (i == 1 ? " checked" : "") + "><label for=\"" + id +
+              "\">" + label + "</label>\n";
+    images += "<img class=\"p" + std::to_string(i) + "\" alt=\"" + label + "\" width=\"" +
+              std::to_string(slide.width) + "\" height=\"" + std::to_string(slide.height) +
+              "\" src=\"data:image/png;base64," + io::base64_encode(slide.positions[i].png) + "\">";
+  }
+  return "<figure class=\"slide\">" + inputs + "<div class=\"stack\">" + images +
+         "</div><figcaption>" + escape_html(slide.caption) + "</figcaption></figure>\n";
+}
+
 }  // namespace
 
 std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
-                      const std::vector<PagePicture>& pictures) {
+                      const std::vector<PagePicture>& pictures,
+                      const std::vector<PageSlide>& slides) {
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
@@ -97,8 +127,18 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
       "<p class=\"note\">Research software for simulation, replay and laboratory use. It is no "
       "medical device and "
       "must not guide the treatment of patients.</p>\n";
-  html += scenario_list(runs, groups);
+  html += "<p class=\"verdict-sentence\">" + escape_html(verdict(runs)) + "</p>\n";
   html += section("Failures", failure_list(runs));
+  std::string shown;
+  for (std::size_t i = 0; i < slides.size(); ++i) shown += slide(slides[i], i);
+  html += section("Before, estimate and truth", shown);
+  html += section(
+      "In short",
+      summary_table(runs) +
+          "<p class=\"soft\">Each line is a run, the blue ones are published: " + kCitation +
+          " Errors are means, at points of the tumour that were not measured and by "
+          "closest point at the craniotomy.</p>\n");
+  html += section("The runs", scenario_list(runs, groups));
   html +=
       section("Quality of the fields",
               quality_table(runs) +

@@ -17,8 +17,22 @@ struct PagePicture {
   int height = 0;
 };
 
+// Pictures of one size on each other, of which the reader chooses one: radio buttons and a style
+// sheet, so that the page needs no script.
+struct PageSlide {
+  struct Position {
+    std::string label;  // plain text
+    std::string png;
+  };
+  std::vector<Position> positions;  // the second is shown first: the estimate
+  std::string caption;
+  int width = 0, height = 0;
+};
+
+// The page opens with verdict() and summary_table(), the slides, and pictures; details follow.
 std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
-                      const std::vector<PagePicture>& pictures);
+                      const std::vector<PagePicture>& pictures,
+                      const std::vector<PageSlide>& slides = {});
 
 // The page's parts, as HTML.
 std::string error_table(const std::vector<ReportedRun>& runs);  // beside the paper's values

@@ -152,9 +152,12 @@ std::string source_table(const std::vector<ReportedRun>& runs) {
     }
   }
   if (rows.empty()) return "";
-  return "<table>\n<tr><th>run</th><th>instrument</th><th>observation</th><th>age (s)</th>"
-         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr>\n" +
-         rows + "</table>\n";
+  return "<table "
+         "class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>observation</th><th>age "
+         "(s)</th>"
+         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr></"
+         "thead>\n<tbody>" +
+         rows + "</tbody></table>\n";
 }
 
 std::string left_out_list(const std::vector<ReportedRun>& runs) {

@@ -29,4 +29,9 @@ inline constexpr double kTime_s = 186.0;
 // The paper does not state it; it follows from the paper's own definition.
 inline constexpr double kFixedRecovery_pct = 100.0 * (1.0 - 0.53 / 2.9);
 
+// Means of the five patients (abstract, section 5), from data at the tumour alone, with contact.
+inline constexpr double kPatientsRecovery_pct = 85.0;
+inline constexpr double kPatientsCraniotomy_mm = 1.6;  // closest point distance
+inline constexpr double kPatientsTime_s = 3.9 * 60.0;
+
 }  // namespace brainshift::client::paper

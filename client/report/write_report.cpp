@@ -8,6 +8,7 @@
 #include "client/report/figures.hpp"
 #include "client/report/head.hpp"
 #include "client/report/html_page.hpp"
+#include "client/report/warped_slices.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
@@ -89,12 +90,40 @@ std::vector<Figure> draw_figures(const std::vector<ReportedRun>& runs,
   return figures;
 }
 
-Result<std::string> encode_png(const Figure& figure) {
+Result<std::string> encode_png(const std::string& file_name, const cv::Mat& image) {
   std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", figure.image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
-    return fail(ErrorCode::kInternal, figure.file_name + ": cannot be encoded as PNG");
+  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
+    return fail(ErrorCode::kInternal, file_name + ": cannot be encoded as PNG");
   }
   return std::string(bytes.begin(), bytes.end());
+}
+
+// Writes the pictures of every position, too.
+Result<std::vector<PageSlide>> write_slides(const std::vector<ReportedRun>& runs,
+                                            const std::vector<RunGroup>& groups,
+                                            const std::map<std::string, Head>& heads,
+                                            const fs::path& out) {
+  std::vector<PageSlide> slides;
+  for (const RunGroup& group : groups) {
+    const auto head =
+        heads.find(runs[group.contact ? *group.contact : *group.fixed].report.case_file);
+    if (head == heads.end()) continue;
+    for (const Slide& slide : warped_slices(group, runs, head->second)) {
+      PageSlide page;
+      page.caption = slide.caption;
+      for (const SlidePosition& position : slide.positions) {
+        const std::string name = slide.file_name + "-" + position.label + ".png";
+        auto png = encode_png(name, position.image);
+        if (!png) return tl::unexpected<Error>(png.error());
+        if (Status ok = io::write_file(out / name, *png); !ok) return tl::unexpected(ok.error());
+        page.positions.push_back({position.label, std::move(*png)});
+        page.width = position.image.cols;
+        page.height = position.image.rows;
+      }
+      slides.push_back(std::move(page));
+    }
+  }
+  return slides;
 }
 
 }  // namespace
@@ -114,13 +143,16 @@ Status write_report(const ReportOptions& options, const Progress& progress) {
   const std::vector<RunGroup> groups = group_runs(*runs);
   std::vector<PagePicture> pictures;
   for (const Figure& figure : draw_figures(*runs, groups, *heads, progress)) {
-    auto png = encode_png(figure);
+    auto png = encode_png(figure.file_name, figure.image);
     if (!png) return tl::unexpected<Error>(png.error());
     if (Status ok = io::write_file(options.out / figure.file_name, *png); !ok) return ok;
     pictures.push_back({std::move(*png), figure.caption, figure.image.cols / kPixelRatio,
                         figure.image.rows / kPixelRatio});
   }
-  if (Status ok = io::write_file(options.out / "report.html", html_page(*runs, groups, pictures));
+  const auto slides = write_slides(*runs, groups, *heads, options.out);
+  if (!slides) return tl::unexpected<Error>(slides.error());
+  if (Status ok =
+          io::write_file(options.out / "report.html", html_page(*runs, groups, pictures, *slides));
       !ok)
     return ok;
   std::vector<RunReport> merged;

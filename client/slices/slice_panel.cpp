@@ -98,15 +98,19 @@ std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface,
 SlicePanel::SlicePanel(const SliceWindow& window)
     : window_(window), image_(window.size(), CV_8UC3, palette::kBlack) {}
 
-void SlicePanel::draw_mri(const VoxelImage& mri, double brightness) {
+void SlicePanel::draw_mri(const VoxelImage& mri, double brightness, const Origin& origin) {
   const geometry::Interpolator at(mri);
   cv::Mat_<float> grey(image_.size());
   std::vector<double> seen;
   for (int y = 0; y < grey.rows; ++y) {
     for (int x = 0; x < grey.cols; ++x) {
-      const float value = at(window_.position({x + 0.5, y + 0.5}));
+      const Vec3 place = window_.position({x + 0.5, y + 0.5});
+      const std::optional<Vec3> shown = origin ? origin(place) : place;
+      const float value = shown ? at(*shown) : 0.0f;
       grey(y, x) = value;
-      if (value > 0.0f && x % 4 == 0 && y % 4 == 0) seen.push_back(value);
+      if (x % 4 != 0 || y % 4 != 0) continue;
+      const float still = origin ? at(place) : value;
+      if (still > 0.0f) seen.push_back(still);
     }
   }
   if (seen.empty()) return;

@@ -8,7 +8,9 @@
 // colour shows the full length of the displacement.
 #pragma once
 
+#include <functional>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,7 +66,10 @@ class SlicePanel {
 
   // Grey values from black at the 1st percentile of the slice's
   // non-zero values to `brightness` (0 to 1) of white at the 99.5th.
-  void draw_mri(const VoxelImage& mri, double brightness);
+  // With `origin` a place of the slice shows the image at origin(place), in the same greys; nothing
+  // where that is null.
+  using Origin = std::function<std::optional<Vec3>(const Vec3& x_ras)>;
+  void draw_mri(const VoxelImage& mri, double brightness, const Origin& origin = {});
   // Colours the samples' cells by the length of the field; max_mm: the end of the colour scale.
   void draw_magnitude_map(const SliceSamples& samples, const Points& field, double max_mm,
                           double opacity);

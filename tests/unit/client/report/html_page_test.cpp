@@ -33,5 +33,25 @@ TEST(Html, PageSaysWhatItIsNotForAndCitesThePaper) {
   EXPECT_THAT(page, HasSubstr("pressure"));
 }
 
+TEST(Html, PageOpensWithTheVerdict) {
+  const ReportedRun run{small_run("contact"), std::nullopt};
+  const std::string page = html_page({run}, group_runs({run}), {});
+  EXPECT_LT(page.find("recovered 93.8 %"), page.find("<h2>"));
+}
+
+TEST(Html, ASlideHasAButtonAndAnImagePerPositionAndShowsTheEstimateFirst) {
+  const ReportedRun run{small_run("contact"), std::nullopt};
+  PageSlide slide;
+  slide.positions = {{"before", "a"}, {"estimate", "b"}, {"<truth>", "c"}};
+  slide.caption = "the slice";
+  const std::string page = html_page({run}, group_runs({run}), {}, {slide, slide});
+  EXPECT_THAT(page, HasSubstr("id=\"slide1-2\""));
+  EXPECT_THAT(page,
+              HasSubstr("id=\"slide0-1\" class=\"p1\" checked><label for=\"slide0-1\">estimate"));
+  EXPECT_THAT(page, HasSubstr("&lt;truth&gt;"));
+  EXPECT_THAT(page, Not(HasSubstr("<script")));
+  EXPECT_THAT(page, Not(HasSubstr("http")));
+}
+
 }  // namespace
 }  // namespace brainshift::client
