@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// evidence_summary TABLE...: checks, pictures, the paper's tables and those of docs/evidence.md from
-// the tables of `evidence`, one per head, into $BRAINSHIFT_STUDY_DIR (study_record.hpp). It measures
-// nothing; study_summary tells whether the checks hold.
+// evidence_summary TABLE...: checks, pictures, the paper's tables and those of docs/evidence.md
+// from the tables of `evidence`, one per head, into $BRAINSHIFT_STUDY_DIR (study_record.hpp). It
+// measures nothing; study_summary tells whether the checks hold.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>

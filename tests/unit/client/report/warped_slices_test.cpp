@@ -50,7 +50,7 @@ TEST(WarpedSlices, ShowTheTissueWhereTheFieldHasPutIt) {
   EXPECT_EQ(coronal.positions[0].label, "before");
   EXPECT_EQ(coronal.positions[1].label, "estimate");
   EXPECT_EQ(coronal.positions[2].label, "truth");
-  // 6 px per mm, up is up: what was 6 mm (36 px) higher is seen after a sag of 6 mm, and the reverse.
+  // 6 px per mm, up is up: what was 6 mm (36 px) higher is seen after a sag of 6 mm; the reverse.
   const int row = coronal.positions[0].image.rows / 2;
   EXPECT_NEAR(grey(coronal.positions[1].image, row), grey(coronal.positions[0].image, row - 36), 2);
   EXPECT_NEAR(grey(coronal.positions[2].image, row), grey(coronal.positions[0].image, row + 36), 2);
