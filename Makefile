@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries evidence replays calculix prior faults fuzz documents format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries evidence ablations replays calculix prior faults fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -62,6 +62,10 @@ surgeries: configure ## many different simulated surgeries on two heads, scored,
 evidence: configure ## twins of the paper's five patients against truths with another mesh, gap, stiffness ..., into out/evidence; QUICK=1
 	cmake --build --preset $(PRESET) -j $(JOBS) --target evidence_programs
 	cmake/scripts/evidence.sh $(BUILD)
+
+ablations: configure ## what each part of the default estimate buys: it is switched off, one at a time, into out/ablations; QUICK=1
+	cmake --build --preset $(PRESET) -j $(JOBS) --target ablation_programs
+	cmake/scripts/ablations.sh $(BUILD)
 
 replays: configure ## five recorded surgeries through the daemon at 1x and at full speed, timed, into out/replays; QUICK=1
 	cmake --build --preset $(PRESET) -j $(JOBS) --target replay_programs

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tests/surgeries/surgery_rows.hpp"
+
 namespace brainshift::evidence {
 namespace {
 
@@ -59,7 +61,7 @@ surgeries::RowFile::Key EvidenceKey::texts() const {
   return {head, std::to_string(patient), truth, std::to_string(seed)};
 }
 
-std::string data_name(int update) { return update == 0 ? "tumour" : "tumour+cortex"; }
+std::string data_name(int update) { return surgeries::stage_name(update); }
 
 surgeries::Row row_of(const EvidenceFigures& figures, const io::SurgeryTruth& truth,
                       const Update& update, const surgeries::UpdateScore& score) {

@@ -22,7 +22,7 @@ struct EvidenceKey {
 };
 inline const std::vector<std::string> kEvidenceKey = {"head", "patient", "truth", "seed"};
 
-// What an update had: "tumour", "tumour+cortex".
+// What an update had: "tumour", "tumour+cortex", "tumour+cortex+tracks".
 std::string data_name(int update);  // from 0
 
 struct EvidenceFigures {

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The truths of the ablations: those of `make evidence` (patients' own motions) and motions of
+// `make surgeries` on the patients' heads, which need the families that the patients' do not.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/evidence/patient_twin.hpp"
+
+namespace brainshift::ablations {
+
+// Consistency, each ingredient and all of them; then joint-tangential, joint-mixed,
+// joint-distension and resection. Another code's truth belongs to another mesh.
+const std::vector<std::string>& truth_names();
+
+// What is averaged and tested together: a motion, "consistency", "all ingredients" alone, and the
+// ten ingredients as one.
+std::string group_of(const std::string& truth);
+inline constexpr const char* kEverything = "all surgeries";
+// kEverything, then the groups of truth_names().
+const std::vector<std::string>& group_names();
+
+struct AblationSurgery {
+  std::string truth;
+  std::uint64_t seed = 0;
+};
+// Of one patient: a seed for each truth, and two for each motion, because a motion is varied by its
+// seed and has no group to join. Seeds are first_seed + patient - 1, and kPatients more.
+std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
+                                          const std::vector<std::string>& truths);
+inline constexpr int kPatients = 5;
+
+// Errors of PatientTwin::play. Precondition: the truth is one of truth_names().
+Result<evidence::PlayedSurgery> play(evidence::PatientTwin& twin, const AblationSurgery& surgery);
+
+}  // namespace brainshift::ablations

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The daemon's pipeline (method condensed) for one variant of a patient's case, and the rows of
+// what it makes of a surgery. An estimate sees the observations alone; the truth is read for its
+// score.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "server/pipeline/pipeline.hpp"
+#include "tests/benchmarks/bench_head.hpp"
+#include "tests/evidence/evidence_rows.hpp"
+#include "tests/evidence/patient_twin.hpp"
+#include "tests/evidence/variant.hpp"
+
+namespace brainshift::evidence {
+
+// What an update finds must not depend on what else the machine does; how long it took is a column.
+inline constexpr double kNoDeadline_ms = 1e6;
+
+struct EstimateSession {
+  Variant variant;
+  std::shared_ptr<const inversion::PreparedModel> prepared;
+  std::shared_ptr<const CondensedOperators> operators;
+  std::unique_ptr<server::Pipeline> pipeline;
+};
+
+// head: with the mesh that the variant asks for, and with the operators of the contact boundary
+// where the variant asks for no others. Errors of validate (the change made no valid case),
+// PreparedModel::prepare, condense, condensed_inverter and Pipeline::build.
+Result<EstimateSession> begin_session(const bench::Head& head, const Variant& variant);
+
+// A row per observation that the variant has seen. `figures`: key and nodes; the other members are
+// filled here. A surgery that is absent is one row with its reason, a refused update a row with the
+// refusal. Errors: of scoring.
+Result<std::vector<surgeries::Row>> estimate_rows(const bench::Head& head, EstimateSession& session,
+                                                  const PlayedSurgery& played,
+                                                  EvidenceFigures figures);
+
+}  // namespace brainshift::evidence

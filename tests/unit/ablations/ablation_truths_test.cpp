@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/ablations/ablation_truths.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "client/twin/scenario.hpp"
+#include "tests/evidence/evidence_truths.hpp"
+
+namespace brainshift::ablations {
+namespace {
+
+using testing::Contains;
+using testing::Not;
+
+TEST(AblationTruths, AreThoseOfTheEvidenceAndMotionsThatTheTwinKnows) {
+  EXPECT_THAT(truth_names(), Contains("consistency"));
+  EXPECT_THAT(truth_names(), Contains("all"));
+  EXPECT_THAT(truth_names(), Contains("joint-mixed"));
+  EXPECT_THAT(truth_names(), Not(Contains("calculix")));
+  for (const std::string& name : truth_names()) {
+    EXPECT_TRUE(evidence::find_truth(name) != nullptr || client::find_scenario(name) != nullptr)
+        << name;
+  }
+}
+
+TEST(AblationTruths, EachIsInOneOfTheGroups) {
+  for (const std::string& name : truth_names()) {
+    EXPECT_THAT(group_names(), Contains(group_of(name)));
+  }
+  EXPECT_EQ(group_names().front(), kEverything);
+  EXPECT_EQ(group_of("gap"), group_of("tracker"));
+  EXPECT_NE(group_of("gap"), group_of("all"));
+  EXPECT_NE(group_of("joint-mixed"), group_of("resection"));
+}
+
+TEST(AblationTruths, NoSeedOfAMotionIsPlayedTwice) {
+  std::set<std::uint64_t> seeds;
+  int motions = 0;
+  for (int patient = 1; patient <= kPatients; ++patient) {
+    for (const AblationSurgery& one : surgeries_of(patient, 1, {"consistency", "joint-mixed"})) {
+      if (one.truth != "joint-mixed") continue;
+      ++motions;
+      seeds.insert(one.seed);
+    }
+  }
+  EXPECT_EQ(motions, 2 * kPatients);
+  EXPECT_EQ(seeds.size(), 2u * kPatients);
+}
+
+}  // namespace
+}  // namespace brainshift::ablations
