@@ -2,7 +2,9 @@
 // evidence_summary TABLE...: checks, pictures, the paper's tables and those of docs/evidence.md
 // from the tables of `evidence`, one per head, into $BRAINSHIFT_STUDY_DIR (study_record.hpp). It
 // measures nothing; study_summary tells whether the checks hold.
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
+
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -22,14 +24,16 @@ namespace {
 Status write_page(const surgeries::Rows& rows, const std::filesystem::path& folder) {
   const auto checks = bench::CsvTable::read(folder / "checks.csv");
   if (!checks) return tl::unexpected(checks.error());
-  std::string page = claims_table(*checks);
-  for (const std::string& head : rows.values("head")) {
-    page += "\n" + head + "\n\n" + truths_table(rows.where("head", head));
+  std::string page;
+  for (const std::string& study : surgeries::Rows(*checks).values("study")) {
+    page += fmt::format("{}\n\n{}\n", study, claims_table(*checks, study));
+    const surgeries::Rows head = rows.where("head", study);
+    if (!head.empty()) page += truths_table(head) + "\n";
   }
   if (std::filesystem::exists(folder / "landmarks.csv")) {
     const auto landmarks = bench::CsvTable::read(folder / "landmarks.csv");
     if (!landmarks) return tl::unexpected(landmarks.error());
-    page += "\n" + landmarks_table(*landmarks);
+    page += landmarks_table(*landmarks);
   }
   return io::write_file(folder / "page.md", page);
 }

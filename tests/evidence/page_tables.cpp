@@ -35,11 +35,11 @@ struct Claim {
 
 std::string without_bracket(const std::string& bound) { return bound.substr(0, bound.find(" (")); }
 
-std::vector<Claim> claims_of(const CsvTable& checks) {
+std::vector<Claim> claims_of(const CsvTable& checks, const std::string& study) {
   std::vector<Claim> claims;
   for (std::size_t row = 0; row < checks.rows(); ++row) {
     const std::string& pass = checks.text(row, "pass");
-    if (pass.empty()) continue;
+    if (pass.empty() || checks.text(row, "study") != study) continue;
     const std::string& name = checks.text(row, "name");
     const std::size_t colon = name.find(": ");
     const bool plain = colon == std::string::npos;
@@ -84,9 +84,9 @@ std::string verdict(const Claim& claim) {
 
 }  // namespace
 
-std::string claims_table(const CsvTable& checks) {
+std::string claims_table(const CsvTable& checks, const std::string& study) {
   std::string text = "| figure | bound | measured | |\n|---|---|---|---|\n";
-  for (const Claim& claim : claims_of(checks)) {
+  for (const Claim& claim : claims_of(checks, study)) {
     text += fmt::format("| {} | {} | {} | {} |\n", claim.kind, claim.bound, measured(claim),
                         verdict(claim));
   }

@@ -11,9 +11,10 @@
 namespace brainshift::evidence {
 
 // What is asked against what was measured: a line per kind of check and bound, over the truths that
-// it was held against. checks: the study's checks.csv (study_record.hpp). Figures without a bound
-// are left out. A line ends with "holds", or with what missed its bound and by which value.
-std::string claims_table(const bench::CsvTable& checks);
+// it was held against. checks: the study's checks.csv (study_record.hpp); study: a head of it, or
+// "landmarks". Figures without a bound are left out. A line ends with "holds", or with what missed
+// its bound and by which value.
+std::string claims_table(const bench::CsvTable& checks, const std::string& study);
 
 // A line per truth: recovered at the tumour and CPPD with contact and fixed, from the tumour alone
 // and with the cortex, beside a rigid shift of the tumour; coverage of the 90 % interval; updates
