@@ -68,15 +68,17 @@ struct Mark {
   cv::Scalar colour;
   client::Marker marker;
 };
-const std::array<Mark, 8>& marks() {
-  static const std::array<Mark, 8> all = {{{palette::kBlack, client::Marker::kCircle},
-                                           {palette::kBlue, client::Marker::kCircle},
-                                           {palette::kSkyBlue, client::Marker::kSquare},
-                                           {palette::kGreen, client::Marker::kTriangle},
-                                           {palette::kOrange, client::Marker::kCircle},
-                                           {palette::kVermillion, client::Marker::kSquare},
-                                           {palette::kPurple, client::Marker::kTriangle},
-                                           {palette::kGrey, client::Marker::kSquare}}};
+const std::array<Mark, 10>& marks() {
+  static const std::array<Mark, 10> all = {{{palette::kBlack, client::Marker::kCircle},
+                                            {palette::kBlue, client::Marker::kCircle},
+                                            {palette::kSkyBlue, client::Marker::kSquare},
+                                            {palette::kGreen, client::Marker::kTriangle},
+                                            {palette::kOrange, client::Marker::kCircle},
+                                            {palette::kVermillion, client::Marker::kSquare},
+                                            {palette::kPurple, client::Marker::kTriangle},
+                                            {palette::kGrey, client::Marker::kSquare},
+                                            {palette::kYellow, client::Marker::kCircle},
+                                            {palette::kInk, client::Marker::kTriangle}}};
   return all;
 }
 
@@ -84,7 +86,8 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
             const std::filesystem::path& folder) {
   client::ChartSpec spec;
   spec.title = picture.title;
-  spec.subtitle = "mean over surgeries, updates from all data; above 1: the change made it worse";
+  spec.subtitle =
+      "geometric mean over surgeries, updates from all data; above 1: the change made it worse";
   spec.x.label = "what was changed, one at a time";
   spec.x.from_zero = false;
   spec.y = {.label = "error, changed / default", .log = true};
@@ -98,7 +101,7 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const Difference* found = parts[i].find(picture.measure, groups[g], "all data");
       if (found == nullptr) continue;
-      const double aside = 0.1 * (static_cast<double>(g) - 3.5);
+      const double aside = 0.08 * (static_cast<double>(g) - 4.5);
       series.points.push_back({static_cast<double>(i) + aside, 1.0 + found->change(), ""});
     }
     spec.series.push_back(std::move(series));

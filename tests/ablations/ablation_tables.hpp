@@ -9,9 +9,9 @@
 
 namespace brainshift::ablations {
 
-// A line per part of which there are rows: mean errors over all surgeries, the variant's over the
-// default's; in how many combinations of measure, group and data the part buys something and in how
-// many it costs something (comparison.hpp), and the largest of each.
+// A line per part of which there are rows: errors over all surgeries, the variant's over the
+// default's (geometric means); in how many combinations of measure, group and data the part buys
+// something and in how many it costs something (comparison.hpp), and the largest of each.
 std::string parts_table(const surgeries::Rows& rows);
 
 // Why parts are not among them, a line each.

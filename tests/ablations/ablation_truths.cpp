@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "client/twin/variation.hpp"
+#include "common/core/random.hpp"
 #include "tests/evidence/paper_tables.hpp"
+#include "tests/support/gross_errors.hpp"
 
 namespace brainshift::ablations {
 namespace {
@@ -13,7 +16,21 @@ namespace {
 static_assert(kPatients == evidence::paper::kPatients);
 
 constexpr std::array kMotions = {"joint-tangential", "joint-mixed", "joint-distension",
-                                 "resection"};
+                                 "resection",        "mannitol",    "outliers"};
+
+// Sag of a brain that shrinks by 2 to 4 % of its volume or, every other time, in one hemisphere.
+client::Scenario mannitol(std::uint64_t seed) {
+  client::Scenario scenario = client::vary(*client::find_scenario("joint-sag"), seed);
+  Random random(seed);
+  scenario.volume = {-kLeastShrinkage * (1.0 + random.uniform()), seed % 2 == 0};
+  return scenario;
+}
+
+client::Scenario motion(const AblationSurgery& surgery) {
+  if (surgery.truth == "mannitol") return mannitol(surgery.seed);
+  const char* name = surgery.truth == "outliers" ? "joint-sag" : surgery.truth.c_str();
+  return client::vary(*client::find_scenario(name), surgery.seed);
+}
 
 bool is_motion(const std::string& truth) {
   return std::find(kMotions.begin(), kMotions.end(), truth) != kMotions.end();
@@ -65,8 +82,13 @@ Result<evidence::PlayedSurgery> play(evidence::PatientTwin& twin, const Ablation
   if (!is_motion(surgery.truth)) {
     return twin.play(*evidence::find_truth(surgery.truth), surgery.seed);
   }
-  const client::Scenario& plain = *client::find_scenario(surgery.truth);
-  return twin.play(client::vary(plain, surgery.seed), surgery.seed);
+  auto played = twin.play(motion(surgery), surgery.seed);
+  if (!played || !played->surgery || surgery.truth != "outliers") return played;
+  Random random(surgery.seed);
+  for (Observation& one : played->surgery->observations) {
+    one = test_support::with_gross_errors(std::move(one), kOutliers, random);
+  }
+  return played;
 }
 
 }  // namespace brainshift::ablations

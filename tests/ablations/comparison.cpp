@@ -55,9 +55,17 @@ Updates updates_of(const Rows& rows, bool alone) {
   return chosen;
 }
 
+// Of what has a unit, the logarithms.
 struct Pairs {
   std::vector<double> of_default, of_variant;
 };
+
+// Below this an error is none.
+constexpr double kLeastError_mm = 1e-4;
+double compared(double value, const Measure& measure) {
+  const bool has_unit = *measure.unit != 0;
+  return has_unit ? std::log(std::max(value, kLeastError_mm)) : value;
+}
 
 // Values of both, where both have one, by group; kEverything holds them all.
 std::map<std::string, Pairs> pairs_of(const Rows& without, const Rows& with, const Measure& measure,
@@ -71,8 +79,8 @@ std::map<std::string, Pairs> pairs_of(const Rows& without, const Rows& with, con
     if (!std::isfinite(a) || !std::isfinite(b)) continue;
     for (const std::string& group :
          {std::string(kEverything), group_of(without.text(i, "truth"))}) {
-      groups[group].of_default.push_back(a);
-      groups[group].of_variant.push_back(b);
+      groups[group].of_default.push_back(compared(a, measure));
+      groups[group].of_variant.push_back(compared(b, measure));
     }
   }
   return groups;
@@ -83,8 +91,13 @@ Difference difference_of(const Measure& measure, const Pairs& pairs) {
   difference.measure = measure.name;
   difference.unit = measure.unit;
   difference.pairs = static_cast<int>(pairs.of_default.size());
-  difference.of_default = mean_std(pairs.of_default).mean;
-  difference.of_variant = mean_std(pairs.of_variant).mean;
+  const bool logs = !difference.unit.empty();
+  const auto mean = [logs](const std::vector<double>& values) {
+    const double plain = mean_std(values).mean;
+    return logs ? std::exp(plain) : plain;
+  };
+  difference.of_default = mean(pairs.of_default);
+  difference.of_variant = mean(pairs.of_variant);
   difference.p = evidence::paired_t_test(pairs.of_variant, pairs.of_default).p;
   const double least = difference.unit.empty() ? kLeastCoverage : kLeastChange;
   difference.counts = difference.p < kSignificant && std::abs(difference.change()) > least;

@@ -77,6 +77,16 @@ std::vector<Part> prior_parts() {
            c.prior.correlation_length_mm = kLeastFineLength_mm;
            c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
          }),
+      of("what the smooth remainder can stand for", "lean",
+         {"prior.gravity_direction_sd_deg", "prior.brain_volume_strain_sd",
+          "prior.opening_pressure_sd_pa", "prior.force_density_sd_n_m3",
+          "prior.coarse_density_sd_n_m3"},
+         "without buoyancy across gravity, brain volume, opening, fine and coarse remainder",
+         [](CaseConfig& c) {
+           c.prior.gravity_direction_sd_deg = c.prior.brain_volume_strain_sd = 0.0;
+           c.prior.opening_pressure_sd_pa = c.prior.coarse_density_sd_n_m3 = 0.0;
+           c.prior.force_density_sd_n_m3 = kLeastDensity_n_m3;
+         }),
       of("rank", "half-rank", {"condensed.max_rank"}, "`condensed.max_rank: 96`",
          [](CaseConfig& c) { c.condensed.max_rank = kHalfRank; }),
   };

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same measurements with and without gross errors in a fifth of the points: up to 20 mm in any
-// direction for boundary points, up to 10 mm for displacements (data_check.hpp rejects data whose
-// neighbours differ by more than 15 mm).
+// The same measurements with and without gross errors (gross_errors.hpp) in a fifth of the points.
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -10,6 +8,7 @@
 #include "common/core/random.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
+#include "tests/support/gross_errors.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift::sensing {
@@ -17,23 +16,6 @@ namespace {
 
 constexpr int kTruths = 10;  // surgeries that differ as client/twin/variation.hpp has it
 constexpr int kMeasurements = 2;
-constexpr double kLeast_mm = 5.0, kMostOfPoints_mm = 20.0, kMostOfDisplacements_mm = 10.0;
-
-void spoil(Points& points, double fraction, double most_mm, Random& random) {
-  const auto count = static_cast<int>(fraction * static_cast<double>(points.cols()));
-  for (const int i : random.choose(count, static_cast<int>(points.cols()))) {
-    points.col(i) += (kLeast_mm + (most_mm - kLeast_mm) * random.uniform()) * random.direction();
-  }
-}
-
-Observation spoilt(Observation observation, double fraction, Random& random) {
-  if (auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    spoil(boundary->points, fraction, kMostOfPoints_mm, random);
-  } else if (auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
-    spoil(pairs->deformed, fraction, kMostOfDisplacements_mm, random);
-  }
-  return observation;
-}
 
 using Surgeries = std::vector<client::SimulatedSurgery>;
 
@@ -60,7 +42,8 @@ Result<double> tumour_error(const bench::Head& head, const CaseConfig& config,
   for (const auto& surgery : surgeries) {
     session->reset();
     for (std::size_t i = 0; i < surgery.observations.size(); ++i) {
-      const auto update = session->run(spoilt(surgery.observations[i], fraction, random));
+      const auto update =
+          session->run(test_support::with_gross_errors(surgery.observations[i], fraction, random));
       if (!update) return tl::unexpected(update.error());
       const auto run = score_update(head, surgery.truths[i], *update);
       if (!run) return tl::unexpected(run.error());

@@ -21,7 +21,9 @@ TEST(AblationTruths, AreThoseOfTheEvidenceAndMotionsThatTheTwinKnows) {
   EXPECT_THAT(truth_names(), Contains("joint-mixed"));
   EXPECT_THAT(truth_names(), Not(Contains("calculix")));
   for (const std::string& name : truth_names()) {
-    EXPECT_TRUE(evidence::find_truth(name) != nullptr || client::find_scenario(name) != nullptr)
+    const bool made_here = name == "mannitol" || name == "outliers";
+    EXPECT_TRUE(made_here || evidence::find_truth(name) != nullptr ||
+                client::find_scenario(name) != nullptr)
         << name;
   }
 }

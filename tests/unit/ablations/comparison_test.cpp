@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/ablations/ablation_truths.hpp"
 #include "tests/unit/ablations/made_up_rows.hpp"
@@ -34,12 +35,13 @@ TEST(Differences, PairTheSameSurgeryAndTheSameData) {
   const Difference* alone = find(all, "tumour", "one ingredient", "tumour alone");
   ASSERT_NE(alone, nullptr);
   EXPECT_EQ(alone->pairs, 2);
-  EXPECT_DOUBLE_EQ(alone->of_default, 1.5);
-  EXPECT_DOUBLE_EQ(alone->of_variant, 2.75);
-  EXPECT_NEAR(alone->change(), 2.75 / 1.5 - 1.0, 1e-12);
+  EXPECT_NEAR(alone->of_default, std::sqrt(1.0 * 2.0), 1e-12);  // geometric means
+  EXPECT_NEAR(alone->of_variant, std::sqrt(1.5 * 4.0), 1e-12);
+  EXPECT_NEAR(alone->change(), std::sqrt(3.0) - 1.0, 1e-12);
   const Difference* last = find(all, "tumour", kEverything, "all data");
   ASSERT_NE(last, nullptr);
-  EXPECT_DOUBLE_EQ(last->of_default, 1.25);  // of gap the tumour alone is the last
+  EXPECT_NEAR(last->of_default, std::sqrt(0.5 * 2.0),
+              1e-12);  // of gap the tumour alone is the last
   EXPECT_EQ(find(all, "tumour", "resection", "all data"), nullptr);
 }
 
@@ -67,8 +69,8 @@ TEST(Differences, AnUpdateWithLessDataIsHeldAgainstTheLastOne) {
   }
   const auto table = rows.table();
   const auto all = differences(surgeries::Rows(table), *find_part("no-cortex"));
-  EXPECT_DOUBLE_EQ(find(all, "tumour", kEverything, "all data")->change(), 3.0);
-  EXPECT_DOUBLE_EQ(find(all, "tumour", kEverything, "tumour alone")->change(), 0.0);
+  EXPECT_NEAR(find(all, "tumour", kEverything, "all data")->change(), 3.0, 1e-12);
+  EXPECT_NEAR(find(all, "tumour", kEverything, "tumour alone")->change(), 0.0, 1e-12);
 }
 
 TEST(Differences, CountWhenTheyAreBothSureAndLarge) {
