@@ -3,7 +3,7 @@
 # ablations.sh BUILD_DIR [OUT_DIR]: what each part of the default estimate buys: the estimate with one part
 # off, or one on that it leaves out, over the truths of `make evidence` and motions of `make surgeries`, on
 # the paper's five patients (docs/ablations.md). Writes to OUT_DIR (default: out/ablations):
-# rows-colin27.csv (a row per update), checks.csv, left_out.csv, pictures, page.md (the table of
+# rows-colin27.csv (a row per update), rows.csv (the columns of it that docs/ablations keeps), checks.csv, left_out.csv, pictures, page.md (the table of
 # docs/ablations.md), tables.md, summary.json. Exit status 0 only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
 #   VARIANTS="..."   these changes only, beside the default

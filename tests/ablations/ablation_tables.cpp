@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
 #include "client/plot/chart.hpp"
+#include "common/core/statistics.hpp"
 #include "tests/ablations/ablation_truths.hpp"
 #include "tests/ablations/comparison.hpp"
 #include "tests/ablations/parts.hpp"
@@ -50,6 +53,29 @@ std::vector<Held> held_parts(const Rows& rows) {
 std::string ratio_text(const Difference* difference) {
   if (difference == nullptr) return "–";
   return fmt::format("{:.2f}", 1.0 + difference->change());
+}
+
+// Median over all updates; the machine did other work.
+std::string time_text(const Rows& rows, const Part& part) {
+  std::map<std::string, double> defaults;
+  const auto key = [&](const Rows& of, std::size_t i) {
+    return of.text(i, "patient") + "," + of.text(i, "truth") + "," + of.text(i, "seed") + "," +
+           of.text(i, "data");
+  };
+  const Rows with = rows.where("variant", kDefault);
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    defaults[key(with, i)] = with.number(i, "update_ms");
+  }
+  const Rows without = rows.where("variant", part.variant.name);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    const auto found = defaults.find(key(without, i));
+    const double ratio =
+        found == defaults.end() ? NAN : without.number(i, "update_ms") / found->second;
+    if (std::isfinite(ratio)) ratios.push_back(ratio);
+  }
+  if (ratios.empty()) return "–";
+  return fmt::format("{:.2f}", percentile(ratios, 50.0));
 }
 
 std::string found_text(const std::vector<Difference>& found, std::size_t of) {
@@ -123,19 +149,36 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
 
 std::string parts_table(const Rows& rows) {
   std::string text =
-      "| part | changed | tumour, tumour alone | tumour | craniotomy | brain | the part buys | the "
-      "part costs |\n|---|---|---|---|---|---|---|---|\n";
+      "| part | changed | tumour, tumour alone | tumour | craniotomy | brain | time | the part "
+      "buys "
+      "| the part costs |\n|---|---|---|---|---|---|---|---|---|\n";
   for (const Held& held : held_parts(rows)) {
     const std::size_t of = held.differences.size();
-    text += fmt::format("| {}{} | {} | {} | {} | {} | {} | {} | {} |\n", held.part->name,
+    text += fmt::format("| {}{} | {} | {} | {} | {} | {} | {} | {} | {} |\n", held.part->name,
                         held.part->added ? " (off by default)" : "", held.part->change,
                         ratio_text(held.find("tumour", kEverything, "tumour alone")),
                         ratio_text(held.find("tumour", kEverything, "all data")),
                         ratio_text(held.find("craniotomy", kEverything, "all data")),
                         ratio_text(held.find("brain", kEverything, "all data")),
-                        found_text(held.result.buys, of), found_text(held.result.costs, of));
+                        time_text(rows, *held.part), found_text(held.result.buys, of),
+                        found_text(held.result.costs, of));
   }
   return text;
+}
+
+std::string short_rows(const Rows& rows) {
+  constexpr std::array kColumns = {"head",       "patient",     "truth",   "seed",
+                                   "variant",    "data",        "status",  "nodes",
+                                   "initial_mm", "tumour_mm",   "cppd_mm", "initial_field_mm",
+                                   "field_mm",   "coverage_90", "quality", "update_ms"};
+  std::string text;
+  for (const char* column : kColumns) text += fmt::format("{}{}", text.empty() ? "" : ",", column);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t c = 0; c < kColumns.size(); ++c) {
+      text += (c == 0 ? '\n' : ',') + rows.text(i, kColumns[c]);
+    }
+  }
+  return text + '\n';
 }
 
 std::string left_out_list() {

@@ -10,9 +10,13 @@
 namespace brainshift::ablations {
 
 // A line per part of which there are rows: errors over all surgeries, the variant's over the
-// default's (geometric means); in how many combinations of measure, group and data the part buys
-// something and in how many it costs something (comparison.hpp), and the largest of each.
+// default's (geometric means); the same of the time of an update (median); in how many combinations
+// of measure, group and data the part buys something and in how many it costs something
+// (comparison.hpp), and the largest of each.
 std::string parts_table(const surgeries::Rows& rows);
+
+// The same rows with the columns that the table and its reader want: what docs/ablations keeps.
+std::string short_rows(const surgeries::Rows& rows);
 
 // Why parts are not among them, a line each.
 std::string left_out_list();

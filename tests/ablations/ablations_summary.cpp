@@ -23,9 +23,11 @@ Status run(const std::filesystem::path& file) {
   const surgeries::Rows rows(*table);
   if (rows.empty()) return fail(ErrorCode::kEmptySet, file.string() + ": no surgery");
   check_ablations(rows);
+  const std::filesystem::path out(folder);
   const std::string page = parts_table(rows) + "\n" + left_out_list();
-  if (Status ok = io::write_file(std::filesystem::path(folder) / "page.md", page); !ok) return ok;
-  return draw_ablations(rows, folder);
+  if (Status ok = io::write_file(out / "page.md", page); !ok) return ok;
+  if (Status ok = io::write_file(out / "rows.csv", short_rows(rows)); !ok) return ok;
+  return draw_ablations(rows, out);
 }
 
 }  // namespace

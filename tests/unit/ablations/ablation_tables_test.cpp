@@ -23,6 +23,31 @@ std::string text_of_file(const std::filesystem::path& path) {
   return text.str();
 }
 
+const std::filesystem::path kDocs = BRAINSHIFT_DOCS;
+
+// The page and the rows beside it say the same.
+TEST(AblationsPage, HasTheTableOfItsRows) {
+  const auto table = bench::CsvTable::read(kDocs / "ablations" / "rows.csv");
+  ASSERT_TRUE(table) << table.error().message;
+  ASSERT_GT(table->rows(), 5000u);
+  const std::string page = text_of_file(kDocs / "ablations.md");
+  EXPECT_THAT(page, HasSubstr(parts_table(surgeries::Rows(*table))));
+  EXPECT_THAT(page, HasSubstr(left_out_list()));
+}
+
+TEST(ShortRows, GiveTheSameTable) {
+  MadeUpRows rows;
+  for (const int seed : {1, 2}) {
+    rows.add("default", "mesh", "tumour", seed, 1.0);
+    rows.add("fixed", "mesh", "tumour", seed, 2.0);
+  }
+  const auto table = rows.table();
+  const auto read = bench::CsvTable::parse(short_rows(surgeries::Rows(table)), "short");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->rows(), 4u);
+  EXPECT_EQ(parts_table(surgeries::Rows(*read)), parts_table(surgeries::Rows(table)));
+}
+
 // Contact halves the error; the rank does nothing; twice the rank is better by a third.
 bench::CsvTable made_up() {
   MadeUpRows rows;
@@ -39,10 +64,11 @@ bench::CsvTable made_up() {
 TEST(PartsTable, SaysWhatAPartBuysAndThatAnotherBuysNothing) {
   const auto table = made_up();
   const std::string text = parts_table(surgeries::Rows(table));
-  EXPECT_THAT(text, HasSubstr("| contact | boundary condition fixed | 2.00 | 2.00 | 2.00 | 2.00 | "
-                              "12 of 16; tumour, all surgeries, tumour alone: 1.00 → 2.00 mm | "
-                              "nothing |"));
-  EXPECT_THAT(text, HasSubstr("1.00 | 1.00 | 1.00 | 1.00 | nothing | nothing |"));
+  EXPECT_THAT(text,
+              HasSubstr("| contact | boundary condition fixed | 2.00 | 2.00 | 2.00 | 2.00 | – | "
+                        "12 of 16; tumour, all surgeries, tumour alone: 1.00 → 2.00 mm | "
+                        "nothing |"));
+  EXPECT_THAT(text, HasSubstr("1.00 | 1.00 | 1.00 | 1.00 | – | nothing | nothing |"));
   EXPECT_THAT(text, HasSubstr("| twice the rank (off by default) |"));
 }
 
