@@ -226,6 +226,7 @@ struct CondensedInverter::Impl {
   VecX norms;                       // of the residuals, per datum
   RemainderVariances left_out;      // what `sampled` knows
   SparseData moved;                 // the data where they are now, when they move
+  std::vector<DataSource> sources_before;
   Points moving_displacement;
   std::vector<IterationRecord> history;
   OmissionErrors errors;
@@ -248,6 +249,7 @@ bool CondensedInverter::Impl::reweigh(const SparseData& data) {
 Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
   if (&data != &moved) moved = data;
   const int before = moved.size();
+  sources_before = moved.sources;
   {
     const StageClock clock(profile, UpdateStage::kFollow);
     rebuild.displacement_at(team, moving.nodes, descent.z(), descent.contact(),
@@ -255,7 +257,7 @@ Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const Mov
     if (!moving.relocate(moving_displacement, moved)) return false;
   }
   if (auto status = accept(moved); !status) return tl::unexpected(status.error());
-  if (moved.size() != before) weights.reset(moved.size());
+  if (moved.size() != before) weights.follow(sources_before, moved);
   return true;
 }
 

@@ -19,6 +19,24 @@ void RobustWeights::reset(int data) {
   weights_.head(size_).setOnes();
 }
 
+void RobustWeights::follow(const std::vector<DataSource>& before, const SparseData& now) {
+  if (now.size() > weights_.size()) {  // reserve() would forget the weights
+    const VecX kept = weights_;
+    reserve(now.size());
+    weights_.head(kept.size()) = kept;
+  }
+  next_.head(now.size()).setOnes();
+  for (const DataSource& source : now.sources) {
+    const auto same = std::find_if(before.begin(), before.end(), [&](const DataSource& one) {
+      return one.name == source.name && one.count == source.count;
+    });
+    if (same == before.end()) continue;
+    next_.segment(source.first, source.count) = weights_.segment(same->first, source.count);
+  }
+  size_ = now.size();
+  std::swap(weights_, next_);
+}
+
 double RobustWeights::source_scale(const SparseData& data, int first, int count) {
   if (count == 0) return 1.0;
   sorted_.clear();

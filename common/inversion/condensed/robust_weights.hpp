@@ -32,6 +32,9 @@ class RobustWeights {
   void reserve(int data);
   // All ones.
   void reset(int data);
+  // The data have been replaced: sources of the same name and number of data keep their weights,
+  // all other data begin with 1.
+  void follow(const std::vector<DataSource>& before, const SparseData& now);
   auto values() const { return weights_.head(size_); }
 
   // norms: |r_i| with the present weight inside (sqrt(w) |r|), m. Returns true when a weight

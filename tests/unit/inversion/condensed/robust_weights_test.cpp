@@ -93,6 +93,30 @@ TEST(RobustWeights, StayWhereTheCallerIsToldThatTheyDo) {
   EXPECT_LT(weights.values()[7], 0.01);
 }
 
+// Boundary points that are measured anew may be fewer; what is known of the others' data stays.
+TEST(RobustWeights, SourcesThatKeepTheirDataKeepTheirWeights) {
+  SparseData data = whole(120);
+  data.sources = {{"ius", 0, 100}, {"tracks", 100, 20}};
+  VecX norms = gaussian_norms(120, 3, 7);
+  norms[3] = norms[105] = 30.0;
+  RobustWeights weights;
+  weights.reset(120);
+  ASSERT_TRUE(weights.update(data, norms));
+  const double distrusted = weights.values()[105];
+  ASSERT_LT(distrusted, 0.01);
+  const auto before = data.sources;
+  for (const int points : {98, 300}) {  // fewer; more than there was room for
+    RobustWeights followed = weights;
+    SparseData now = whole(points + 20);
+    now.sources = {{"ius", 0, points}, {"tracks", points, 20}};
+    followed.follow(before, now);
+    ASSERT_EQ(followed.values().size(), points + 20);
+    EXPECT_EQ(followed.values()[points + 5], distrusted);
+    EXPECT_EQ(followed.values().head(points).minCoeff(), 1.0);
+    EXPECT_EQ(followed.outliers(points, 20), 1);
+  }
+}
+
 TEST(RobustWeights, ASourceThatIsOffAsAWholeKeepsItsWeight) {
   SparseData data = whole(200);
   data.sources = {{"a", 0, 100}, {"b", 100, 100}};
