@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 #include <vector>
 
 #include "client/plot/chart.hpp"
@@ -84,7 +85,7 @@ std::string found_text(const std::vector<Difference>& found, std::size_t of) {
 }
 
 struct Picture {
-  const char* file;
+  std::string file;
   const char* title;
   const char* measure;
 };
@@ -217,14 +218,21 @@ void check_ablations(const Rows& rows) {
 }
 
 Status draw_ablations(const Rows& rows, const std::filesystem::path& folder) {
-  const std::vector<Held> parts = held_parts(rows);
-  for (const Picture& picture :
-       {Picture{"ablations-tumour.png", "Error at the tumour without a part, or with one more",
-                "tumour"},
-        Picture{"ablations-craniotomy.png",
-                "Closest point distance at the craniotomy without a part, or with one more",
-                "craniotomy"}}) {
-    if (Status ok = draw(parts, picture, folder); !ok) return ok;
+  // In two pictures, so that the names have room.
+  std::vector<Held> prior, rest;
+  for (Held& held : held_parts(rows)) {
+    const bool of_prior =
+        held.part->variant.anew == evidence::Anew::kOperators && !held.part->added;
+    (of_prior ? prior : rest).push_back(std::move(held));
+  }
+  for (const auto& [parts, suffix] : {std::pair{&prior, "-prior.png"}, {&rest, "-data.png"}}) {
+    for (const auto& [measure, title] :
+         {std::pair{"tumour", "Error at the tumour without a part, or with one more"},
+          {"craniotomy",
+           "Closest point distance at the craniotomy without a part, or with one more"}}) {
+      const Picture picture{std::string("ablations-") + measure + suffix, title, measure};
+      if (Status ok = draw(*parts, picture, folder); !ok) return ok;
+    }
   }
   return {};
 }

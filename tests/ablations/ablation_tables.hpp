@@ -25,8 +25,8 @@ std::string left_out_list();
 // somewhere. Figures: the same of parts that are off; updates that were refused.
 void check_ablations(const surgeries::Rows& rows);
 
-// ablations-tumour.png, ablations-craniotomy.png: error without each part over the default's, a dot
-// per group of truths. kWriteFailed.
+// ablations-tumour-prior.png and -data.png, ablations-craniotomy-prior.png and -data.png: error
+// without each part over the default's, a dot per group of truths. kWriteFailed.
 Status draw_ablations(const surgeries::Rows& rows, const std::filesystem::path& folder);
 
 }  // namespace brainshift::ablations

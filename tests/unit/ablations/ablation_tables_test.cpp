@@ -80,7 +80,7 @@ TEST(AblationPictures, AreDrawn) {
   const test_support::TemporaryFolder folder;
   const auto table = made_up();
   ASSERT_TRUE(draw_ablations(surgeries::Rows(table), folder.path()));
-  EXPECT_GT(std::filesystem::file_size(folder.path() / "ablations-tumour.png"), 1000u);
+  EXPECT_GT(std::filesystem::file_size(folder.path() / "ablations-tumour-prior.png"), 1000u);
   EXPECT_FALSE(draw_ablations(surgeries::Rows(table), folder.path() / "no-such"));
 }
 
