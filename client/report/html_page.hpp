@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/report/escape_html.hpp"
 #include "client/report/head.hpp"
 
 namespace brainshift::client {
@@ -44,8 +45,5 @@ std::string left_out_list(const std::vector<ReportedRun>& runs);
 std::string source_table(const std::vector<ReportedRun>& runs);
 // Empty when nothing failed.
 std::string failure_list(const std::vector<ReportedRun>& runs);
-
-// `text` with &, <, >, " and ' replaced by their entities.
-std::string escape_html(std::string_view text);
 
 }  // namespace brainshift::client

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "client/report/html_page.hpp"
+#include "client/report/escape_html.hpp"
 
 namespace brainshift::client {
 

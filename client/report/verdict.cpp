@@ -5,7 +5,7 @@
 #include <functional>
 #include <optional>
 
-#include "client/report/html_page.hpp"
+#include "client/report/escape_html.hpp"
 #include "client/report/html_table.hpp"
 #include "client/report/paper_values.hpp"
 

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace brainshift::client {
+
+// `text` with &, <, >, " and ' replaced by their entities.
+std::string escape_html(std::string_view text);
+
+}  // namespace brainshift::client
