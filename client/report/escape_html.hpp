@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Text of reports and case files inside an HTML page.
 #pragma once
 
 #include <string>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/report/html_page.hpp"
+#include "client/report/escape_html.hpp"
 
 #include <algorithm>
 #include <cstdio>

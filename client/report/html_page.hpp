@@ -3,10 +3,8 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "client/report/escape_html.hpp"
 #include "client/report/head.hpp"
 
 namespace brainshift::client {

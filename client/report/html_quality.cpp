@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <set>
 
+#include "client/report/escape_html.hpp"
 #include "client/report/html_page.hpp"
 #include "client/report/html_table.hpp"
 

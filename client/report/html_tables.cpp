@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/report/escape_html.hpp"
 #include "client/report/html_page.hpp"
 #include "client/report/html_table.hpp"
 #include "client/report/paper_values.hpp"

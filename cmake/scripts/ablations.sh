@@ -3,8 +3,9 @@
 # ablations.sh BUILD_DIR [OUT_DIR]: what each part of the default estimate buys: the estimate with one part
 # off, or one on that it leaves out, over the truths of `make evidence` and motions of `make surgeries`, on
 # the paper's five patients (docs/ablations.md). Writes to OUT_DIR (default: out/ablations):
-# rows-colin27.csv (a row per update), rows.csv (the columns of it that docs/ablations keeps), checks.csv, left_out.csv, pictures, page.md (the table of
-# docs/ablations.md), tables.md, summary.json. Exit status 0 only if every check holds.
+# rows-colin27.csv (a row per update), rows.csv (the columns of it that docs/ablations keeps), checks.csv,
+# left_out.csv, pictures, page.md (the table of docs/ablations.md), tables.md, summary.json. Exit status 0
+# only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
 #   VARIANTS="..."   these changes only, beside the default
 #   QUICK=1          patients 1 and 2, from seed 1001, on 2 thousand nodes; into out/ablations-quick
@@ -29,7 +30,7 @@ fi
 resume_study "$out" "${RESUME:-1}"
 
 status=0
-step "estimates" "$bin/ablations" --out "$out/rows-colin27.csv" "${options[@]}"
+step estimates "$bin/ablations" --out "$out/rows-colin27.csv" "${options[@]}"
 step summary "$bin/ablations_summary" "$out/rows-colin27.csv" || status=1
 current=summary
 "$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make ablations" \

@@ -6,13 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 #include <vector>
 
 #include "client/plot/chart.hpp"
-#include "common/core/statistics.hpp"
 #include "tests/ablations/ablation_truths.hpp"
 #include "tests/ablations/comparison.hpp"
 #include "tests/ablations/parts.hpp"
@@ -51,32 +49,11 @@ std::vector<Held> held_parts(const Rows& rows) {
   return all;
 }
 
-std::string ratio_text(const Difference* difference) {
-  if (difference == nullptr) return "–";
-  return fmt::format("{:.2f}", 1.0 + difference->change());
+std::string ratio_text(double ratio) {
+  return std::isfinite(ratio) ? fmt::format("{:.2f}", ratio) : std::string("–");
 }
-
-// Median over all updates; the machine did other work.
-std::string time_text(const Rows& rows, const Part& part) {
-  std::map<std::string, double> defaults;
-  const auto key = [&](const Rows& of, std::size_t i) {
-    return of.text(i, "patient") + "," + of.text(i, "truth") + "," + of.text(i, "seed") + "," +
-           of.text(i, "data");
-  };
-  const Rows with = rows.where("variant", kDefault);
-  for (std::size_t i = 0; i < with.size(); ++i) {
-    defaults[key(with, i)] = with.number(i, "update_ms");
-  }
-  const Rows without = rows.where("variant", part.variant.name);
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < without.size(); ++i) {
-    const auto found = defaults.find(key(without, i));
-    const double ratio =
-        found == defaults.end() ? NAN : without.number(i, "update_ms") / found->second;
-    if (std::isfinite(ratio)) ratios.push_back(ratio);
-  }
-  if (ratios.empty()) return "–";
-  return fmt::format("{:.2f}", percentile(ratios, 50.0));
+std::string ratio_text(const Difference* difference) {
+  return difference == nullptr ? "–" : ratio_text(1.0 + difference->change());
 }
 
 std::string found_text(const std::vector<Difference>& found, std::size_t of) {
@@ -161,8 +138,8 @@ std::string parts_table(const Rows& rows) {
                         ratio_text(held.find("tumour", kEverything, "all data")),
                         ratio_text(held.find("craniotomy", kEverything, "all data")),
                         ratio_text(held.find("brain", kEverything, "all data")),
-                        time_text(rows, *held.part), found_text(held.result.buys, of),
-                        found_text(held.result.costs, of));
+                        ratio_text(median_time_ratio(rows, *held.part)),
+                        found_text(held.result.buys, of), found_text(held.result.costs, of));
   }
   return text;
 }

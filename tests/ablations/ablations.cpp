@@ -56,13 +56,6 @@ Status run(const Arguments& arguments) {
   return {};
 }
 
-std::string known_truth(const std::string& name) {
-  for (const std::string& known : truth_names()) {
-    if (known == name) return "";
-  }
-  return name + " is unknown";
-}
-
 std::string known_variant(const std::string& name) {
   const auto parts = parts_from({name});
   return parts ? "" : parts.error().message;
@@ -80,7 +73,7 @@ int main(int argc, char** argv) {
   app.add_option("--patients", arguments.patients, "of the paper, separated by spaces")
       ->check(CLI::Range(1, brainshift::ablations::kPatients));
   app.add_option("--truths", arguments.truths, "names, separated by spaces; default: all of them")
-      ->check(brainshift::ablations::known_truth);
+      ->check(CLI::IsMember(brainshift::ablations::truth_names()));
   app.add_option("--variants", arguments.variants, "names, separated by spaces; default: all")
       ->check(brainshift::ablations::known_variant);
   brainshift::surgeries::add_study_options(app, arguments);

@@ -3,12 +3,12 @@
 // `ablations`, into $BRAINSHIFT_STUDY_DIR (study_record.hpp). It measures nothing; study_summary
 // tells whether the checks hold.
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 
 #include "common/io/files/file_access.hpp"
 #include "tests/ablations/ablation_tables.hpp"
+#include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::ablations {
 namespace {
@@ -37,16 +37,6 @@ int main(int argc, char** argv) {
   std::filesystem::path table;
   CLI::App app{"Checks, table and pictures of the ablations.", "ablations_summary"};
   app.add_option("table", table, "table of ablations")->required();
-  app.footer("Exit status: 0 summarised, 1 failure, 2 bad usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "ablations_summary: %s (see ablations_summary --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::ablations::run(table);
-  if (ok) return 0;
-  std::fprintf(stderr, "ablations_summary: %s\n", ok.error().message.c_str());
-  return 1;
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::ablations::run(table); });
 }

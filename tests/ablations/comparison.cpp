@@ -137,6 +137,23 @@ std::vector<Difference> differences(const Rows& rows, const Part& part) {
   return all;
 }
 
+double median_time_ratio(const Rows& rows, const Part& part) {
+  const Rows with = rows.where("variant", kDefault);
+  const Rows without = rows.where("variant", part.variant.name);
+  std::map<std::string, double> defaults;
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    defaults[surgery_of(with, i) + with.text(i, "data")] = with.number(i, "update_ms");
+  }
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    const auto found = defaults.find(surgery_of(without, i) + without.text(i, "data"));
+    if (found == defaults.end()) continue;
+    const double ratio = without.number(i, "update_ms") / found->second;
+    if (std::isfinite(ratio)) ratios.push_back(ratio);
+  }
+  return percentile(ratios, 50.0);
+}
+
 Balance balance(const std::vector<Difference>& differences, const Part& part) {
   Balance balance;
   for (const Difference& difference : differences) {

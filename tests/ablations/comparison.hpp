@@ -46,6 +46,10 @@ std::string text_of(const Difference& difference);
 // either of them was refused in is no pair. The data "all data" are the last update of each.
 std::vector<Difference> differences(const surgeries::Rows& rows, const Part& part);
 
+// Time of an update over that of the default's update of the same data, the median over all of
+// them; NaN without any. What else the machine did is in it.
+double median_time_ratio(const surgeries::Rows& rows, const Part& part);
+
 // Those that count, largest change first: with the part better than without it, and the reverse.
 struct Balance {
   std::vector<Difference> buys, costs;

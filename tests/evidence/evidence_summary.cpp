@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -16,6 +15,7 @@
 #include "tests/evidence/evidence_pictures.hpp"
 #include "tests/evidence/page_tables.hpp"
 #include "tests/evidence/patient_tables.hpp"
+#include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -70,16 +70,6 @@ int main(int argc, char** argv) {
   std::vector<std::filesystem::path> tables;
   CLI::App app{"Checks and pictures of the evidence study.", "evidence_summary"};
   app.add_option("tables", tables, "tables of evidence")->required();
-  app.footer("Exit status: 0 summarised, 1 failure, 2 bad usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "evidence_summary: %s (see evidence_summary --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::evidence::run(tables);
-  if (ok) return 0;
-  std::fprintf(stderr, "evidence_summary: %s\n", ok.error().message.c_str());
-  return 1;
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::evidence::run(tables); });
 }

@@ -221,12 +221,12 @@ struct CondensedInverter::Impl {
   bool robust;
   double medium_sd_mm;
 
-  Stopwatch watch;                  // of the update
-  std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
-  VecX norms;                       // of the residuals, per datum
-  RemainderVariances left_out;      // what `sampled` knows
-  SparseData moved;                 // the data where they are now, when they move
-  std::vector<DataSource> sources_before;
+  Stopwatch watch;                         // of the update
+  std::vector<int> rebuilt_slaves;         // whose displacement is not interpolated
+  VecX norms;                              // of the residuals, per datum
+  RemainderVariances left_out;             // what `sampled` knows
+  SparseData moved;                        // the data where they are now, when they move
+  std::vector<DataSource> sources_before;  // of `moved`, before they moved
   Points moving_displacement;
   std::vector<IterationRecord> history;
   OmissionErrors errors;
@@ -248,7 +248,6 @@ bool CondensedInverter::Impl::reweigh(const SparseData& data) {
 
 Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
   if (&data != &moved) moved = data;
-  const int before = moved.size();
   sources_before = moved.sources;
   {
     const StageClock clock(profile, UpdateStage::kFollow);
@@ -257,7 +256,7 @@ Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const Mov
     if (!moving.relocate(moving_displacement, moved)) return false;
   }
   if (auto status = accept(moved); !status) return tl::unexpected(status.error());
-  if (moved.size() != before) weights.follow(sources_before, moved);
+  weights.follow(sources_before, moved);
   return true;
 }
 

@@ -20,6 +20,7 @@ void RobustWeights::reset(int data) {
 }
 
 void RobustWeights::follow(const std::vector<DataSource>& before, const SparseData& now) {
+  if (now.sources.empty() && now.size() == size_) return;
   if (now.size() > weights_.size()) {  // reserve() would forget the weights
     const VecX kept = weights_;
     reserve(now.size());

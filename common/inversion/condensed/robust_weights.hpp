@@ -32,8 +32,9 @@ class RobustWeights {
   void reserve(int data);
   // All ones.
   void reset(int data);
-  // The data have been replaced: sources of the same name and number of data keep their weights,
-  // all other data begin with 1.
+  // The data have been measured anew: a source of the same name and number of data keeps its
+  // weights, wherever it stands now; all other data begin with 1. Data without sources count as
+  // one source.
   void follow(const std::vector<DataSource>& before, const SparseData& now);
   auto values() const { return weights_.head(size_); }
 

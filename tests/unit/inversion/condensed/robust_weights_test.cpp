@@ -105,16 +105,36 @@ TEST(RobustWeights, SourcesThatKeepTheirDataKeepTheirWeights) {
   const double distrusted = weights.values()[105];
   ASSERT_LT(distrusted, 0.01);
   const auto before = data.sources;
-  for (const int points : {98, 300}) {  // fewer; more than there was room for
+  for (const int points : {98, 100, 300}) {  // fewer; as many; more than there was room for
     RobustWeights followed = weights;
     SparseData now = whole(points + 20);
     now.sources = {{"ius", 0, points}, {"tracks", points, 20}};
     followed.follow(before, now);
     ASSERT_EQ(followed.values().size(), points + 20);
     EXPECT_EQ(followed.values()[points + 5], distrusted);
-    EXPECT_EQ(followed.values().head(points).minCoeff(), 1.0);
+    EXPECT_EQ(followed.values().head(points).minCoeff(), points == 100 ? weights.values()[3] : 1.0);
     EXPECT_EQ(followed.outliers(points, 20), 1);
   }
+}
+
+// One source has a point more and another one a point less: the total tells nothing.
+TEST(RobustWeights, StayWithTheirSourceWhereOnlyTheTotalIsTheSame) {
+  SparseData data = whole(120);
+  data.sources = {{"ius", 0, 60}, {"tracks", 60, 20}, {"stereo", 80, 40}};
+  VecX norms = gaussian_norms(120, 3, 7);
+  norms[65] = 30.0;
+  RobustWeights weights;
+  weights.reset(120);
+  ASSERT_TRUE(weights.update(data, norms));
+  const double distrusted = weights.values()[65];
+  const auto before = data.sources;
+  data.sources = {{"ius", 0, 59}, {"tracks", 59, 20}, {"stereo", 79, 41}};
+  weights.follow(before, data);
+  EXPECT_EQ(weights.values()[64], distrusted);
+  EXPECT_EQ(weights.outliers(0, 120), 1);
+  data.sources.clear();  // as many data as before, of one nameless source
+  weights.follow({}, data);
+  EXPECT_EQ(weights.values()[64], distrusted);
 }
 
 TEST(RobustWeights, ASourceThatIsOffAsAWholeKeepsItsWeight) {
