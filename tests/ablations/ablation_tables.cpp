@@ -95,7 +95,7 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
   spec.x.label = "what was changed, one at a time";
   spec.x.from_zero = false;
   spec.y = {.label = "error, changed / default", .log = true};
-  spec.size = {3400, 1200};  // room for the names
+  spec.size = {4400, 1300};  // room for the names
   const std::vector<std::string>& groups = group_names();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     client::Series series;

@@ -23,6 +23,18 @@ std::string text_of_file(const std::filesystem::path& path) {
   return text.str();
 }
 
+const std::filesystem::path kDocs = BRAINSHIFT_DOCS;
+
+// The page and the rows beside it say the same.
+TEST(AblationsPage, HasTheTableOfItsRows) {
+  const auto table = bench::CsvTable::read(kDocs / "ablations" / "rows.csv");
+  ASSERT_TRUE(table) << table.error().message;
+  ASSERT_GT(table->rows(), 5000u);
+  const std::string page = text_of_file(kDocs / "ablations.md");
+  EXPECT_THAT(page, HasSubstr(parts_table(surgeries::Rows(*table))));
+  EXPECT_THAT(page, HasSubstr(left_out_list()));
+}
+
 TEST(ShortRows, GiveTheSameTable) {
   MadeUpRows rows;
   for (const int seed : {1, 2}) {
