@@ -122,6 +122,17 @@ Scenario resection() {
   return scenario;
 }
 
+// A spatula holds the cortex aside while the fluid drains.
+Scenario retraction() {
+  Scenario scenario =
+      joint(paper(), "retraction",
+            "sag while a spatula presses on the exposed cortex and draws it aside; ultrasound, "
+            "stereo camera, vessel forks");
+  scenario.fluid_levels_mm = {30.0};
+  scenario.retraction = Retraction{4000.0, 12.0, 45.0};
+  return scenario;
+}
+
 // What the five patients share: the paper's instruments, and Table 3's initial misfit.
 Scenario patient(const char* name, double misfit_mm, const char* description) {
   Scenario scenario;
@@ -182,9 +193,10 @@ Scenario patient_5() {
 
 const std::vector<Scenario>& all_scenarios() {
   static const std::vector<Scenario> scenarios = {
-      paper(),     paper_icp(),        distension(),       sag_progress(), no_contact(),
-      joint_sag(), joint_distension(), joint_tangential(), joint_mixed(),  resection(),
-      patient_1(), patient_2(),        patient_3(),        patient_4(),    patient_5()};
+      paper(),       paper_icp(), distension(),       sag_progress(),
+      no_contact(),  joint_sag(), joint_distension(), joint_tangential(),
+      joint_mixed(), resection(), retraction(),       patient_1(),
+      patient_2(),   patient_3(), patient_4(),        patient_5()};
   return scenarios;
 }
 

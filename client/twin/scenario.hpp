@@ -3,9 +3,9 @@
 //
 // A surgery is a series of moments. Every instrument makes one observation at
 // each of them. The brain is in equilibrium (drained, common/fem/elasticity.hpp)
-// under gravity, with the fluid at the moment's level, and under one swelling and one volume
-// change that do not change. Part of the tumour may be gone (resection.hpp). Each moment has its
-// own truth, points and noise.
+// under gravity, with the fluid at the moment's level, and under one swelling, one volume change
+// and one spatula (retraction.hpp) that do not change. Part of the tumour may be gone
+// (resection.hpp). Each moment has its own truth, points and noise.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,7 @@
 
 #include "client/twin/load.hpp"
 #include "client/twin/resection.hpp"
+#include "client/twin/retraction.hpp"
 
 namespace brainshift::client {
 
@@ -73,7 +74,8 @@ struct Scenario {
   VolumeChange volume;       // of the brain or a half of it
   // Largest volume strain by which a variation (variation.hpp) lets the brain shrink.
   double largest_shrinkage = 0.0;
-  std::optional<Resection> resection;  // absent: all tissue is there
+  std::optional<Resection> resection;    // absent: all tissue is there
+  std::optional<Retraction> retraction;  // absent: nothing touches the cortex
   // Unknown stiffness: ln of the shear modulus varies smoothly, with this standard deviation over
   // this length (stiffness.hpp). Grey and white matter differ by some 30 %, and so do patients.
   double stiffness_sd = 0.0;

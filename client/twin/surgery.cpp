@@ -62,6 +62,7 @@ io::SurgeryTruth record_truth(const TruthBrain& brain, const Scenario& scenario,
     scalars["swelling_radius_mm"] = scenario.swelling.radius_mm;
   }
   if (scenario.volume.strain != 0.0) scalars["brain_volume_strain"] = scenario.volume.strain;
+  if (scenario.retraction) scalars["retraction_pa"] = scenario.retraction->pressure_pa;
   if (scenario.resection) {
     scalars["resected_fraction"] = scenario.resection->volume_fraction;
     scalars["removed_nodes"] = static_cast<double>(brain.removed.size());

@@ -54,7 +54,16 @@ Points gravity_load(const TruthBrain& brain, const Gravity& gravity, double flui
   return fem::buoyancy_load(brain.tissue, material, gravity.direction, plane, gravity.direction);
 }
 
-Points constant_load(const TruthBrain& brain, const Scenario& scenario) {
+namespace {
+
+// With another mesh at its own vertices, which are the first nodes of its space.
+void add_retraction(const TruthBrain& brain, const Scenario& scenario, Points& load) {
+  if (!scenario.retraction) return;
+  const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
+  load.leftCols(body.mesh.num_nodes()) += retraction_load(body, *scenario.retraction);
+}
+
+Points volume_load(const TruthBrain& brain, const Scenario& scenario) {
   const Material& material = brain.config.material;
   const Vec3 centre = swelling_centre(brain.model, scenario.swelling);
   const Vec3 tumour = brain.model.tumour.vertices.rowwise().mean();
@@ -68,6 +77,14 @@ Points constant_load(const TruthBrain& brain, const Scenario& scenario) {
   if (scenario.volume.strain != 0.0) {
     load += volume_change_load(brain.tissue, material, tumour, scenario.volume);
   }
+  return load;
+}
+
+}  // namespace
+
+Points constant_load(const TruthBrain& brain, const Scenario& scenario) {
+  Points load = volume_load(brain, scenario);
+  add_retraction(brain, scenario, load);
   return load;
 }
 

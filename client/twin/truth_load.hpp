@@ -18,7 +18,7 @@ Gravity gravity_of(const BrainModel& model, const Scenario& scenario);
 Vec3 tilted_gravity(const BrainModel& model, double tilt_deg);
 
 // Nodal forces, N, 3 x nodes of the case's mesh or of brain.elsewhere's space. Weight and buoyancy
-// with the fluid at this level, mm below gravity's plane; swelling and volume change.
+// with the fluid at this level, mm below gravity's plane; swelling, volume change and spatula.
 Points gravity_load(const TruthBrain& brain, const Gravity& gravity, double fluid_level_mm);
 Points constant_load(const TruthBrain& brain, const Scenario& scenario);
 

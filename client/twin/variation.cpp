@@ -41,6 +41,18 @@ Scenario vary(const Scenario& scenario, std::uint64_t seed) {
   if (shrinkage > 0.0) varied.volume = {-shrinkage, one_hemisphere};
   const double fraction = between(kLeastResected, kMostResected, random);
   if (varied.resection) varied.resection->volume_fraction = fraction;
+
+  const double press = between(kLeastPress, kMostPress, random);
+  const double angle_deg = kMostAside_deg * random.uniform();
+  const Vec3 aside = random.direction();
+  const Vec3 outwards = random.direction();
+  const Vec3 middle = kSpatulaOffset_mm * std::cbrt(random.uniform()) * outwards;
+  if (varied.retraction) {
+    varied.retraction->pressure_pa *= press;
+    varied.retraction->angle_deg = angle_deg;
+    varied.retraction->aside = aside;
+    varied.retraction->offset_mm = middle;
+  }
   return varied;
 }
 

@@ -18,6 +18,8 @@
 //   shrinkage         where the scenario allows it (Scenario::largest_shrinkage): a volume strain
 //                     from 0 to that, of the whole brain or of the tumour's half with equal
 //                     probability
+//   retraction        pressure times kLeastPress to kMostPress; it draws aside in any direction at
+//                     an angle up to kMostAside_deg; its middle moves by up to kSpatulaOffset_mm
 //   resection         fraction of the tumour's volume from kLeastResected to kMostResected: the
 //                     superficial part goes first, and what is left at the ground is being decided
 //
@@ -36,6 +38,8 @@ inline constexpr double kGravityTurn_deg = 6.0;
 inline constexpr double kStiffnessSd = 0.3, kStiffnessLength_mm = 20.0;
 inline constexpr double kLeastSwelling = 0.5, kMostSwelling = 1.3;
 inline constexpr double kSwellingOffset_mm = 15.0;
+inline constexpr double kLeastPress = 0.5, kMostPress = 1.3;
+inline constexpr double kMostAside_deg = 60.0, kSpatulaOffset_mm = 8.0;
 inline constexpr double kLeastResected = 0.6, kMostResected = 0.8;
 
 // The same seed gives the same variation. It promises no contact-free brain, whatever the scenario

@@ -96,11 +96,12 @@ struct ContactConfig {
 // of 0 leaves a family out. Where the strengths are estimated, a surgery may have up to
 // kLargestStrength times these, or none of a family.
 struct PriorConfig {
-  // Remainder: fine (the paper's), medium and coarse correlation length.
+  // Remainder: fine (the paper's), medium and coarse correlation length. What the fine one
+  // explains, the medium one does as well (docs/ablations.md): it is off.
   double correlation_length_mm = 5.0;
   double medium_length_mm = 20.0;
   double coarse_length_mm = 60.0;
-  double force_density_sd_n_m3 = 1000.0;
+  double force_density_sd_n_m3 = 0.0;
   double medium_density_sd_n_m3 = 1000.0;
   double coarse_density_sd_n_m3 = 1000.0;
   // Drainage and pose, in units of the full buoyancy load.
@@ -183,7 +184,7 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
   // Largest number of prior modes kept, those of the load families among them.
-  int max_rank = 192;
+  int max_rank = 128;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.

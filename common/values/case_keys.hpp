@@ -206,8 +206,8 @@ void visit(A& a, V& v) {
      "about half the width of a brain"},
     v.coarse_length_mm, between(1.0, 300.0));
   a({"force_density_sd_n_m3", "N/m3", "Standard deviation of the fine remainder's force density",
-     "a tenth of the weight of tissue"},
-    v.force_density_sd_n_m3, positive());
+     "decision 0030", "0: no such modes. The paper's prior has this part alone."},
+    v.force_density_sd_n_m3, not_negative());
   a({"medium_density_sd_n_m3", "N/m3", "The same of the medium remainder", "decision 0018",
      "0: no such modes."},
     v.medium_density_sd_n_m3, not_negative());
@@ -325,7 +325,7 @@ void visit(A& a, V& v) {
 template <typename A, Of<CondensedConfig> V>
 void visit(A& a, V& v) {
   a({"max_rank", "", "Largest number of prior modes kept, those of the load families among them",
-     "docs/decisions/0018"},
+     "docs/decisions/0030"},
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));

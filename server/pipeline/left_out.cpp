@@ -32,8 +32,10 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
     const char* keys;
     bool off;
     double cortex_mm, tumour_mm;
+    bool replaced = false;
   };
   const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
+  const bool medium = prior.medium_density_sd_n_m3 > 0.0;
   const Part parts[] = {
       {"gravity modes", "prior.gravity_mode_sd or prior.gravity_levels_mm", no_gravity, 2.1, 2.3},
       {"swelling of the tumour", "prior.tumour_volume_strain_sd or prior.tumour_volume_radii_mm",
@@ -45,7 +47,7 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
       {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
        4.8, 1.6},
       {"fine remainder", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0, 0.1,
-       0.1},
+       0.1, medium},
       {"medium remainder", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0, 0.8,
        0.8},
       {"coarse remainder", "prior.coarse_density_sd_n_m3", prior.coarse_density_sd_n_m3 == 0.0, 1.1,
@@ -53,9 +55,15 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
   std::vector<Omission> omissions;
   for (const Part& part : parts) {
     if (!part.off) continue;
+    if (part.replaced) {
+      omissions.push_back({part.name, fmt::format("{} is 0", part.keys),
+                           "none seen in simulated surgeries: the medium remainder takes its place "
+                           "(docs/ablations.md)"});
+      continue;
+    }
     omissions.push_back({part.name, fmt::format("{} is 0 or empty", part.keys),
                          fmt::format("where it acts, about {:.1f} mm at the cortex and {:.1f} mm "
-                                     "at the tumour (median of the default prior)",
+                                     "at the tumour (median of draws from the prior)",
                                      part.cortex_mm, part.tumour_mm)});
   }
   return omissions;

@@ -15,8 +15,8 @@ namespace {
 
 static_assert(kPatients == evidence::paper::kPatients);
 
-constexpr std::array kMotions = {"joint-tangential", "joint-mixed", "joint-distension",
-                                 "resection",        "mannitol",    "outliers"};
+constexpr std::array kMotions = {"joint-tangential", "joint-mixed", "joint-distension", "resection",
+                                 "retraction",       "mannitol",    "outliers"};
 
 // Sag of a brain that shrinks by 2 to 4 % of its volume or, every other time, in one hemisphere.
 client::Scenario mannitol(std::uint64_t seed) {
@@ -72,8 +72,10 @@ std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
   const std::uint64_t seed = first_seed + static_cast<std::uint64_t>(patient - 1);
   std::vector<AblationSurgery> surgeries;
   for (const std::string& truth : truths) {
-    surgeries.push_back({truth, seed});
-    if (is_motion(truth)) surgeries.push_back({truth, seed + kPatients});
+    const int seeds = is_motion(truth) ? kSeedsPerMotion : 1;
+    for (int k = 0; k < seeds; ++k) {
+      surgeries.push_back({truth, seed + static_cast<std::uint64_t>(k * kPatients)});
+    }
   }
   return surgeries;
 }

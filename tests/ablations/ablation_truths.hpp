@@ -12,9 +12,10 @@
 namespace brainshift::ablations {
 
 // Consistency, each ingredient and all of them; then joint-tangential, joint-mixed,
-// joint-distension and resection of the twin, "mannitol" (joint-sag in a brain or hemisphere that
-// shrinks by kLeastShrinkage to twice that) and "outliers" (joint-sag with gross errors in
-// kOutliers of boundary points and landmarks). Another code's truth belongs to another mesh.
+// joint-distension, resection and retraction of the twin, "mannitol" (joint-sag in a brain or
+// hemisphere that shrinks by kLeastShrinkage to twice that) and "outliers" (joint-sag with gross
+// errors in kOutliers of boundary points and landmarks). Another code's truth belongs to another
+// mesh.
 inline constexpr double kLeastShrinkage = 0.02;
 inline constexpr double kOutliers = 0.2;
 const std::vector<std::string>& truth_names();
@@ -30,8 +31,10 @@ struct AblationSurgery {
   std::string truth;
   std::uint64_t seed = 0;
 };
-// Of one patient: a seed for each truth, and two for each motion, because a motion is varied by its
-// seed and has no group to join. Seeds are first_seed + patient - 1, and kPatients more.
+// Of one patient: a seed for each truth, and kSeedsPerMotion for each motion, because a motion is
+// varied by its seed and has no group to join. Seeds are first_seed + patient - 1, and kPatients
+// more each time.
+inline constexpr int kSeedsPerMotion = 4;
 std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
                                           const std::vector<std::string>& truths);
 inline constexpr int kPatients = 5;

@@ -11,12 +11,11 @@ namespace {
 using evidence::Anew;
 using Change = std::function<void(CaseConfig&)>;
 
-// 0 is no value of these keys.
-constexpr double kLeastDensity_n_m3 = 1e-3;
-constexpr double kLeastFineLength_mm = 0.1, kLeastLength_mm = 1.0;
+constexpr double kLeastLength_mm = 1.0;   // the key's least value
+constexpr double kDensity_n_m3 = 1000.0;  // as of the medium remainder
 // A tracked probe as decision 0020 has it, which a client would state.
 constexpr double kProbePoseSd_mm = 0.5, kProbePoseSd_deg = 0.5;
-constexpr int kHalfRank = 96, kDoubleRank = 384;
+constexpr int kLowRank = 112, kHighRank = 192;  // 97 are load families
 
 Part part(std::string name, std::string variant, Anew anew, std::vector<std::string> keys,
           std::string change, Change to) {
@@ -61,9 +60,6 @@ std::vector<Part> prior_parts() {
       of("opening", "no-opening", {"prior.opening_pressure_sd_pa"},
          "`prior.opening_pressure_sd_pa: 0`",
          [](CaseConfig& c) { c.prior.opening_pressure_sd_pa = 0.0; }),
-      of("fine remainder", "no-fine", {"prior.force_density_sd_n_m3"},
-         "`prior.force_density_sd_n_m3: 0.001` (0 is no value)",
-         [](CaseConfig& c) { c.prior.force_density_sd_n_m3 = kLeastDensity_n_m3; }),
       of("medium remainder", "no-medium", {"prior.medium_density_sd_n_m3"},
          "`prior.medium_density_sd_n_m3: 0`",
          [](CaseConfig& c) { c.prior.medium_density_sd_n_m3 = 0.0; }),
@@ -71,24 +67,12 @@ std::vector<Part> prior_parts() {
          "`prior.coarse_density_sd_n_m3: 0`",
          [](CaseConfig& c) { c.prior.coarse_density_sd_n_m3 = 0.0; }),
       of("correlation of the remainder", "uncorrelated",
-         {"prior.correlation_length_mm", "prior.medium_length_mm", "prior.coarse_length_mm"},
-         "its three lengths at their least: 0.1, 1, 1 mm",
+         {"prior.medium_length_mm", "prior.coarse_length_mm"}, "its lengths at their least: 1 mm",
          [](CaseConfig& c) {
-           c.prior.correlation_length_mm = kLeastFineLength_mm;
            c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
          }),
-      of("what the smooth remainder can stand for", "lean",
-         {"prior.gravity_direction_sd_deg", "prior.brain_volume_strain_sd",
-          "prior.opening_pressure_sd_pa", "prior.force_density_sd_n_m3",
-          "prior.coarse_density_sd_n_m3"},
-         "without buoyancy across gravity, brain volume, opening, fine and coarse remainder",
-         [](CaseConfig& c) {
-           c.prior.gravity_direction_sd_deg = c.prior.brain_volume_strain_sd = 0.0;
-           c.prior.opening_pressure_sd_pa = c.prior.coarse_density_sd_n_m3 = 0.0;
-           c.prior.force_density_sd_n_m3 = kLeastDensity_n_m3;
-         }),
-      of("rank", "half-rank", {"condensed.max_rank"}, "`condensed.max_rank: 96`",
-         [](CaseConfig& c) { c.condensed.max_rank = kHalfRank; }),
+      of("rank", "low-rank", {"condensed.max_rank"}, "`condensed.max_rank: 112`",
+         [](CaseConfig& c) { c.condensed.max_rank = kLowRank; }),
   };
 }
 
@@ -129,9 +113,24 @@ std::vector<Part> added_parts() {
                       c.sensing.probe_pose_sd_mm = kProbePoseSd_mm;
                       c.sensing.probe_pose_sd_deg = kProbePoseSd_deg;
                     });
+  const auto of = [](const char* name, const char* variant, std::vector<std::string> keys,
+                     const char* change, Change to) {
+    return part(name, variant, Anew::kOperators, std::move(keys), change, std::move(to));
+  };
+  const Part fine = of("fine remainder", "fine", {"prior.force_density_sd_n_m3"},
+                       "`prior.force_density_sd_n_m3: 1000`",
+                       [](CaseConfig& c) { c.prior.force_density_sd_n_m3 = kDensity_n_m3; });
+  const Part former =
+      of("the same with room for its modes", "former",
+         {"prior.force_density_sd_n_m3", "condensed.max_rank"},
+         "the default before decision 0030: the same, and `condensed.max_rank: 192`",
+         [](CaseConfig& c) {
+           c.prior.force_density_sd_n_m3 = kDensity_n_m3;
+           c.condensed.max_rank = kHighRank;
+         });
   Part rank =
-      part("twice the rank", "double-rank", Anew::kOperators, {"condensed.max_rank"},
-           "`condensed.max_rank: 384`", [](CaseConfig& c) { c.condensed.max_rank = kDoubleRank; });
+      part("a higher rank", "high-rank", Anew::kOperators, {"condensed.max_rank"},
+           "`condensed.max_rank: 192`", [](CaseConfig& c) { c.condensed.max_rank = kHighRank; });
   Part refined =
       part("refinement", "refined", Anew::kMesh, {"mesh.tumour_edge_mm", "mesh.craniotomy_edge_mm"},
            "half the edge at tumour and rim (`mesh.generate.tumour_edge_mm`, "
@@ -146,7 +145,7 @@ std::vector<Part> added_parts() {
       part("pore pressure", "pressure", Anew::kOperators, {"scene.pressure"},
            "`scene.pressure: on`", [](CaseConfig& c) { c.scene.pressure = Carry::kOn; });
   pressure.slow = true;
-  return {added(probe), added(rank), added(refined), added(pressure)};
+  return {added(fine), added(former), added(probe), added(rank), added(refined), added(pressure)};
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 // As in the table; joint-distension is the same truth as distension with more to see.
 const std::vector<std::string> kScenarios = {"paper",     "paper-icp",        "distension",
                                              "joint-sag", "joint-tangential", "joint-mixed",
-                                             "resection"};
+                                             "resection", "retraction"};
 
 struct Arguments : StudyArguments {
   fs::path head = BRAINSHIFT_DEFAULT_CASE;

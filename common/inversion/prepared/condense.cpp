@@ -118,9 +118,10 @@ MatrixXd test_vectors(const CondensedOperators& operators, Eigen::Index rows, in
 std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eigen::Index rows) {
   // A coarse field needs fewer than a fine one.
   std::array<double, kRemainders> share = {0.4, 0.4, 0.2};
+  if (config.prior.force_density_sd_n_m3 == 0.0) share[0] = 0.0;
   if (config.prior.medium_density_sd_n_m3 == 0.0) share[1] = 0.0;
   if (config.prior.coarse_density_sd_n_m3 == 0.0) share[2] = 0.0;
-  const double all = share[0] + share[1] + share[2];
+  const double all = share[0] + share[1] + share[2];  // 0: no remainder
   const int left = std::max(kRemainders, config.condensed.max_rank - loads);
   std::array<int, kRemainders> kept{};
   for (std::size_t g = 0; g < kept.size(); ++g) {

@@ -48,15 +48,15 @@ TEST(ShortRows, GiveTheSameTable) {
   EXPECT_EQ(parts_table(surgeries::Rows(*read)), parts_table(surgeries::Rows(table)));
 }
 
-// Contact halves the error; the rank does nothing; twice the rank is better by a third.
+// Contact halves the error; the rank does nothing; a higher rank is better by a third.
 bench::CsvTable made_up() {
   MadeUpRows rows;
   for (int seed = 1; seed <= 8; ++seed) {
     const double noise = 1e-4 * seed;
     rows.add("default", "mesh", "tumour", seed, 1.0);
     rows.add("fixed", "mesh", "tumour", seed, 2.0 + noise);
-    rows.add("half-rank", "mesh", "tumour", seed, 1.0 + noise);
-    rows.add("double-rank", "mesh", "tumour", seed, 0.67 - noise);
+    rows.add("low-rank", "mesh", "tumour", seed, 1.0 + noise);
+    rows.add("high-rank", "mesh", "tumour", seed, 0.67 - noise);
   }
   return rows.table();
 }
@@ -69,7 +69,7 @@ TEST(PartsTable, SaysWhatAPartBuysAndThatAnotherBuysNothing) {
                         "12 of 16; tumour, all surgeries, tumour alone: 1.00 → 2.00 mm | "
                         "nothing |"));
   EXPECT_THAT(text, HasSubstr("1.00 | 1.00 | 1.00 | 1.00 | – | nothing | nothing |"));
-  EXPECT_THAT(text, HasSubstr("| twice the rank (off by default) |"));
+  EXPECT_THAT(text, HasSubstr("| a higher rank (off by default) |"));
 }
 
 TEST(AblationChecks, TurnRedForAPartOfTheDefaultThatBuysNothing) {
@@ -83,7 +83,7 @@ TEST(AblationChecks, TurnRedForAPartOfTheDefaultThatBuysNothing) {
                                 ">= 1 (of 16; it costs something in 0),1,"));
   EXPECT_THAT(checks, HasSubstr("ablations,rank: combinations in which it buys something,0,"
                                 ">= 1 (of 16; it costs something in 0),0,"));
-  EXPECT_THAT(checks, HasSubstr("ablations,twice the rank: combinations in which it buys "
+  EXPECT_THAT(checks, HasSubstr("ablations,a higher rank: combinations in which it buys "
                                 "something,12,shown; of 16; it costs something in 0,,"));
   EXPECT_THAT(text_of_file(folder.path() / "left_out.csv"), HasSubstr("ablations,calculix: "));
 }

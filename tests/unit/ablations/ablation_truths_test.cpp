@@ -48,8 +48,8 @@ TEST(AblationTruths, NoSeedOfAMotionIsPlayedTwice) {
       seeds.insert(one.seed);
     }
   }
-  EXPECT_EQ(motions, 2 * kPatients);
-  EXPECT_EQ(seeds.size(), 2u * kPatients);
+  EXPECT_EQ(motions, kSeedsPerMotion * kPatients);
+  EXPECT_EQ(static_cast<int>(seeds.size()), motions);
 }
 
 }  // namespace

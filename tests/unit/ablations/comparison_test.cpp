@@ -78,9 +78,9 @@ TEST(Differences, CountWhenTheyAreBothSureAndLarge) {
   for (int seed = 1; seed <= 8; ++seed) {
     const double noise = 1e-4 * seed;
     rows.add("default", "mesh", "tumour", seed, 1.0);
-    rows.add("fixed", "mesh", "tumour", seed, 1.01 + noise);           // sure, and 1 %
-    rows.add("no-fine", "mesh", "tumour", seed, 1.5 + noise);          // sure, and 50 %
-    rows.add("half-rank", "mesh", "tumour", seed, seed == 8 ? 9 : 1);  // 100 %, by one surgery
+    rows.add("fixed", "mesh", "tumour", seed, 1.01 + noise);          // sure, and 1 %
+    rows.add("no-fine", "mesh", "tumour", seed, 1.5 + noise);         // sure, and 50 %
+    rows.add("low-rank", "mesh", "tumour", seed, seed == 8 ? 9 : 1);  // 100 %, by one surgery
   }
   const auto table = rows.table();
   const surgeries::Rows all(table);
@@ -90,7 +90,7 @@ TEST(Differences, CountWhenTheyAreBothSureAndLarge) {
   };
   EXPECT_FALSE(counts("fixed"));
   EXPECT_TRUE(counts("no-fine"));
-  EXPECT_FALSE(counts("half-rank"));
+  EXPECT_FALSE(counts("low-rank"));
 }
 
 TEST(Differences, OfTheIntervalAreDeparturesFromNineTenths) {

@@ -50,7 +50,7 @@ TEST(Parts, OfTheDataSeeTheTumourAlone) {
 }
 
 TEST(PartsFrom, KeepTheOrderAndHaveTheDefault) {
-  const auto parts = parts_from({"no-fine", "fixed"});
+  const auto parts = parts_from({"no-medium", "fixed"});
   ASSERT_TRUE(parts);
   ASSERT_EQ(parts->size(), 3u);
   EXPECT_EQ((*parts)[0].variant.name, kDefault);
@@ -62,7 +62,7 @@ TEST(PartsFrom, NameWhatIsUnknownAndWhatIsKnown) {
   ASSERT_FALSE(parts);
   EXPECT_EQ(parts.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(parts.error().message, HasSubstr("no-luck"));
-  EXPECT_THAT(parts.error().message, HasSubstr("half-rank"));
+  EXPECT_THAT(parts.error().message, HasSubstr("low-rank"));
 }
 
 }  // namespace

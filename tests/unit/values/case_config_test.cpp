@@ -85,7 +85,7 @@ std::vector<Range> ranges() {
       {"prior.correlation_length_mm", [](C& c) -> double& { return c.prior.correlation_length_mm; },
        0.09, 0.1, 200, 201},
       {"prior.force_density_sd_n_m3", [](C& c) -> double& { return c.prior.force_density_sd_n_m3; },
-       0, 1e-300, 1e300, kInf},
+       -1, 0, 1e300, kInf},
       {"prior.gravity_mode_sd", [](C& c) -> double& { return c.prior.gravity_mode_sd; }, -0.1, 0,
        1e300, kInf},
       {"inversion.sigma_mm", [](C& c) -> double& { return c.inversion.sigma_mm; }, 0, 1e-6, 1e3,

@@ -20,8 +20,8 @@ TEST(Scenarios, AreNamedOnceAndDescribedInOneLine) {
   EXPECT_EQ(names,
             (std::set<std::string>{"paper", "paper-icp", "distension", "sag-progress", "no-contact",
                                    "joint-sag", "joint-distension", "joint-tangential",
-                                   "joint-mixed", "resection", "patient-1", "patient-2",
-                                   "patient-3", "patient-4", "patient-5"}));
+                                   "joint-mixed", "resection", "retraction", "patient-1",
+                                   "patient-2", "patient-3", "patient-4", "patient-5"}));
 }
 
 TEST(SagProgress, TheFluidFallsSteadilyFrom15To55InTwentyObservations) {

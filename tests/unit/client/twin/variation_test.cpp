@@ -48,6 +48,10 @@ TEST(Variation, FillsItsRanges) {
   expect_fills(
       extremes("resection", [](const Scenario& s) { return s.resection->volume_fraction; }), 0.6,
       0.8);
+  expect_fills(extremes("retraction", [](const Scenario& s) { return s.retraction->pressure_pa; }),
+               2000.0, 5200.0);
+  expect_fills(extremes("retraction", [](const Scenario& s) { return s.retraction->angle_deg; }),
+               0.0, 60.0);
 }
 
 // Gravity turns, and the swelling moves, in every direction: both signs of every axis.
@@ -84,6 +88,7 @@ TEST(Variation, AddsNoPartThatTheScenarioLacks) {
     EXPECT_EQ(varied.name, scenario.name);
     EXPECT_EQ(varied.swelling.volume_strain != 0.0, scenario.swelling.volume_strain != 0.0);
     EXPECT_EQ(varied.resection.has_value(), scenario.resection.has_value());
+    EXPECT_EQ(varied.retraction.has_value(), scenario.retraction.has_value());
     EXPECT_EQ(varied.volume.strain != 0.0, scenario.largest_shrinkage > 0.0);
     EXPECT_EQ(varied.gravity_tilt_deg, scenario.gravity_tilt_deg);
     EXPECT_EQ(varied.stiffness_sd, 0.3);

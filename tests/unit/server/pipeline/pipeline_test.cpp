@@ -300,6 +300,7 @@ TEST(Pipeline, SaysWhatItLeavesOut) {
 
 TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
   PriorConfig prior;
+  prior.force_density_sd_n_m3 = prior.medium_density_sd_n_m3;
   EXPECT_TRUE(prior_omissions(prior).empty());
   prior.tumour_volume_strain_sd = 0.0;
   prior.gravity_levels_mm.clear();
@@ -312,6 +313,19 @@ TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
   EXPECT_THAT(left_out[1].estimated_error, HasSubstr("1.7 mm at the cortex"));
   prior.resection_stress_sd_pa = 0.0;
   EXPECT_EQ(prior_omissions(prior).size(), 3u);
+}
+
+// By default the medium remainder stands for the fine one; without it that one is missing.
+TEST(Pipeline, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
+  PriorConfig prior;
+  const auto by_default = prior_omissions(prior);
+  ASSERT_EQ(by_default.size(), 1u);
+  EXPECT_EQ(by_default[0].part, "fine remainder");
+  EXPECT_THAT(by_default[0].estimated_error, HasSubstr("the medium remainder takes its place"));
+  prior.medium_density_sd_n_m3 = 0.0;
+  const auto none = prior_omissions(prior);
+  ASSERT_EQ(none.size(), 2u);
+  EXPECT_THAT(none[0].estimated_error, HasSubstr("0.1 mm at the cortex"));
 }
 
 TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
