@@ -7,8 +7,7 @@
 //   fluid level       +- kFluidLevel_mm: drainage depends on posture and on cisterns that happen to
 //                     be opened; at 55 mm of depth that is a quarter of the lost fluid
 //   pose              gravity turned by up to kGravityTurn_deg about any axis: a head clamp whose
-//                     pose is read by eye; half of what the default case holds for one standard
-//                     deviation (prior.gravity_direction_sd_deg). The scenario's own tilt stays.
+//                     pose is read by eye. The scenario's own tilt stays.
 //   stiffness         ln G with standard deviation kStiffnessSd over kStiffnessLength_mm: grey and
 //                     white matter differ by some 30 %, and gyri are about that wide
 //   swelling          strength times kLeastSwelling to kMostSwelling: oedema that is resolving to

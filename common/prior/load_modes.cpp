@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/prior/load_modes.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cassert>
 #include <cmath>
@@ -155,26 +156,63 @@ void add_resection(const BrainModel& model, const CaseConfig& config, Columns& o
   }
 }
 
-// Forces of the traction that a function of the node gives, on the triangles between three
-// craniotomy nodes: a third of a triangle's area to each corner.
+// The triangles between three craniotomy nodes, like an ellipse in a plane.
 struct Opening {
   std::vector<NodeIndex> nodes;
-  VecX areas_mm2;  // per node
-  Vec3 normal = Vec3::Zero();
+  VecX areas_mm2;  // per node: a third of each triangle at it
+  Vec3 centre = Vec3::Zero();
+  Vec3 long_half_axis = Vec3::Zero(), short_half_axis = Vec3::Zero();  // mm
+
   bool empty() const { return nodes.empty(); }
+  std::vector<Vec3> bump_centres() const {
+    std::vector<Vec3> centres = {centre};
+    for (int k = 0; k < kBumpsOfRing; ++k) {
+      const double angle = 2.0 * std::numbers::pi * k / kBumpsOfRing;
+      centres.push_back(
+          centre + kRing * (std::cos(angle) * long_half_axis + std::sin(angle) * short_half_axis));
+    }
+    return centres;
+  }
+  double bump(const Vec3& at, const Vec3& x) const {
+    const double a = long_half_axis.dot(x - at) / long_half_axis.squaredNorm();
+    const double b = short_half_axis.dot(x - at) / short_half_axis.squaredNorm();
+    return std::exp(-0.5 * (a * a + b * b) / (kBumpWidth * kBumpWidth));
+  }
 };
+
+// An ellipse whose area has the second moments of the nodes' areas: a quarter of the squares of its
+// half axes.
+void fit_ellipse(const Points& nodes, const Vec3& normal, Opening& opening) {
+  const double area = opening.areas_mm2.sum();
+  opening.centre = nodes * opening.areas_mm2 / area;
+  const auto [first, second] = across(normal);
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+    const Vec3 away = nodes.col(i) - opening.centre;
+    const Eigen::Vector2d place(away.dot(first), away.dot(second));
+    moments += opening.areas_mm2[i] / area * place * place.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(moments);
+  const auto half_axis = [&](int k) -> Vec3 {
+    const double length = 2.0 * std::sqrt(std::max(0.0, axes.eigenvalues()[k]));
+    return length * (axes.eigenvectors()(0, k) * first + axes.eigenvectors()(1, k) * second);
+  };
+  opening.short_half_axis = half_axis(0);
+  opening.long_half_axis = half_axis(1);
+}
 
 Opening opening_of(const BrainModel& model) {
   const std::set<NodeIndex> inside(model.craniotomy.begin(), model.craniotomy.end());
   VecX area = VecX::Zero(model.mesh.num_nodes());
   Opening opening;
+  Vec3 normal = Vec3::Zero();
   for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
     const Eigen::Vector3i corner = model.boundary_triangles.col(t);
     if (!inside.count(corner[0]) || !inside.count(corner[1]) || !inside.count(corner[2])) continue;
     const Vec3 a = model.mesh.nodes.col(corner[0]), b = model.mesh.nodes.col(corner[1]),
                c = model.mesh.nodes.col(corner[2]);
     const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
-    opening.normal += vector_area;
+    normal += vector_area;
     for (const int node : corner) area[node] += vector_area.norm() / 3.0;
   }
   for (const NodeIndex node : inside) {
@@ -182,7 +220,7 @@ Opening opening_of(const BrainModel& model) {
   }
   if (opening.nodes.empty()) return opening;
   opening.areas_mm2 = area(opening.nodes);
-  opening.normal.normalize();
+  fit_ellipse(model.mesh.nodes(Eigen::all, opening.nodes), normal.normalized(), opening);
   return opening;
 }
 
@@ -198,15 +236,12 @@ void add_opening(const BrainModel& model, const PriorConfig& prior, Columns& out
     }
     out.add(PriorPart::kOpening, units::stress_from_pa(prior.opening_pressure_sd_pa), load);
   };
-  for (int axis = 0; axis < 3; ++axis) {
-    add([axis](const Vec3&) -> Vec3 { return Vec3::Unit(axis); });
-  }
-  const Points nodes = model.mesh.nodes(Eigen::all, opening.nodes);
-  const Vec3 centre = nodes.rowwise().mean();
-  const auto [first, second] = across(opening.normal);
-  for (const Vec3& direction : {first, second}) {
-    const double reach = (direction.transpose() * (nodes.colwise() - centre)).cwiseAbs().maxCoeff();
-    add([&](const Vec3& x) -> Vec3 { return direction.dot(x - centre) / reach * opening.normal; });
+  for (const Vec3& centre : opening.bump_centres()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      add([&opening, centre, axis](const Vec3& x) -> Vec3 {
+        return opening.bump(centre, x) * Vec3::Unit(axis);
+      });
+    }
   }
 }
 

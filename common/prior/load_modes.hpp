@@ -20,8 +20,10 @@
 //                          (2 pi)^(3/2) s^3. A weight w rho g along each axis, rho g that of tissue
 //                          in air; and an initial stress w sigma0, one of its six components at a
 //                          time
-//   opening                traction on the craniotomy's patch: constant along each axis; along its
-//                          mean normal, growing from -1 to 1 across the patch in two directions
+//   opening                traction on the craniotomy's patch along each axis, in bumps: one in its
+//                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
+//                          with standard deviations of kBumpWidth of them. What pulls or presses
+//                          there, a spatula or dura that gives way, does not do so all over
 // Swelling honours the stiffness of tumour and regions (contact/tissues.hpp). All families have
 // zero mean and their columns are independent.
 #pragma once
@@ -37,6 +39,10 @@ namespace brainshift::prior {
 inline constexpr double kMidlineWidth_mm = 10.0;
 // Half of a brain's width: what swells with a tumour lies in its hemisphere.
 inline constexpr double kTumourVolumeReach_mm = 75.0;
+
+// Of the opening, in parts of its half axes.
+inline constexpr int kBumpsOfRing = 6;
+inline constexpr double kRing = 0.65, kBumpWidth = 0.45;
 
 struct LoadModes {
   Eigen::MatrixXd columns;    // 3n x k, N, node-major, in the order of the parts

@@ -12,6 +12,11 @@
 // estimate moves. This is the data side of non-rigid ICP (Chui & Rangarajan 2003; paper 2.7 for
 // the rigid kind).
 //
+// Many more points are measured than guide the model. With options.average_mm a guiding point
+// stands for its neighbours (a superobservation, Lorenc 1981, Mon Weather Rev 109:701): its
+// distance is the median of theirs, whose errors of their own mostly cancel. A gross error among
+// them does not matter.
+//
 // The first data are those of a rigid motion of the surface, such as a rigid ICP's: far from the
 // surface, closest points would lie on its wrong side. Of that motion nothing else enters the data.
 #pragma once
@@ -45,7 +50,13 @@ class IndexedPatch {
 
 struct SurfaceDistanceOptions {
   int points = 300;           // at most; chosen of those over the surface, always the same ones
-  double sd_mm = 0.5;         // of a point along the normal
+  double sd_mm = 0.5;         // of a point along the normal, apart from its neighbours
+  double shared_sd_mm = 0.0;  // of what it and its neighbours are off by alike, besides
+  // How far on the undeformed surface a point may lie from the guiding point nearest to it and
+  // still count to its neighbours; of kMeasuredPerPoint x points measured ones. With k of them,
+  // itself among them, the variance of a datum is pi sd^2 / (2 k) + shared_sd^2 (that of a median
+  // of many normal errors). 0, or k below kFewestAveraged: the point is as it was measured.
+  double average_mm = 0.0;
   double pose_sd_mm = 0.0;    // of the instrument's place: three common errors (none if 0)
   double pose_sd_deg = 0.0;   // of its direction, about the points' centroid: three more
   double farthest_mm = 30.0;  // from the surface; a point farther away is not of it
@@ -56,6 +67,9 @@ struct SurfaceDistanceOptions {
   int fewest = 10;
   std::string measured = "cortical surface", surface = "craniotomy";
 };
+
+inline constexpr int kMeasuredPerPoint = 10;
+inline constexpr int kFewestAveraged = 3;
 
 class SurfaceDistances {
  public:
@@ -81,15 +95,20 @@ class SurfaceDistances {
  private:
   SurfaceDistances(std::shared_ptr<const IndexedPatch> patch, const SurfaceDistanceOptions& options,
                    const RigidTransform& T_undeformed_measured);
-  // Data of the columns of `measured` that lie over the interior of the surface with these
-  // vertices. `kept`, if not null, receives their indices.
-  SparseData measure(Points vertices, const Points& measured, std::vector<int>* kept) const;
+  // Data of the columns of `measured`, with these standard deviations, that lie over the interior
+  // of the surface with these vertices. `kept`, if not null, receives their indices.
+  SparseData measure(Points vertices, const Points& measured, const VecX& sd_mm,
+                     std::vector<int>* kept) const;
+  // Moves the guiding points along their normals to the medians, and sets their standard
+  // deviations. data: of all points that were measured; guiding: which of them guide.
+  void average(const SparseData& data, const std::vector<int>& guiding);
   Points first_vertices() const;
 
   std::shared_ptr<const IndexedPatch> patch_;
   SurfaceDistanceOptions options_;
   RigidTransform T_undeformed_measured_;
   Points guiding_;  // the measured points in use
+  VecX sd_mm_;      // of their distances
 };
 
 }  // namespace brainshift::registration

@@ -96,8 +96,8 @@ struct ContactConfig {
 // of 0 leaves a family out. Where the strengths are estimated, a surgery may have up to
 // kLargestStrength times these, or none of a family.
 struct PriorConfig {
-  // Remainder: fine (the paper's), medium and coarse correlation length. What the fine one
-  // explains, the medium one does as well (docs/ablations.md): it is off.
+  // Remainder: fine (the paper's), medium and coarse correlation length. Parts that are off explain
+  // nothing that others do not explain as well (docs/ablations.md, docs/decisions/0030).
   double correlation_length_mm = 5.0;
   double medium_length_mm = 20.0;
   double coarse_length_mm = 60.0;
@@ -108,7 +108,7 @@ struct PriorConfig {
   double gravity_mode_sd = 1.0;
   // Standard deviation of the direction of gravity. A mode across it has gravity_mode_sd times the
   // tangent of this angle.
-  double gravity_direction_sd_deg = 10.0;
+  double gravity_direction_sd_deg = 0.0;
   // Fluid planes below the reference plane.
   std::vector<double> gravity_levels_mm = {-40.0, -20.0, 0.0, 20.0, 40.0, 60.0};
   // Volume strain of swelling or shrinking tissue around the tumour: standard deviation at its
@@ -119,8 +119,8 @@ struct PriorConfig {
   double brain_volume_strain_sd = 0.007;
   // Tissue that is removed at the tumour: its weight, in units of the tumour's weight in air, and
   // the stress that it carried.
-  double resection_weight_sd = 1.0;
-  double resection_stress_sd_pa = 300.0;
+  double resection_weight_sd = 0.0;
+  double resection_stress_sd_pa = 0.0;
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
@@ -162,10 +162,11 @@ struct SensingConfig {
   // (docs/decisions/0020).
   double probe_pose_sd_mm = 0.0;
   double probe_pose_sd_deg = 0.0;
-  // What a point of a tumour boundary is off by along the normal, beside the noise that its
-  // observation states. The default is what optical trackers are specified at
-  // (docs/decisions/0029).
-  double boundary_error_sd_mm = 0.3;
+  // What neighbouring points of a tumour boundary are off by alike along the normal, beside the
+  // noise that their observation states (docs/decisions/0029, 0031).
+  double boundary_error_sd_mm = 0.4;
+  // Of a boundary's points those within this distance are averaged (docs/decisions/0031). 0: none.
+  double boundary_average_mm = 3.0;
   // How well the image that landmarks were found in during surgery is registered: an error that all
   // pairs of an observation share.
   double landmark_pose_sd_mm = 0.0;
@@ -184,7 +185,7 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
   // Largest number of prior modes kept, those of the load families among them.
-  int max_rank = 128;
+  int max_rank = 116;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.

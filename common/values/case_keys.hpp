@@ -218,8 +218,10 @@ void visit(A& a, V& v) {
      "Standard deviation of buoyancy modes", "", "0 switches them off."},
     v.gravity_mode_sd, not_negative());
   a({"gravity_direction_sd_deg", "degrees", "How well the direction of gravity is known",
-     "what tracking of a head leaves",
-     "The modes across gravity are weaker than those along it by the tangent."},
+     "decision 0030",
+     "The modes across gravity are weaker than those along it by the tangent. 0: no such modes; "
+     "the "
+     "coarse remainder stands for a pose that is off."},
     v.gravity_direction_sd_deg, between(0.0, 80.0));
   a({"gravity_levels_mm", "mm below the reference plane along gravity",
      "Fluid planes of these modes", "", "May be empty."},
@@ -242,11 +244,11 @@ void visit(A& a, V& v) {
      "decision 0018", "0: no such modes."},
     v.brain_volume_strain_sd, between(0.0, 2.0));
   a({"resection_weight_sd", "in units of the tumour's weight in air",
-     "Weight that is missing or added at the tumour, standard deviation", "decision 0018",
+     "Weight that is missing or added at the tumour, standard deviation", "decision 0030",
      "0: no such modes."},
     v.resection_weight_sd, not_negative());
   a({"resection_stress_sd_pa", "Pa",
-     "Stress that removed tissue carried at the tumour, standard deviation", "decision 0018",
+     "Stress that removed tissue carried at the tumour, standard deviation", "decision 0030",
      "0: no such modes."},
     v.resection_stress_sd_pa, not_negative());
   a({"opening_pressure_sd_pa", "Pa", "Pull and pressure at the craniotomy, standard deviation",
@@ -309,10 +311,15 @@ void visit(A& a, V& v) {
   a({"probe_pose_sd_deg", "degrees", "The same for the probe's direction", "docs/decisions/0020"},
     v.probe_pose_sd_deg, between(0.0, 45.0));
   a({"boundary_error_sd_mm", "mm",
-     "What a point of a tumour boundary is off by along the normal, beside the noise that its "
-     "observation states: standard deviation of the tracker's errors and the like",
-     "docs/decisions/0029", "Used with tumour: distances."},
+     "What neighbouring points of a tumour boundary are off by alike along the normal, beside the "
+     "noise that their observation states: standard deviation of the tracker's errors and the like",
+     "docs/decisions/0031", "Used with tumour: distances."},
     v.boundary_error_sd_mm, between(0.0, 100.0));
+  a({"boundary_average_mm", "mm",
+     "A point of a tumour boundary that guides the model stands for the points within this "
+     "distance, by the median of their distances",
+     "docs/decisions/0031", "0: for itself alone. Used with tumour: distances."},
+    v.boundary_average_mm, between(0.0, 20.0));
   a({"landmark_pose_sd_mm", "mm",
      "How well the image that landmarks were found in during surgery is registered: standard "
      "deviation of a shift that all pairs of an observation share",

@@ -32,18 +32,26 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
     const char* keys;
     bool off;
     double cortex_mm, tumour_mm;
-    bool replaced = false;
+    const char* instead = nullptr;  // the part that takes its place
   };
   const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
-  const bool medium = prior.medium_density_sd_n_m3 > 0.0;
+  const bool swells = prior.tumour_volume_strain_sd > 0.0 && !prior.tumour_volume_radii_mm.empty();
+  const auto where_on = [](bool on, const char* name) { return on ? name : nullptr; };
+  const char* const medium =
+      where_on(prior.medium_density_sd_n_m3 > 0.0, "the medium remainder takes its place");
+  const char* const coarse =
+      where_on(prior.coarse_density_sd_n_m3 > 0.0, "the coarse remainder takes its place");
+  const char* const tumour = where_on(swells, "swelling of the tumour takes its place");
   const Part parts[] = {
       {"gravity modes", "prior.gravity_mode_sd or prior.gravity_levels_mm", no_gravity, 2.1, 2.3},
+      {"buoyancy across gravity", "prior.gravity_direction_sd_deg",
+       !no_gravity && prior.gravity_direction_sd_deg == 0.0, 0.4, 0.4, coarse},
       {"swelling of the tumour", "prior.tumour_volume_strain_sd or prior.tumour_volume_radii_mm",
-       prior.tumour_volume_strain_sd == 0.0 || prior.tumour_volume_radii_mm.empty(), 1.7, 1.4},
+       !swells, 1.7, 1.4},
       {"volume of the brain", "prior.brain_volume_strain_sd", prior.brain_volume_strain_sd == 0.0,
        0.4, 0.4},
       {"resection", "prior.resection_weight_sd and prior.resection_stress_sd_pa",
-       prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6},
+       prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6, tumour},
       {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
        4.8, 1.6},
       {"fine remainder", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0, 0.1,
@@ -55,10 +63,10 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
   std::vector<Omission> omissions;
   for (const Part& part : parts) {
     if (!part.off) continue;
-    if (part.replaced) {
-      omissions.push_back({part.name, fmt::format("{} is 0", part.keys),
-                           "none seen in simulated surgeries: the medium remainder takes its place "
-                           "(docs/ablations.md)"});
+    if (part.instead != nullptr) {
+      omissions.push_back(
+          {part.name, fmt::format("{} is 0", part.keys),
+           fmt::format("none seen in simulated surgeries: {} (docs/ablations.md)", part.instead)});
       continue;
     }
     omissions.push_back({part.name, fmt::format("{} is 0 or empty", part.keys),

@@ -76,7 +76,8 @@ double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& opt
 
 struct Alignment {
   registration::IcpResult icp;
-  std::vector<int> guiding;  // indices of the points that guide the model, ascending
+  std::vector<int> inliers;  // indices of the points that it holds for, ascending
+  std::vector<int> guiding;  // those of them that guide the model
   int outliers = 0;          // points that the alignment leaves aside
 };
 
@@ -110,6 +111,7 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
   alignment.guiding = guiding_points(static_cast<int>(inliers.size()), guiding);
   for (int& one : alignment.guiding) one = inliers[static_cast<std::size_t>(one)];
   alignment.outliers = static_cast<int>(points.cols()) - static_cast<int>(inliers.size());
+  alignment.inliers = std::move(inliers);
   alignment.icp = std::move(*icp);
   return alignment;
 }
@@ -142,14 +144,16 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   }
   registration::SurfaceDistanceOptions options;
   options.points = config.inversion.sparse_points;
-  options.sd_mm = std::hypot(sd_mm, config.sensing.boundary_error_sd_mm);
+  options.sd_mm = sd_mm;
+  options.shared_sd_mm = config.sensing.boundary_error_sd_mm;
+  options.average_mm = config.sensing.boundary_average_mm;
   options.pose_sd_mm = config.sensing.probe_pose_sd_mm;
   options.pose_sd_deg = config.sensing.probe_pose_sd_deg;
   options.fewest = 3;
   options.measured = "tumour boundary";
   options.surface = "tumour";
   auto surface = registration::SurfaceDistances::build(targets.tumour,
-                                                       body.points(Eigen::all, alignment->guiding),
+                                                       body.points(Eigen::all, alignment->inliers),
                                                        options, alignment->icp.T_surface_points);
   if (!surface) return tl::unexpected(surface.error());
   RegisteredObservation registered;

@@ -23,10 +23,11 @@
 //   PatientPose      rejected: not assimilated in this version
 //
 // Standard deviation of a datum: inversion.sigma_mm, the sigma_eps of the paper's W_eps, or the
-// observation's own where that is larger. Distances of a tumour boundary add
-// sensing.boundary_error_sd_mm to its square. The paper's method and its variants take the former
-// whatever the observation says. Points that ICP takes for outliers guide nothing. Errors that
-// aligned points have in common: registration::sparse_data_from_alignment.
+// observation's own where that is larger. Distances of a tumour boundary stand for their neighbours
+// within sensing.boundary_average_mm, whose noise they average, and add the square of
+// sensing.boundary_error_sd_mm to what is left of its square. The paper's method and its variants
+// take the former whatever the observation says. Points that ICP takes for outliers guide nothing.
+// Errors that aligned points have in common: registration::sparse_data_from_alignment.
 #pragma once
 
 #include <memory>

@@ -11,11 +11,13 @@ namespace {
 using evidence::Anew;
 using Change = std::function<void(CaseConfig&)>;
 
-constexpr double kLeastLength_mm = 1.0;   // the key's least value
-constexpr double kDensity_n_m3 = 1000.0;  // as of the medium remainder
+constexpr double kLeastLength_mm = 1.0;  // the key's least value
+// Of parts that are off: their values before decision 0030.
+constexpr double kDensity_n_m3 = 1000.0, kDirectionSd_deg = 10.0;
+constexpr double kWeightSd = 1.0, kStressSd_pa = 300.0;
 // A tracked probe as decision 0020 has it, which a client would state.
 constexpr double kProbePoseSd_mm = 0.5, kProbePoseSd_deg = 0.5;
-constexpr int kLowRank = 112, kHighRank = 192;  // 97 are load families
+constexpr int kLowRank = 104, kHighRank = 192;  // 92 are load families
 
 Part part(std::string name, std::string variant, Anew anew, std::vector<std::string> keys,
           std::string change, Change to) {
@@ -45,18 +47,12 @@ std::vector<Part> prior_parts() {
   return {
       of("buoyancy", "no-buoyancy", {"prior.gravity_mode_sd"}, "`prior.gravity_mode_sd: 0`",
          [](CaseConfig& c) { c.prior.gravity_mode_sd = 0.0; }),
-      of("buoyancy across gravity", "no-across", {"prior.gravity_direction_sd_deg"},
-         "`prior.gravity_direction_sd_deg: 0`",
-         [](CaseConfig& c) { c.prior.gravity_direction_sd_deg = 0.0; }),
       of("swelling about the tumour", "no-tumour-volume", {"prior.tumour_volume_strain_sd"},
          "`prior.tumour_volume_strain_sd: 0`",
          [](CaseConfig& c) { c.prior.tumour_volume_strain_sd = 0.0; }),
       of("brain volume", "no-brain-volume", {"prior.brain_volume_strain_sd"},
          "`prior.brain_volume_strain_sd: 0`",
          [](CaseConfig& c) { c.prior.brain_volume_strain_sd = 0.0; }),
-      of("resection", "no-resection", {"prior.resection_weight_sd", "prior.resection_stress_sd_pa"},
-         "`prior.resection_weight_sd: 0`, `resection_stress_sd_pa: 0`",
-         [](CaseConfig& c) { c.prior.resection_weight_sd = c.prior.resection_stress_sd_pa = 0.0; }),
       of("opening", "no-opening", {"prior.opening_pressure_sd_pa"},
          "`prior.opening_pressure_sd_pa: 0`",
          [](CaseConfig& c) { c.prior.opening_pressure_sd_pa = 0.0; }),
@@ -71,7 +67,7 @@ std::vector<Part> prior_parts() {
          [](CaseConfig& c) {
            c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
          }),
-      of("rank", "low-rank", {"condensed.max_rank"}, "`condensed.max_rank: 112`",
+      of("rank", "low-rank", {"condensed.max_rank"}, "`condensed.max_rank: 104`",
          [](CaseConfig& c) { c.condensed.max_rank = kLowRank; }),
   };
 }
@@ -97,6 +93,9 @@ std::vector<Part> data_parts() {
       of("error of a boundary's points", "no-boundary-error", {"sensing.boundary_error_sd_mm"},
          "`sensing.boundary_error_sd_mm: 0`",
          [](CaseConfig& c) { c.sensing.boundary_error_sd_mm = 0.0; }),
+      of("averages of a boundary's points", "no-averages", {"sensing.boundary_average_mm"},
+         "`sensing.boundary_average_mm: 0`",
+         [](CaseConfig& c) { c.sensing.boundary_average_mm = 0.0; }),
       of("tumour as distances", "rigid-tumour", {"sensing.tumour"}, "`sensing.tumour: rigid`",
          [](CaseConfig& c) { c.sensing.tumour = SurfaceGuidance::kRigid; }),
       of("cortex as distances", "rigid-cortex", {"sensing.surface"}, "`sensing.surface: rigid`",
@@ -120,12 +119,25 @@ std::vector<Part> added_parts() {
   const Part fine = of("fine remainder", "fine", {"prior.force_density_sd_n_m3"},
                        "`prior.force_density_sd_n_m3: 1000`",
                        [](CaseConfig& c) { c.prior.force_density_sd_n_m3 = kDensity_n_m3; });
-  const Part former =
-      of("the same with room for its modes", "former",
-         {"prior.force_density_sd_n_m3", "condensed.max_rank"},
-         "the default before decision 0030: the same, and `condensed.max_rank: 192`",
-         [](CaseConfig& c) {
+  const Part across = of("buoyancy across gravity", "across", {"prior.gravity_direction_sd_deg"},
+                         "`prior.gravity_direction_sd_deg: 10`", [](CaseConfig& c) {
+                           c.prior.gravity_direction_sd_deg = kDirectionSd_deg;
+                         });
+  const Part resection =
+      of("resection", "resection", {"prior.resection_weight_sd", "prior.resection_stress_sd_pa"},
+         "`prior.resection_weight_sd: 1`, `resection_stress_sd_pa: 300`", [](CaseConfig& c) {
+           c.prior.resection_weight_sd = kWeightSd;
+           c.prior.resection_stress_sd_pa = kStressSd_pa;
+         });
+  const Part all =
+      of("these three, with room for their modes", "all-families",
+         {"prior.force_density_sd_n_m3", "prior.gravity_direction_sd_deg",
+          "prior.resection_weight_sd", "prior.resection_stress_sd_pa", "condensed.max_rank"},
+         "all of these, and `condensed.max_rank: 192`", [](CaseConfig& c) {
            c.prior.force_density_sd_n_m3 = kDensity_n_m3;
+           c.prior.gravity_direction_sd_deg = kDirectionSd_deg;
+           c.prior.resection_weight_sd = kWeightSd;
+           c.prior.resection_stress_sd_pa = kStressSd_pa;
            c.condensed.max_rank = kHighRank;
          });
   Part rank =
@@ -145,7 +157,8 @@ std::vector<Part> added_parts() {
       part("pore pressure", "pressure", Anew::kOperators, {"scene.pressure"},
            "`scene.pressure: on`", [](CaseConfig& c) { c.scene.pressure = Carry::kOn; });
   pressure.slow = true;
-  return {added(fine), added(former), added(probe), added(rank), added(refined), added(pressure)};
+  return {added(fine),  added(across), added(resection), added(all),
+          added(probe), added(rank),   added(refined),   added(pressure)};
 }
 
 }  // namespace

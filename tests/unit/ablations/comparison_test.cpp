@@ -79,7 +79,7 @@ TEST(Differences, CountWhenTheyAreBothSureAndLarge) {
     const double noise = 1e-4 * seed;
     rows.add("default", "mesh", "tumour", seed, 1.0);
     rows.add("fixed", "mesh", "tumour", seed, 1.01 + noise);          // sure, and 1 %
-    rows.add("no-fine", "mesh", "tumour", seed, 1.5 + noise);         // sure, and 50 %
+    rows.add("no-medium", "mesh", "tumour", seed, 1.5 + noise);       // sure, and 50 %
     rows.add("low-rank", "mesh", "tumour", seed, seed == 8 ? 9 : 1);  // 100 %, by one surgery
   }
   const auto table = rows.table();
@@ -89,7 +89,7 @@ TEST(Differences, CountWhenTheyAreBothSureAndLarge) {
         ->counts;
   };
   EXPECT_FALSE(counts("fixed"));
-  EXPECT_TRUE(counts("no-fine"));
+  EXPECT_TRUE(counts("no-medium"));
   EXPECT_FALSE(counts("low-rank"));
 }
 

@@ -410,5 +410,87 @@ TEST(TumourDistances, RefusePointsFarFromTheSurfaceInTheirOwnWords) {
   EXPECT_TRUE(SurfaceDistances::build(patch, away, options, back));
 }
 
+// 3,000 points, each off by 0.5 mm along the normal; 100 guide.
+class Superobservations : public testing::Test {
+ protected:
+  static Points noisy(double sd_mm) {
+    Points points = points_on_cap(3000, 7.0);
+    Random random(5);
+    for (auto p : points.colwise()) p += sd_mm * random.normal() * p.normalized();
+    return points;
+  }
+  static VecX heights(const SparseData& data) {
+    VecX values(data.size());
+    for (int i = 0; i < data.size(); ++i) {
+      values[i] = data.directions.col(i).dot(data.displacements.col(i));
+    }
+    return values;
+  }
+  static SurfaceDistanceOptions averaged() {
+    SurfaceDistanceOptions options;
+    options.points = 100;
+    options.sd_mm = 0.5;
+    options.average_mm = 3.0;
+    return options;
+  }
+};
+
+TEST_F(Superobservations, AreOffByWhatTheySay) {
+  const SparseData data = built(noisy(0.5), averaged()).first();
+  ASSERT_EQ(data.size(), 100);
+  const VecX off = heights(data);
+  // 1,000 points are used, so about ten for each: sd near 0.5 sqrt(pi / 20) = 0.2 mm.
+  EXPECT_NEAR(data.sd_mm.mean(), 0.2, 0.04);
+  const double rms = (off.array() / data.sd_mm.array()).matrix().norm() / 10.0;
+  EXPECT_NEAR(rms, 1.0, 0.2);
+  EXPECT_LT(std::abs(off.mean()), 0.06);  // three standard errors
+}
+
+TEST_F(Superobservations, KeepWhatNeighboursShare) {
+  SurfaceDistanceOptions options = averaged();
+  const VecX alone = built(noisy(0.5), options).first().sd_mm;
+  options.shared_sd_mm = 0.4;
+  const VecX shared = built(noisy(0.5), options).first().sd_mm;
+  EXPECT_LT((shared.cwiseAbs2() - alone.cwiseAbs2() - VecX::Constant(100, 0.16)).norm(), 1e-12);
+}
+
+// A fifth of the points are 8 mm off, as many inwards as outwards: a mean would have 3 mm of that
+// where three of ten neighbours are.
+TEST_F(Superobservations, AreNotMovedByGrossErrors) {
+  Points points = noisy(0.1);
+  for (Eigen::Index i = 0; i < points.cols(); i += 5) {
+    points.col(i) += (i % 2 == 0 ? 8.0 : -8.0) * points.col(i).normalized();
+  }
+  SurfaceDistanceOptions options = averaged();
+  options.points = 40;
+  const VecX off = heights(built(points, options).first());
+  int gross = 0;
+  for (const double one : off) gross += std::abs(one) > 0.5 ? 1 : 0;
+  EXPECT_LE(gross, 2);  // clusters that are mostly gross by chance
+}
+
+TEST_F(Superobservations, OfFewerThanThreeNeighboursAreThePointsThemselves) {
+  const Points points = noisy(0.5).leftCols(90);
+  SurfaceDistanceOptions options = averaged();
+  options.average_mm = 0.0;
+  const SparseData plain = built(points, options).first();
+  options.average_mm = 1e-3;
+  const SparseData alone = built(points, options).first();
+  EXPECT_EQ(alone.displacements, plain.displacements);
+  EXPECT_EQ(alone.sd_mm, plain.sd_mm);
+}
+
+// A surface that moves as a whole is measured as exactly as without averages.
+TEST_F(Superobservations, FollowTheSurfaceAsItMoves) {
+  const Vec3 sink(0, 0, -3);
+  const SurfaceDistances surface = built(noisy(0.0).colwise() + sink, averaged());
+  const Points moved = still(surface).colwise() + sink;
+  EXPECT_LT((heights(surface.at(moved)).array() -
+             (surface.at(moved).directions.transpose() * sink).array())
+                .cwiseAbs()
+                .maxCoeff(),
+            0.1);
+}
+
 }  // namespace
 }  // namespace brainshift::registration

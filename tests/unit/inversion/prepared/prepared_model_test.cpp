@@ -13,7 +13,10 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
   std::set<std::string> stages;
   CaseConfig config = test_support::toy_config();
   const std::vector<double> levels = config.prior.gravity_levels_mm;
-  config.prior = {};  // every part
+  config.prior = {};  // every part:
+  config.prior.gravity_direction_sd_deg = 10.0;
+  config.prior.resection_weight_sd = 1.0;
+  config.prior.resection_stress_sd_pa = 300.0;
   config.prior.gravity_levels_mm = levels;
   const auto model =
       PreparedModel::prepare(patient(), config, Boundary::kFixed,
@@ -22,7 +25,7 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
   EXPECT_EQ(model->boundary(), Boundary::kFixed);
   EXPECT_EQ(&model->model(), patient().get());
   // Fluid levels in three directions, bumps of three radii, the brain's halves, resection, opening.
-  EXPECT_EQ(model->prior().num_modes(), 6 + (27 + 27 + 7) + 4 + 9 + 5);
+  EXPECT_EQ(model->prior().num_modes(), 6 + (27 + 27 + 7) + 4 + 9 + 21);
   EXPECT_GT(model->timings().factor_nonzeros, 0u);
   EXPECT_GT(model->timings().bytes, 0u);
   EXPECT_GE(model->timings().total_s, model->timings().factor_s);

@@ -301,6 +301,9 @@ TEST(Pipeline, SaysWhatItLeavesOut) {
 TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
   PriorConfig prior;
   prior.force_density_sd_n_m3 = prior.medium_density_sd_n_m3;
+  prior.gravity_direction_sd_deg = 10.0;
+  prior.resection_weight_sd = 1.0;
+  prior.resection_stress_sd_pa = 300.0;
   EXPECT_TRUE(prior_omissions(prior).empty());
   prior.tumour_volume_strain_sd = 0.0;
   prior.gravity_levels_mm.clear();
@@ -315,17 +318,22 @@ TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
   EXPECT_EQ(prior_omissions(prior).size(), 3u);
 }
 
-// By default the medium remainder stands for the fine one; without it that one is missing.
+// By default other parts stand for three; without those these are missing.
 TEST(Pipeline, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
   PriorConfig prior;
   const auto by_default = prior_omissions(prior);
-  ASSERT_EQ(by_default.size(), 1u);
-  EXPECT_EQ(by_default[0].part, "fine remainder");
-  EXPECT_THAT(by_default[0].estimated_error, HasSubstr("the medium remainder takes its place"));
+  ASSERT_EQ(by_default.size(), 3u);
+  EXPECT_EQ(by_default[0].part, "buoyancy across gravity");
+  EXPECT_THAT(by_default[0].estimated_error, HasSubstr("the coarse remainder takes its place"));
+  EXPECT_EQ(by_default[1].part, "resection");
+  EXPECT_THAT(by_default[1].estimated_error, HasSubstr("swelling of the tumour takes its place"));
+  EXPECT_EQ(by_default[2].part, "fine remainder");
+  EXPECT_THAT(by_default[2].estimated_error, HasSubstr("the medium remainder takes its place"));
   prior.medium_density_sd_n_m3 = 0.0;
   const auto none = prior_omissions(prior);
-  ASSERT_EQ(none.size(), 2u);
-  EXPECT_THAT(none[0].estimated_error, HasSubstr("0.1 mm at the cortex"));
+  ASSERT_EQ(none.size(), 4u);
+  EXPECT_EQ(none[2].part, "fine remainder");
+  EXPECT_THAT(none[2].estimated_error, HasSubstr("0.1 mm at the cortex"));
 }
 
 TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
