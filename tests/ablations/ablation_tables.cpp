@@ -72,8 +72,8 @@ struct Mark {
   cv::Scalar colour;
   client::Marker marker;
 };
-const std::array<Mark, 10>& marks() {
-  static const std::array<Mark, 10> all = {{{palette::kBlack, client::Marker::kCircle},
+const std::array<Mark, 11>& marks() {
+  static const std::array<Mark, 11> all = {{{palette::kBlack, client::Marker::kCircle},
                                             {palette::kBlue, client::Marker::kCircle},
                                             {palette::kSkyBlue, client::Marker::kSquare},
                                             {palette::kGreen, client::Marker::kTriangle},
@@ -81,8 +81,9 @@ const std::array<Mark, 10>& marks() {
                                             {palette::kVermillion, client::Marker::kSquare},
                                             {palette::kPurple, client::Marker::kTriangle},
                                             {palette::kGrey, client::Marker::kSquare},
-                                            {palette::kYellow, client::Marker::kCircle},
-                                            {palette::kInk, client::Marker::kTriangle}}};
+                                            {palette::kOrange, client::Marker::kTriangle},
+                                            {palette::kInk, client::Marker::kTriangle},
+                                            {palette::kBlue, client::Marker::kSquare}}};
   return all;
 }
 
@@ -105,7 +106,7 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const Difference* found = parts[i].find(picture.measure, groups[g], "all data");
       if (found == nullptr) continue;
-      const double aside = 0.08 * (static_cast<double>(g) - 4.5);
+      const double aside = 0.08 * (static_cast<double>(g) - 5.0);
       series.points.push_back({static_cast<double>(i) + aside, 1.0 + found->change(), ""});
     }
     spec.series.push_back(std::move(series));
@@ -195,14 +196,15 @@ void check_ablations(const Rows& rows) {
 }
 
 Status draw_ablations(const Rows& rows, const std::filesystem::path& folder) {
-  // In two pictures, so that the names have room.
-  std::vector<Held> prior, rest;
+  // In three pictures, so that the names have room.
+  std::vector<Held> prior, data, off;
   for (Held& held : held_parts(rows)) {
-    const bool of_prior =
-        held.part->variant.anew == evidence::Anew::kOperators && !held.part->added;
-    (of_prior ? prior : rest).push_back(std::move(held));
+    const bool of_prior = held.part->variant.anew == evidence::Anew::kOperators;
+    (held.part->added ? off : of_prior ? prior : data).push_back(std::move(held));
   }
-  for (const auto& [parts, suffix] : {std::pair{&prior, "-prior.png"}, {&rest, "-data.png"}}) {
+  for (const auto& [parts, suffix] :
+       {std::pair{&prior, "-prior.png"}, {&data, "-data.png"}, {&off, "-off.png"}}) {
+    if (parts->empty()) continue;
     for (const auto& [measure, title] :
          {std::pair{"tumour", "Error at the tumour without a part, or with one more"},
           {"craniotomy",

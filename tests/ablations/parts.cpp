@@ -130,7 +130,7 @@ std::vector<Part> added_parts() {
            c.prior.resection_stress_sd_pa = kStressSd_pa;
          });
   const Part all =
-      of("these three, with room for their modes", "all-families",
+      of("these three with room for their modes", "all-families",
          {"prior.force_density_sd_n_m3", "prior.gravity_direction_sd_deg",
           "prior.resection_weight_sd", "prior.resection_stress_sd_pa", "condensed.max_rank"},
          "all of these, and `condensed.max_rank: 192`", [](CaseConfig& c) {
