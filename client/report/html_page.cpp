@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/report/html_page.hpp"
-#include "client/report/escape_html.hpp"
 
 #include <algorithm>
 #include <cstdio>
 
+#include "client/report/escape_html.hpp"
 #include "client/report/verdict.hpp"
 #include "common/io/files/binary_codec.hpp"
 

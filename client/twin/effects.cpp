@@ -68,6 +68,16 @@ Status check_gravity(const TruthBrain& brain, const Scenario& scenario) {
   return {};
 }
 
+Status check_retraction(const TruthBrain& brain, const Scenario& scenario) {
+  if (!scenario.retraction) return {};
+  const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
+  if (!retraction_load(body, *scenario.retraction).isZero(0.0)) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("scenario {} does nothing on this case: its spatula of radius {:g} mm "
+                          "presses on no node of the opening",
+                          scenario.name, scenario.retraction->radius_mm));
+}
+
 bool depends_on_contact(const Scenario& scenario) {
   return scenario.adverse.gap_seed || scenario.adverse.penalty_factor != 1.0;
 }

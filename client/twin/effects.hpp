@@ -15,6 +15,9 @@ inline constexpr double kLeastTilt_deg = 1.0;
 // none is out of the fluid.
 Status check_gravity(const TruthBrain& brain, const Scenario& scenario);
 
+// Before a surgery. kInvalidArgument: a spatula that touches no exposed node, or without pressure.
+Status check_retraction(const TruthBrain& brain, const Scenario& scenario);
+
 // True when an ingredient changes the contact with the skull.
 bool depends_on_contact(const Scenario& scenario);
 // Whether contact matters to a surgery's truths.

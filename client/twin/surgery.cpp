@@ -251,6 +251,7 @@ Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSource& sol
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress) {
   if (Status ok = check_gravity(brain, scenario); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_retraction(brain, scenario); !ok) return tl::unexpected(ok.error());
   const Points swelling = constant_load(brain, scenario);
   Random random(seed);
   ProbeError error(scenario.adverse.probe);

@@ -172,6 +172,27 @@ TriangleSurface boundary_surface(const TetMesh& mesh, std::vector<NodeIndex>* no
   return surface;
 }
 
+TriangleSurface surface_between(const Points& positions, const Triangles& triangles,
+                                std::vector<NodeIndex> nodes) {
+  std::sort(nodes.begin(), nodes.end());
+  TriangleSurface surface;
+  surface.vertices = positions(Eigen::all, nodes);
+  const auto vertex_of = [&nodes](NodeIndex node) {
+    const auto found = std::lower_bound(nodes.begin(), nodes.end(), node);
+    return found != nodes.end() && *found == node ? static_cast<int>(found - nodes.begin()) : -1;
+  };
+  std::vector<int> corners;
+  for (Eigen::Index t = 0; t < triangles.cols(); ++t) {
+    const std::array<int, 3> corner = {vertex_of(triangles(0, t)), vertex_of(triangles(1, t)),
+                                       vertex_of(triangles(2, t))};
+    if (std::min({corner[0], corner[1], corner[2]}) < 0) continue;
+    corners.insert(corners.end(), corner.begin(), corner.end());
+  }
+  surface.triangles =
+      Eigen::Map<const Triangles>(corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
+  return surface;
+}
+
 Points vertex_normals(const TriangleSurface& surface) {
   Points normals = Points::Zero(3, surface.num_vertices());
   for (int t = 0; t < surface.num_triangles(); ++t) {
@@ -205,6 +226,21 @@ double enclosed_volume(const TriangleSurface& surface) {
 double area(const TriangleSurface& surface) {
   double twice = 0.0;
   for (int t = 0; t < surface.num_triangles(); ++t) twice += area_vector(surface, t).norm();
+  return 0.5 * twice;
+}
+
+VecX vertex_areas(const TriangleSurface& surface) {
+  VecX areas = VecX::Zero(surface.num_vertices());
+  for (int t = 0; t < surface.num_triangles(); ++t) {
+    const double third = 0.5 * area_vector(surface, t).norm() / 3.0;
+    for (const int vertex : surface.triangles.col(t)) areas[vertex] += third;
+  }
+  return areas;
+}
+
+Vec3 vector_area(const TriangleSurface& surface) {
+  Vec3 twice = Vec3::Zero();
+  for (int t = 0; t < surface.num_triangles(); ++t) twice += area_vector(surface, t);
   return 0.5 * twice;
 }
 

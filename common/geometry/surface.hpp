@@ -21,6 +21,12 @@ Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles(
 TriangleSurface boundary_surface(const TetMesh& mesh,
                                  std::vector<NodeIndex>* node_of_vertex = nullptr);
 
+// The triangles between three of these nodes. Vertices are all of the nodes, in increasing order.
+// positions: 3 x n, mm; triangles: 3 x t node indices; nodes without repetition.
+TriangleSurface surface_between(const Points& positions,
+                                const Eigen::Matrix<int, 3, Eigen::Dynamic>& triangles,
+                                std::vector<NodeIndex> nodes);
+
 // Unit outward normals at the vertices, 3 x v: area-weighted mean of the adjacent triangles'
 // normals (the paper's "average nodal normal"). The column of an unused vertex is zero.
 Points vertex_normals(const TriangleSurface& surface);
@@ -32,6 +38,10 @@ TriangleSurface offset_surface(const TriangleSurface& surface, double distance_m
 // (mm^2).
 double enclosed_volume(const TriangleSurface& surface);
 double area(const TriangleSurface& surface);
+// A third of the area of the triangles at each vertex, mm^2; their sum is area().
+VecX vertex_areas(const TriangleSurface& surface);
+// Sum over the triangles of their areas times their unit normals, mm^2; zero for a closed surface.
+Vec3 vector_area(const TriangleSurface& surface);
 
 // True when every edge is shared by exactly two oppositely oriented triangles.
 bool is_closed(const TriangleSurface& surface);

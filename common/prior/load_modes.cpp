@@ -3,10 +3,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <set>
 #include <vector>
 
 #include "common/contact/tissues.hpp"
@@ -159,11 +159,11 @@ void add_resection(const BrainModel& model, const CaseConfig& config, Columns& o
 // The triangles between three craniotomy nodes, like an ellipse in a plane.
 struct Opening {
   std::vector<NodeIndex> nodes;
-  VecX areas_mm2;  // per node: a third of each triangle at it
+  VecX areas_mm2;  // per node
   Vec3 centre = Vec3::Zero();
   Vec3 long_half_axis = Vec3::Zero(), short_half_axis = Vec3::Zero();  // mm
 
-  bool empty() const { return nodes.empty(); }
+  bool empty() const { return !(areas_mm2.sum() > 0.0); }
   std::vector<Vec3> bump_centres() const {
     std::vector<Vec3> centres = {centre};
     for (int k = 0; k < kBumpsOfRing; ++k) {
@@ -181,14 +181,14 @@ struct Opening {
 };
 
 // An ellipse whose area has the second moments of the nodes' areas: a quarter of the squares of its
-// half axes.
-void fit_ellipse(const Points& nodes, const Vec3& normal, Opening& opening) {
+// half axes. surface: a vertex for each of the nodes.
+void fit_ellipse(const TriangleSurface& surface, Opening& opening) {
   const double area = opening.areas_mm2.sum();
-  opening.centre = nodes * opening.areas_mm2 / area;
-  const auto [first, second] = across(normal);
+  opening.centre = surface.vertices * opening.areas_mm2 / area;
+  const auto [first, second] = across(geometry::vector_area(surface).normalized());
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
-  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
-    const Vec3 away = nodes.col(i) - opening.centre;
+  for (Eigen::Index i = 0; i < surface.vertices.cols(); ++i) {
+    const Vec3 away = surface.vertices.col(i) - opening.centre;
     const Eigen::Vector2d place(away.dot(first), away.dot(second));
     moments += opening.areas_mm2[i] / area * place * place.transpose();
   }
@@ -202,25 +202,13 @@ void fit_ellipse(const Points& nodes, const Vec3& normal, Opening& opening) {
 }
 
 Opening opening_of(const BrainModel& model) {
-  const std::set<NodeIndex> inside(model.craniotomy.begin(), model.craniotomy.end());
-  VecX area = VecX::Zero(model.mesh.num_nodes());
   Opening opening;
-  Vec3 normal = Vec3::Zero();
-  for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
-    const Eigen::Vector3i corner = model.boundary_triangles.col(t);
-    if (!inside.count(corner[0]) || !inside.count(corner[1]) || !inside.count(corner[2])) continue;
-    const Vec3 a = model.mesh.nodes.col(corner[0]), b = model.mesh.nodes.col(corner[1]),
-               c = model.mesh.nodes.col(corner[2]);
-    const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
-    normal += vector_area;
-    for (const int node : corner) area[node] += vector_area.norm() / 3.0;
-  }
-  for (const NodeIndex node : inside) {
-    if (area[node] > 0.0) opening.nodes.push_back(node);
-  }
-  if (opening.nodes.empty()) return opening;
-  opening.areas_mm2 = area(opening.nodes);
-  fit_ellipse(model.mesh.nodes(Eigen::all, opening.nodes), normal.normalized(), opening);
+  opening.nodes = model.craniotomy;
+  std::sort(opening.nodes.begin(), opening.nodes.end());
+  const TriangleSurface surface =
+      geometry::surface_between(model.mesh.nodes, model.boundary_triangles, opening.nodes);
+  opening.areas_mm2 = geometry::vertex_areas(surface);
+  if (!opening.empty()) fit_ellipse(surface, opening);
   return opening;
 }
 

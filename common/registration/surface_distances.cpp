@@ -18,14 +18,6 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
-// At most `most` columns, in their order.
-Points thinned(const Points& points, int most) {
-  if (points.cols() <= most) return points;
-  std::vector<int> chosen = Random(kSubsetSeed).choose(most, static_cast<int>(points.cols()));
-  std::sort(chosen.begin(), chosen.end());
-  return points(Eigen::all, chosen);
-}
-
 }  // namespace
 
 Result<std::shared_ptr<const IndexedPatch>> IndexedPatch::build(SurfacePatch patch) {
@@ -41,17 +33,15 @@ SurfaceDistances::SurfaceDistances(std::shared_ptr<const IndexedPatch> patch,
     : patch_(std::move(patch)), options_(options), T_undeformed_measured_(T_undeformed_measured) {}
 
 Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPatch> patch,
-                                                 const Points& given,
+                                                 const Points& measured,
                                                  const SurfaceDistanceOptions& options,
                                                  const RigidTransform& T_undeformed_measured) {
-  for (Eigen::Index i = 0; i < given.cols(); ++i) {
-    if (!given.col(i).allFinite()) {
+  for (Eigen::Index i = 0; i < measured.cols(); ++i) {
+    if (!measured.col(i).allFinite()) {
       return fail(ErrorCode::kNotFinite,
                   fmt::format("{}: point {} is not finite", options.measured, i));
     }
   }
-  const Points measured =
-      options.average_mm > 0.0 ? thinned(given, kMeasuredPerPoint * options.points) : given;
   SurfaceDistances made(std::move(patch), options, T_undeformed_measured);
   std::vector<int> over;
   const Points vertices = made.first_vertices();

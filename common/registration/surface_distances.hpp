@@ -53,9 +53,9 @@ struct SurfaceDistanceOptions {
   double sd_mm = 0.5;         // of a point along the normal, apart from its neighbours
   double shared_sd_mm = 0.0;  // of what it and its neighbours are off by alike, besides
   // How far on the undeformed surface a point may lie from the guiding point nearest to it and
-  // still count to its neighbours; of kMeasuredPerPoint x points measured ones. With k of them,
-  // itself among them, the variance of a datum is pi sd^2 / (2 k) + shared_sd^2 (that of a median
-  // of many normal errors). 0, or k below kFewestAveraged: the point is as it was measured.
+  // still count to its neighbours. With k of them, itself among them, the variance of a datum is
+  // pi sd^2 / (2 k) + shared_sd^2 (that of a median of many normal errors). 0, or k below
+  // kFewestAveraged: the point is as it was measured.
   double average_mm = 0.0;
   double pose_sd_mm = 0.0;    // of the instrument's place: three common errors (none if 0)
   double pose_sd_deg = 0.0;   // of its direction, about the points' centroid: three more
@@ -68,7 +68,6 @@ struct SurfaceDistanceOptions {
   std::string measured = "cortical surface", surface = "craniotomy";
 };
 
-inline constexpr int kMeasuredPerPoint = 10;
 inline constexpr int kFewestAveraged = 3;
 
 class SurfaceDistances {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "common/geometry/surface.hpp"
 #include "common/geometry/tet_locator.hpp"
 
 namespace brainshift::registration {
@@ -12,21 +13,8 @@ SurfacePatch craniotomy_patch(const BrainModel& model) {
   SurfacePatch patch;
   patch.nodes = model.craniotomy;
   std::sort(patch.nodes.begin(), patch.nodes.end());
-  std::map<NodeIndex, int> vertex;
-  for (std::size_t i = 0; i < patch.nodes.size(); ++i) {
-    vertex[patch.nodes[i]] = static_cast<int>(i);
-  }
-  patch.surface.vertices = model.mesh.nodes(Eigen::all, patch.nodes);
-  std::vector<int> corners;
-  for (Eigen::Index t = 0; t < model.boundary_triangles.cols(); ++t) {
-    const auto triangle = model.boundary_triangles.col(t);
-    if (!vertex.count(triangle[0]) || !vertex.count(triangle[1]) || !vertex.count(triangle[2])) {
-      continue;
-    }
-    for (int k = 0; k < 3; ++k) corners.push_back(vertex[triangle[k]]);
-  }
-  patch.surface.triangles = Eigen::Map<const Eigen::Matrix<int, 3, Eigen::Dynamic>>(
-      corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
+  patch.surface =
+      geometry::surface_between(model.mesh.nodes, model.boundary_triangles, patch.nodes);
   const auto count = static_cast<Eigen::Index>(patch.nodes.size());
   patch.weights.resize(count, count);
   patch.weights.setIdentity();

@@ -220,8 +220,7 @@ void visit(A& a, V& v) {
   a({"gravity_direction_sd_deg", "degrees", "How well the direction of gravity is known",
      "decision 0030",
      "The modes across gravity are weaker than those along it by the tangent. 0: no such modes; "
-     "the "
-     "coarse remainder stands for a pose that is off."},
+     "the coarse remainder stands for a pose that is off."},
     v.gravity_direction_sd_deg, between(0.0, 80.0));
   a({"gravity_levels_mm", "mm below the reference plane along gravity",
      "Fluid planes of these modes", "", "May be empty."},

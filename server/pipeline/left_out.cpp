@@ -37,15 +37,13 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
   const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
   const bool swells = prior.tumour_volume_strain_sd > 0.0 && !prior.tumour_volume_radii_mm.empty();
   const auto where_on = [](bool on, const char* name) { return on ? name : nullptr; };
-  const char* const medium =
-      where_on(prior.medium_density_sd_n_m3 > 0.0, "the medium remainder takes its place");
-  const char* const coarse =
-      where_on(prior.coarse_density_sd_n_m3 > 0.0, "the coarse remainder takes its place");
-  const char* const tumour = where_on(swells, "swelling of the tumour takes its place");
+  const char* const medium = where_on(prior.medium_density_sd_n_m3 > 0.0, "the medium remainder");
+  const char* const coarse = where_on(prior.coarse_density_sd_n_m3 > 0.0, "the coarse remainder");
+  const char* const tumour = where_on(swells, "swelling of the tumour");
   const Part parts[] = {
       {"gravity modes", "prior.gravity_mode_sd or prior.gravity_levels_mm", no_gravity, 2.1, 2.3},
       {"buoyancy across gravity", "prior.gravity_direction_sd_deg",
-       !no_gravity && prior.gravity_direction_sd_deg == 0.0, 0.4, 0.4, coarse},
+       !no_gravity && prior.gravity_direction_sd_deg == 0.0, 0.4, 0.4, coarse},  // at 10 degrees
       {"swelling of the tumour", "prior.tumour_volume_strain_sd or prior.tumour_volume_radii_mm",
        !swells, 1.7, 1.4},
       {"volume of the brain", "prior.brain_volume_strain_sd", prior.brain_volume_strain_sd == 0.0,
@@ -53,7 +51,7 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
       {"resection", "prior.resection_weight_sd and prior.resection_stress_sd_pa",
        prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6, tumour},
       {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
-       4.8, 1.6},
+       4.4, 1.3},
       {"fine remainder", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0, 0.1,
        0.1, medium},
       {"medium remainder", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0, 0.8,
@@ -66,7 +64,8 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
     if (part.instead != nullptr) {
       omissions.push_back(
           {part.name, fmt::format("{} is 0", part.keys),
-           fmt::format("none seen in simulated surgeries: {} (docs/ablations.md)", part.instead)});
+           fmt::format("none seen in simulated surgeries: {} takes its place (docs/ablations.md)",
+                       part.instead)});
       continue;
     }
     omissions.push_back({part.name, fmt::format("{} is 0 or empty", part.keys),

@@ -30,11 +30,14 @@ constexpr double kScaleOverSd = 3.0;
 // A residual of seven scales. Welsch weights underflow far behind it, and a median does not need
 // them.
 constexpr double kSmallestWelschWeight = 1e-12;
+// Points of a boundary that are averaged for each that guides the model.
+constexpr int kMeasuredPerPoint = 10;
 
 // Ascending, so that neighbouring data stay neighbours; the same for the same number of points.
-std::vector<int> guiding_points(int available, int wanted) {
-  std::vector<int> chosen = Random(kSubsetSeed).choose(wanted, available);
+std::vector<int> some_of(const std::vector<int>& points, int wanted) {
+  std::vector<int> chosen = Random(kSubsetSeed).choose(wanted, static_cast<int>(points.size()));
   std::sort(chosen.begin(), chosen.end());
+  for (int& one : chosen) one = points[static_cast<std::size_t>(one)];
   return chosen;
 }
 
@@ -77,14 +80,12 @@ double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& opt
 struct Alignment {
   registration::IcpResult icp;
   std::vector<int> inliers;  // indices of the points that it holds for, ascending
-  std::vector<int> guiding;  // those of them that guide the model
   int outliers = 0;          // points that the alignment leaves aside
 };
 
 // Aligned rigidly from the tracked pose, which is the identity: the points arrive in patient RAS.
 Result<Alignment> align(const Points& points, double observed_sd_mm,
-                        const registration::TargetSurface& surface, int guiding,
-                        const CaseConfig& config) {
+                        const registration::TargetSurface& surface, const CaseConfig& config) {
   registration::IcpOptions options;
   options.rotation = config.scene.rotation != Carry::kOff;
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
@@ -108,8 +109,6 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
                     inliers.size(), points.cols(), icp->rms_mm));
   }
   Alignment alignment;
-  alignment.guiding = guiding_points(static_cast<int>(inliers.size()), guiding);
-  for (int& one : alignment.guiding) one = inliers[static_cast<std::size_t>(one)];
   alignment.outliers = static_cast<int>(points.cols()) - static_cast<int>(inliers.size());
   alignment.inliers = std::move(inliers);
   alignment.icp = std::move(*icp);
@@ -117,10 +116,11 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
 }
 
 // Displacements by a rigid alignment (paper 2.7).
-RegisteredObservation from_alignment(const Points& points, double sd_mm, Alignment alignment) {
+RegisteredObservation from_alignment(const Points& points, double sd_mm, Alignment alignment,
+                                     int guiding) {
   RegisteredObservation registered;
   registered.data = select(registration::sparse_data_from_alignment(points, alignment.icp, sd_mm),
-                           alignment.guiding);
+                           some_of(alignment.inliers, guiding));
   registered.outliers = alignment.outliers;
   registered.icp = std::move(alignment.icp);
   return registered;
@@ -136,11 +136,12 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   const auto target = targets.tumour_distance
                           ? registration::TargetSurface(*targets.tumour_distance)
                           : registration::TargetSurface(targets.tumour->surface().at_rest());
-  auto alignment = align(body.points, body.sd_mm, target, config.inversion.sparse_points, config);
+  auto alignment = align(body.points, body.sd_mm, target, config);
   if (!alignment) return tl::unexpected(alignment.error());
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
   if (!follows_deformation(config.sensing.tumour, method)) {
-    return from_alignment(body.points, sd_mm, std::move(*alignment));
+    return from_alignment(body.points, sd_mm, std::move(*alignment),
+                          config.inversion.sparse_points);
   }
   registration::SurfaceDistanceOptions options;
   options.points = config.inversion.sparse_points;
@@ -152,9 +153,10 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   options.fewest = 3;
   options.measured = "tumour boundary";
   options.surface = "tumour";
-  auto surface = registration::SurfaceDistances::build(targets.tumour,
-                                                       body.points(Eigen::all, alignment->inliers),
-                                                       options, alignment->icp.T_surface_points);
+  const int per_point = options.average_mm > 0.0 ? kMeasuredPerPoint : 1;
+  const std::vector<int> used = some_of(alignment->inliers, per_point * options.points);
+  auto surface = registration::SurfaceDistances::build(
+      targets.tumour, body.points(Eigen::all, used), options, alignment->icp.T_surface_points);
   if (!surface) return tl::unexpected(surface.error());
   RegisteredObservation registered;
   registered.surface = std::move(*surface);
@@ -175,10 +177,11 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   const SensingConfig& sensing = config.sensing;
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
   if (!follows_deformation(sensing.surface, method)) {
-    auto alignment = align(body.surface.vertices, body.sd_mm,
-                           targets.craniotomy->surface().at_rest(), sensing.surface_points, config);
+    auto alignment =
+        align(body.surface.vertices, body.sd_mm, targets.craniotomy->surface().at_rest(), config);
     if (!alignment) return tl::unexpected(alignment.error());
-    return from_alignment(body.surface.vertices, sd_mm, std::move(*alignment));
+    return from_alignment(body.surface.vertices, sd_mm, std::move(*alignment),
+                          sensing.surface_points);
   }
   registration::SurfaceDistanceOptions options;
   options.points = sensing.surface_points;

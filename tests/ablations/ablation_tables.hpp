@@ -25,7 +25,7 @@ std::string left_out_list();
 // somewhere. Figures: the same of parts that are off; updates that were refused.
 void check_ablations(const surgeries::Rows& rows);
 
-// ablations-tumour-prior.png and -data.png, ablations-craniotomy-prior.png and -data.png: error
+// ablations-MEASURE-prior.png, -data.png and -off.png, MEASURE tumour and craniotomy: error
 // without each part over the default's, a dot per group of truths. kWriteFailed.
 Status draw_ablations(const surgeries::Rows& rows, const std::filesystem::path& folder);
 

@@ -27,6 +27,11 @@ Part part(std::string name, std::string variant, Anew anew, std::vector<std::str
           std::move(change)};
 }
 
+Part operators_part(const char* name, const char* variant, std::vector<std::string> keys,
+                    const char* change, Change to) {
+  return part(name, variant, Anew::kOperators, std::move(keys), change, std::move(to));
+}
+
 Part added(Part part) {
   part.added = true;
   return part;
@@ -40,35 +45,33 @@ std::vector<Part> boundary_parts() {
 
 // Families of loads and the smooth remainder.
 std::vector<Part> prior_parts() {
-  const auto of = [](const char* name, const char* variant, std::vector<std::string> keys,
-                     const char* change, Change to) {
-    return part(name, variant, Anew::kOperators, std::move(keys), change, std::move(to));
-  };
   return {
-      of("buoyancy", "no-buoyancy", {"prior.gravity_mode_sd"}, "`prior.gravity_mode_sd: 0`",
-         [](CaseConfig& c) { c.prior.gravity_mode_sd = 0.0; }),
-      of("swelling about the tumour", "no-tumour-volume", {"prior.tumour_volume_strain_sd"},
-         "`prior.tumour_volume_strain_sd: 0`",
-         [](CaseConfig& c) { c.prior.tumour_volume_strain_sd = 0.0; }),
-      of("brain volume", "no-brain-volume", {"prior.brain_volume_strain_sd"},
-         "`prior.brain_volume_strain_sd: 0`",
-         [](CaseConfig& c) { c.prior.brain_volume_strain_sd = 0.0; }),
-      of("opening", "no-opening", {"prior.opening_pressure_sd_pa"},
-         "`prior.opening_pressure_sd_pa: 0`",
-         [](CaseConfig& c) { c.prior.opening_pressure_sd_pa = 0.0; }),
-      of("medium remainder", "no-medium", {"prior.medium_density_sd_n_m3"},
-         "`prior.medium_density_sd_n_m3: 0`",
-         [](CaseConfig& c) { c.prior.medium_density_sd_n_m3 = 0.0; }),
-      of("coarse remainder", "no-coarse", {"prior.coarse_density_sd_n_m3"},
-         "`prior.coarse_density_sd_n_m3: 0`",
-         [](CaseConfig& c) { c.prior.coarse_density_sd_n_m3 = 0.0; }),
-      of("correlation of the remainder", "uncorrelated",
-         {"prior.medium_length_mm", "prior.coarse_length_mm"}, "its lengths at their least: 1 mm",
-         [](CaseConfig& c) {
-           c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
-         }),
-      of("rank", "low-rank", {"condensed.max_rank"}, "`condensed.max_rank: 104`",
-         [](CaseConfig& c) { c.condensed.max_rank = kLowRank; }),
+      operators_part("buoyancy", "no-buoyancy", {"prior.gravity_mode_sd"},
+                     "`prior.gravity_mode_sd: 0`",
+                     [](CaseConfig& c) { c.prior.gravity_mode_sd = 0.0; }),
+      operators_part("swelling about the tumour", "no-tumour-volume",
+                     {"prior.tumour_volume_strain_sd"}, "`prior.tumour_volume_strain_sd: 0`",
+                     [](CaseConfig& c) { c.prior.tumour_volume_strain_sd = 0.0; }),
+      operators_part("brain volume", "no-brain-volume", {"prior.brain_volume_strain_sd"},
+                     "`prior.brain_volume_strain_sd: 0`",
+                     [](CaseConfig& c) { c.prior.brain_volume_strain_sd = 0.0; }),
+      operators_part("opening", "no-opening", {"prior.opening_pressure_sd_pa"},
+                     "`prior.opening_pressure_sd_pa: 0`",
+                     [](CaseConfig& c) { c.prior.opening_pressure_sd_pa = 0.0; }),
+      operators_part("medium remainder", "no-medium", {"prior.medium_density_sd_n_m3"},
+                     "`prior.medium_density_sd_n_m3: 0`",
+                     [](CaseConfig& c) { c.prior.medium_density_sd_n_m3 = 0.0; }),
+      operators_part("coarse remainder", "no-coarse", {"prior.coarse_density_sd_n_m3"},
+                     "`prior.coarse_density_sd_n_m3: 0`",
+                     [](CaseConfig& c) { c.prior.coarse_density_sd_n_m3 = 0.0; }),
+      operators_part("correlation of the remainder", "uncorrelated",
+                     {"prior.medium_length_mm", "prior.coarse_length_mm"},
+                     "its lengths at their least: 1 mm",
+                     [](CaseConfig& c) {
+                       c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
+                     }),
+      operators_part("rank", "low-rank", {"condensed.max_rank"}, "`condensed.max_rank: 104`",
+                     [](CaseConfig& c) { c.condensed.max_rank = kLowRank; }),
   };
 }
 
@@ -112,34 +115,31 @@ std::vector<Part> added_parts() {
                       c.sensing.probe_pose_sd_mm = kProbePoseSd_mm;
                       c.sensing.probe_pose_sd_deg = kProbePoseSd_deg;
                     });
-  const auto of = [](const char* name, const char* variant, std::vector<std::string> keys,
-                     const char* change, Change to) {
-    return part(name, variant, Anew::kOperators, std::move(keys), change, std::move(to));
-  };
-  const Part fine = of("fine remainder", "fine", {"prior.force_density_sd_n_m3"},
-                       "`prior.force_density_sd_n_m3: 1000`",
-                       [](CaseConfig& c) { c.prior.force_density_sd_n_m3 = kDensity_n_m3; });
-  const Part across = of("buoyancy across gravity", "across", {"prior.gravity_direction_sd_deg"},
-                         "`prior.gravity_direction_sd_deg: 10`", [](CaseConfig& c) {
-                           c.prior.gravity_direction_sd_deg = kDirectionSd_deg;
-                         });
-  const Part resection =
-      of("resection", "resection", {"prior.resection_weight_sd", "prior.resection_stress_sd_pa"},
-         "`prior.resection_weight_sd: 1`, `resection_stress_sd_pa: 300`", [](CaseConfig& c) {
-           c.prior.resection_weight_sd = kWeightSd;
-           c.prior.resection_stress_sd_pa = kStressSd_pa;
-         });
-  const Part all =
-      of("these three with room for their modes", "all-families",
-         {"prior.force_density_sd_n_m3", "prior.gravity_direction_sd_deg",
-          "prior.resection_weight_sd", "prior.resection_stress_sd_pa", "condensed.max_rank"},
-         "all of these, and `condensed.max_rank: 192`", [](CaseConfig& c) {
-           c.prior.force_density_sd_n_m3 = kDensity_n_m3;
-           c.prior.gravity_direction_sd_deg = kDirectionSd_deg;
-           c.prior.resection_weight_sd = kWeightSd;
-           c.prior.resection_stress_sd_pa = kStressSd_pa;
-           c.condensed.max_rank = kHighRank;
-         });
+  const Part fine = operators_part("fine remainder", "fine", {"prior.force_density_sd_n_m3"},
+                                   "`prior.force_density_sd_n_m3: 1000`", [](CaseConfig& c) {
+                                     c.prior.force_density_sd_n_m3 = kDensity_n_m3;
+                                   });
+  const Part across =
+      operators_part("buoyancy across gravity", "across", {"prior.gravity_direction_sd_deg"},
+                     "`prior.gravity_direction_sd_deg: 10`",
+                     [](CaseConfig& c) { c.prior.gravity_direction_sd_deg = kDirectionSd_deg; });
+  const Part resection = operators_part(
+      "resection", "resection", {"prior.resection_weight_sd", "prior.resection_stress_sd_pa"},
+      "`prior.resection_weight_sd: 1`, `resection_stress_sd_pa: 300`", [](CaseConfig& c) {
+        c.prior.resection_weight_sd = kWeightSd;
+        c.prior.resection_stress_sd_pa = kStressSd_pa;
+      });
+  const Part all = operators_part(
+      "these three with room for their modes", "all-families",
+      {"prior.force_density_sd_n_m3", "prior.gravity_direction_sd_deg", "prior.resection_weight_sd",
+       "prior.resection_stress_sd_pa", "condensed.max_rank"},
+      "all of these, and `condensed.max_rank: 192`", [](CaseConfig& c) {
+        c.prior.force_density_sd_n_m3 = kDensity_n_m3;
+        c.prior.gravity_direction_sd_deg = kDirectionSd_deg;
+        c.prior.resection_weight_sd = kWeightSd;
+        c.prior.resection_stress_sd_pa = kStressSd_pa;
+        c.condensed.max_rank = kHighRank;
+      });
   Part rank =
       part("a higher rank", "high-rank", Anew::kOperators, {"condensed.max_rank"},
            "`condensed.max_rank: 192`", [](CaseConfig& c) { c.condensed.max_rank = kHighRank; });

@@ -106,6 +106,30 @@ TEST(VertexNormals, OfASphereAreRadial) {
   }
 }
 
+// Of a box of 3 x 4 x 7: thirds add up, a closed surface has no vector area, its top has its own.
+TEST(VertexAreas, AddUpToTheArea) {
+  const TetMesh mesh = test_support::box_mesh(3, 2, 4, Vec3(3, 4, 7));
+  const TriangleSurface surface = boundary_surface(mesh);
+  EXPECT_NEAR(vertex_areas(surface).sum(), area(surface), 1e-9);
+  EXPECT_GT(vertex_areas(surface).minCoeff(), 0.0);
+  EXPECT_LT(vector_area(surface).norm(), 1e-9);
+}
+
+TEST(SurfaceBetween, HasTheTrianglesOfItsNodesAlone) {
+  const TetMesh mesh = test_support::box_mesh(3, 2, 4, Vec3(3, 4, 7));
+  std::vector<NodeIndex> top;
+  for (NodeIndex node = mesh.num_nodes() - 1; node >= 0; --node) {  // in falling order
+    if (mesh.nodes(2, node) == 7.0) top.push_back(node);
+  }
+  const TriangleSurface surface = surface_between(mesh.nodes, boundary_triangles(mesh), top);
+  ASSERT_EQ(surface.num_vertices(), 4 * 3);
+  EXPECT_EQ(surface.num_triangles(), 2 * 3 * 2);
+  EXPECT_NEAR(area(surface), 12.0, 1e-12);
+  EXPECT_LT((vector_area(surface) - Vec3(0, 0, 12)).norm(), 1e-12);
+  EXPECT_EQ(Vec3(surface.vertices.col(0)), Vec3(mesh.nodes.col(top.back())));
+  EXPECT_EQ(surface_between(mesh.nodes, boundary_triangles(mesh), {0, 1}).num_triangles(), 0);
+}
+
 TEST(VertexNormals, AreWeightedByArea) {
   // A vertex between a triangle of area 1/2 facing +z and one of area 3/2 facing +x.
   TriangleSurface surface;

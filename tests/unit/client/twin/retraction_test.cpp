@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/twin/retraction.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,6 +58,17 @@ TEST_F(RetractionLoad, TurnsTowardsTheSideByItsAngle) {
   EXPECT_LT((load.row(1) + 0.5 * pressed.row(2)).norm(), 1e-12 * load.norm());
   EXPECT_LT((load.row(2) - std::sqrt(0.75) * pressed.row(2)).norm(), 1e-12 * load.norm());
   EXPECT_EQ(load.row(0).norm(), 0.0);
+}
+
+TEST(Retraction, ThatTouchesNoExposedNodeIsAnError) {
+  Scenario scenario = *find_scenario("retraction");
+  scenario.fluid_levels_mm = {-20.0};
+  scenario.retraction->offset_mm = Vec3(200, 0, 0);
+  const auto surgery =
+      play_scenario(test_support::toy_patient(6), test_support::toy_config(), scenario, 1);
+  ASSERT_FALSE(surgery);
+  EXPECT_EQ(surgery.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(surgery.error().message, testing::HasSubstr("presses on no node of the opening"));
 }
 
 TEST(Retraction, PushesTheCortexIntoTheBrain) {
