@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <cassert>
 
-// LAPACK's name, as Fortran spells it.
-// NOLINTNEXTLINE(readability-identifier-naming)
-extern "C" void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+// LAPACK's names, as Fortran spells them.
+// NOLINTBEGIN(readability-identifier-naming)
+extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+}
+// NOLINTEND(readability-identifier-naming)
 
 namespace brainshift::linalg::blas {
 namespace {
@@ -73,6 +77,15 @@ bool cholesky(Out<double> a) {
   const int n = rows(a), lda = leading(a);
   int info = 0;
   if (n > 0) dpotrf_(&lower, &n, a.data(), &lda, &info);
+  return info == 0;
+}
+
+bool invert_factored(Out<double> l) {
+  assert(l.rows() == l.cols());
+  const char lower = 'L';
+  const int n = rows(l), lda = leading(l);
+  int info = 0;
+  if (n > 0) dpotri_(&lower, &n, l.data(), &lda, &info);
   return info == 0;
 }
 

@@ -30,6 +30,8 @@ void subtract_outer(const In<double>& a, Out<double> c);
 void gram(const In<double>& a, double beta, Out<double> c);
 // Lower triangle of A -> L with L L^T = A, in place; false when A is not positive definite.
 [[nodiscard]] bool cholesky(Out<double> a);
+// Lower factor L -> lower triangle of (L L^T)^-1, in place; false when L is singular.
+[[nodiscard]] bool invert_factored(Out<double> l);
 // B = L^-1 B and B = L^-T B.
 void solve_lower(const In<double>& l, Out<double> b);
 void solve_lower_transposed(const In<double>& l, Out<double> b);

@@ -45,8 +45,8 @@ class Brains {
   explicit Brains(const bench::Head& head)
       : operators_(*head.operators),
         window_{0, operators_.num_modes()},
-        factor_(operators_, head.config.contact.penalty_n_per_mm, team_),
-        contact_(operators_, window_, head.config.contact.penalty_n_per_mm, true, factor_, team_),
+        system_(operators_, window_, head.config.contact.penalty_n_per_mm, team_),
+        contact_(operators_, window_, head.config.contact.penalty_n_per_mm, true, system_, team_),
         rebuild_(operators_, window_, team_),
         check_(head.model->mesh.nodes, head.model->mesh.tets, team_),
         places_(places_of(*head.model, *head.locator)),
@@ -72,7 +72,7 @@ class Brains {
   ThreadTeam team_;
   const CondensedOperators& operators_;
   inversion::ModeWindow window_;
-  inversion::ContactFactor factor_;
+  inversion::ContactSystem system_;
   inversion::ContactAtLoads contact_;
   inversion::FieldRebuild rebuild_;
   fem::DeformationCheck check_;

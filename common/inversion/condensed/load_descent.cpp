@@ -35,9 +35,9 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
     : window_(window),
       team_(team),
       profile_(profile),
-      factor_(operators, beta, team),
-      reduction_(operators, window, factor_, team),
-      contact_(operators, window, beta, contact, factor_, team),
+      system_(operators, window, beta, team),
+      reduction_(operators, window, system_),
+      contact_(operators, window, beta, contact, system_, team),
       reach_(operators, window, beta, contact, reduction_, team),
       posterior_(window),
       z_(VecX::Zero(window.count)),
@@ -58,10 +58,10 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
 
 void LoadDescent::forget() {
   z_.setZero();
-  contact_at_z_ = false;
+  contact_at_z_ = contact_kept_ = false;
   contact_.forget();
   reduction_.forget();
-  factor_.forget();
+  system_.forget();
 }
 
 double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& strengths,
@@ -133,14 +133,20 @@ Status LoadDescent::solve_contact(const VecX& z) {
 
 Status LoadDescent::return_contact() {
   if (contact_at_z_) return {};
-  if (auto status = solve_contact(z_); !status) return status;
-  contact_at_z_ = true;
+  if (contact_kept_) {
+    contact_.return_to_kept();
+  } else {
+    if (auto status = solve_contact(z_); !status) return status;
+    contact_.keep();
+  }
+  contact_at_z_ = contact_kept_ = true;
   return {};
 }
 
 void LoadDescent::accept_trial() {
   z_ = trial_;
-  contact_at_z_ = true;
+  contact_.keep();
+  contact_at_z_ = contact_kept_ = true;
 }
 
 Status LoadDescent::linearise(SampledOperators& sampled) {
@@ -166,7 +172,7 @@ bool LoadDescent::far_from_model() const {
 Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
   if (auto status = minimise(strengths); !status) return status;
   z_ = posterior_.z();
-  contact_at_z_ = false;
+  contact_at_z_ = contact_kept_ = false;
   if (auto status = return_contact(); !status) return status;
   return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
 }

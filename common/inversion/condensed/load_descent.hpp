@@ -42,9 +42,9 @@
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
-#include "common/inversion/skull/contact_factor.hpp"
 #include "common/inversion/skull/contact_reach.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
+#include "common/inversion/skull/contact_system.hpp"
 #include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/values/estimate.hpp"
@@ -139,7 +139,7 @@ class LoadDescent {
   ModeWindow window_;
   ThreadTeam& team_;
   UpdateProfile& profile_;
-  ContactFactor factor_;
+  ContactSystem system_;
   ContactReduction reduction_;
   ContactAtLoads contact_;
   ContactReach reach_;
@@ -157,6 +157,7 @@ class LoadDescent {
   Eigen::MatrixXd covariance_factor_;
   double decrement_ = 0.0;
   bool contact_at_z_ = false;  // else at a trial or at the mean
+  bool contact_kept_ = false;  // contact_ has kept that of z_
 };
 
 }  // namespace brainshift::inversion

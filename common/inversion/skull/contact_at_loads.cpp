@@ -2,36 +2,55 @@
 #include "common/inversion/skull/contact_at_loads.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
-
-#include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 namespace {
-
-namespace blas = linalg::blas;
 
 constexpr double kShortestStep = 1e-6;
 
 }  // namespace
 
 ContactAtLoads::ContactAtLoads(const CondensedOperators& operators, ModeWindow window, double beta,
-                               bool contact, ContactFactor& factor, ThreadTeam& team)
+                               bool contact, ContactSystem& system, ThreadTeam& team)
     : operators_(operators),
       window_(window),
       beta_(beta),
       contact_(contact),
-      factor_(factor),
+      system_(system),
       team_(team),
       set_(static_cast<std::size_t>(operators.num_slaves()), 0),
       free_penetration_(operators.initial_penetration_mm),
       forces_(operators.num_slaves()),
+      newton_penetration_(operators.num_slaves()),
       all_forces_(VecX::Zero(operators.num_slaves())),
-      before_(VecX::Zero(operators.num_slaves())),
       penetration_(operators.initial_penetration_mm),
-      work_(ContactFactor::most_work_rows(operators)) {
-  const auto slaves = static_cast<std::size_t>(operators.num_slaves());
-  active_.reserve(slaves);
+      before_(VecX::Zero(operators.num_slaves())),
+      penetration_before_(operators.num_slaves()),
+      correction_(operators.num_slaves()) {
+  active_.reserve(static_cast<std::size_t>(operators.num_slaves()));
+  corrected_.reserve(static_cast<std::size_t>(operators.num_slaves()));
+  kept_.active.reserve(static_cast<std::size_t>(operators.num_slaves()));
+  keep();
+}
+
+void ContactAtLoads::keep() {
+  kept_.set = set_;
+  kept_.active = active_;
+  kept_.forces = forces_;
+  kept_.all_forces = all_forces_;
+  kept_.penetration = penetration_;
+  kept_.violation_mm = violation_mm_;
+}
+
+void ContactAtLoads::return_to_kept() {
+  set_ = kept_.set;
+  active_ = kept_.active;
+  forces_ = kept_.forces;
+  all_forces_ = kept_.all_forces;
+  penetration_ = kept_.penetration;
+  violation_mm_ = kept_.violation_mm;
 }
 
 void ContactAtLoads::forget() {
@@ -55,46 +74,43 @@ Status ContactAtLoads::solve(const VecX& z) {
         operators_.initial_penetration_mm.segment(begin, end - begin) -
         modes.middleRows(begin, end - begin) * z;
   });
-  violation_mm_ = 0.0;
   sets_ = 0;
+  violation_mm_ = 0.0;
   if (!contact_) {
     penetration_ = free_penetration_;
     return {};
   }
-  update_penetration();
+  begin_set();
+  all_forces_.setZero();
+  double value = std::numeric_limits<double>::infinity();
   while (sets_ < kMaxSets) {
-    // Free to press: slaves that do, and those that penetrate.
-    for (std::size_t i = 0; i < set_.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      set_[i] = all_forces_[row] > 0.0 || penetration_[row] > kContactViolation_mm ? 1 : 0;
-    }
     ++sets_;
     list_active(set_, active_);
-    if (auto status = solve_forces(); !status) return status;
-    before_ = all_forces_;
-    const double value = dual();
+    if (auto status = system_.take(set_); !status) return status;
+    system_.solve(z, free_penetration_, forces_.head(size()), newton_penetration_);
     const bool all_press = size() == 0 || forces_.head(size()).minCoeff() >= 0.0;
-    double step = 1.0;
-    for (;; step *= 0.5) {
-      all_forces_ = before_;
-      for (int j = 0; j < size(); ++j) {
-        const int slave = active_[static_cast<std::size_t>(j)];
-        all_forces_[slave] = std::max(0.0, before_[slave] + step * (forces_[j] - before_[slave]));
-      }
-      update_penetration();
-      if (all_press || step < kShortestStep || dual() < value) break;
-    }
     violation_mm_ = 0.0;
     for (std::size_t i = 0; i < set_.size(); ++i) {
       if (!set_[i]) {
-        violation_mm_ = std::max(violation_mm_, penetration_[static_cast<Eigen::Index>(i)]);
+        violation_mm_ = std::max(violation_mm_, newton_penetration_[static_cast<Eigen::Index>(i)]);
       }
     }
-    if (!all_press || violation_mm_ > kContactViolation_mm) continue;
-    for (const int slave : active_) {  // by construction; the sum has it up to rounding
-      penetration_[slave] = all_forces_[slave] / beta_;
+    const bool solved = all_press && violation_mm_ <= kContactViolation_mm;
+    if (!solved && sets_ < kPlainSets) {
+      exchange();
+      continue;
     }
-    return {};
+    before_ = all_forces_;
+    penetration_before_ = penetration_;
+    for (double step = 1.0;; step *= 0.5) {
+      go(step);
+      const double now = dual();
+      if (!all_press && step >= kShortestStep && !(now < value)) continue;
+      value = now;
+      break;
+    }
+    if (solved) return {};
+    follow();
   }
   return fail(ErrorCode::kNotConverged,
               "contact: the active set of fixed loads did not settle in " +
@@ -106,37 +122,69 @@ double ContactAtLoads::dual() const {
   return -0.5 * all_forces_.dot(free_penetration_ + penetration_ - all_forces_ / beta_);
 }
 
-Status ContactAtLoads::solve_forces() {
-  if (auto status = factor_.take(set_); !status) return status;
-  for (int j = 0; j < size(); ++j) {
-    forces_[j] = free_penetration_[active_[static_cast<std::size_t>(j)]];
+void ContactAtLoads::exchange() {
+  for (std::size_t i = 0; i < set_.size(); ++i) {
+    if (set_[i]) continue;
+    set_[i] = newton_penetration_[static_cast<Eigen::Index>(i)] > kContactViolation_mm ? 1 : 0;
   }
-  factor_.solve(forces_.head(size()), work_.head(factor_.work_rows()));
-  return {};
+  for (int j = 0; j < size(); ++j) {
+    set_[static_cast<std::size_t>(active_[static_cast<std::size_t>(j)])] =
+        forces_[j] >= 0.0 ? 1 : 0;
+  }
+}
+
+void ContactAtLoads::follow() {
+  for (std::size_t i = 0; i < set_.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    set_[i] = all_forces_[row] > 0.0 || penetration_[row] > kContactViolation_mm ? 1 : 0;
+  }
+}
+
+// Slaves with a force need no penetration here: of few others each is the product of one column,
+// because Phi is symmetric.
+void ContactAtLoads::begin_set() {
+  active_.clear();
+  corrected_.clear();
+  for (int slave = 0; slave < operators_.num_slaves(); ++slave) {
+    (all_forces_[slave] > 0.0 ? active_ : corrected_).push_back(slave);
+  }
+  penetration_ = free_penetration_;
+  if (active_.size() <= corrected_.size()) {
+    auto forces = forces_.head(size());
+    gather(all_forces_.data(), active_, forces.data());
+    subtract_penetration(operators_, active_, forces, team_, penetration_);
+  } else {
+    team_.split(static_cast<long>(corrected_.size()), [&](long begin, long end) {
+      for (long j = begin; j < end; ++j) {
+        const int slave = corrected_[static_cast<std::size_t>(j)];
+        penetration_[slave] -= operators_.compliance.col(slave).dot(all_forces_);
+      }
+    });
+  }
+  follow();
+}
+
+void ContactAtLoads::go(double step) {
+  corrected_.clear();
+  penetration_ = newton_penetration_;
+  if (step < 1.0) penetration_ = penetration_before_ + step * (penetration_ - penetration_before_);
+  all_forces_ = before_;  // of slaves that are not free, 0
+  for (int j = 0; j < size(); ++j) {
+    const int slave = active_[static_cast<std::size_t>(j)];
+    const double force =
+        step < 1.0 ? before_[slave] + step * (forces_[j] - before_[slave]) : forces_[j];
+    all_forces_[slave] = std::max(0.0, force);
+    if (force >= 0.0) continue;
+    correction_[static_cast<Eigen::Index>(corrected_.size())] = -force;
+    corrected_.push_back(slave);
+  }
+  subtract_penetration(operators_, corrected_, correction_, team_, penetration_);
 }
 
 Status ContactAtLoads::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
-  if (auto status = factor_.take(set_); !status) return status;
-  adjoint_ = felt;
-  factor_.solve(adjoint_, work_.head(factor_.work_rows()));
-  for (int j = 0; j < size(); ++j) {
-    out += adjoint_[j] * operators_.slave_modes.row(active_[static_cast<std::size_t>(j)])
-                             .segment(window_.first, window_.count)
-                             .transpose();
-  }
+  if (auto status = system_.take(set_); !status) return status;
+  system_.add_adjoint(felt, out);
   return {};
-}
-
-void ContactAtLoads::update_penetration() {
-  penetration_ = free_penetration_;
-  team_.split(penetration_.size(), [&](long begin, long end) {
-    for (Eigen::Index slave = 0; slave < all_forces_.size(); ++slave) {
-      if (all_forces_[slave] == 0.0) continue;
-      blas::add_scaled(end - begin, -all_forces_[slave],
-                       operators_.compliance.col(slave).data() + begin,
-                       penetration_.data() + begin);
-    }
-  });
 }
 
 }  // namespace brainshift::inversion

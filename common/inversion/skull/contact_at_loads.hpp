@@ -6,10 +6,13 @@
 //
 // This is the condition of a strictly convex problem,
 //   minimise 1/2 f (Phi + I / beta) f - (p - L z) f   over f >= 0,
-// so that it has one solution, whatever the search began with. Projected Newton steps (Bertsekas
-// 1982, SIAM J. Control Optim. 20:221): the minimum over the slaves that are free to press, and
-// where one of them would pull, a shorter step on the way there, so that the value always falls.
-// Sets are solved for by ContactFactor. Nothing is allocated after construction.
+// so that it has one solution, whatever the search began with. Slaves of a set that pull leave it
+// and others that penetrate join it (primal-dual active sets: Hintermüller, Ito & Kunisch 2002,
+// SIAM J. Optim. 13:865). That mostly settles within six sets. Where it does not, projected Newton
+// steps follow (Bertsekas 1982, SIAM J. Control Optim. 20:221): the minimum over the slaves that
+// are free to press, and where one of them would pull, a shorter step on the way there, so that the
+// value always falls. Sets are solved for by ContactSystem. Nothing is allocated after
+// construction, but for what that makes once.
 #pragma once
 
 #include <vector>
@@ -17,9 +20,8 @@
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/contact_system.hpp"
 #include "common/inversion/skull/mode_window.hpp"
-#include "common/linalg/growing_matrix.hpp"
 #include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
@@ -31,18 +33,21 @@ class ContactAtLoads {
  public:
   // contact: false keeps every slave open. Keeps references to all but the numbers.
   ContactAtLoads(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
-                 ContactFactor& factor, ThreadTeam& team);
+                 ContactSystem& system, ThreadTeam& team);
 
   // The next search begins from these forces of these slaves, N; where they pull, from 0.
   void begin_from(const std::vector<int>& slaves, const Eigen::Ref<const VecX>& forces);
   // Solves for z from the last forces on, or from those of begin_from(). kNotConverged after
-  // kMaxSets sets; errors of ContactFactor::take.
+  // kMaxSets sets; errors of ContactSystem::take.
   Status solve(const VecX& z);
-  // out += T^T felt with T = D^-1 L_A of the present set (contact_reduction.hpp): what forces felt
-  // by data mean for the modes. felt: one per active slave; out: r.
+  // out += T^T felt with T of the present set (contact_system.hpp): what forces felt by data mean
+  // for the modes. felt: one per active slave; out: r.
   Status add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
   // The next search begins from the empty set.
   void forget();
+  // Remembers the present solution; returns to it without a search.
+  void keep();
+  void return_to_kept();
 
   const contact::ActiveSet& set() const { return set_; }
   int size() const { return static_cast<int>(active_.size()); }
@@ -53,26 +58,44 @@ class ContactAtLoads {
   int sets() const { return sets_; }  // solved for by the last solve()
 
   static constexpr int kMaxSets = 500;
+  // Sets before steps are projected.
+  static constexpr int kPlainSets = 10;
 
  private:
-  Status solve_forces();
-  void update_penetration();
+  // The first set of a search from all_forces_.
+  void begin_set();
+  // The next set by what pulls and what penetrates in the solution of this one.
+  void exchange();
+  // The next set of projected steps, free to press: slaves that do, and those that penetrate.
+  void follow();
+  // all_forces_ and penetration_ a part `step` of the way from before_ to those of the set, without
+  // forces that pull.
+  void go(double step);
   double dual() const;
 
   const CondensedOperators& operators_;
   ModeWindow window_;
   double beta_;
   bool contact_;
-  ContactFactor& factor_;
+  ContactSystem& system_;
   ThreadTeam& team_;
   contact::ActiveSet set_;
   std::vector<int> active_;
-  VecX free_penetration_;                            // p - L z
-  VecX forces_, all_forces_, before_, penetration_;  // all_forces_: s, start of the next solve
+  VecX free_penetration_;             // p - L z
+  VecX forces_, newton_penetration_;  // of the present set: of its slaves, N; s, mm
+  VecX all_forces_, penetration_;     // s; the start of the next solve
+  VecX before_, penetration_before_;  // s
+  std::vector<int> corrected_;        // slaves that would pull; those without a force
+  VecX correction_;                   // to their forces, N
   double violation_mm_ = 0.0;
   int sets_ = 0;
-  linalg::GrowingVector adjoint_;
-  VecX work_;
+  struct Solution {
+    contact::ActiveSet set;
+    std::vector<int> active;
+    VecX forces, all_forces, penetration;
+    double violation_mm = 0.0;
+  };
+  Solution kept_;
 };
 
 }  // namespace brainshift::inversion

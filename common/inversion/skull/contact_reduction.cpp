@@ -4,13 +4,11 @@
 namespace brainshift::inversion {
 
 ContactReduction::ContactReduction(const CondensedOperators& operators, ModeWindow window,
-                                   ContactFactor& factor, ThreadTeam& team)
+                                   ContactSystem& system)
     : operators_(operators),
       window_(window),
-      factor_(factor),
-      team_(team),
-      response_(operators.num_slaves(), window.count + 1),
-      work_(ContactFactor::most_work_rows(operators), window.count + 1) {
+      system_(system),
+      response_(operators.num_slaves(), window.count + 1) {
   active_.reserve(static_cast<std::size_t>(operators.num_slaves()));
   set_.reserve(static_cast<std::size_t>(operators.num_slaves()));
 }
@@ -19,24 +17,11 @@ Status ContactReduction::activate(const contact::ActiveSet& set) {
   if (set == set_) return {};
   set_.clear();
   active_.clear();
-  if (auto status = factor_.take(set); !status) return status;
+  if (auto status = system_.take(set); !status) return status;
   set_ = set;
-  active_ = factor_.active();
-  const int k = size();
-  if (k == 0) return {};
-  Eigen::Map<Eigen::MatrixXd> response(response_.data(), k, window_.count + 1);
-  for (int j = 0; j < window_.count; ++j) {
-    const double* column = operators_.slave_modes.col(window_.first + j).data();
-    for (int i = 0; i < k; ++i) response(i, j) = column[active_[static_cast<std::size_t>(i)]];
-  }
-  for (int i = 0; i < k; ++i) {
-    response(i, window_.count) =
-        operators_.initial_penetration_mm[active_[static_cast<std::size_t>(i)]];
-  }
-  team_.split(response.cols(), [&](long begin, long end) {
-    factor_.solve(response.middleCols(begin, end - begin),
-                  work_.block(0, begin, factor_.work_rows(), end - begin));
-  });
+  active_ = system_.active();
+  if (size() == 0) return {};
+  system_.respond(Eigen::Map<Eigen::MatrixXd>(response_.data(), size(), window_.count + 1));
   return {};
 }
 
@@ -49,13 +34,9 @@ Result<Eigen::MatrixXd> ContactReduction::response_before() const {
   const int k = size();
   Eigen::MatrixXd response(k, window_.first);
   if (k == 0) return response;
-  if (auto status = factor_.take(set_); !status) return tl::unexpected(status.error());
-  for (int i = 0; i < k; ++i) {
-    response.row(i) =
-        operators_.slave_modes.row(active_[static_cast<std::size_t>(i)]).head(window_.first);
-  }
-  Eigen::MatrixXd work(factor_.work_rows(), window_.first);
-  factor_.solve(response, work);
+  if (auto status = system_.take(set_); !status) return tl::unexpected(status.error());
+  response = operators_.slave_modes(active_, Eigen::seqN(0, window_.first));
+  system_.solve(response);
   return response;
 }
 

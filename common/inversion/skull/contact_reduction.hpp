@@ -11,8 +11,7 @@
 
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
-#include "common/core/thread_team.hpp"
-#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/contact_system.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/operators/condensed_operators.hpp"
 
@@ -20,12 +19,10 @@ namespace brainshift::inversion {
 
 class ContactReduction {
  public:
-  // Keeps references to the operators, to the factor that it shares with ContactAtLoads, and to the
-  // team that shares the work.
-  ContactReduction(const CondensedOperators& operators, ModeWindow window, ContactFactor& factor,
-                   ThreadTeam& team);
+  // Keeps references to the operators and to the system that it shares with ContactAtLoads.
+  ContactReduction(const CondensedOperators& operators, ModeWindow window, ContactSystem& system);
 
-  // Errors of ContactFactor::take. set: one flag per slave, or empty for none.
+  // Errors of ContactSystem::take. set: one flag per slave, or empty for none.
   Status activate(const contact::ActiveSet& set);
   void forget() {
     set_.clear();
@@ -43,18 +40,16 @@ class ContactReduction {
   void forces_at(const VecX& z, Eigen::Ref<VecX> out) const;
 
   // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
-  // Allocates. Errors of ContactFactor::take.
+  // Allocates. Errors of ContactSystem::take.
   Result<Eigen::MatrixXd> response_before() const;
 
  private:
   const CondensedOperators& operators_;
   ModeWindow window_;
-  ContactFactor& factor_;
-  ThreadTeam& team_;
+  ContactSystem& system_;
   contact::ActiveSet set_;
   std::vector<int> active_;
   Eigen::MatrixXd response_;  // storage; the first k x (r + 1) entries are used, column-major
-  Eigen::MatrixXd work_;      // of ContactFactor::solve
 };
 
 }  // namespace brainshift::inversion

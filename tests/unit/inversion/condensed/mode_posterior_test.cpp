@@ -3,7 +3,7 @@
 #include "common/inversion/condensed/mode_posterior.hpp"
 
 #include "common/inversion/condensed/source_check.hpp"
-#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/contact_system.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -35,8 +35,8 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   const ModeWindow window{0, brain->num_modes()};
   ThreadTeam team(1);
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-  ContactFactor factor(*brain, 1.0, team);
-  ContactReduction no_contact(*brain, window, factor, team);
+  ContactSystem system(*brain, window, 1.0, team);
+  ContactReduction no_contact(*brain, window, system);
   int agreed = 0, contradicted = 0, under_the_first = 0;
   for (int trial = 0; trial < 80; ++trial) {
     SparseData data = sagging_data(Boundary::kFixed, 0.3, 4);

@@ -29,10 +29,10 @@ VecX reference_forces(const CondensedOperators& brain, const VecX& z) {
 struct Search {
   explicit Search(const CondensedOperators& brain, bool contact = true)
       : team(1),
-        factor(brain, kBeta, team),
-        at_loads(brain, kWindow, kBeta, contact, factor, team) {}
+        system(brain, kWindow, kBeta, team),
+        at_loads(brain, kWindow, kBeta, contact, system, team) {}
   ThreadTeam team;
-  ContactFactor factor;
+  ContactSystem system;
   ContactAtLoads at_loads;
 };
 
@@ -91,6 +91,48 @@ TEST(ContactAtLoads, FindsTheSameFromForcesThatAreGiven) {
   search.at_loads.begin_from(std::vector<int>(search.at_loads.active()), solution);
   ASSERT_TRUE(search.at_loads.solve(z));
   EXPECT_EQ(search.at_loads.sets(), 1);
+}
+
+// Where slaves also pull on each other, the exchange of those that pull and those that penetrate
+// goes in circles. Projected steps go on.
+TEST(ContactAtLoads, SolvesContactWhereExchangesGoInCircles) {
+  CondensedOperators brain = skull_operators(0.5);
+  Random random(17);
+  Eigen::MatrixXd any(kSlaves, kSlaves / 2);
+  for (double& value : any.reshaped()) value = random.normal();
+  brain.compliance = any * any.transpose();
+  Search search(brain);
+  int longest = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const VecX z = skull_loads(seed, 1.0);
+    search.at_loads.forget();
+    ASSERT_TRUE(search.at_loads.solve(z));
+    expect_solution(brain, z, search.at_loads);
+    longest = std::max(longest, search.at_loads.sets());
+  }
+  EXPECT_GT(longest, ContactAtLoads::kPlainSets) << "the test shows nothing";
+}
+
+TEST(ContactAtLoads, ReturnsToTheSolutionThatItKept) {
+  const CondensedOperators brain = skull_operators(0.5);
+  Search search(brain);
+  const VecX z = skull_loads(6, 1.0);
+  ASSERT_TRUE(search.at_loads.solve(z));
+  ASSERT_GT(search.at_loads.size(), 10);
+  search.at_loads.keep();
+  const VecX forces = search.at_loads.forces(), depth = search.at_loads.penetration();
+  const std::vector<int> active = search.at_loads.active();
+  ASSERT_TRUE(search.at_loads.solve(skull_loads(7, 3.0)));
+  ASSERT_NE(search.at_loads.active(), active);
+  search.at_loads.return_to_kept();
+  EXPECT_EQ(search.at_loads.active(), active);
+  EXPECT_EQ(search.at_loads.forces(), forces);
+  EXPECT_EQ(search.at_loads.penetration(), depth);
+  VecX adjoint = VecX::Zero(kModes), expected = VecX::Zero(kModes);
+  ASSERT_TRUE(search.at_loads.add_adjoint(forces, adjoint));
+  ASSERT_TRUE(search.at_loads.solve(z));
+  ASSERT_TRUE(search.at_loads.add_adjoint(forces, expected));
+  EXPECT_LT((adjoint - expected).norm(), 1e-10 * expected.norm());
 }
 
 TEST(ContactAtLoads, WithoutContactNothingTouches) {

@@ -26,19 +26,19 @@ int changes(const CondensedOperators& brain, const ContactReduction& model, cons
 
 struct Skull {
   explicit Skull(bool with_contact = true)
-      : contact(brain, kWindow, kBeta, with_contact, factor, team),
+      : contact(brain, kWindow, kBeta, with_contact, system, team),
         reach(brain, kWindow, kBeta, with_contact, model, team) {}
   CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team{2};
-  ContactFactor factor{brain, kBeta, team};
-  ContactReduction model{brain, kWindow, factor, team};
+  ContactSystem system{brain, kWindow, kBeta, team};
+  ContactReduction model{brain, kWindow, system};
   ContactAtLoads contact;
   ContactReach reach;
 };
 
 TEST(ContactReach, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
   Skull skull;
-  auto& [brain, team, factor, model, contact, reach] = skull;
+  auto& [brain, team, system, model, contact, reach] = skull;
   int shortened = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const VecX z = skull_loads(seed, 0.5), step = skull_loads(seed + 20, 2.0);
@@ -60,7 +60,7 @@ TEST(ContactReach, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
 
 TEST(ContactReach, SlavesThatTheLinearModelHasWrongAlreadyDoNotCount) {
   Skull skull;
-  auto& [brain, team, factor, model, contact, reach] = skull;
+  auto& [brain, team, system, model, contact, reach] = skull;
   ASSERT_TRUE(model.activate(contact::ActiveSet(kSlaves)));
   const VecX z = skull_loads(3, 1.0);
   ASSERT_TRUE(contact.solve(z));

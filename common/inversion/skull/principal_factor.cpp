@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/skull/contact_factor.hpp"
+#include "common/inversion/skull/principal_factor.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "common/linalg/team_cholesky.hpp"
 
@@ -24,59 +23,55 @@ void list_active(const contact::ActiveSet& set, std::vector<int>& active) {
   }
 }
 
-ContactFactor::ContactFactor(const CondensedOperators& operators, double beta, ThreadTeam& team)
-    : operators_(operators),
-      beta_(beta),
+PrincipalFactor::PrincipalFactor(const double* matrix, int size, double shift, ThreadTeam& team)
+    : matrix_(matrix),
+      total_(size),
+      shift_(shift),
       team_(team),
-      row_in_base_(static_cast<std::size_t>(operators.num_slaves()), -1),
-      row_in_set_(static_cast<std::size_t>(operators.num_slaves()), -1),
-      factor_(new double[static_cast<std::size_t>(operators.compliance.size())]),
-      cache_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMostChanges]),
-      columns_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMostChanges]),
+      row_in_base_(static_cast<std::size_t>(size), -1),
+      row_in_set_(static_cast<std::size_t>(size), -1),
+      factor_(new double[static_cast<std::size_t>(size) * static_cast<std::size_t>(size)]),
+      cache_(new double[static_cast<std::size_t>(size) * kMostChanges]),
+      columns_(new double[static_cast<std::size_t>(size) * kMostChanges]),
       schur_(kMostChanges, kMostChanges) {
-  const auto slaves = static_cast<std::size_t>(operators.num_slaves());
-  for (std::vector<int>* each : {&active_, &base_, &changed_}) each->reserve(slaves);
+  const auto all = static_cast<std::size_t>(size);
+  for (std::vector<int>* each : {&active_, &base_, &changed_}) each->reserve(all);
   cached_.reserve(kMostChanges);
-  set_.reserve(slaves);
+  set_.reserve(all);
 }
 
-ContactFactor::Column ContactFactor::factor() const {
+PrincipalFactor::Column PrincipalFactor::factor() const {
   return {factor_.get(), base_size(), base_size(), Eigen::OuterStride<>(base_size())};
 }
 
-ContactFactor::Column ContactFactor::columns(Eigen::Index first, Eigen::Index count) const {
-  const Eigen::Index slaves = operators_.num_slaves();
-  return {columns_.get() + first * slaves, base_size(), count, Eigen::OuterStride<>(slaves)};
+PrincipalFactor::Column PrincipalFactor::columns(Eigen::Index first, Eigen::Index count) const {
+  return {columns_.get() + first * total_, base_size(), count, Eigen::OuterStride<>(total_)};
 }
 
-double ContactFactor::entry(int row, int column) const {
-  return operators_.compliance(row, column) + (row == column ? 1.0 / beta_ : 0.0);
-}
-
-Status ContactFactor::take(const contact::ActiveSet& set) {
-  if (set == set_) return {};
+bool PrincipalFactor::take(const contact::ActiveSet& set) {
+  if (set == set_) return true;
   set_ = set;
   list_active(set, active_);
   std::fill(row_in_set_.begin(), row_in_set_.end(), -1);
   for (int j = 0; j < size(); ++j)
     row_in_set_[static_cast<std::size_t>(active_[static_cast<std::size_t>(j)])] = j;
   changed_.clear();
-  for (const int slave : active_) {
-    if (row_in_base_[static_cast<std::size_t>(slave)] < 0) changed_.push_back(slave);
+  for (const int member : active_) {
+    if (row_in_base_[static_cast<std::size_t>(member)] < 0) changed_.push_back(member);
   }
   joining_ = changed_.size();
-  for (const int slave : base_) {
-    if (row_in_set_[static_cast<std::size_t>(slave)] < 0) changed_.push_back(slave);
+  for (const int member : base_) {
+    if (row_in_set_[static_cast<std::size_t>(member)] < 0) changed_.push_back(member);
   }
   leaving_ = changed_.size() - joining_;
   if (changes() <= std::max(kFewChanges, base_size() / kPart) && gather_columns() &&
       factorise_changes()) {
-    return {};
+    return true;
   }
   return make_base();
 }
 
-void ContactFactor::forget() {
+void PrincipalFactor::forget() {
   set_.clear();
   active_.clear();
   base_.clear();
@@ -87,66 +82,64 @@ void ContactFactor::forget() {
   std::fill(row_in_set_.begin(), row_in_set_.end(), -1);
 }
 
-Status ContactFactor::make_base() {
+bool PrincipalFactor::make_base() {
   base_ = active_;
   row_in_base_ = row_in_set_;
   changed_.clear();
   cached_.clear();
   joining_ = leaving_ = 0;
-  if (base_.empty()) return {};
+  if (base_.empty()) return true;
   auto d = factor();
   team_.split(base_size(), [&](long begin, long end) {
     for (Eigen::Index j = begin; j < end; ++j) {
-      const double* column = operators_.compliance.col(base_[static_cast<std::size_t>(j)]).data();
+      const double* own = column(base_[static_cast<std::size_t>(j)]);
       for (Eigen::Index i = j; i < base_size(); ++i) {
-        d(i, j) = column[base_[static_cast<std::size_t>(i)]];
+        d(i, j) = own[base_[static_cast<std::size_t>(i)]];
       }
-      d(j, j) += 1.0 / beta_;
+      d(j, j) += shift_;
     }
   });
-  if (linalg::cholesky(d, team_)) return {};
-  const std::string slaves = std::to_string(base_.size());
+  if (linalg::cholesky(d, team_)) return true;
   forget();
-  return fail(ErrorCode::kSingularMatrix,
-              "contact: the compliance of " + slaves + " active slaves is not positive definite");
+  return false;
 }
 
-bool ContactFactor::gather_columns() {
-  const Eigen::Index slaves = operators_.num_slaves(), rows = base_size();
+bool PrincipalFactor::gather_columns() {
+  const Eigen::Index rows = base_size();
   const std::size_t before = cached_.size();
-  for (const int slave : changed_) {
-    if (std::find(cached_.begin(), cached_.end(), slave) != cached_.end()) continue;
+  for (const int member : changed_) {
+    if (std::find(cached_.begin(), cached_.end(), member) != cached_.end()) continue;
     if (cached_.size() == kMostChanges) return false;
-    double* column = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * slaves;
-    const int own_row = row_in_base_[static_cast<std::size_t>(slave)];
+    double* made = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * total_;
+    const int own_row = row_in_base_[static_cast<std::size_t>(member)];
     if (own_row < 0) {
-      const double* compliance = operators_.compliance.col(slave).data();
+      const double* own = column(member);
       for (Eigen::Index i = 0; i < rows; ++i) {
-        column[i] = compliance[base_[static_cast<std::size_t>(i)]];
+        made[i] = own[base_[static_cast<std::size_t>(i)]];
       }
     } else {
-      std::fill(column, column + rows, 0.0);
-      column[own_row] = 1.0;
+      std::fill(made, made + rows, 0.0);
+      made[own_row] = 1.0;
     }
-    cached_.push_back(slave);
+    cached_.push_back(member);
   }
   if (rows > 0 && cached_.size() > before) {
-    Column fresh(cache_.get() + static_cast<Eigen::Index>(before) * slaves, rows,
-                 static_cast<Eigen::Index>(cached_.size() - before), Eigen::OuterStride<>(slaves));
+    Column fresh(cache_.get() + static_cast<Eigen::Index>(before) * total_, rows,
+                 static_cast<Eigen::Index>(cached_.size() - before), Eigen::OuterStride<>(total_));
     team_.split(fresh.cols(), [&](long begin, long end) {
       blas::solve_lower(factor(), fresh.middleCols(begin, end - begin));
     });
   }
   for (std::size_t j = 0; j < changed_.size(); ++j) {
     const auto place = std::find(cached_.begin(), cached_.end(), changed_[j]) - cached_.begin();
-    std::copy_n(cache_.get() + place * slaves, rows,
-                columns_.get() + static_cast<Eigen::Index>(j) * slaves);
+    std::copy_n(cache_.get() + place * total_, rows,
+                columns_.get() + static_cast<Eigen::Index>(j) * total_);
   }
   return true;
 }
 
 // C = D_aa - V_a^T V_a = G G^T, Z = -G^-1 V_a^T V_q, N N^T = V_q^T V_q + Z^T Z.
-bool ContactFactor::factorise_changes() {
+bool PrincipalFactor::factorise_changes() {
   const auto a = static_cast<Eigen::Index>(joining_), q = static_cast<Eigen::Index>(leaving_);
   if (a + q == 0) return true;
   auto all = schur_.topLeftCorner(a + q, a + q);
@@ -173,7 +166,7 @@ bool ContactFactor::factorise_changes() {
   return blas::cholesky(leaving);
 }
 
-void ContactFactor::solve(blas::Out<double> b, blas::Out<double> work) const {
+void PrincipalFactor::solve(blas::Out<double> b, blas::Out<double> work) const {
   const Eigen::Index rows = base_size(), columns_of_b = b.cols();
   const auto a = static_cast<Eigen::Index>(joining_), q = static_cast<Eigen::Index>(leaving_);
   if (b.rows() == 0) return;
@@ -184,7 +177,7 @@ void ContactFactor::solve(blas::Out<double> b, blas::Out<double> work) const {
   }
   auto x = work.topRows(rows);
   auto t = work.middleRows(rows, a + q);
-  const auto row_of = [&](int slave) { return row_in_set_[static_cast<std::size_t>(slave)]; };
+  const auto row_of = [&](int member) { return row_in_set_[static_cast<std::size_t>(member)]; };
   for (Eigen::Index c = 0; c < columns_of_b; ++c) {
     for (Eigen::Index i = 0; i < rows; ++i) {
       const int row = row_of(base_[static_cast<std::size_t>(i)]);

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/skull/contact_system.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "common/core/random.hpp"
+#include "tests/unit/inversion/skull_fixture.hpp"
+
+namespace brainshift::inversion {
+namespace {
+
+using Eigen::MatrixXd;
+
+contact::ActiveSet random_set(Random& random, double share) {
+  contact::ActiveSet set(kSlaves);
+  for (char& one : set) one = random.uniform() < share ? 1 : 0;
+  return set;
+}
+
+// The set's own compliance, factorised on its own.
+struct Reference {
+  Reference(const CondensedOperators& brain, const contact::ActiveSet& set) {
+    list_active(set, active);
+    MatrixXd d = brain.compliance(active, active);
+    d.diagonal().array() += 1.0 / kBeta;
+    factor.compute(d);
+  }
+  std::vector<int> active;
+  Eigen::LLT<MatrixXd> factor;
+};
+
+// All that a system answers for one set.
+void expect_answers(const CondensedOperators& brain, ContactSystem& system,
+                    const contact::ActiveSet& set, ModeWindow window) {
+  const Reference reference(brain, set);
+  ASSERT_EQ(system.active(), reference.active);
+  ASSERT_EQ(system.set(), set);
+  const std::vector<int>& active = reference.active;
+  const auto k = static_cast<Eigen::Index>(active.size());
+  const MatrixXd modes = brain.slave_modes.middleCols(window.first, window.count);
+  const VecX z = skull_loads(11, 1.0).head(window.count);
+
+  const VecX free = brain.initial_penetration_mm - modes * z;
+  const VecX forces = reference.factor.solve(VecX(free(active)));
+  const VecX depth = free - brain.compliance(Eigen::all, active) * forces;
+  VecX found_forces(k), found_depth(kSlaves);
+  system.solve(z, free, found_forces, found_depth);
+  EXPECT_LT((found_forces - forces).norm(), 1e-10 * (1.0 + forces.norm()));
+  EXPECT_LT((found_depth - depth).norm(), 1e-10 * (1.0 + depth.norm()));
+
+  MatrixXd loads(k, window.count + 1);
+  loads << modes(active, Eigen::all), brain.initial_penetration_mm(active);
+  const MatrixXd response = reference.factor.solve(loads);
+  MatrixXd found_response(k, window.count + 1);
+  system.respond(found_response);
+  EXPECT_LT((found_response - response).norm(), 1e-10 * (1.0 + response.norm()));
+
+  Random random(12);
+  VecX felt(k);
+  for (double& value : felt) value = random.normal();
+  VecX adjoint = VecX::Ones(window.count);
+  const VecX expected = adjoint + response.leftCols(window.count).transpose() * felt;
+  system.add_adjoint(felt, adjoint);
+  EXPECT_LT((adjoint - expected).norm(), 1e-10 * (1.0 + expected.norm()));
+
+  MatrixXd any(k, 3);
+  for (double& value : any.reshaped()) value = random.normal();
+  const MatrixXd solved = reference.factor.solve(any);
+  system.solve(any);
+  EXPECT_LT((any - solved).norm(), 1e-10 * (1.0 + solved.norm()));
+}
+
+TEST(ContactSystem, AnswersForFewSlavesAsForMost) {
+  const CondensedOperators brain = skull_operators(0.5);
+  ThreadTeam team(2);
+  for (const ModeWindow window : {kWindow, ModeWindow{2, 7}}) {
+    ContactSystem system(brain, window, kBeta, team);
+    Random random(3);
+    int most = 0, fewer = 0;
+    for (const double share : {0.1, 0.5, 0.7, 0.9, 0.95, 0.3, 0.8, 1.1, 0.62, 0.58}) {
+      contact::ActiveSet set = random_set(random, share);
+      for (int step = 0; step < 5; ++step) {
+        ASSERT_TRUE(system.take(set));
+        expect_answers(brain, system, set, window);
+        (system.size() > ContactSystem::kMost * kSlaves ? most : fewer) += 1;
+        for (int i = 0; i <= step; ++i) {
+          char& one = set[static_cast<std::size_t>(random.uniform() * kSlaves)];
+          one = one ? 0 : 1;
+        }
+      }
+    }
+    EXPECT_GT(most, 15) << "the test shows nothing";
+    EXPECT_GT(fewer, 15) << "the test shows nothing";
+  }
+}
+
+TEST(ContactSystem, ServesTheEmptySetAndAllSlaves) {
+  const CondensedOperators brain = skull_operators(0.5);
+  ThreadTeam team(2);
+  ContactSystem system(brain, kWindow, kBeta, team);
+  const contact::ActiveSet none(kSlaves), all(kSlaves, 1);
+  for (const contact::ActiveSet& set : {none, all, none}) {
+    ASSERT_TRUE(system.take(set));
+    if (system.size() > 0) {
+      expect_answers(brain, system, set, kWindow);
+      continue;
+    }
+    const VecX z = skull_loads(4, 1.0), free = brain.initial_penetration_mm - brain.slave_modes * z;
+    VecX forces(0), depth(kSlaves);
+    system.solve(z, free, forces, depth);
+    EXPECT_EQ(depth, free);
+  }
+}
+
+TEST(ContactSystem, AnIndefiniteComplianceIsRejectedAndLeavesNoSet) {
+  for (const double share : {0.3, 0.9}) {
+    CondensedOperators brain = skull_operators(0.5);
+    brain.compliance(7, 7) = -1.0;
+    ThreadTeam team(2);
+    ContactSystem system(brain, kWindow, kBeta, team);
+    contact::ActiveSet set(kSlaves);
+    for (int i = 0; i < share * kSlaves; ++i) set[static_cast<std::size_t>(i)] = 1;
+    const Status status = system.take(set);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::kSingularMatrix);
+    EXPECT_EQ(system.size(), 0);
+    std::fill(set.begin(), set.begin() + 30, char{0});
+    if (share > ContactSystem::kMost) continue;
+    ASSERT_TRUE(system.take(set));
+  }
+}
+
+}  // namespace
+}  // namespace brainshift::inversion
