@@ -18,6 +18,48 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
+constexpr int kTrend = 12;       // coefficients of an affine displacement
+constexpr int kTrendRounds = 4;  // of robust weights
+constexpr double kHuber = 1.345;
+// Of the mean diagonal: what no distance shows, such as a turn of a ball, stays zero.
+constexpr double kRidge = 1e-6;
+
+// n . (a + B x) is what an affine displacement makes of the distances: its row for one datum. Lengths
+// in units of `size`.
+Eigen::Matrix<double, kTrend, 1> trend_row(const Vec3& n, const Vec3& x, double size) {
+  Eigen::Matrix<double, kTrend, 1> row;
+  row.head<3>() = n;
+  for (int k = 0; k < 3; ++k) row.segment<3>(3 + 3 * k) = (x[k] / size) * n;
+  return row;
+}
+
+// What the affine displacement that explains the distances best leaves of them, by Huber's weights
+// (1964, Ann. Math. Stat. 35:73); gross errors hardly move it.
+VecX without_trend(const SparseData& data) {
+  const Eigen::Index count = data.positions.cols();
+  VecX left = (data.directions.array() * data.displacements.array()).colwise().sum().transpose();
+  const VecX distances = left;
+  const Vec3 centre = data.positions.rowwise().mean();
+  const double size =
+      std::max(1.0, std::sqrt((data.positions.colwise() - centre).colwise().squaredNorm().mean()));
+  Eigen::MatrixXd rows(kTrend, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    rows.col(i) = trend_row(data.directions.col(i), data.positions.col(i) - centre, size);
+  }
+  VecX weights = VecX::Ones(count);
+  for (int round = 0; round < kTrendRounds; ++round) {
+    Eigen::Matrix<double, kTrend, kTrend> normal = rows * weights.asDiagonal() * rows.transpose();
+    normal.diagonal().array() += kRidge * std::max(1e-300, normal.trace() / kTrend);
+    const Eigen::Matrix<double, kTrend, 1> right = rows * weights.cwiseProduct(distances);
+    left = distances - rows.transpose() * normal.ldlt().solve(right);
+    const VecX sizes = left.cwiseAbs();
+    const double sd = 1.4826 * percentile({sizes.data(), static_cast<std::size_t>(count)}, 50.0);
+    if (!(sd > 0.0)) break;
+    weights = (kHuber * sd / sizes.array().max(kHuber * sd)).matrix();
+  }
+  return left;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const IndexedPatch>> IndexedPatch::build(SurfacePatch patch) {
@@ -73,6 +115,7 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
 void SurfaceDistances::average(const SparseData& data, const std::vector<int>& guiding) {
   const Points centres = data.positions(Eigen::all, guiding);
   const double farthest = options_.average_mm * options_.average_mm;
+  const VecX left = without_trend(data);
   std::vector<std::vector<double>> distances(guiding.size());
   VecX away(centres.cols());  // squared
   for (Eigen::Index i = 0; i < data.positions.cols(); ++i) {
@@ -80,15 +123,14 @@ void SurfaceDistances::average(const SparseData& data, const std::vector<int>& g
     const Vec3 place = data.positions.col(i);
     away = (centres.colwise() - place).colwise().squaredNorm().transpose();
     if (away.minCoeff(&nearest) > farthest) continue;
-    distances[static_cast<std::size_t>(nearest)].push_back(
-        data.directions.col(i).dot(data.displacements.col(i)));
+    distances[static_cast<std::size_t>(nearest)].push_back(left[i]);
   }
   for (std::size_t i = 0; i < guiding.size(); ++i) {
     if (distances[i].size() < kFewestAveraged) continue;
     const auto own = static_cast<Eigen::Index>(i);
     const Vec3 n = data.directions.col(guiding[i]);
     const double median = percentile(distances[i], 50.0);
-    guiding_.col(own) += (median - n.dot(data.displacements.col(guiding[i]))) * n;
+    guiding_.col(own) += (median - left[guiding[i]]) * n;
     const double of_median = options_.sd_mm * std::sqrt(0.5 * std::numbers::pi /
                                                         static_cast<double>(distances[i].size()));
     sd_mm_[own] = std::hypot(of_median, options_.shared_sd_mm);

@@ -15,7 +15,8 @@
 // Many more points are measured than guide the model. With options.average_mm a guiding point
 // stands for its neighbours (a superobservation, Lorenc 1981, Mon Weather Rev 109:701): its
 // distance is the median of theirs, whose errors of their own mostly cancel. A gross error among
-// them does not matter.
+// them does not matter. Distances also differ because the surface has moved otherwise than
+// rigidly; the median is therefore that of what an affine displacement of the whole surface leaves.
 //
 // The first data are those of a rigid motion of the surface, such as a rigid ICP's: far from the
 // surface, closest points would lie on its wrong side. Of that motion nothing else enters the data.
