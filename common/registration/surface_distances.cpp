@@ -24,8 +24,8 @@ constexpr double kHuber = 1.345;
 // Of the mean diagonal: what no distance shows, such as a turn of a ball, stays zero.
 constexpr double kRidge = 1e-6;
 
-// n . (a + B x) is what an affine displacement makes of the distances: its row for one datum. Lengths
-// in units of `size`.
+// n . (a + B x) is what an affine displacement makes of the distances: its row for one datum.
+// Lengths in units of `size`.
 Eigen::Matrix<double, kTrend, 1> trend_row(const Vec3& n, const Vec3& x, double size) {
   Eigen::Matrix<double, kTrend, 1> row;
   row.head<3>() = n;
