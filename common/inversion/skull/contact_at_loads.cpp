@@ -39,7 +39,6 @@ void ContactAtLoads::keep() {
   kept_.set = set_;
   kept_.active = active_;
   kept_.forces = forces_;
-  kept_.all_forces = all_forces_;
   kept_.penetration = penetration_;
   kept_.violation_mm = violation_mm_;
 }
@@ -48,7 +47,7 @@ void ContactAtLoads::return_to_kept() {
   set_ = kept_.set;
   active_ = kept_.active;
   forces_ = kept_.forces;
-  all_forces_ = kept_.all_forces;
+  begin_from(active_, forces());
   penetration_ = kept_.penetration;
   violation_mm_ = kept_.violation_mm;
 }

@@ -92,7 +92,7 @@ class ContactAtLoads {
   struct Solution {
     contact::ActiveSet set;
     std::vector<int> active;
-    VecX forces, all_forces, penetration;
+    VecX forces, penetration;
     double violation_mm = 0.0;
   };
   Solution kept_;

@@ -113,10 +113,7 @@ bool PrincipalFactor::gather_columns() {
     double* made = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * total_;
     const int own_row = row_in_base_[static_cast<std::size_t>(member)];
     if (own_row < 0) {
-      const double* own = column(member);
-      for (Eigen::Index i = 0; i < rows; ++i) {
-        made[i] = own[base_[static_cast<std::size_t>(i)]];
-      }
+      gather(column(member), base_, made);
     } else {
       std::fill(made, made + rows, 0.0);
       made[own_row] = 1.0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "common/contact/penalty.hpp"
 #include "common/core/random.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/operators/condensed_operators.hpp"
@@ -40,6 +41,12 @@ inline VecX skull_loads(std::uint64_t seed, double size) {
   VecX z(kModes);
   for (double& value : z) value = size * random.normal();
   return z;
+}
+
+inline contact::ActiveSet random_set(Random& random, double share) {
+  contact::ActiveSet set(kSlaves);
+  for (char& one : set) one = random.uniform() < share ? 1 : 0;
+  return set;
 }
 
 }  // namespace brainshift::inversion

@@ -13,12 +13,6 @@ namespace {
 
 using Eigen::MatrixXd;
 
-contact::ActiveSet random_set(Random& random, double share) {
-  contact::ActiveSet set(kSlaves);
-  for (char& one : set) one = random.uniform() < share ? 1 : 0;
-  return set;
-}
-
 // The set's own compliance, factorised on its own.
 struct Reference {
   Reference(const CondensedOperators& brain, const contact::ActiveSet& set) {

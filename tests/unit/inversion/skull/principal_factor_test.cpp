@@ -39,12 +39,6 @@ void expect_solves(const CondensedOperators& brain, const PrincipalFactor& facto
   EXPECT_LT((x - expected).norm(), 1e-11 * (1.0 + expected.norm()));
 }
 
-contact::ActiveSet random_set(Random& random, double share) {
-  contact::ActiveSet set(kSlaves);
-  for (char& one : set) one = random.uniform() < share ? 1 : 0;
-  return set;
-}
-
 TEST(PrincipalFactor, SolvesForSetsThatFollowEachOther) {
   const CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team(2);
