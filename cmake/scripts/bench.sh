@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # bench.sh BIN_DIR [OUT_DIR]: error against run time of all inversion methods, and the latency of
 # updates through the real daemon and client. Empties OUT_DIR (default: out/bench) and writes to it:
-# raw CSV, figures, tables.md, scenes.txt, summary.json. Exit status 0 only if every check holds.
-#   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold;
-#               no scenes.txt
-#   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs 20 GiB
-#   BUDGET_S=.. time per method, mesh and scenario, default 200 s
+# raw CSV and JSON (tests/benchmarks/bench_results.hpp), figures, tables.md, summary.json. Exit status
+# 0 only if every check holds.
+#   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold
+#   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs 18 GiB
+#   BUDGET_S=.. time per method, mesh and scenario, default 400 s
 #   REFINED=... sizes that are meshed with refinement too, default 18 (QUICK: none)
+#   KERNEL=...  the other BLAS kernel that latencies are measured with, default Haswell
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -15,84 +16,149 @@ bin=${1:?usage: bench.sh BIN_DIR [OUT_DIR]}
 out=${2:-out/bench}
 case_file=config/cases/colin27.yaml
 seed=1
+kernel=${KERNEL:-Haswell}
 if [ "${QUICK:-0}" = 1 ]; then
-  sizes=${SIZES-18} refined=${REFINED-} repetitions=5 cycles=10 growth_updates=1000
+  sizes=${SIZES-18} refined=${REFINED-} repetitions=5 each=10 growth_updates=1000
 else
-  sizes=${SIZES-5,18,40,100} refined=${REFINED-18} repetitions=20 cycles=100 growth_updates=10000
+  sizes=${SIZES-5,18,40,100} refined=${REFINED-18} repetitions=20 each=100 growth_updates=10000
 fi
 
 name=bench
 . cmake/scripts/steps.sh
 
 fact() { printf '%s,%s\n' "$1" "$2" >>"$out/facts.csv"; }
+leave_out() { printf '%s\n' "$1" >>"$out/left_out.csv"; }
+
+prepare() {  # CASE MODEL JSON
+  "$bin/brainshiftd" prepare --case "$1" --out "$out/$2.h5" --json >"$out/$3.json"
+}
+
+# The default case with nothing rebuilt but the region of 40 mm about the tumour.
+prepare_region() {
+  sed 's/^  far_field: auto/  far_field: off/' "$case_file" >"$out/region.yaml" || return
+  grep -q '^  far_field: off' "$out/region.yaml" || return
+  prepare "$out/region.yaml" region prepare-region
+}
+
+# NAME SCENARIO EACH: observations of the scenario, none of them twice.
+observe() {
+  "$bin/bench_observations" --case "$case_file" --scenario "$2" --seed "$seed" --each "$3" \
+    --out "$out/$1.surgery"
+}
 
 # Notes the time from the daemon's start to the line with its endpoint.
 serve() {
   local begin=$EPOCHREALTIME
-  start_daemon "$out/colin27.h5"
+  start_daemon "$out/$1.h5"
   fact load_to_ready_s "$(seconds_since "$begin" 3)"
 }
 
 # Resident memory of the daemon, bytes.
 daemon_rss() { awk '/^VmRSS:/ { print 1024 * $2 }' "/proc/$daemon/status"; }
 
-replay() {  # SCENARIO CYCLES NAME
+replay() {  # SURGERY NAME CYCLES
   "$bin/brainshift" replay "$out/$1.surgery" --endpoint "$endpoint" --boundary contact \
-    --method condensed --repeat "$2" --report "$out/$3.json" --latency-csv "$out/latency-$3.csv"
+    --method condensed --repeat "${3:-1}" --report "$out/run-$2.json" \
+    --latency-csv "$out/latency-$2.csv"
+  rm -rf "$out/run-$2" "$out"/run-"$2"*.vtu
+}
+
+# Five sessions with one update each.
+first_updates() {
+  local i
+  for i in 1 2 3 4 5; do replay cold "cold-$i$1" || return; done
 }
 
 measure_growth() {
-  replay no-contact 500 warm-up
+  replay no-contact warm-up $((growth_updates / (each * 5))) || return
   fact rss_before_bytes "$(daemon_rss)"
-  replay no-contact "$growth_updates" growth
+  replay no-contact growth $((growth_updates / each)) || return
   fact rss_after_bytes "$(daemon_rss)"
   fact growth_updates "$growth_updates"
+  rm "$out"/run-{warm-up,growth}.json "$out"/latency-{warm-up,growth}.csv
 }
 
-prepare() {
-  "$bin/brainshiftd" prepare --case "$case_file" --out "$out/colin27.h5" --json >"$out/prepare.json"
+# Every latency of one kernel; $1: "" or @KERNEL, $2: which recording of sag-progress.
+latencies() {
+  step "serve: load the model file$1" serve colin27
+  step "replay: $2$1" replay "$2" "sag-progress$1"
+  [ -n "$1" ] || fact rss_session_bytes "$(daemon_rss)"
+  local one
+  for one in no-contact paper joint-sag joint-mixed distension; do
+    step "replay: $one$1" replay "$one" "$one$1"
+  done
+  step "replay: distension, five sessions with one update each$1" first_updates "$1"
+  if [ -z "$1" ]; then
+    step "replay: no-contact, $growth_updates updates, memory of the daemon" measure_growth
+  fi
+  step "stop: daemon" stop_daemon
+  step "serve: the region about the tumour$1" start_daemon "$out/region.h5"
+  step "replay: region$1" replay short "region$1"
+  step "stop: daemon" stop_daemon
 }
 
 empty_folder "$out"
+"$bin/bench_summary" --machine --commit "$(commit_name)" >"$out/machine.txt"
 echo "name,value" >"$out/facts.csv"
+: >"$out/left_out.csv"
 
-step "prepare: default case, both boundaries" prepare
-step "serve: load the model file" serve
-for scenario in no-contact paper distension sag-progress; do
-  step "simulate: $scenario, seed $seed" "$bin/brainshift" simulate --case "$case_file" \
-    --scenario "$scenario" --seed "$seed" --out "$out/$scenario.surgery"
+step "prepare: default case, both boundaries" prepare "$case_file" colin27 prepare
+step "prepare: the same with the region about the tumour only" prepare_region
+# 20 moments in sag-progress, 1 in the others.
+step "observe: sag-progress, $((20 * each)) observations" observe sag-progress sag-progress "$each"
+step "observe: sag-progress, 200 observations" observe short sag-progress 10
+for scenario in no-contact paper; do
+  step "observe: $scenario" observe "$scenario" "$scenario" "$each"
 done
-# 20 observations in sag-progress, 1 in the others.
-step "replay: sag-progress, $((20 * cycles)) updates" replay sag-progress "$cycles" sag-progress
-for scenario in paper distension no-contact; do
-  step "replay: $scenario, $cycles updates" replay "$scenario" "$cycles" "$scenario"
+for scenario in joint-sag joint-mixed distension; do
+  step "observe: $scenario" observe "$scenario" "$scenario" 10
 done
-step "replay: no-contact, $growth_updates updates, memory of the daemon" measure_growth
-step "stop: daemon" stop_daemon
+step "observe: distension, once" observe cold distension 1
+latencies "" sag-progress
+export OPENBLAS_CORETYPE=$kernel
+latencies "@$kernel" short
+unset OPENBLAS_CORETYPE
+stages() {
+  "$bin/bench_update" --model "$out/colin27.h5" --passes 1 --stages-csv "$out/stages.csv" \
+    "$out"/{short,paper,no-contact,joint-sag,joint-mixed,distension}.surgery
+}
+step "stages: where the time of an update goes" stages
+rm "$out"/*.surgery "$out"/*.h5 "$out/region.yaml"  # a gigabyte that nobody reads
 
 # One process per mesh, so that the memory of one does not count for the next.
 error_time() {
   "$bin/bench_error_time" --case "$case_file" --repetitions "$repetitions" \
-    --method-budget-s "${BUDGET_S:-200}" --out "$out" "$@"
+    --method-budget-s "${BUDGET_S:-400}" --out "$out" "$@"
 }
 for size in ${sizes//,/ }; do
-  step "error against time: $size thousand nodes" error_time --sizes "$size"
+  case $size in
+    5) step "error against time: 5 thousand nodes" error_time --sizes 5 ;;
+    18)
+      step "error against time: 18 thousand nodes" error_time --sizes 18 --scenarios paper \
+        --methods condensed,condensed-exact,paper,paper-woodbury,cg
+      leave_out "18 thousand nodes: pcg, and distension, whose slow methods take an hour"
+      ;;
+    *)  # a truth of another stiffness costs a factorisation each
+      step "error against time: $size thousand nodes" error_time --sizes "$size" \
+        --scenarios paper --methods condensed --repetitions 3
+      leave_out "$size thousand nodes: all methods but condensed; three surgeries"
+      ;;
+  esac
 done
 for size in ${refined//,/ }; do
   step "error against time: $size thousand nodes, refined" error_time --sizes "$size" \
-    --local-factor 0.6 --methods condensed,paper-woodbury,cg
+    --local-factor 0.6 --scenarios paper --methods condensed --repetitions 3
 done
-
-options=()
-case ",$sizes," in
-  *,100,*) options+=(--with-100k) ;;
-  *) options+=(--left-out "mesh of 100 thousand nodes: not among SIZES=$sizes") ;;
-esac
+for size in 40 100; do
+  case ",$sizes," in
+    *,$size,*) ;;
+    *) leave_out "mesh of $size thousand nodes: not among SIZES=$sizes" ;;
+  esac
+done
 if [ "${QUICK:-0}" = 1 ]; then
-  options+=(--left-out "QUICK=1: $((20 * cycles)) updates for the tail, $growth_updates for the memory")
+  leave_out "QUICK=1: $((20 * each)) updates for the tail, $growth_updates for the memory; scenes"
 else
-  # The table of docs/architecture.md.
-  scenes() { "$bin/bench_scenes" "$case_file" >"$out/scenes.txt"; }
+  scenes() { "$bin/bench_scenes" --case "$case_file" --csv "$out/scenes.csv" >"$out/scenes.txt"; }
   step "scenes: what leaving out parts saves and costs" scenes
   # Its exit status repeats the checks below, so only a missing result is an error here.
   exactness() {
@@ -105,4 +171,4 @@ else
 fi
 current=summary
 echo
-"$bin/bench_summary" --dir "$out" --commit "$(commit_name)" "${options[@]}"
+"$bin/bench_summary" --dir "$out"

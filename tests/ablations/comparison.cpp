@@ -10,7 +10,7 @@
 
 #include "common/core/statistics.hpp"
 #include "tests/ablations/ablation_truths.hpp"
-#include "tests/evidence/paired_test.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 
 namespace brainshift::ablations {
 namespace {
@@ -98,7 +98,7 @@ Difference difference_of(const Measure& measure, const Pairs& pairs) {
   };
   difference.of_default = mean(pairs.of_default);
   difference.of_variant = mean(pairs.of_variant);
-  difference.p = evidence::paired_t_test(pairs.of_variant, pairs.of_default).p;
+  difference.p = bench::paired_t_test(pairs.of_variant, pairs.of_default).p;
   const double least = difference.unit.empty() ? kLeastCoverage : kLeastChange;
   difference.counts = difference.p < kSignificant && std::abs(difference.change()) > least;
   return difference;

@@ -22,15 +22,16 @@ struct Check {
 };
 
 // A value that was not measured is NaN and does not pass. Times in units of t_solve are divided by
-// full_solve_ms of the same report. `folder`: for the commands;
-// `with_100k`: also checks that mesh.
-std::vector<Check> checks(const Results& results, const std::string& folder, bool with_100k);
+// full_solve_ms of the same report. `folder`: for the commands. What belongs to the mesh of 100
+// thousand nodes is checked unless left_out.csv names that mesh.
+std::vector<Check> checks(const Results& results, const std::string& folder);
 
 // {"checks": [...], "left_out": [...]}; a value that is not finite is null.
 std::string to_json(const std::vector<Check>& checks, const std::vector<std::string>& left_out);
 
-// Markdown: machine and commit, checks, meshes, methods, latencies.
-std::string tables(const Results& results, const std::vector<Check>& checks,
-                   const std::string& commit);
+// Markdown: machine and commit, checks, latencies, stages, scenes, meshes, methods.
+std::string tables(const Results& results, const std::vector<Check>& checks);
+// machine.txt: processor, cores, memory, BLAS kernel, commit.
+std::string machine_line(const std::string& commit);
 
 }  // namespace brainshift::bench

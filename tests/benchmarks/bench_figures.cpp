@@ -59,11 +59,16 @@ ChartSpec error_panel(const std::vector<MethodSummary>& methods, Error error,
   spec.series.push_back(front);
   for (const MethodSummary& one : methods) {
     if (!std::isfinite(one.p50_ms) || !std::isfinite(one.*error)) continue;
-    const std::string name = one.method == "condensed" ? one.method + ", " + one.start : one.method;
+    const bool own = one.prior == "paper";
+    const std::string name = one.method == "condensed" ? one.method + ", " + one.start
+                             : own                     ? one.method + ", the paper's prior"
+                                                       : one.method;
     auto found = std::find_if(spec.series.begin(), spec.series.end(),
                               [&](const Series& s) { return s.legend == name; });
     if (found == spec.series.end()) {
-      const Marker marker = one.start == "warm" ? Marker::kCircle : Marker::kTriangle;
+      const Marker marker = own                   ? Marker::kSquare
+                            : one.start == "warm" ? Marker::kCircle
+                                                  : Marker::kTriangle;
       spec.series.push_back({name, colour_of(one.method), marker, false, 0.0, {}});
       found = spec.series.end() - 1;
     }
@@ -94,17 +99,19 @@ Status draw_errors(const Results& results, const fs::path& folder, std::vector<f
 }
 
 Status draw_latency(const Results& results, const fs::path& folder, std::vector<fs::path>& files) {
-  const std::vector<std::pair<cv::Scalar, double>> styles = {{palette::kVermillion, 0.0},
-                                                             {palette::kGreen, 18.0},
-                                                             {palette::kOrange, 8.0},
-                                                             {palette::kBlue, 0.0}};
+  // Colour and dash length; the longest are told apart by both.
+  const std::vector<std::pair<cv::Scalar, double>> styles = {
+      {palette::kVermillion, 0.0}, {palette::kOrange, 8.0},  {palette::kPurple, 0.0},
+      {palette::kGreen, 18.0},     {palette::kSkyBlue, 0.0}, {palette::kGreen, 0.0},
+      {palette::kBlue, 0.0}};
   ChartSpec spec;
   spec.title = "Latency of updates through daemon and client, loopback";
   spec.subtitle = "condensed method, contact; the first update of each session is not included";
   spec.x = {"latency (ms)", true};
   spec.y = {"share of updates that take longer", true};
   for (const auto& [scenario, latency] : results.latency_ms) {
-    if (latency.size() < 2) continue;
+    const bool other_kernel = scenario.find('@') != std::string::npos;
+    if (latency.size() < 2 || other_kernel) continue;
     std::vector<double> sorted = latency;
     std::sort(sorted.begin(), sorted.end());
     const auto& style = styles[spec.series.size() % styles.size()];

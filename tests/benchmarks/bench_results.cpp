@@ -126,23 +126,70 @@ Status read_direct(const fs::path& file, const std::string& scenario,
 }
 
 Status read_runs(const fs::path& folder, Results& results) {
-  for (const char* scenario : {"paper", "distension", "sag-progress", "no-contact"}) {
-    const fs::path report = folder / (std::string(scenario) + ".json");
-    if (!fs::exists(report)) continue;
-    auto runs = client::read_reports(report);
+  const std::string prefix = "run-";
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string stem = entry.path().stem().string();
+    if (stem.rfind(prefix, 0) != 0 || entry.path().extension() != ".json") continue;
+    auto runs = client::read_reports(entry.path());
     if (!runs) return tl::unexpected(runs.error());
-    if (!runs->empty()) results.runs[scenario] = runs->front();
-    const fs::path csv = folder / ("latency-" + std::string(scenario) + ".csv");
+    const std::string name = stem.substr(prefix.size());
+    if (!runs->empty()) results.runs[name] = runs->front();
+    const fs::path csv = folder / ("latency-" + name + ".csv");
     if (!fs::exists(csv)) continue;
     const auto table = CsvTable::read(csv);
     if (!table) return tl::unexpected(table.error());
-    auto& values = results.latency_ms[scenario];
+    auto& values = results.latency_ms[name];
     for (std::size_t row = 1; row < table->rows(); ++row) {
       const double value = table->number(row, "latency_ms");
       if (std::isfinite(value)) values.push_back(value);
     }
   }
   return {};
+}
+
+Status read_table(const fs::path& file, CsvTable& table) {
+  if (!fs::exists(file)) return {};
+  auto read = CsvTable::read(file);
+  if (!read) return tl::unexpected(read.error());
+  table = std::move(*read);
+  return {};
+}
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::vector<std::string> lines;
+  std::ifstream text(file);
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+// Of one method and repetition: the column's number, where it is finite.
+std::map<std::string, double> by_repetition(const CsvTable& table, const MethodSummary& one,
+                                            const char* column) {
+  std::map<std::string, double> values;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double rank = table.number(row, "rank"), value = table.number(row, column);
+    if (table.text(row, "mesh") == one.mesh && table.text(row, "scenario") == one.scenario &&
+        table.text(row, "method") == one.method && table.text(row, "prior") == one.prior &&
+        table.text(row, "start") == one.start &&
+        (std::isfinite(rank) ? static_cast<int>(rank) : 0) == one.rank && std::isfinite(value)) {
+      values[table.text(row, "repetition")] = value;
+    }
+  }
+  return values;
+}
+
+PairedTest compare(const CsvTable& table, const MethodSummary& first, const MethodSummary& second,
+                   const char* column) {
+  const auto a = by_repetition(table, first, column), b = by_repetition(table, second, column);
+  std::vector<double> of_second, of_first;
+  for (const auto& [repetition, error] : a) {
+    const auto other = b.find(repetition);
+    if (other == b.end()) continue;
+    of_first.push_back(error);
+    of_second.push_back(other->second);
+  }
+  return paired_t_test(of_second, of_first);
 }
 
 }  // namespace
@@ -153,12 +200,14 @@ double Results::fact(const std::string& name) const {
 }
 
 const MethodSummary* Results::find(const std::string& mesh, const std::string& scenario,
-                                   const std::string& method, const std::string& start,
-                                   int rank) const {
+                                   const std::string& method, const std::string& start, int rank,
+                                   const std::string& prior) const {
   const MethodSummary* best = nullptr;
   for (const MethodSummary& one : methods) {
-    if (one.mesh != mesh || one.scenario != scenario || one.method != method || one.start != start)
+    if (one.mesh != mesh || one.scenario != scenario || one.method != method ||
+        one.start != start || one.prior != prior) {
       continue;
+    }
     if (rank != kLargestRank && one.rank != rank) continue;
     if (best == nullptr || one.rank > best->rank) best = &one;
   }
@@ -173,12 +222,13 @@ std::vector<MethodSummary> summarise(const CsvTable& table) {
     key.mesh = table.text(row, "mesh");
     key.scenario = table.text(row, "scenario");
     key.method = table.text(row, "method");
+    key.prior = table.text(row, "prior");
     key.start = table.text(row, "start");
     const double rank = table.number(row, "rank");
     key.rank = std::isfinite(rank) ? static_cast<int>(rank) : 0;
     const auto same = [&](const MethodSummary& one) {
       return one.mesh == key.mesh && one.scenario == key.scenario && one.method == key.method &&
-             one.start == key.start && one.rank == key.rank;
+             one.prior == key.prior && one.start == key.start && one.rank == key.rank;
     };
     const auto found = std::find_if(summaries.begin(), summaries.end(), same);
     const auto at = static_cast<std::size_t>(found - summaries.begin());
@@ -222,32 +272,24 @@ std::vector<MethodSummary> summarise(const CsvTable& table) {
   return summaries;
 }
 
+Results::FirstUpdates Results::first_updates(const std::string& suffix) const {
+  FirstUpdates first;
+  for (const auto& [name, run] : runs) {
+    const std::size_t at = name.find('@');
+    const std::string kernel = at == std::string::npos ? "" : name.substr(at);
+    if (name.rfind("cold-", 0) != 0 || kernel != suffix) continue;
+    if (!run.cold_ms || !run.full_solve_ms || !run.contact) continue;
+    first.active = first.over_tsolve.empty() ? run.contact->active
+                                             : std::min(first.active, run.contact->active);
+    first.over_tsolve.push_back(*run.cold_ms / *run.full_solve_ms);
+  }
+  return first;
+}
+
 PairedErrors paired_errors(const CsvTable& table, const MethodSummary& first,
                            const MethodSummary& second) {
-  const auto by_repetition = [&](const MethodSummary& one) {
-    std::map<std::string, double> errors;
-    for (std::size_t row = 0; row < table.rows(); ++row) {
-      const double rank = table.number(row, "rank"), error = table.number(row, "cross_mm");
-      if (table.text(row, "mesh") == one.mesh && table.text(row, "scenario") == one.scenario &&
-          table.text(row, "method") == one.method && table.text(row, "start") == one.start &&
-          (std::isfinite(rank) ? static_cast<int>(rank) : 0) == one.rank && std::isfinite(error)) {
-        errors[table.text(row, "repetition")] = error;
-      }
-    }
-    return errors;
-  };
-  const auto a = by_repetition(first), b = by_repetition(second);
-  PairedErrors paired;
-  for (const auto& [repetition, error] : a) {
-    const auto other = b.find(repetition);
-    if (other == b.end()) continue;
-    ++paired.measurements;
-    paired.first_mm += error;
-    paired.second_mm += other->second;
-  }
-  paired.first_mm /= paired.measurements;
-  paired.second_mm /= paired.measurements;
-  return paired;
+  return {compare(table, first, second, "cross_mm"),
+          compare(table, first, second, "field_mean_mm")};
 }
 
 Result<Results> read_results(const fs::path& folder) {
@@ -263,6 +305,15 @@ Result<Results> read_results(const fs::path& folder) {
   results.error_time = std::move(*error_time);
   results.methods = summarise(results.error_time);
   if (Status ok = read_runs(folder, results); !ok) return tl::unexpected(ok.error());
+  if (Status ok = read_table(folder / "stages.csv", results.stages); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  if (Status ok = read_table(folder / "scenes.csv", results.scenes); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  results.left_out = lines_of(folder / "left_out.csv");
+  const auto machine = lines_of(folder / "machine.txt");
+  if (!machine.empty()) results.machine = machine.front();
   if (fs::exists(folder / "facts.csv")) {
     const auto facts = CsvTable::read(folder / "facts.csv");
     if (!facts) return tl::unexpected(facts.error());

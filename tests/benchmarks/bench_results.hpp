@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What one `make bench` wrote to its folder. Its figures, tables and checks have no other source.
 //
+//   machine.txt                      bench_summary --machine: where it ran, and the commit
 //   meshes-*.csv, error_time-*.csv   bench_error_time
-//   NAME.json, latency-NAME.csv      `brainshift replay` of scenario NAME
+//   run-NAME.json, latency-NAME.csv  `brainshift replay` of the surgery NAME; with another BLAS
+//                                    kernel NAME@KERNEL
+//   stages.csv                       bench_update: where the time of an update goes
+//   scenes.csv                       bench_scenes: what leaving out parts saves and costs
 //   facts.csv                        name,value: what the script measured itself
+//   left_out.csv                     what the script did not run, a line each
 //   prepare.json                     `brainshiftd prepare --json`
 //   direct-NAME.json                 bench_exactness --scenario NAME
 #pragma once
@@ -18,12 +23,13 @@
 #include "client/replay/run_report.hpp"
 #include "common/core/error.hpp"
 #include "tests/benchmarks/csv_table.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 
 namespace brainshift::bench {
 
 // Repetitions of one method on one mesh and scenario, taken together.
 struct MethodSummary {
-  std::string mesh, scenario, method, start;
+  std::string mesh, scenario, method, prior, start;
   int rank = 0;  // 0: not applicable
   int repetitions = 0;
   double p50_ms = 0.0;       // of those that gave an estimate; NaN for none
@@ -44,25 +50,35 @@ struct MethodSummary {
 struct Results {
   CsvTable meshes;
   CsvTable error_time;
-  std::vector<MethodSummary> methods;                     // in the order of error_time
-  std::map<std::string, client::RunReport> runs;          // by scenario
-  std::map<std::string, std::vector<double>> latency_ms;  // by scenario, without the first update
+  std::vector<MethodSummary> methods;  // in the order of error_time
+  CsvTable stages;
+  CsvTable scenes;
+  std::map<std::string, client::RunReport> runs;          // by NAME
+  std::map<std::string, std::vector<double>> latency_ms;  // by NAME, without the first update
   std::map<std::string, double> facts;
+  std::vector<std::string> left_out;
+  std::string machine;  // machine.txt
 
   // NaN when there is none.
   double fact(const std::string& name) const;
   const MethodSummary* find(const std::string& mesh, const std::string& scenario,
                             const std::string& method, const std::string& start,
-                            int rank = kLargestRank) const;
+                            int rank = kLargestRank, const std::string& prior = "case") const;
+  // The first updates of all sessions cold-N (with `suffix` "@KERNEL" or ""), each over the solve
+  // of its session, and the least number of active slaves.
+  struct FirstUpdates {
+    std::vector<double> over_tsolve;
+    int active = 0;
+  };
+  FirstUpdates first_updates(const std::string& suffix) const;
   static constexpr int kLargestRank = -1;
 };
 
 std::vector<MethodSummary> summarise(const CsvTable& error_time);
 
-// Mean errors at the tumour of two methods, over the measurements that both of them have inverted.
+// Errors of two methods on the surgeries that both of them have inverted: second - first.
 struct PairedErrors {
-  int measurements = 0;
-  double first_mm = 0.0, second_mm = 0.0;  // NaN without measurements
+  PairedTest tumour, field;  // mm; of cross_mm and field_mean_mm
 };
 PairedErrors paired_errors(const CsvTable& error_time, const MethodSummary& first,
                            const MethodSummary& second);

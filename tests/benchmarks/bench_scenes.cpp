@@ -2,11 +2,13 @@
 // What leaving out parts of a scene saves and costs on the default head, for
 // every scenario of the twin without ICP: the time of updates with and without
 // a part, the true difference between them, and the inverter's own estimate of
-// that difference. `make bench` writes the table to out/bench/scenes.txt.
-//   build/release/bin/bench_scenes [case.yaml]
+// that difference.
+//   build/release/bin/bench_scenes [--case CASE] [--csv FILE]
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,7 +53,7 @@ struct Measured {
   }
 };
 
-void run(const std::string& case_file) {
+void run(const std::string& case_file, const std::string& csv_file) {
   auto [config, brain] = value_or_exit(patient::read_patient(case_file));
   const auto model = std::make_shared<const BrainModel>(std::move(brain));
   const auto prepared =
@@ -79,6 +81,9 @@ void run(const std::string& case_file) {
     inverters.push_back(value_or_exit(
         inversion::CondensedInverter::build(operators, locator, config, part.options)));
   }
+  std::ofstream csv;
+  if (!csv_file.empty()) csv.open(csv_file);
+  csv << "scenario,left_out,active,largest_mm,difference_mm,estimate_mm,invert_ms,rebuild_ms\n";
   std::printf("%-13s%-14s%8s%9s%11s%12s%11s%11s\n", "scenario", "left out", "active", "max mm",
               "diff mm", "estimate mm", "invert ms", "rebuild ms");
   for (const char* name : {"paper", "no-contact", "distension", "sag-progress"}) {
@@ -94,11 +99,18 @@ void run(const std::string& case_file) {
         measured.add(inverters[p], data, estimate);
         if (p == 0) full = estimate;
         const auto& error = parts[p].error;
+        const double largest_mm = estimate.displacement.colwise().norm().maxCoeff();
+        const double difference_mm =
+            (estimate.displacement - full.displacement).colwise().norm().maxCoeff();
+        const double estimate_mm = error != nullptr ? inverters[p].omission_errors().*error : 0.0;
+        const double invert_ms = percentile(measured.invert_ms, 50);
+        const double rebuild_ms = percentile(measured.rebuild_ms, 50);
         std::printf("%-13s%-14s%8d%9.3f%11.4f%12.4f%11.2f%11.2f\n", name, parts[p].name,
-                    estimate.contact.active, estimate.displacement.colwise().norm().maxCoeff(),
-                    (estimate.displacement - full.displacement).colwise().norm().maxCoeff(),
-                    error != nullptr ? inverters[p].omission_errors().*error : 0.0,
-                    percentile(measured.invert_ms, 50), percentile(measured.rebuild_ms, 50));
+                    estimate.contact.active, largest_mm, difference_mm, estimate_mm, invert_ms,
+                    rebuild_ms);
+        csv << name << ',' << parts[p].name << ',' << estimate.contact.active << ',' << largest_mm
+            << ',' << difference_mm << ',' << estimate_mm << ',' << invert_ms << ',' << rebuild_ms
+            << '\n';
       }
     }
   }
@@ -109,6 +121,11 @@ void run(const std::string& case_file) {
 
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
-  brainshift::run(argc > 1 ? argv[1] : BRAINSHIFT_DEFAULT_CASE);
+  std::string case_file = BRAINSHIFT_DEFAULT_CASE, csv_file;
+  CLI::App app("What leaving out parts of a scene saves and costs.", "bench_scenes");
+  app.add_option("--case", case_file, "case file")->capture_default_str();
+  app.add_option("--csv", csv_file, "file for a row per surgery and part");
+  CLI11_PARSE(app, argc, argv);
+  brainshift::run(case_file, csv_file);
   return 0;
 }

@@ -19,13 +19,16 @@ namespace {
 struct Arguments {
   std::filesystem::path folder = "out/bench";
   std::string commit = "unknown";
-  std::vector<std::string> left_out;
-  bool with_100k = false;
   bool figures_only = false;
+  bool machine = false;
 };
 
 // True when every check holds.
 Result<bool> run(const Arguments& arguments) {
+  if (arguments.machine) {
+    std::printf("%s\n", machine_line(arguments.commit).c_str());
+    return true;
+  }
   const auto results = read_results(arguments.folder);
   if (!results) return tl::unexpected(results.error());
   const auto figures = draw_figures(*results, arguments.folder);
@@ -33,11 +36,10 @@ Result<bool> run(const Arguments& arguments) {
   for (const auto& file : *figures) std::printf("wrote %s\n", file.c_str());
   if (arguments.figures_only) return true;
 
-  const auto all = checks(*results, arguments.folder.string(), arguments.with_100k);
-  Status ok =
-      io::write_file(arguments.folder / "tables.md", tables(*results, all, arguments.commit));
+  const auto all = checks(*results, arguments.folder.string());
+  Status ok = io::write_file(arguments.folder / "tables.md", tables(*results, all));
   if (ok) {
-    ok = io::write_file(arguments.folder / "summary.json", to_json(all, arguments.left_out));
+    ok = io::write_file(arguments.folder / "summary.json", to_json(all, results->left_out));
   }
   if (!ok) return tl::unexpected(ok.error());
   bool pass = true;
@@ -47,7 +49,7 @@ Result<bool> run(const Arguments& arguments) {
                 check.bound.c_str());
     pass = pass && check.pass;
   }
-  for (const std::string& part : arguments.left_out) std::printf("left out: %s\n", part.c_str());
+  for (const std::string& part : results->left_out) std::printf("left out: %s\n", part.c_str());
   return pass;
 }
 
@@ -60,9 +62,8 @@ int main(int argc, char** argv) {
   bench::Arguments arguments;
   app.add_option("--dir", arguments.folder, "folder with the measurements; results go there too")
       ->capture_default_str();
-  app.add_option("--commit", arguments.commit, "for tables.md")->capture_default_str();
-  app.add_option("--left-out", arguments.left_out, "a part that was not run, for summary.json");
-  app.add_flag("--with-100k", arguments.with_100k, "check the mesh of 100 thousand nodes too");
+  app.add_flag("--machine", arguments.machine, "print what machine.txt holds, and no more");
+  app.add_option("--commit", arguments.commit, "for --machine")->capture_default_str();
   app.add_flag("--figures-only", arguments.figures_only, "no tables, no checks");
   app.footer("Exit status: 0 every check holds, 1 one does not or failure, 2 bad usage or input.");
   try {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <thread>
 
@@ -30,16 +32,6 @@ std::string first_field(const char* file, const std::string& key) {
     return begin == std::string::npos ? "" : line.substr(begin);
   }
   return "unknown";
-}
-
-void machine(std::ostringstream& out, const std::string& commit) {
-  std::istringstream memory(first_field("/proc/meminfo", "MemTotal"));
-  double kib = 0.0;
-  memory >> kib;
-  out << "Processor: " << first_field("/proc/cpuinfo", "model name") << ", "
-      << std::thread::hardware_concurrency() << " logical cores, OpenBLAS kernel "
-      << linalg::blas_kernel() << "; memory " << cell(kib / kMib, 3) << " GiB; commit " << commit
-      << ".\n";
 }
 
 void check_table(std::ostringstream& out, const std::vector<Check>& checks) {
@@ -78,12 +70,13 @@ void method_table(std::ostringstream& out, const Results& results) {
   out << "\nTimes are over n repetitions, errors over those repetitions that all methods of a mesh "
          "and "
          "scenario have.\n";
-  out << "\n| mesh | scenario | method | modes | start | n | p50 ms | max ms | of t_solve | tumour "
+  out << "\n| mesh | scenario | method | prior | modes | start | n | p50 ms | max ms | of t_solve "
+         "| tumour "
          "error mm | field error mm | largest mm | coverage | active | iterations | status |\n"
-         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const MethodSummary& one : results.methods) {
-    out << "| " << one.mesh << " | " << one.scenario << " | " << one.method << " | "
-        << (one.rank > 0 ? std::to_string(one.rank) : "-") << " | " << one.start << " | "
+    out << "| " << one.mesh << " | " << one.scenario << " | " << one.method << " | " << one.prior
+        << " | " << (one.rank > 0 ? std::to_string(one.rank) : "-") << " | " << one.start << " | "
         << one.repetitions << " | " << cell(one.p50_ms) << " | " << cell(one.max_ms) << " | "
         << cell(one.over_tsolve) << " | " << cell(one.cross_mm) << " | " << cell(one.field_mean_mm)
         << " | " << cell(one.field_max_mm) << " | " << cell(one.coverage_90) << " | "
@@ -92,13 +85,13 @@ void method_table(std::ostringstream& out, const Results& results) {
 }
 
 void latency_table(std::ostringstream& out, const Results& results) {
-  out << "\n| scenario | updates | first ms | p50 ms | p95 ms | p99 ms | max ms | t_solve ms | "
+  out << "\n| surgery | updates | first ms | p50 ms | p95 ms | p99 ms | max ms | t_solve ms | "
          "p50 of t_solve | active |\n|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const auto& [scenario, run] : results.runs) {
+  for (const auto& [name, run] : results.runs) {
     if (!run.latency_ms) continue;
     const auto& latency = *run.latency_ms;
     const double t_solve = run.full_solve_ms.value_or(std::nan(""));
-    out << "| " << scenario << " | " << run.updates << " | "
+    out << "| " << name << " | " << run.updates << " | "
         << cell(run.cold_ms.value_or(std::nan("")));
     for (const double value :
          {latency.p50, latency.p95, latency.p99, latency.max, t_solve, latency.p50 / t_solve}) {
@@ -108,20 +101,75 @@ void latency_table(std::ostringstream& out, const Results& results) {
   }
 }
 
+// A row per stage, a column per surgery.
+void stage_table(std::ostringstream& out, const Results& results) {
+  const CsvTable& table = results.stages;
+  std::vector<std::string> surgeries, stages;
+  std::map<std::pair<std::string, std::string>, double> cells;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string &surgery = table.text(row, "surgery"), &stage = table.text(row, "stage");
+    if (std::find(surgeries.begin(), surgeries.end(), surgery) == surgeries.end()) {
+      surgeries.push_back(surgery);
+    }
+    if (std::find(stages.begin(), stages.end(), stage) == stages.end()) stages.push_back(stage);
+    cells[{surgery, stage}] = table.number(row, "over_tsolve");
+  }
+  out << "\nMedians in units of t_solve, in one process without messages.\n\n| stage |";
+  for (const auto& surgery : surgeries) out << ' ' << surgery << " |";
+  out << "\n|---|";
+  for (std::size_t i = 0; i < surgeries.size(); ++i) out << "---|";
+  out << '\n';
+  for (const auto& stage : stages) {
+    out << "| " << stage << " |";
+    for (const auto& surgery : surgeries) out << ' ' << cell(cells[{surgery, stage}], 2) << " |";
+    out << '\n';
+  }
+}
+
+void scene_table(std::ostringstream& out, const Results& results) {
+  out << "\n| surgery | left out | active | largest displacement mm | change mm | estimate of it "
+         "mm "
+         "| invert ms | rebuild ms |\n|---|---|---|---|---|---|---|---|\n";
+  const CsvTable& scenes = results.scenes;
+  for (std::size_t row = 0; row < scenes.rows(); ++row) {
+    out << "| " << scenes.text(row, "scenario") << " | " << scenes.text(row, "left_out") << " | "
+        << scenes.text(row, "active");
+    for (const char* column :
+         {"largest_mm", "difference_mm", "estimate_mm", "invert_ms", "rebuild_ms"}) {
+      out << " | " << cell(scenes.number(row, column));
+    }
+    out << " |\n";
+  }
+}
+
 }  // namespace
 
-std::string tables(const Results& results, const std::vector<Check>& checks,
-                   const std::string& commit) {
+std::string machine_line(const std::string& commit) {
+  std::istringstream memory(first_field("/proc/meminfo", "MemTotal"));
+  double kib = 0.0;
+  memory >> kib;
+  return first_field("/proc/cpuinfo", "model name") + ", " +
+         std::to_string(std::thread::hardware_concurrency()) + " logical cores, BLAS kernel " +
+         linalg::blas_kernel() + "; memory " + cell(kib / kMib, 3) + " GiB; commit " + commit;
+}
+
+std::string tables(const Results& results, const std::vector<Check>& checks) {
   std::ostringstream out;
-  machine(out, commit);
+  out << "Processor: " << results.machine << ".\n";
   out << "\n### Checks\n";
   check_table(out, checks);
   out << "\n### Latency through daemon and client, loopback\n";
   latency_table(out, results);
+  out << "\n### Where the time of an update goes\n";
+  stage_table(out, results);
+  out << "\n### What leaving out parts of a scene saves and costs\n";
+  scene_table(out, results);
   out << "\n### Growth with the mesh\n";
   mesh_table(out, results);
   out << "\n### Methods\n";
   method_table(out, results);
+  if (!results.left_out.empty()) out << "\n### Left out\n\n";
+  for (const std::string& line : results.left_out) out << "- " << line << '\n';
   return out.str();
 }
 

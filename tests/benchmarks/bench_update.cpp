@@ -29,7 +29,7 @@ using inversion::UpdateProfile;
 using inversion::UpdateStage;
 
 struct Arguments {
-  std::string model_file, csv;
+  std::string model_file, csv, stages_csv;
   std::vector<std::string> surgeries;
   int passes = 5;
 };
@@ -126,6 +126,20 @@ void print(const std::string& name, const Timed& timed, double t_solve_ms) {
   }
 }
 
+void write_stages(const std::string& name, const Timed& timed, double t_solve_ms,
+                  std::ofstream& csv) {
+  const auto row = [&](const char* stage, const std::vector<double>& ms, double times) {
+    const double median = percentile(ms, 50.0);
+    csv << name << ',' << stage << ',' << median << ',' << median / t_solve_ms << ',' << times
+        << '\n';
+  };
+  for (std::size_t i = 0; i < inversion::kUpdateStages; ++i) {
+    row(inversion::to_string(static_cast<UpdateStage>(i)), timed.stage_ms[i],
+        percentile(timed.stage_times[i], 50.0));
+  }
+  row("update", timed.ms, 1);
+}
+
 void run(const Arguments& arguments) {
   const Head head = load(arguments.model_file);
   std::printf("%d nodes, %d slaves, %d modes; t_solve %.1f ms; BLAS kernel %s\n",
@@ -134,12 +148,16 @@ void run(const Arguments& arguments) {
   std::ofstream csv;
   if (!arguments.csv.empty()) csv.open(arguments.csv);
   if (csv.is_open()) csv << "surgery,update,ms,t_solve_ms,active,steps\n";
+  std::ofstream stages;
+  if (!arguments.stages_csv.empty()) stages.open(arguments.stages_csv);
+  if (stages.is_open()) stages << "surgery,stage,p50_ms,over_tsolve,times\n";
   Player player(head);
   for (const std::string& file : arguments.surgeries) {
     const auto observations = observations_of(file);
     const std::string name = std::filesystem::path(file).stem().string();
     const Timed timed = play(player, observations, arguments.passes);
     print(name, timed, head.t_solve_ms);
+    if (stages.is_open()) write_stages(name, timed, head.t_solve_ms, stages);
     for (std::size_t i = 0; csv.is_open() && i < timed.ms.size(); ++i) {
       csv << name << ',' << i + 1 << ',' << timed.ms[i] << ',' << head.t_solve_ms << ','
           << timed.active[i] << ',' << timed.steps[i] << '\n';
@@ -158,6 +176,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
   app.add_option("--csv", arguments.csv, "file for a row per update");
+  app.add_option("--stages-csv", arguments.stages_csv, "file for a row per surgery and stage");
   app.add_option("surgeries", arguments.surgeries, "surgery files of the same case")->required();
   CLI11_PARSE(app, argc, argv);
   brainshift::run(arguments);

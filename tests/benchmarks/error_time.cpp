@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "client/replay/score.hpp"
-#include "client/twin/measure.hpp"
 #include "client/twin/surgery.hpp"
+#include "client/twin/variation.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
@@ -54,6 +54,7 @@ class Alarm {
 
 struct Row {
   Method method = Method::kCondensed;
+  const char* prior = "case";
   int rank = 0;  // 0: not applicable
   const char* start = "cold";
   int repetition = 1;
@@ -67,6 +68,7 @@ std::vector<std::string> lead(const Head& head, const Trial& trial, const Row& r
           std::to_string(head.model->mesh.num_nodes()),
           trial.scenario,
           std::string(to_string(row.method)),
+          row.prior,
           row.rank > 0 ? std::to_string(row.rank) : "",
           row.start,
           std::to_string(row.repetition),
@@ -76,10 +78,10 @@ std::vector<std::string> lead(const Head& head, const Trial& trial, const Row& r
 
 Status write_estimate(const Head& head, const Trial& trial, const Row& row,
                       const Estimate& estimate, CsvWriter& out) {
+  const auto& truth = trial.surgeries[static_cast<std::size_t>(row.repetition - 1)].truth;
   client::RunReport report;
-  if (Status ok = client::score(*head.model, trial.truth, estimate, report); !ok) return ok;
-  const VecX field_mm =
-      (estimate.displacement - trial.truth.displacement).colwise().norm().transpose();
+  if (Status ok = client::score(*head.model, truth, estimate, report); !ok) return ok;
+  const VecX field_mm = (estimate.displacement - truth.displacement).colwise().norm().transpose();
   const auto optional = [](const std::optional<double>& value) {
     return value ? csv_number(*value) : std::string();
   };
@@ -105,32 +107,39 @@ Result<Trial> make_trial(const Head& head, const client::Scenario& scenario, int
                          std::uint64_t seed, const Progress& progress) {
   client::Scenario first = scenario;
   first.fluid_levels_mm.resize(1);
-  auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(), first,
-                                       seed, progress);
-  if (!surgery) return tl::unexpected(surgery.error());
-  const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
-  if (pairs == nullptr) {
-    return fail(ErrorCode::kInvalidArgument,
-                "scenario " + scenario.name + ": measures no displacements; choose another");
-  }
   Trial trial;
   trial.scenario = scenario.name;
-  trial.truth = std::move(surgery->truths.front());
-  trial.data.push_back(sparse_data(*pairs, head.config));
-  const Points moved = client::at_points(trial.truth.displacement, trial.truth.points.at("sparse"));
-  Random random(seed + 1);
-  // The same points, in the order of the record.
-  const Points recorded =
-      client::at_points(head.model->mesh.nodes, trial.truth.points.at("sparse"));
-  if (recorded.cols() != pairs->undeformed.cols()) {
-    return fail(ErrorCode::kInternal,
-                "scenario " + scenario.name + ": truth and observation differ in their points");
-  }
-  for (int r = 1; r < repetitions; ++r) {
-    trial.data.push_back(sparse_data(
-        client::measure_displacements(recorded, moved, scenario.noise_sd_mm, random), head.config));
+  for (int r = 0; r < repetitions; ++r) {
+    report(progress, "truths of " + scenario.name, static_cast<double>(r) / repetitions);
+    const std::uint64_t own = seed + static_cast<std::uint64_t>(r);
+    auto surgery = client::play_scenario(*head.model, head.config, head.prepared->forward(),
+                                         client::vary(first, own), own);
+    if (!surgery) return tl::unexpected(surgery.error());
+    const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
+    if (pairs == nullptr) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "scenario " + scenario.name + ": measures no displacements; choose another");
+    }
+    trial.surgeries.push_back(
+        {std::move(surgery->truths.front()), sparse_data(*pairs, head.config)});
   }
   return trial;
+}
+
+Result<Prior> papers_prior(const Head& head) {
+  constexpr double kTissueInAir_n_m3 = 9800.0;
+  CaseConfig config = head.config;
+  PriorConfig& prior = config.prior;
+  prior.force_density_sd_n_m3 = kTissueInAir_n_m3;
+  for (double* other :
+       {&prior.medium_density_sd_n_m3, &prior.coarse_density_sd_n_m3, &prior.gravity_mode_sd,
+        &prior.tumour_volume_strain_sd, &prior.brain_volume_strain_sd, &prior.resection_weight_sd,
+        &prior.resection_stress_sd_pa, &prior.opening_pressure_sd_pa}) {
+    *other = 0.0;
+  }
+  auto prepared = inversion::PreparedModel::prepare(head.model, config, Boundary::kContact);
+  if (!prepared) return tl::unexpected(prepared.error());
+  return Prior{"paper", std::make_shared<const inversion::PreparedModel>(std::move(*prepared))};
 }
 
 Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& out) {
@@ -144,14 +153,14 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   row.t_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
   Estimate estimate;
   // Memory is claimed and caches are filled by an update that does not count.
-  if (Status ok = inverter->update(trial.data.back(), estimate); !ok) return ok;
+  if (Status ok = inverter->update(trial.surgeries.back().data, estimate); !ok) return ok;
   for (const char* start : {"cold", "warm"}) {
     row.start = start;
     row.repetition = 0;
-    for (const SparseData& data : trial.data) {
+    for (const PlayedSurgery& surgery : trial.surgeries) {
       ++row.repetition;
       const Stopwatch watch;
-      const Status updated = inverter->update(data, estimate);
+      const Status updated = inverter->update(surgery.data, estimate);
       row.time_ms = watch.milliseconds();
       if (updated) {
         if (Status ok = write_estimate(head, trial, row, estimate, out); !ok) return ok;
@@ -169,8 +178,7 @@ using Update =
 
 // One update by the given method. What a method prepares before
 // surgery is prepared here, outside its times.
-Result<Update> one_update(const Head& head, Method method) {
-  const inversion::PreparedModel& model = *head.prepared;
+Result<Update> one_update(const inversion::PreparedModel& model, Method method) {
   if (method != Method::kCondensedExact) {
     return Update(
         [&model, method](const SparseData& data, const inversion::InversionOptions& options) {
@@ -192,15 +200,16 @@ Result<Update> one_update(const Head& head, Method method) {
   });
 }
 
-Status run_method(const Head& head, const Trial& trial, Method method, int repetitions,
-                  double budget_s, CsvWriter& out) {
+Status run_method(const Head& head, const Trial& trial, Method method, const Prior& prior,
+                  int repetitions, double budget_s, CsvWriter& out) {
   Row row;
   row.method = method;
-  row.t_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
-  const auto invert = one_update(head, method);
+  row.prior = prior.name;
+  row.t_solve_ms = inversion::measure_full_solve_ms(*prior.prepared);
+  const auto invert = one_update(*prior.prepared, method);
   if (!invert) return tl::unexpected(invert.error());
   const Stopwatch all;
-  for (int r = 0; r < repetitions && r < static_cast<int>(trial.data.size()); ++r) {
+  for (int r = 0; r < repetitions && r < static_cast<int>(trial.surgeries.size()); ++r) {
     const double left_s = budget_s - all.seconds();
     if (left_s <= 0.0) break;
     const Alarm alarm(left_s);
@@ -208,7 +217,7 @@ Status run_method(const Head& head, const Trial& trial, Method method, int repet
     options.stop = alarm.token();
     row.repetition = r + 1;
     const Stopwatch watch;
-    const auto estimate = (*invert)(trial.data[static_cast<std::size_t>(r)], options);
+    const auto estimate = (*invert)(trial.surgeries[static_cast<std::size_t>(r)].data, options);
     row.time_ms = watch.milliseconds();
     if (estimate) {
       if (Status ok = write_estimate(head, trial, row, *estimate, out); !ok) return ok;

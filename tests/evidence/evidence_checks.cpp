@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/core/statistics.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 #include "tests/evidence/evidence_truths.hpp"
-#include "tests/evidence/paired_test.hpp"
 #include "tests/evidence/paper_tables.hpp"
 #include "tests/support/study_record.hpp"
 
@@ -109,7 +109,7 @@ class EvidenceChecks {
           fixed.push_back(b.number(i, column));
         }
       }
-      const PairedTest test = paired_t_test(contact, fixed);
+      const bench::PairedTest test = bench::paired_t_test(contact, fixed);
       if (test.pairs < 2) continue;
       check(fmt::format("{}: {} with contact less that of fixed mm", truth, what), test.mean,
             fmt::format("<= 0 or p > {} (p {:.2g}; {} pairs)", kSignificant, test.p, test.pairs),

@@ -15,8 +15,8 @@
 #include "common/core/stopwatch.hpp"
 #include "common/io/landmarks/pair_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 #include "tests/evidence/landmark_study.hpp"
-#include "tests/evidence/paired_test.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/surgeries/study_program.hpp"
 
@@ -82,8 +82,8 @@ void check(const std::vector<LeftOutLandmark>& landmarks, const std::string& stu
     test_support::record_figure(study, std::string("rms distance of ") + method.name + " mm", rms,
                                 "shown", source);
     if (!method.bound) continue;
-    const PairedTest test =
-        paired_t_test(column(&LeftOutLandmark::estimate), column(method.distance));
+    const bench::PairedTest test =
+        bench::paired_t_test(column(&LeftOutLandmark::estimate), column(method.distance));
     test_support::record_check(study, std::string("rms distance: estimate over ") + method.name,
                                estimate / rms, "< 1", estimate < rms, source);
     test_support::record_figure(study, std::string("p of a paired t test against ") + method.name,

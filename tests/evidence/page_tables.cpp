@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/benchmarks/paired_test.hpp"
 #include "tests/evidence/evidence_checks.hpp"
-#include "tests/evidence/paired_test.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -141,7 +141,7 @@ std::string landmarks_table(const CsvTable& landmarks) {
                                         {"thin-plate spline", "thin_plate_mm"}}) {
     const std::vector<double> other = column(file_name);
     text += fmt::format("| {} | {:.3f} mm | {:.2g} |\n", name, rms(other),
-                        paired_t_test(estimate, other).p);
+                        bench::paired_t_test(estimate, other).p);
   }
   return text + fmt::format("| **estimate** | {:.3f} mm | |\n", rms(estimate));
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/core/statistics.hpp"
-#include "tests/evidence/paired_test.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 #include "tests/evidence/paper_tables.hpp"
 
 namespace brainshift::evidence {
@@ -98,7 +98,8 @@ class PatientTables {
       };
       const std::vector<double> contact = errors("contact"), fixed = errors("fixed");
       const bool pairs = contact.size() == fixed.size() && contact.size() > 1;
-      const PairedTest test = pairs ? paired_t_test(contact, fixed) : PairedTest{};
+      const bench::PairedTest test =
+          pairs ? bench::paired_t_test(contact, fixed) : bench::PairedTest{};
       out_ << (test.pairs > 1 ? fmt::format(" {:.2g}; {} by {:.2f} mm |", test.p,
                                             test.mean < 0.0 ? "contact better" : "fixed better",
                                             std::abs(test.mean))

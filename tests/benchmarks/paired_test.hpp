@@ -8,7 +8,7 @@
 
 #include <span>
 
-namespace brainshift::evidence {
+namespace brainshift::bench {
 
 struct PairedTest {
   int pairs = 0;
@@ -24,4 +24,4 @@ PairedTest paired_t_test(std::span<const double> a, std::span<const double> b);
 // I_x(a, b) for a, b > 0 and x in [0, 1].
 double incomplete_beta(double a, double b, double x);
 
-}  // namespace brainshift::evidence
+}  // namespace brainshift::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/evidence/paired_test.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 
 #include <cassert>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "common/core/statistics.hpp"
 
-namespace brainshift::evidence {
+namespace brainshift::bench {
 namespace {
 
 // The continued fraction of I_x(a, b), which converges fast for x < (a + 1) / (a + b + 2).
@@ -61,4 +61,4 @@ PairedTest paired_t_test(std::span<const double> a, std::span<const double> b) {
   return test;
 }
 
-}  // namespace brainshift::evidence
+}  // namespace brainshift::bench

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/evidence/paired_test.hpp"
+#include "tests/benchmarks/paired_test.hpp"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <vector>
 
-namespace brainshift::evidence {
+namespace brainshift::bench {
 namespace {
 
 // Two-sided p of published tables: t = 2.571 at 5 degrees of freedom is 0.05, 4.032 is 0.01; 12.706
@@ -47,4 +47,4 @@ TEST(PairedTest, LeavesMissingPairsOutAndNeedsTwo) {
 }
 
 }  // namespace
-}  // namespace brainshift::evidence
+}  // namespace brainshift::bench
