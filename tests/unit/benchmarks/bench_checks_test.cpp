@@ -97,8 +97,11 @@ std::string surgeries(int count, double paper_ms, double paper_mm, double conden
   std::ostringstream rows;
   rows << kHeading;
   const auto row = [&](const char* method, const char* rank, int i, double ms, double mm) {
-    rows << "18k,18000,paper," << method << ",case," << rank << ",cold," << i << ',' << ms
-         << ",4000," << mm + 0.01 * i << ',' << mm + 0.02 * i << ",1.0,88,11,19,converged,0.9,10\n";
+    for (const char* mesh : {"5k,5000", "18k,18000"}) {
+      rows << mesh << ",paper," << method << ",case," << rank << ",cold," << i << ',' << ms
+           << ",4000," << mm + 0.01 * i << ',' << mm + 0.02 * i
+           << ",1.0,88,11,19,converged,0.9,10\n";
+    }
   };
   for (int i = 1; i <= count; ++i) {
     row("condensed", "116", i, 20, condensed_mm);
