@@ -71,6 +71,21 @@ TEST(ModelStore, MeasuresAFullSolveOnRequest) {
   ASSERT_TRUE(made.has_value());
   EXPECT_GT((*made)->info.full_solve_ms, 0.0);
   EXPECT_GT((*made)->info.factor_s, 0.0);
+  const auto again = store.make(request);
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ((*again)->info.full_solve_ms, (*made)->info.full_solve_ms) << "measured once";
+}
+
+TEST(ModelStore, KeepsTheFactorThatAMethodNeedsWhereItWasMeasuredToo) {
+  ModelStore store(patient(), config(), {operators()});
+  wire::SessionRequest request;
+  request.measure_full_solve = true;
+  ASSERT_TRUE(store.make(request).has_value());
+  request.method = Method::kPaper;
+  const auto made = store.make(request);
+  ASSERT_TRUE(made.has_value()) << made.error().message;
+  EXPECT_GT((*made)->info.factor_s, 0.0);
+  EXPECT_TRUE((*made)->pipeline.run(tumour_moved(1)).has_value());
 }
 
 TEST(ModelStore, CondensesWhenTheModelFileHoldsNoOperators) {
