@@ -29,7 +29,7 @@ struct Arguments {
   std::vector<double> sizes = {5, 18, 40, 100};
   double local_factor = 1.0;
   std::vector<std::string> methods;
-  std::vector<int> ranks = {16, 32, 64, 128};
+  std::vector<int> ranks = {16, 32, 64, CondensedConfig{}.max_rank};
   std::vector<std::string> scenarios = {"paper", "distension"};
   int repetitions = 20;
   int compared = 20;

@@ -41,7 +41,7 @@ using inversion::PreparedModel;
 
 constexpr double kExactBound_mm = 1e-6;
 constexpr double kReducedBound_mm = 0.01;
-constexpr int kRanks[] = {32, 64, 128};
+constexpr int kRanks[] = {32, 64, CondensedConfig{}.max_rank};
 
 struct Arguments {
   std::string case_file = BRAINSHIFT_DEFAULT_CASE;
