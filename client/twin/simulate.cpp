@@ -17,15 +17,9 @@ using patient::Patient;
 
 Status write_surgery(const SimulateOptions& options, const std::string& scenario_name,
                      const Patient& patient, const SimulatedSurgery& surgery) {
-  io::SurgeryMeta meta;
-  meta.case_id = patient.model.case_id;
-  meta.model_id = patient.model.model_id;
-  meta.case_file = std::filesystem::absolute(options.case_file).lexically_normal().string();
-  meta.scenario = scenario_name;
-  meta.seed = options.seed;
-  meta.created_utc = utc_now();
-  meta.software = "brainshift twin";
-  auto file = io::SurgeryFile::create(options.out, meta);
+  auto file = io::SurgeryFile::create(
+      options.out, simulated_meta(patient.model, options.case_file, scenario_name, options.seed,
+                                  "brainshift twin"));
   if (!file) return tl::unexpected(file.error());
   Status status;
   for (std::size_t i = 0; status && i < surgery.observations.size(); ++i) {
@@ -40,6 +34,20 @@ Status write_surgery(const SimulateOptions& options, const std::string& scenario
 }
 
 }  // namespace
+
+io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::path& case_file,
+                               const std::string& scenario, std::uint64_t seed,
+                               const std::string& software) {
+  io::SurgeryMeta meta;
+  meta.case_id = model.case_id;
+  meta.model_id = model.model_id;
+  meta.case_file = std::filesystem::absolute(case_file).lexically_normal().string();
+  meta.scenario = scenario;
+  meta.seed = seed;
+  meta.created_utc = utc_now();
+  meta.software = software;
+  return meta;
+}
 
 std::vector<ScenarioInfo> scenarios() {
   std::vector<ScenarioInfo> infos;

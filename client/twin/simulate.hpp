@@ -18,6 +18,8 @@
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/values/brain_model.hpp"
 
 namespace brainshift::client {
 
@@ -41,5 +43,11 @@ struct SimulateOptions {
 // kInvalidArgument when an ingredient does nothing (effects.hpp). kWriteFailed when `out` exists or
 // cannot be written. Other errors: of reading the case, building its model, and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
+
+// What a surgery file says of a simulated surgery of this model, made now by `software`. The case
+// file is named by its full path.
+io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::path& case_file,
+                               const std::string& scenario, std::uint64_t seed,
+                               const std::string& software);
 
 }  // namespace brainshift::client

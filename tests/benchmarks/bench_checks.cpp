@@ -134,6 +134,8 @@ void add_preparation(const Results& results, const std::string& folder, std::vec
   const std::string serve = "brainshiftd serve --model " + folder + "/colin27.h5";
   all.push_back(
       at_most("preparation, both boundaries", results.fact("prepare_s"), 25.0, "s", prepare));
+  all.push_back(at_most("preparation, peak memory", results.fact("prepare_peak_bytes") / kGib, 8.0,
+                        "GiB", prepare));
   all.push_back(
       at_most("model file", results.fact("model_file_bytes") / kMib, 300.0, "MiB", prepare));
   all.push_back(at_most("daemon with a session, resident memory",
@@ -174,6 +176,15 @@ void add_scenes(const Results& results, const std::string& folder, std::vector<C
   all.push_back(std::move(check));
 }
 
+void add_coverage(const Results& results, const std::string& folder, std::vector<Check>& all) {
+  const MethodSummary* ours = results.find("18k", "paper", "condensed", "cold");
+  Check check{"share of true displacements within the 90 % interval, scenario paper, mean",
+              ours != nullptr ? ours->own_coverage_90 : kNone, "0.80 to 0.97", false,
+              "bench_error_time --sizes 18 --scenarios paper --out " + folder};
+  check.pass = check.value >= 0.80 && check.value <= 0.97;
+  all.push_back(std::move(check));
+}
+
 bool leaves_out_100k(const Results& results) {
   return std::any_of(results.left_out.begin(), results.left_out.end(), [](const auto& line) {
     return line.find("100 thousand nodes") != std::string::npos;
@@ -194,6 +205,7 @@ std::vector<Check> checks(const Results& results, const std::string& folder) {
   add_preparation(results, folder, all);
   if (!leaves_out_100k(results)) add_large(results, folder, all);
   add_scenes(results, folder, all);
+  add_coverage(results, folder, all);
   Check growth =
       at_most("growth of the daemon's memory over 10,000 updates",
               (results.fact("rss_after_bytes") - results.fact("rss_before_bytes")) / kMib, 0.0,

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "client/twin/simulate.hpp"
 #include "client/twin/surgery.hpp"
 #include "client/twin/truth_brain.hpp"
-#include "common/core/utc_time.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
@@ -78,14 +78,9 @@ Status run(const Arguments& arguments) {
   const auto surgery = client::play_scenario(*brain, last, often, arguments.seed);
   if (!surgery) return tl::unexpected(surgery.error());
 
-  io::SurgeryMeta meta;
-  meta.case_id = patient->model.case_id;
-  meta.model_id = patient->model.model_id;
-  meta.case_file = std::filesystem::absolute(arguments.case_file).lexically_normal().string();
-  meta.scenario = scenario->name;
-  meta.seed = arguments.seed;
-  meta.created_utc = utc_now();
-  meta.software = "brainshift bench_observations";
+  const io::SurgeryMeta meta =
+      client::simulated_meta(patient->model, arguments.case_file, scenario->name, arguments.seed,
+                             "brainshift bench_observations");
   auto file = io::SurgeryFile::create(arguments.out, meta);
   if (!file) return tl::unexpected(file.error());
   Status status;

@@ -265,6 +265,7 @@ std::vector<MethodSummary> summarise(const CsvTable& table) {
     one.field_mean_mm = mean_of(table, compared, "field_mean_mm");
     one.field_max_mm = mean_of(table, compared, "field_max_mm");
     one.coverage_90 = mean_of(table, compared, "coverage_90");
+    one.own_coverage_90 = mean_of(table, rows, "coverage_90");
     one.active = mean_of(table, rows, "active");
     one.iterations = mean_of(table, rows, "iterations");
     one.status = common_status(table, rows);

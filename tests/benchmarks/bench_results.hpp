@@ -44,7 +44,8 @@ struct MethodSummary {
   double field_mean_mm = 0.0;
   double field_max_mm = 0.0;
   double coverage_90 = 0.0;
-  std::string status;  // the one of all repetitions, or "N of M converged"
+  double own_coverage_90 = 0.0;  // over all repetitions of this method
+  std::string status;            // the one of all repetitions, or "N of M converged"
 };
 
 struct Results {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <initializer_list>
 #include <map>
 #include <sstream>
 #include <thread>
@@ -21,6 +22,11 @@ std::string cell(double value, int digits = 3) {
 
 std::string whole(double value) {
   return std::isfinite(value) ? std::to_string(std::lround(value)) : "-";
+}
+
+void numbers(std::ostringstream& out, const CsvTable& table, std::size_t row,
+             std::initializer_list<const char*> columns) {
+  for (const char* column : columns) out << " | " << cell(table.number(row, column));
 }
 
 std::string first_field(const char* file, const std::string& key) {
@@ -55,9 +61,7 @@ void mesh_table(std::ostringstream& out, const Results& results) {
     const MethodSummary* warm = results.find(name, "paper", "condensed", "warm");
     out << "| " << name;
     for (const char* column : {"nodes", "tets", "slaves"}) out << " | " << meshes.text(row, column);
-    for (const char* column : {"edge_mm", "t_solve_ms", "factor_s", "condense_s"}) {
-      out << " | " << cell(meshes.number(row, column));
-    }
+    numbers(out, meshes, row, {"edge_mm", "t_solve_ms", "factor_s", "condense_s"});
     for (const char* column : {"operator_bytes", "peak_rss_bytes"}) {
       out << " | " << whole(meshes.number(row, column) / kMib);
     }
@@ -134,10 +138,8 @@ void scene_table(std::ostringstream& out, const Results& results) {
   for (std::size_t row = 0; row < scenes.rows(); ++row) {
     out << "| " << scenes.text(row, "scenario") << " | " << scenes.text(row, "left_out") << " | "
         << scenes.text(row, "active");
-    for (const char* column :
-         {"largest_mm", "difference_mm", "estimate_mm", "invert_ms", "rebuild_ms"}) {
-      out << " | " << cell(scenes.number(row, column));
-    }
+    numbers(out, scenes, row,
+            {"largest_mm", "difference_mm", "estimate_mm", "invert_ms", "rebuild_ms"});
     out << " |\n";
   }
 }

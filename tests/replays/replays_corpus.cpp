@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "client/twin/simulate.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/core/utc_time.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/replays/corpus.hpp"
@@ -30,14 +30,8 @@ Status make(const patient::Patient& patient, const CorpusSurgery& surgery,
   const auto played =
       client::play_scenario(patient.model, patient.config, surgery.scenario, surgery.seed);
   if (!played) return tl::unexpected(played.error());
-  io::SurgeryMeta meta;
-  meta.case_id = patient.model.case_id;
-  meta.model_id = patient.model.model_id;
-  meta.case_file = fs::absolute(arguments.head).lexically_normal().string();
-  meta.scenario = surgery.name;
-  meta.seed = surgery.seed;
-  meta.created_utc = utc_now();
-  meta.software = "brainshift replays_corpus";
+  const io::SurgeryMeta meta = client::simulated_meta(patient.model, arguments.head, surgery.name,
+                                                      surgery.seed, "brainshift replays_corpus");
   const auto recording = record(*played, surgery.scenario.fluid_levels_mm.size());
   const fs::path file = arguments.folder / (surgery.name + ".surgery");
   if (Status ok = write_recording(file, meta, recording); !ok) return ok;

@@ -164,6 +164,23 @@ TEST(BenchChecks, TailAndMemoryNeedTheirNumberOfUpdates) {
   EXPECT_FALSE(named(all, "growth").pass);
 }
 
+TEST(BenchChecks, CoverageIsTheMeanOverAllSurgeriesOfTheMethod) {
+  const auto check = [](const std::string& coverages) {
+    std::string rows = kHeading;
+    std::istringstream list(coverages);
+    int repetition = 0;
+    for (std::string one; list >> one;) {
+      rows += "18k,18000,paper,condensed,case,116,cold," + std::to_string(++repetition) +
+              ",20,2,0.2,0.3,1.0,88,11,9,converged," + one + ",10\n";
+    }
+    return named(checks(results_of(rows), "out"), "within the 90 % interval");
+  };
+  EXPECT_DOUBLE_EQ(check("0.75 1.0").value, 0.875);
+  EXPECT_TRUE(check("0.75 1.0").pass);
+  EXPECT_FALSE(check("0.75 0.8").pass);
+  EXPECT_FALSE(check("0.97 1.0").pass);
+}
+
 TEST(BenchChecks, AMeshThatIsLeftOutIsNotChecked) {
   Results results;
   const std::size_t all = checks(results, "out").size();
