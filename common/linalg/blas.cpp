@@ -5,12 +5,17 @@
 
 #include <algorithm>
 #include <cassert>
+#include <vector>
 
 // LAPACK's names, as Fortran spells them.
 // NOLINTBEGIN(readability-identifier-naming)
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dgeqrf_(const int* m, const int* n, double* a, const int* lda, double* tau, double* work,
+             const int* lwork, int* info);
+void dorgqr_(const int* m, const int* n, const int* k, double* a, const int* lda, const double* tau,
+             double* work, const int* lwork, int* info);
 }
 // NOLINTEND(readability-identifier-naming)
 
@@ -87,6 +92,20 @@ bool invert_factored(Out<double> l) {
   int info = 0;
   if (n > 0) dpotri_(&lower, &n, l.data(), &lda, &info);
   return info == 0;
+}
+
+void orthonormalise(Out<double> a) {
+  assert(a.rows() >= a.cols());
+  if (a.size() == 0) return;
+  const int m = rows(a), n = columns(a), stride = leading(a);
+  constexpr int kWorkPerColumn = 64;  // of LAPACK's blocks
+  const int size = kWorkPerColumn * n;
+  std::vector<double> scales(static_cast<std::size_t>(n)), work(static_cast<std::size_t>(size));
+  int info = 0;  // of arguments only
+  dgeqrf_(&m, &n, a.data(), &stride, scales.data(), work.data(), &size, &info);
+  assert(info == 0);
+  dorgqr_(&m, &n, &n, a.data(), &stride, scales.data(), work.data(), &size, &info);
+  assert(info == 0);
 }
 
 void solve_lower(const In<double>& l, Out<double> b) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The few dense kernels of the hot path, on the system's BLAS and LAPACK. Those choose their
 // instructions at run time; code compiled for any x86-64 cannot. Column-major views; nothing is
-// allocated here.
+// allocated here unless it says so.
 // Preconditions: shapes agree, outputs do not overlap inputs (asserted in debug builds).
 #pragma once
 
@@ -32,6 +32,9 @@ void gram(const In<double>& a, double beta, Out<double> c);
 [[nodiscard]] bool cholesky(Out<double> a);
 // Lower factor L -> lower triangle of (L L^T)^-1, in place; false when L is singular.
 [[nodiscard]] bool invert_factored(Out<double> l);
+// A, m x n with n <= m, -> m x n with orthonormal columns that span those of A (Q of its QR
+// factorisation), in place. Allocates.
+void orthonormalise(Out<double> a);
 // B = L^-1 B and B = L^-T B.
 void solve_lower(const In<double>& l, Out<double> b);
 void solve_lower_transposed(const In<double>& l, Out<double> b);

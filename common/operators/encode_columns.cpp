@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/operators/encode_columns.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -177,8 +176,8 @@ class Encoder {
         decoded.setZero();
         block.lengths.assign(3 * static_cast<std::size_t>(rows.cols()), 0);
       } else {
-        const Eigen::HouseholderQR<MatrixXd> qr(factor);
-        const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(factor.rows(), factor.cols());
+        MatrixXd basis = factor;
+        linalg::blas::orthonormalise(basis);
         MatrixXd coefficients(rows.cols(), basis.cols());
         linalg::blas::multiply_transposed(1.0, rows, basis, 0.0, coefficients);
         coefficients = coefficients.array().rint().matrix();

@@ -58,16 +58,18 @@ inversion::BlockStore block_store(io::CheckpointFile& file) {
   return store;
 }
 
-// Factorises and condenses.
+// Factorises and condenses. prior: nullptr before the first boundary.
 Status prepare_boundary(const std::shared_ptr<const BrainModel>& model, const CaseConfig& config,
                         std::size_t which, const PrepareOptions& options,
+                        std::shared_ptr<const prior::ForcePrior>& prior,
                         PreparedPatient& prepared) {
   if (auto status = not_stopped(options); !status) return status;
   const Stopwatch watch;
   const Boundary boundary = kPreparedBoundaries[which];
   const Progress progress = with_prefix(options.progress, to_string(boundary));
-  const auto factorised = PreparedModel::prepare(model, config, boundary, progress);
+  const auto factorised = PreparedModel::prepare(model, config, boundary, progress, prior);
   if (!factorised) return tl::unexpected(factorised.error());
+  prior = factorised->shared_prior();
   if (auto status = not_stopped(options); !status) return status;
   report(progress, "measure", 0.0);
   prepared.boundaries[which] = {factorised->timings(),
@@ -110,8 +112,9 @@ Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOpt
   if (auto status = open_checkpoint(options, config, *model, prepared); !status) {
     return tl::unexpected(status.error());
   }
+  std::shared_ptr<const prior::ForcePrior> prior;
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {
-    const auto status = prepare_boundary(model, config, i, options, prepared);
+    const auto status = prepare_boundary(model, config, i, options, prior, prepared);
     if (status) continue;
     auto& checkpoint = prepared.checkpoint;
     if (checkpoint && checkpoint->blocks().empty()) (void)checkpoint->remove();

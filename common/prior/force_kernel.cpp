@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/prior/force_kernel.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -11,10 +10,14 @@
 
 #include "common/core/point_columns.hpp"
 #include "common/geometry/spread_nodes.hpp"
+#include "common/linalg/blas.hpp"
 
 namespace brainshift::prior {
 namespace {
 
+namespace blas = linalg::blas;
+
+using Transposed = Eigen::Map<Eigen::MatrixXd>;
 using KdTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
                                         PointColumns, 3, std::size_t>;
@@ -38,6 +41,9 @@ double wendland_c2(double r, double support) {
 ForceKernel ForceKernel::compact(const Points& nodes, const VecX& nodal_volumes, double length_mm,
                                  double force_density_sd) {
   assert(nodal_volumes.size() == nodes.cols());
+  ForceKernel kernel;
+  kernel.compact_.resize(nodes.cols(), nodes.cols());
+  if (force_density_sd == 0.0) return kernel;
   const double support = kSupportOverLength * length_mm;
   const PointColumns cloud{nodes};
   KdTree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
@@ -56,8 +62,6 @@ ForceKernel ForceKernel::compact(const Points& nodes, const VecX& nodal_volumes,
       if (value != 0.0) entries.emplace_back(static_cast<int>(i), static_cast<int>(j), value);
     }
   }
-  ForceKernel kernel;
-  kernel.compact_.resize(nodes.cols(), nodes.cols());
   kernel.compact_.setFromTriplets(entries.begin(), entries.end());
   return kernel;
 }
@@ -86,17 +90,29 @@ ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, d
                             papers_correlation((nodes.col(i) - centres.col(j)).norm(), length_mm);
     }
   }
-  among.llt().matrixU().solveInPlace<Eigen::OnTheRight>(kernel.basis_);
+  [[maybe_unused]] const bool definite = blas::cholesky(among);
+  assert(definite);
+  blas::solve_lower(among, Transposed(kernel.basis_.data(), m, nodes.cols()));
   return kernel;
 }
 
 void ForceKernel::multiply(const RowMajor& in, RowMajor& out) const {
+  out.resize(in.rows(), in.cols());
   if (compact_.rows() > 0) {
     out.noalias() = compact_ * in;
-  } else {
-    const RowMajor projected = basis_.transpose() * in;
-    out.noalias() = basis_ * projected;
+    return;
   }
+  const Eigen::Map<const Eigen::MatrixXd> basis(basis_.data(), basis_.cols(), basis_.rows());
+  blas::multiply(1.0, project(in), basis, 0.0, Transposed(out.data(), in.cols(), in.rows()));
+}
+
+// BLAS wants columns: all is transposed.
+Eigen::MatrixXd ForceKernel::project(const RowMajor& in) const {
+  const Eigen::Map<const Eigen::MatrixXd> basis(basis_.data(), basis_.cols(), basis_.rows());
+  const Eigen::Map<const Eigen::MatrixXd> given(in.data(), in.cols(), in.rows());
+  Eigen::MatrixXd projected(in.cols(), basis_.cols());
+  blas::multiply_by_transposed(1.0, given, basis, 0.0, projected);
+  return projected;
 }
 
 void ForceKernel::add_to(const Points& w, Points& f) const {
@@ -105,23 +121,53 @@ void ForceKernel::add_to(const Points& w, Points& f) const {
   f += out.transpose();
 }
 
+// Not all fields at once: memory. work(first, fields): the three components of field first + j are
+// columns 3 j to 3 j + 2 of `fields`, n rows.
+template <typename Work>
+void ForceKernel::for_some_fields(const Eigen::MatrixXd& w, const Work& work) {
+  constexpr Eigen::Index kFields = 32;
+  const Eigen::Index n = w.rows() / 3;
+  RowMajor fields;
+  for (Eigen::Index first = 0; first < w.cols(); first += kFields) {
+    const Eigen::Index count = std::min(kFields, w.cols() - first);
+    fields.resize(n, 3 * count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      fields.middleCols<3>(3 * j) =
+          Eigen::Map<const Points>(w.col(first + j).data(), 3, n).transpose();
+    }
+    work(first, fields);
+  }
+}
+
+VecX ForceKernel::variance_along(const Eigen::MatrixXd& w) const {
+  VecX variance(w.cols());
+  RowMajor forces;
+  for_some_fields(w, [&](Eigen::Index first, const RowMajor& fields) {
+    VecX each;
+    if (compact_.rows() > 0) {
+      multiply(fields, forces);
+      each = fields.cwiseProduct(forces).colwise().sum();
+    } else {
+      each = project(fields).rowwise().squaredNorm();
+    }
+    for (Eigen::Index j = 0; j < each.size() / 3; ++j) {
+      variance[first + j] = each.segment<3>(3 * j).sum();
+    }
+  });
+  return variance;
+}
+
 void ForceKernel::apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
   const Eigen::Index n = w.rows() / 3;
   f.resize(w.rows(), w.cols());
-  // A few fields at a time: stays in cache.
-  constexpr Eigen::Index kColumns = 8;
-  RowMajor in, out;
-  for (Eigen::Index first = 0; first < w.cols(); first += kColumns) {
-    const Eigen::Index count = std::min(kColumns, w.cols() - first);
-    in.resize(n, 3 * count);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      in.middleCols<3>(3 * j) = Eigen::Map<const Points>(w.col(first + j).data(), 3, n).transpose();
-    }
-    multiply(in, out);
+  RowMajor out;
+  for_some_fields(w, [&](Eigen::Index first, const RowMajor& fields) {
+    const Eigen::Index count = fields.cols() / 3;
+    multiply(fields, out);
     for (Eigen::Index j = 0; j < count; ++j) {
       Eigen::Map<Points>(f.col(first + j).data(), 3, n) = out.middleCols<3>(3 * j).transpose();
     }
-  }
+  });
 }
 
 Eigen::MatrixXd ForceKernel::dense() const {

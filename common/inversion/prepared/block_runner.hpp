@@ -25,15 +25,25 @@ class BlockRunner {
   // the factor.
   static constexpr int kBlock = 64;
 
+  // What one core works with. The matrices are for `work` below to use as it likes; they keep
+  // their memory from one block to the next.
+  struct Member {
+    fem::BlockSolver solver;
+    Eigen::MatrixXd loads, solved, forces;
+  };
+
   // Keeps a reference to the model. threads: 0 means as many as cores.
   BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads)
       : team_(threads), progress_(std::move(progress)), stop_(std::move(stop)) {
     for (int i = 0; i < team_.size(); ++i) {
-      solvers_.push_back(std::make_unique<fem::BlockSolver>(
-          model.forward().stiffness(), model.forward().factor(), model.forward().dofs()));
+      members_.push_back(std::make_unique<Member>(
+          Member{{model.forward().stiffness(), model.forward().factor(), model.forward().dofs()},
+                 {},
+                 {},
+                 {}}));
     }
   }
-  // Status work(first, count, solver) for column ranges that cover [0, columns). kUnavailable when
+  // Status work(first, count, Member&) for column ranges that cover [0, columns). kUnavailable when
   // stopped; else the error of a block, after which no other is begun.
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
@@ -47,7 +57,7 @@ class BlockRunner {
         const int first = block * kBlock;
         Status& status = statuses[static_cast<std::size_t>(member)];
         status = work(first, std::min(kBlock, columns - first),
-                      *solvers_[static_cast<std::size_t>(member)]);
+                      *members_[static_cast<std::size_t>(member)]);
         if (!status) {
           failed = true;
           return;
@@ -70,7 +80,7 @@ class BlockRunner {
   ThreadTeam team_;
   Progress progress_;
   std::stop_token stop_;
-  std::vector<std::unique_ptr<fem::BlockSolver>> solvers_;
+  std::vector<std::unique_ptr<Member>> members_;
 };
 
 }  // namespace brainshift::inversion

@@ -56,7 +56,7 @@ Status contact_columns(const PreparedModel& model, const CondenseOptions& option
     result.initial_penetration_mm[i] = pair.initial_penetration_mm;
   }
   std::mutex store_mutex;
-  auto status = runner.run("contact columns", s, [&](int first, int count, auto& solver) -> Status {
+  auto status = runner.run("contact columns", s, [&](int first, int count, auto& own) -> Status {
     MatrixXf columns(rows, count);
     MatrixXd compliance(s, count);
     bool kept = false;
@@ -65,12 +65,14 @@ Status contact_columns(const PreparedModel& model, const CondenseOptions& option
       kept = options.store.load(first / kBlock, columns, compliance);
     }
     if (!kept) {
-      MatrixXd loads = MatrixXd::Zero(rows, count), u;
+      own.loads.setZero(rows, count);
       for (int j = 0; j < count; ++j) {
         const auto slave = static_cast<std::size_t>(first) + static_cast<std::size_t>(j);
-        loads.col(j).segment<3>(3 * result.slaves[slave]) = result.slave_normals.col(first + j);
+        own.loads.col(j).template segment<3>(3 * result.slaves[slave]) =
+            result.slave_normals.col(first + j);
       }
-      if (auto solved = solver.solve(loads, u); !solved) return solved;
+      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+      const MatrixXd& u = own.solved;
       for (int j = 0; j < count; ++j) {
         for (int i = 0; i < s; ++i) {
           compliance(i, j) = result.slave_normals.col(i).dot(
@@ -175,25 +177,22 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& al
     if (kept[g] > 0) sketches[g].resize(rows, tested);
   }
   MatrixXd load_columns(rows, loads);
-  auto status =
-      runner.run("prior modes", tested, [&](int first, int count, auto& solver) -> Status {
-        MatrixXd u, load, column;
-        if (auto solved = solver.solve(omega.middleCols(first, count), u); !solved) return solved;
-        for (int g = 0; g < kRemainders; ++g) {
-          if (kept[static_cast<std::size_t>(g)] == 0) continue;
-          prior.kernel(g).apply(u, load);
-          if (auto solved = solver.solve(load, column); !solved) return solved;
-          sketches[static_cast<std::size_t>(g)].middleCols(first, count) = column;
-        }
-        return {};
-      });
-  if (!status) return status;
-  status = runner.run("load modes", loads, [&](int first, int count, auto& solver) -> Status {
-    MatrixXd u;
-    if (auto solved = solver.solve(prior.modes().middleCols(first, count), u); !solved) {
-      return solved;
+  auto status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
+    own.loads = omega.middleCols(first, count);
+    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+    for (int g = 0; g < kRemainders; ++g) {
+      if (kept[static_cast<std::size_t>(g)] == 0) continue;
+      prior.kernel(g).apply(own.solved, own.forces);
+      if (auto solved = own.solver.solve(own.forces, own.loads); !solved) return solved;
+      sketches[static_cast<std::size_t>(g)].middleCols(first, count) = own.loads;
     }
-    load_columns.middleCols(first, count) = u;
+    return {};
+  });
+  if (!status) return status;
+  status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
+    own.loads = prior.modes().middleCols(first, count);
+    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+    load_columns.middleCols(first, count) = own.solved;
     return {};
   });
   if (!status) return status;
@@ -228,16 +227,16 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
   const int probed = std::min<int>(kVarianceNodes, static_cast<int>(spread.size()));
   MatrixXd variance = MatrixXd::Zero(3 * probed, kRemainders);
   auto status =
-      runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& solver) -> Status {
-        MatrixXd unit = MatrixXd::Zero(nodes.size(), count), u, load;
+      runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& own) -> Status {
+        own.loads.setZero(nodes.size(), count);
         for (int j = 0; j < count; ++j) {
           const int dof = first + j;
-          unit(3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3, j) = 1.0;
+          own.loads(3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3, j) = 1.0;
         }
-        if (auto solved = solver.solve(unit, u); !solved) return solved;
+        if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
         for (int g = 0; g < kRemainders; ++g) {
-          model.prior().kernel(g).apply(u, load);
-          for (int j = 0; j < count; ++j) variance(first + j, g) = u.col(j).dot(load.col(j));
+          variance.col(g).segment(first, count) =
+              model.prior().kernel(g).variance_along(own.solved);
         }
         return {};
       });

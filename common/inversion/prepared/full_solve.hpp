@@ -6,7 +6,7 @@
 
 namespace brainshift::inversion {
 
-// Median of 15 single solves after one that warms up, ms. Takes 16 solves of time: about half a
+// Median of 9 single solves after one that warms up, ms. Takes 10 solves of time: a third of a
 // second on the default head.
 double measure_full_solve_ms(const PreparedModel& model);
 

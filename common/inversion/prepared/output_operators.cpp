@@ -64,13 +64,14 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   MatrixXd x(3 * nodes, h);  // K^-1 H^T
   result.compliance.resize(h, h);
   result.covariance.setZero(h, h);
-  const auto solve_block = [&](int first, int count, fem::BlockSolver& solver) -> Status {
-    MatrixXd loads = MatrixXd::Zero(3 * nodes, count), u;
+  const auto solve_block = [&](int first, int count, BlockRunner::Member& own) -> Status {
+    own.loads.setZero(3 * nodes, count);
     for (int j = 0; j < count; ++j) {
       const Output& output = outputs[static_cast<std::size_t>(first + j)];
-      loads.col(j).segment<3>(3 * output.node) = output.direction;
+      own.loads.col(j).segment<3>(3 * output.node) = output.direction;
     }
-    if (auto status = solver.solve(loads, u); !status) return status;
+    if (auto status = own.solver.solve(own.loads, own.solved); !status) return status;
+    const MatrixXd& u = own.solved;
     for (int j = 0; j < count; ++j) {
       for (int i = first + j; i < h; ++i) {
         const Output& output = outputs[static_cast<std::size_t>(i)];
@@ -82,8 +83,8 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
     return {};
   };
   // Lower triangle only: rows from the block's first one on.
-  const auto covariance_block = [&](int first, int count, fem::BlockSolver&) -> Status {
-    MatrixXd forces;
+  const auto covariance_block = [&](int first, int count, BlockRunner::Member& own) -> Status {
+    MatrixXd& forces = own.forces;
     model.prior().apply_remainders(x.middleCols(first, count), forces);
     linalg::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
                                       result.covariance.block(first, first, h - first, count));

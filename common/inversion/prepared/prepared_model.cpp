@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/prepared_model.hpp"
 
+#include <future>
 #include <utility>
 
 #include "common/core/stopwatch.hpp"
 #include "common/core/units.hpp"
+#include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -40,7 +42,8 @@ prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValue
 }
 
 PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
-                             contact::ForwardModel forward, prior::ForcePrior prior)
+                             contact::ForwardModel forward,
+                             std::shared_ptr<const prior::ForcePrior> prior)
     : model_(std::move(model)),
       config_(std::move(config)),
       forward_(std::move(forward)),
@@ -49,16 +52,30 @@ PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig
 
 Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> model,
                                              const CaseConfig& config, Boundary boundary,
-                                             const Progress& progress) {
+                                             const Progress& progress,
+                                             std::shared_ptr<const prior::ForcePrior> prior) {
   const Stopwatch whole;
+  linalg::use_single_threaded_blas();
+  double prior_s = 0.0;
+  std::future<Status> made;
+  if (!prior) {
+    made = std::async(std::launch::async, [&]() -> Status {
+      const Stopwatch watch;
+      auto modes = prior::load_modes(*model, config);
+      if (!modes) return tl::unexpected(modes.error());
+      prior = std::make_shared<const prior::ForcePrior>(
+          build_prior(*model, config.prior, std::move(*modes)));
+      prior_s = watch.seconds();
+      return {};
+    });
+  }
   auto forward = contact::ForwardModel::build(*model, config, boundary, progress);
+  if (made.valid()) {
+    report(progress, "prior", 0.0);
+    const Status status = made.get();
+    if (forward && !status) return tl::unexpected(status.error());
+  }
   if (!forward) return tl::unexpected(forward.error());
-  const Stopwatch prior_watch;
-  report(progress, "prior", 0.0);
-  auto modes = prior::load_modes(*model, config);
-  if (!modes) return tl::unexpected(modes.error());
-  prior::ForcePrior prior = build_prior(*model, config.prior, std::move(*modes));
-  const double prior_s = prior_watch.seconds();
 
   PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));
   const fem::StiffnessFactor& factor = prepared.forward_.factor();
@@ -68,7 +85,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   timings.factor_s = factor.factor_seconds();
   timings.prior_s = prior_s;
   timings.factor_nonzeros = factor.nonzeros();
-  timings.bytes = prepared.forward_.bytes() + prepared.prior_.bytes();
+  timings.bytes = prepared.forward_.bytes() + prepared.prior().bytes();
   timings.total_s = whole.seconds();
   report(progress, "ready", 1.0);
   return prepared;

@@ -26,7 +26,7 @@ struct PrepareTimings {
   double assemble_s = 0.0;
   double analyse_s = 0.0;
   double factor_s = 0.0;
-  double prior_s = 0.0;
+  double prior_s = 0.0;  // beside the factorisation; 0 for a prior that was given
   double total_s = 0.0;
   std::uint64_t factor_nonzeros = 0;  // of L
   std::uint64_t bytes = 0;            // memory of factor, matrix and prior
@@ -34,26 +34,30 @@ struct PrepareTimings {
 
 class PreparedModel {
  public:
-  // kFloatingBody, kSingularMatrix, kEmptySet or kNotFinite names the cause.
+  // kFloatingBody, kSingularMatrix, kEmptySet or kNotFinite names the cause. prior: of the same
+  // model and case, under another boundary (it does not depend on that); else it is made, while
+  // the stiffness matrix is factorised.
   static Result<PreparedModel> prepare(std::shared_ptr<const BrainModel> model,
                                        const CaseConfig& config, Boundary boundary,
-                                       const Progress& progress = {});
+                                       const Progress& progress = {},
+                                       std::shared_ptr<const prior::ForcePrior> prior = nullptr);
 
   const BrainModel& model() const { return *model_; }
   const CaseConfig& config() const { return config_; }
   Boundary boundary() const { return forward_.boundary(); }
   const PrepareTimings& timings() const { return timings_; }
   const contact::ForwardModel& forward() const { return forward_; }
-  const prior::ForcePrior& prior() const { return prior_; }
+  const prior::ForcePrior& prior() const { return *prior_; }
+  std::shared_ptr<const prior::ForcePrior> shared_prior() const { return prior_; }
   const geometry::TetLocator& locator() const { return locator_; }
 
  private:
   PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
-                contact::ForwardModel forward, prior::ForcePrior prior);
+                contact::ForwardModel forward, std::shared_ptr<const prior::ForcePrior> prior);
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;
   contact::ForwardModel forward_;
-  prior::ForcePrior prior_;
+  std::shared_ptr<const prior::ForcePrior> prior_;
   geometry::TetLocator locator_;
   PrepareTimings timings_;
 };

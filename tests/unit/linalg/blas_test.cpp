@@ -81,6 +81,20 @@ TEST(Blas, CholeskyAndItsTriangularSolves) {
   EXPECT_LT((y * single.transpose() - row).norm(), kFloatRounding);
 }
 
+TEST(Blas, OrthonormalColumnsSpanTheSame) {
+  const Blocks blocks;
+  const MatrixXd given = blocks.a();
+  MatrixXd storage = blocks.storage_a;
+  auto q = storage.block(1, 2, 7, 5);
+  blas::orthonormalise(q);
+  EXPECT_LT((q.transpose() * q - MatrixXd::Identity(5, 5)).norm(), kRounding);
+  EXPECT_LT((q * (q.transpose() * given) - given).norm(), kRounding);
+  storage.block(1, 2, 7, 5) = given;
+  EXPECT_EQ(storage, blocks.storage_a) << "numbers beside the block have changed";
+  MatrixXd none(4, 0);
+  blas::orthonormalise(none);
+}
+
 TEST(Blas, CholeskyRejectsAnIndefiniteMatrix) {
   MatrixXd indefinite = MatrixXd::Identity(4, 4);
   indefinite(2, 2) = -1.0;
