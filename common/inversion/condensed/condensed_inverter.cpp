@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "common/inversion/condensed/field_rebuild.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
+#include "common/inversion/condensed/reason.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/contract/data_check.hpp"
@@ -48,82 +48,8 @@ double displacement_sd_mm(const CondensedOperators& operators, PriorPart part) {
   return std::sqrt(squares / static_cast<double>(3 * operators.num_nodes()));
 }
 
-// Into memory that `reason` has already.
-void set_reason(EstimateStatus outcome, const Estimate& estimate, const CondensedConfig& config,
-                std::string& reason) {
-  const ContactSummary& contact = estimate.contact;
-  char text[240];
-  switch (outcome) {
-    case EstimateStatus::kConverged:
-      std::snprintf(text, sizeof text, "loads and contact settled in %d steps", contact.iterations);
-      break;
-    case EstimateStatus::kDeadline:
-      std::snprintf(
-          text, sizeof text,
-          "deadline of %g ms reached after %d steps; best iterate returned, %.2g standard "
-          "deviations from its minimum",
-          config.deadline_ms, contact.iterations, contact.decrement);
-      break;
-    default:
-      if (contact.decrement <= kDecrement) {
-        std::snprintf(text, sizeof text,
-                      "weights or places of the data did not settle; loads and contact did, in %d "
-                      "steps",
-                      contact.iterations);
-        break;
-      }
-      std::snprintf(text, sizeof text,
-                    "loads did not settle in %d steps; best iterate returned, %.2g standard "
-                    "deviations from its minimum",
-                    contact.iterations, contact.decrement);
-  }
-  reason.assign(text);
-  if (estimate.misfit_ratio > kUnexplainedMisfit) {
-    std::snprintf(text, sizeof text,
-                  "; the prior does not explain the data: they lie %.1f standard deviations off",
-                  estimate.misfit_ratio);
-    reason.append(text);
-  }
-  for (std::size_t part = 0; part < estimate.prior_at_bound.size(); ++part) {
-    if (!estimate.prior_at_bound[part]) continue;
-    const std::string_view name = to_string(static_cast<PriorPart>(part));
-    std::snprintf(text, sizeof text, "; the strength of %.*s is at its bound, %g times the case's",
-                  static_cast<int>(name.size()), name.data(), kLargestStrength);
-    reason.append(text);
-  }
-}
-
 bool same(const RemainderVariances& a, const RemainderVariances& b) {
   return ((a - b).array().abs() <= kSameVariance * a.array().max(b.array())).all();
-}
-
-// Outliers, and sources that contradict the others.
-void append_sources(Estimate& estimate) {
-  for (const SourceSummary& source : estimate.sources) {
-    char text[240];
-    if (source.outliers > 0) {
-      std::snprintf(text, sizeof text, "; %d of %d data of \"%.64s\" count less as outliers",
-                    source.outliers, source.data, source.source.c_str());
-      estimate.reason.append(text);
-    }
-    if (!source.consistent) {
-      std::snprintf(
-          text, sizeof text,
-          "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of "
-          "freedom",
-          source.source.c_str(), source.chi_square, source.degrees_of_freedom);
-      estimate.reason.append(text);
-    }
-  }
-}
-
-// Of data without named sources.
-void append_outliers(const RobustWeights& weights, int data, std::string& reason) {
-  const int outliers = weights.outliers(0, data);
-  if (outliers == 0) return;
-  char text[80];
-  std::snprintf(text, sizeof text, "; %d of %d data count less as outliers", outliers, data);
-  reason.append(text);
 }
 
 }  // namespace
@@ -497,8 +423,8 @@ Status CondensedInverter::Impl::estimate_omissions() {
   errors.far_field_mm = rebuild.far_field_error_mm();
   errors.gravity_modes_mm = 0.0;
   if (options.gravity_modes) return {};
-  const auto error =
-      gravity_modes_error_mm(sampled, descent.reduction(), rebuild, descent.posterior());
+  const auto error = gravity_modes_error_mm(sampled, descent.reduction(), rebuild,
+                                            descent.posterior(), penetration);
   if (!error) return tl::unexpected(error.error());
   errors.gravity_modes_mm = *error;
   return {};
@@ -546,9 +472,11 @@ Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
     return status;
   }
   estimate.status = *outcome;
-  set_reason(*outcome, estimate, impl.condensed, estimate.reason);
+  set_reason(*outcome, impl.condensed.deadline_ms, estimate);
   append_sources(estimate);
-  if (data->sources.empty()) append_outliers(impl.weights, data->size(), estimate.reason);
+  if (data->sources.empty()) {
+    append_outliers(impl.weights.outliers(0, data->size()), data->size(), estimate.reason);
+  }
   append_contradiction(impl.contradictions.find(*data), *data, estimate.reason);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};

@@ -15,7 +15,8 @@ double contact_error_mm(const VecX& penetration) {
 }
 
 Result<double> gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction& contact,
-                                      const FieldRebuild& rebuild, const ModePosterior& posterior) {
+                                      const FieldRebuild& rebuild, const ModePosterior& posterior,
+                                      const VecX& penetration) {
   MatrixXd gravity = sampled.modes_before();  // J_g
   if (gravity.cols() == 0) return 0.0;
   const auto forces = contact.response_before();  // T_g
@@ -30,7 +31,10 @@ Result<double> gravity_modes_error_mm(SampledOperators& sampled, const ContactRe
   const VecX dz = -(explained * dg).tail(posterior.unknowns() - sampled.common());
   VecX df = -*forces * dg;
   if (contact.size() > 0) df -= contact.response().leftCols(dz.size()) * dz;
-  return kGravitySafety * rebuild.greatest_control_move(dg, dz, contact, df);
+  VecX after = penetration + contact.penetration_change(dg, dz, df);
+  for (const int slave : contact.active()) after[slave] = 0.0;
+  return kGravitySafety * rebuild.greatest_control_move(dg, dz, contact, df) +
+         contact_error_mm(after);
 }
 
 }  // namespace brainshift::inversion

@@ -12,7 +12,8 @@
 //                    C = J^T J_g,     X = (S^-2 + J^T J)^-1 C
 //                    du = (U_g - G_A T_g) dg + (U - G_A T) dz
 //                  exact where the set stays; kGravitySafety times its greatest size at the control
-//                  nodes.
+//                  nodes. Where slaves would penetrate that the step leaves open, contact pushes
+//                  back: kContactSafety times the greatest of these depths is added.
 //   far field      far_field.hpp
 #pragma once
 
@@ -25,16 +26,18 @@
 namespace brainshift::inversion {
 
 // Measured: the true difference is at most 1.5 times the penetration and 1.22 times the step on the
-// toy patient, 1.02 and 1.19 times on the default head (tests/benchmarks/bench_scenes.cpp).
+// toy patient, 1.02 and 1.19 times on the default head where the set stays
+// (tests/benchmarks/bench_scenes.cpp).
 inline constexpr double kContactSafety = 2.0;
 inline constexpr double kGravitySafety = 2.0;
 
 // penetration: one per slave, mm.
 double contact_error_mm(const VecX& penetration);
 
-// posterior: of the reduction's set, with the answer of the update. Allocates. Errors of
-// ContactReduction::response_before.
+// posterior: of the reduction's set, with the answer of the update; penetration: of every slave
+// there, mm. Allocates. Errors of ContactReduction::response_before.
 Result<double> gravity_modes_error_mm(SampledOperators& sampled, const ContactReduction& contact,
-                                      const FieldRebuild& rebuild, const ModePosterior& posterior);
+                                      const FieldRebuild& rebuild, const ModePosterior& posterior,
+                                      const VecX& penetration);
 
 }  // namespace brainshift::inversion

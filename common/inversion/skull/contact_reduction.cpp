@@ -40,4 +40,13 @@ Result<Eigen::MatrixXd> ContactReduction::response_before() const {
   return response;
 }
 
+VecX ContactReduction::penetration_change(const VecX& dg, const VecX& dz, const VecX& df) const {
+  VecX change = -operators_.slave_modes.leftCols(window_.first) * dg -
+                operators_.slave_modes.middleCols(window_.first, window_.count) * dz;
+  for (int j = 0; j < size(); ++j) {
+    change -= df[j] * operators_.compliance.col(active_[static_cast<std::size_t>(j)]);
+  }
+  return change;
+}
+
 }  // namespace brainshift::inversion

@@ -42,6 +42,9 @@ class ContactReduction {
   // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
   // Allocates. Errors of ContactSystem::take.
   Result<Eigen::MatrixXd> response_before() const;
+  // -L_g dg - L dz - Phi_:A df: change of every slave's penetration, mm, where the modes before the
+  // window move by dg, those of the window by dz and the forces of the set by df, N. Allocates.
+  VecX penetration_change(const VecX& dg, const VecX& dz, const VecX& df) const;
 
  private:
   const CondensedOperators& operators_;
