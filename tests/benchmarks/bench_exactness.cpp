@@ -6,6 +6,7 @@
 // Q^T beta Q anew (paper eq. 16), solves for the 3m columns V = K_p^-1 A^T, and (Sigma with the
 // strength of its parts that the method has estimated)
 //   u = u0 + K_p^-1 Sigma V mu,   (V^T Sigma V + R) mu = d - A u0,   K_p u0 = Q^T beta p
+// with the variances R that the method gave the data: outliers count less (robust_weights.hpp).
 // Exit status: 0 when the exact method is within kExactBound_mm and the reduced one, with all its
 // modes, within kReducedBound_mm; 1 when not, or on a failure; 2 for bad usage or bad input.
 #include <CLI/CLI.hpp>
@@ -206,7 +207,6 @@ Status compare_reduced(const PreparedModel& model, const io::ModelFile& head,
   config.condensed.deadline_ms = 1e6;  // accuracy is asked for here, not speed
   // The direct posterior is that of one prior, not a mean over hypotheses.
   config.prior.estimate_scales = false;
-  config.sensing.robust_weights = false;
   const auto locator = std::make_shared<const geometry::TetLocator>(head.model.mesh);
   std::vector<int> ranks(std::begin(kFewerRanks), std::end(kFewerRanks));
   ranks.push_back(operators->num_modes());
@@ -220,7 +220,10 @@ Status compare_reduced(const PreparedModel& model, const io::ModelFile& head,
     const int other = slaves_in_one_only(exact.active_slaves, reduced.active_slaves);
     Difference own = difference(reduced.displacement, direct);
     const Difference to_exact = own;
-    const auto own_direct = direct_posterior(model, data, reduced);
+    // Data that the update distrusts are distrusted as much.
+    SparseData weighted = data;
+    weighted.sd_mm.array() /= inverter->weights().array().sqrt();
+    const auto own_direct = direct_posterior(model, weighted, reduced);
     if (!own_direct) return tl::unexpected(own_direct.error());
     own = difference(reduced.displacement, *own_direct);
     compared.json["reduced"].push_back({{"rank", rank},

@@ -450,6 +450,7 @@ Result<CondensedInverter> CondensedInverter::build(
 }
 
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
+VecX CondensedInverter::weights() const { return impl_->weights.values(); }
 const UpdateProfile& CondensedInverter::profile() const { return impl_->profile; }
 
 Status CondensedInverter::update(const SparseData& given, Estimate& estimate,

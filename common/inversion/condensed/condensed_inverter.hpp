@@ -81,6 +81,9 @@ class CondensedInverter {
   Status update(const SparseData& data, Estimate& estimate, const InversionOptions& asked = {});
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;
+  // Of the last update(): of every datum, in (0, 1], by which its variance was divided
+  // (robust_weights.hpp).
+  VecX weights() const;
   // Of the last update().
   const UpdateProfile& profile() const;
 

@@ -7,6 +7,7 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
+#include "common/inversion/condensed/robust_weights.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -87,6 +88,9 @@ TEST_P(Condensed, GrossErrorsLoseTheirInfluence) {
   for (int i = 0; i < spoilt.size(); i += 5) spoilt.displacements.col(i) += Vec3(5.0, -4.0, 3.0);
   spoilt.sources = {{"ius", 0, spoilt.size()}};
   ASSERT_TRUE(inverter.update(spoilt, robust));
+  const VecX weights = inverter.weights();
+  ASSERT_EQ(weights.size(), spoilt.size());
+  for (int i = 0; i < spoilt.size(); ++i) EXPECT_EQ(weights[i] < kOutlierWeight, i % 5 == 0) << i;
   CaseConfig with = config();
   with.sensing.robust_weights = false;
   ASSERT_TRUE(Condensed::inverter(GetParam(), {}, with).update(spoilt, kept));
