@@ -12,6 +12,8 @@
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dsytd2_(const char* uplo, const int* n, double* a, const int* lda, double* d, double* e,
+             double* tau, int* info);
 void dgeqrf_(const int* m, const int* n, double* a, const int* lda, double* tau, double* work,
              const int* lwork, int* info);
 void dorgqr_(const int* m, const int* n, const int* k, double* a, const int* lda, const double* tau,
@@ -106,6 +108,25 @@ void orthonormalise(Out<double> a) {
   assert(info == 0);
   dorgqr_(&m, &n, &n, a.data(), &stride, scales.data(), work.data(), &size, &info);
   assert(info == 0);
+}
+
+void tridiagonalise(Out<double> a, Eigen::Ref<Eigen::VectorXd> b,
+                    Eigen::Ref<Eigen::VectorXd> diagonal, Eigen::Ref<Eigen::VectorXd> beside,
+                    Eigen::Ref<Eigen::VectorXd> scales) {
+  assert(a.rows() == a.cols() && b.size() == a.rows() && diagonal.size() == a.rows());
+  const int n = rows(a), stride = leading(a);
+  if (n == 0) return;
+  assert(beside.size() == n - 1 && scales.size() == n - 1);
+  int info = 0;  // of arguments only
+  dsytd2_("L", &n, a.data(), &stride, diagonal.data(), beside.data(), scales.data(), &info);
+  assert(info == 0);
+  // Q = H_1 ... H_n-1, H_i = 1 - scale v v^T with v = (0, 1, column i below that).
+  for (int i = 0; i + 1 < n; ++i) {
+    const auto v = a.col(i).tail(n - i - 2);
+    const double along = scales[i] * (b[i + 1] + v.dot(b.tail(n - i - 2)));
+    b[i + 1] -= along;
+    b.tail(n - i - 2) -= along * v;
+  }
 }
 
 void solve_lower(const In<double>& l, Out<double> b) {

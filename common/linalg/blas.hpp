@@ -35,6 +35,12 @@ void gram(const In<double>& a, double beta, Out<double> c);
 // A, m x n with n <= m, -> m x n with orthonormal columns that span those of A (Q of its QR
 // factorisation), in place. Allocates.
 void orthonormalise(Out<double> a);
+// A = Q T Q^T with T tridiagonal, and b -> Q^T b. a: lower triangle of A, overwritten;
+// diagonal: n, beside: n - 1 numbers, of T; scales: n - 1, work. n = A.rows() = b.size(). For small
+// matrices: one column after the other.
+void tridiagonalise(Out<double> a, Eigen::Ref<Eigen::VectorXd> b,
+                    Eigen::Ref<Eigen::VectorXd> diagonal, Eigen::Ref<Eigen::VectorXd> beside,
+                    Eigen::Ref<Eigen::VectorXd> scales);
 // B = L^-1 B and B = L^-T B.
 void solve_lower(const In<double>& l, Out<double> b);
 void solve_lower_transposed(const In<double>& l, Out<double> b);

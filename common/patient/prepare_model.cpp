@@ -73,7 +73,7 @@ Status prepare_boundary(const std::shared_ptr<const BrainModel>& model, const Ca
   if (auto status = not_stopped(options); !status) return status;
   report(progress, "measure", 0.0);
   prepared.boundaries[which] = {factorised->timings(),
-                                inversion::measure_full_solve_ms(*factorised)};
+                                inversion::measure_full_solve_ms(factorised->forward())};
   inversion::CondenseOptions condensing;
   condensing.progress = progress;
   condensing.stop = options.stop;

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/prepared/full_solve.hpp"
@@ -69,14 +70,20 @@ Result<ModelStore::FullSolve> ModelStore::full_solve(Boundary boundary,
   if (const auto found = full_solves_.find(boundary); found != full_solves_.end()) {
     return found->second;
   }
-  const bool needed = factorised_.contains(boundary);
-  const auto factor = factorised(boundary, stop);
-  if (!factor) return tl::unexpected(factor.error());
-  const FullSolve measured{(*factor)->timings().factor_s,
-                           inversion::measure_full_solve_ms(**factor)};
-  full_solves_.emplace(boundary, measured);
-  if (!needed) factorised_.erase(boundary);
-  return measured;
+  const auto measure = [&](const contact::ForwardModel& forward) {
+    const FullSolve measured{forward.factor().factor_seconds(),
+                             inversion::measure_full_solve_ms(forward)};
+    full_solves_.emplace(boundary, measured);
+    return measured;
+  };
+  if (const auto found = factorised_.find(boundary); found != factorised_.end()) {
+    return measure(found->second->forward());
+  }
+  if (stop.stop_requested()) return stopped();
+  spdlog::info("factorising boundary={} for its time", to_string(boundary));
+  const auto forward = contact::ForwardModel::build(*model_, config_, boundary);
+  if (!forward) return tl::unexpected(forward.error());
+  return measure(*forward);
 }
 
 Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(

@@ -58,7 +58,7 @@ Head load(const std::string& file) {
   head.locator = std::make_shared<const geometry::TetLocator>(head.model->mesh);
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(head.model, head.config, Boundary::kContact));
-  head.t_solve_ms = inversion::measure_full_solve_ms(prepared);
+  head.t_solve_ms = inversion::measure_full_solve_ms(prepared.forward());
   return head;
 }
 

@@ -150,7 +150,7 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   if (!inverter) return tl::unexpected(inverter.error());
   Row row;
   row.rank = rank;
-  row.t_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
+  row.t_solve_ms = inversion::measure_full_solve_ms(head.prepared->forward());
   Estimate estimate;
   // Memory is claimed and caches are filled by an update that does not count.
   if (Status ok = inverter->update(trial.surgeries.back().data, estimate); !ok) return ok;
@@ -205,7 +205,7 @@ Status run_method(const Head& head, const Trial& trial, Method method, const Pri
   Row row;
   row.method = method;
   row.prior = prior.name;
-  row.t_solve_ms = inversion::measure_full_solve_ms(*prior.prepared);
+  row.t_solve_ms = inversion::measure_full_solve_ms(prior.prepared->forward());
   const auto invert = one_update(*prior.prepared, method);
   if (!invert) return tl::unexpected(invert.error());
   const Stopwatch all;

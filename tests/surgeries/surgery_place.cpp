@@ -144,7 +144,7 @@ Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows,
   facts.patient_seed = plan.patient_seed;
   facts.nodes = head.model->mesh.num_nodes();
   facts.slaves = static_cast<int>(head.model->slaves.size());
-  facts.full_solve_ms = inversion::measure_full_solve_ms(*head.prepared);
+  facts.full_solve_ms = inversion::measure_full_solve_ms(head.prepared->forward());
   for (const std::uint64_t seed : plan.seeds) {
     PlayedBrains brains(head, seed);
     for (const std::string& name : plan.scenarios) {

@@ -8,9 +8,8 @@
 
 namespace brainshift::inversion {
 
-double measure_full_solve_ms(const PreparedModel& model) {
+double measure_full_solve_ms(const contact::ForwardModel& forward) {
   constexpr int kRepetitions = 9;
-  const contact::ForwardModel& forward = model.forward();
   const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
   VecX x = forward.factor().solve(b);  // allocates the workspace
   std::vector<double> times_ms;

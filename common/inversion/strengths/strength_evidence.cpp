@@ -221,28 +221,35 @@ bool StrengthEvidence::changed_profiles(const Projection& projection,
   return true;
 }
 
+// In coordinates in which M is tridiagonal, so that a strength costs a pass over its diagonals.
 bool StrengthEvidence::profile(double variance, double floor, StrengthProfile& out,
                                Workspace& work) {
   const Eigen::Index count = work.gram.rows();
   out.fill(0.0);
   if (count == 0) return true;
-  // Lower factor of I + change M in work.shifted; ln of its determinant in `log_root`, halved. By
-  // Eigen: BLAS takes as long for matrices this small.
+  for (linalg::GrowingVector* each : {&work.diagonal, &work.pivots}) each->resize(count);
+  for (linalg::GrowingVector* each : {&work.beside, &work.factor}) each->resize(count - 1);
+  blas::tridiagonalise(work.gram, work.projected, work.diagonal, work.beside, work.factor);
+  // I + change M = F D F^T with F unit lower bidiagonal; 1/2 ln of its determinant in `log_root`.
   double log_root = 0.0;
   const auto shift = [&](double change) {
-    work.shifted.resize(count, count);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      work.shifted.col(j).tail(count - j) = change * work.gram.col(j).tail(count - j);
-      work.shifted(j, j) += 1.0;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      double pivot = 1.0 + change * work.diagonal[i];
+      if (i > 0) {
+        const double own = change * work.beside[i - 1];
+        work.factor[i - 1] = own / work.pivots[i - 1];
+        pivot -= own * work.factor[i - 1];
+      }
+      if (!(pivot > 0.0)) return false;
+      work.pivots[i] = pivot;
     }
-    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(work.shifted);
-    if (factor.info() != Eigen::Success) return false;
-    log_root = work.shifted.diagonal().array().log().sum();
-    return true;
+    log_root = 0.5 * work.pivots.array().log().sum();
+    return std::isfinite(log_root);
   };
   const auto solve = [&](linalg::GrowingVector& v) {
-    work.shifted.triangularView<Eigen::Lower>().solveInPlace(v);
-    work.shifted.triangularView<Eigen::Lower>().transpose().solveInPlace(v);
+    for (Eigen::Index i = 1; i < count; ++i) v[i] -= work.factor[i - 1] * v[i - 1];
+    v.array() /= work.pivots.array();
+    for (Eigen::Index i = count - 1; i > 0; --i) v[i - 1] -= work.factor[i - 1] * v[i];
   };
   work.start = work.projected;
   double without = 0.0;  // 1/2 ln |N|

@@ -43,6 +43,7 @@ class StrengthEvidence {
   struct Workspace {
     linalg::GrowingMatrix omega, gram, change, shifted;
     linalg::GrowingVector whitened, projected, changed, start, mean;
+    linalg::GrowingVector diagonal, beside, pivots, factor;  // of a tridiagonal matrix
   };
   // W^T Omega^-1 [W y] of one hypothesis.
   struct Projection {
@@ -94,7 +95,7 @@ class StrengthEvidence {
   void factorise_parts();
   // Lower factor of Omega; false as above.
   bool fill_omega(const PerPart<double>& variances, linalg::GrowingMatrix& omega) const;
-  // From M and b in work.gram and work.projected.
+  // From M and b in work.gram and work.projected, which it overwrites.
   static bool profile(double variance, double floor, StrengthProfile& out, Workspace& work);
 
   PerPart<int> first_{}, count_{};  // modes by part

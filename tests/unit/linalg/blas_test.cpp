@@ -95,6 +95,27 @@ TEST(Blas, OrthonormalColumnsSpanTheSame) {
   blas::orthonormalise(none);
 }
 
+// b^T (shift + A)^-1 b and the trace are the same for T and Q^T b.
+TEST(Blas, TridiagonalMatrixStandsForTheGivenOne) {
+  std::srand(12);
+  for (const Eigen::Index n : {1, 2, 3, 9}) {
+    const MatrixXd random = MatrixXd::Random(n, n), a = random * random.transpose();
+    const Eigen::VectorXd b = Eigen::VectorXd::Random(n);
+    MatrixXd overwritten = a;
+    overwritten.triangularView<Eigen::StrictlyUpper>().setConstant(7.0);  // not read
+    Eigen::VectorXd turned = b, diagonal(n), beside(n - 1), scales(n - 1);
+    blas::tridiagonalise(overwritten, turned, diagonal, beside, scales);
+    MatrixXd t = diagonal.asDiagonal();
+    if (n > 1) t.diagonal(1) = t.diagonal(-1) = beside;
+    EXPECT_NEAR(t.trace(), a.trace(), kRounding * a.trace());
+    for (const double shift : {0.5, 3.0}) {
+      const MatrixXd unit = shift * MatrixXd::Identity(n, n);
+      EXPECT_NEAR(turned.dot((unit + t).ldlt().solve(turned)), b.dot((unit + a).ldlt().solve(b)),
+                  10.0 * kRounding);
+    }
+  }
+}
+
 TEST(Blas, CholeskyRejectsAnIndefiniteMatrix) {
   MatrixXd indefinite = MatrixXd::Identity(4, 4);
   indefinite(2, 2) = -1.0;
