@@ -109,9 +109,11 @@ Status draw_latency(const Results& results, const fs::path& folder, std::vector<
   spec.subtitle = "condensed method, contact; the first update of each session is not included";
   spec.x = {"latency (ms)", true};
   spec.y = {"share of updates that take longer", true};
+  const auto other_kernel = [](const std::string& name) {
+    return name.find('@') != std::string::npos;
+  };
   for (const auto& [scenario, latency] : results.latency_ms) {
-    const bool other_kernel = scenario.find('@') != std::string::npos;
-    if (latency.size() < 2 || other_kernel) continue;
+    if (latency.size() < 2 || other_kernel(scenario)) continue;
     std::vector<double> sorted = latency;
     std::sort(sorted.begin(), sorted.end());
     const auto& style = styles[spec.series.size() % styles.size()];
@@ -130,7 +132,7 @@ Status draw_latency(const Results& results, const fs::path& folder, std::vector<
   if (spec.series.empty()) return {};
   double t_solve = 0.0;
   for (const auto& [scenario, run] : results.runs) {
-    t_solve = std::max(t_solve, run.full_solve_ms.value_or(0.0));
+    if (!other_kernel(scenario)) t_solve = std::max(t_solve, run.full_solve_ms.value_or(0.0));
   }
   spec.series.push_back({"t_solve",
                          palette::kInk,
