@@ -35,7 +35,7 @@ struct Arguments {
   int compared = 20;
   int timed = 3;
   std::uint64_t seed = 1;
-  double memory_limit_gib = 20.0;
+  double memory_limit_gib = 22.0;
   double method_budget_s = 200.0;
   std::filesystem::path out = "out/bench";
   bool quick = false;
