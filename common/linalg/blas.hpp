@@ -36,8 +36,9 @@ void gram(const In<double>& a, double beta, Out<double> c);
 // factorisation), in place. Allocates.
 void orthonormalise(Out<double> a);
 // A = Q T Q^T with T tridiagonal, and b -> Q^T b. a: lower triangle of A, overwritten;
-// diagonal: n, beside: n - 1 numbers, of T; scales: n - 1, work. n = A.rows() = b.size(). For small
-// matrices: one column after the other.
+// diagonal: n, beside: n - 1 numbers, of T; scales: n - 1, work. n = A.rows() = b.size(). By
+// Householder's reflections, one column after the other: for small matrices (Golub & Van Loan 2013,
+// Matrix Computations, 8.3.1).
 void tridiagonalise(Out<double> a, Eigen::Ref<Eigen::VectorXd> b,
                     Eigen::Ref<Eigen::VectorXd> diagonal, Eigen::Ref<Eigen::VectorXd> beside,
                     Eigen::Ref<Eigen::VectorXd> scales);

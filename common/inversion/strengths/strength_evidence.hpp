@@ -15,9 +15,10 @@
 //
 //   ln p(t) = ln p(0) + 1/2 ln |N| - 1/2 ln |A| + 1/2 t b^T A^-1 N^-1 b,   A = I + (t - v_g) M
 //
-// (Woodbury; M, N and A commute.) Where one part's variance changes by delta, C = W^T Omega^-1 W of
-// all parts side by side becomes C - delta C_g^T (I + delta C_gg)^-1 C_g. Allocates nothing after
-// construction but when more columns are needed than ever before.
+// (Woodbury; M, N and A commute.) M is made tridiagonal once, so that every t costs a pass over its
+// diagonals. Where one part's variance changes by delta, C = W^T Omega^-1 W of all parts side by
+// side becomes C - delta C_g^T (I + delta C_gg)^-1 C_g. Allocates nothing after construction but
+// when more columns are needed than ever before.
 #pragma once
 
 #include <array>
