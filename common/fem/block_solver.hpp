@@ -15,8 +15,8 @@ class BlockSolver {
   BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor,
               const DofMap& dofs);
 
-  // U = T K^-1 T^T F. Columns are nodal vectors, node-major, 3n rows; F in N, U in mm. Errors as
-  // check_many.
+  // U = T K^-1 T^T F. Columns are nodal vectors, node-major, 3n rows; F in N, U in mm; both may
+  // be the same matrix. Errors as check_many.
   Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
 
  private:
@@ -26,8 +26,6 @@ class BlockSolver {
   const DofMap& dofs_;
   StiffnessFactor::Workspace workspace_;
   Eigen::MatrixXd rhs_, unknowns_;
-  Points nodal_;
-  VecX column_;
 };
 
 }  // namespace brainshift::fem

@@ -50,8 +50,12 @@ void DofMap::finalise() {
 }
 
 void DofMap::expand(const VecX& q, Points& u) const {
-  assert(q.size() == num_unknowns_);
   u.resize(3, num_nodes());
+  expand_into(q, u);
+}
+
+void DofMap::expand_into(const Eigen::Ref<const VecX>& q, Eigen::Ref<Points> u) const {
+  assert(q.size() == num_unknowns_ && u.cols() == num_nodes());
   for (int node = 0; node < num_nodes(); ++node) {
     Vec3 local;
     for (int axis = 0; axis < 3; ++axis) {
@@ -69,8 +73,12 @@ Points DofMap::expand(const VecX& q) const {
 }
 
 void DofMap::restrict_to(const Points& f, VecX& q) const {
-  assert(f.cols() == num_nodes());
   q.resize(num_unknowns_);
+  restrict_into(f, q);
+}
+
+void DofMap::restrict_into(const Eigen::Ref<const Points>& f, Eigen::Ref<VecX> q) const {
+  assert(f.cols() == num_nodes() && q.size() == num_unknowns_);
   for (int node = 0; node < num_nodes(); ++node) {
     const Vec3 local =
         identity_[node] ? Vec3(f.col(node)) : Vec3(frames_[node].transpose() * f.col(node));

@@ -46,6 +46,9 @@ class DofMap {
   Points expand(const VecX& q) const;
   void restrict_to(const Points& f, VecX& q) const;
   VecX restrict_to(const Points& f) const;
+  // The same into memory of the right size, such as a column of a matrix.
+  void expand_into(const Eigen::Ref<const VecX>& q, Eigen::Ref<Points> u) const;
+  void restrict_into(const Eigen::Ref<const Points>& f, Eigen::Ref<VecX> q) const;
 
  private:
   std::vector<Mat3> frames_;

@@ -141,6 +141,12 @@ void solve_lower_transposed(const In<double>& l, Out<double> b) {
               1.0, l.data(), leading(l), b.data(), leading(b));
 }
 
+void solve_lower_right(const In<double>& l, Out<double> b) {
+  assert(l.rows() == b.cols());
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, rows(b),
+              columns(b), 1.0, l.data(), leading(l), b.data(), leading(b));
+}
+
 void solve_lower_transposed_right(const In<double>& l, Out<double> b) {
   assert(l.rows() == b.cols());
   cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),

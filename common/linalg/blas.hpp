@@ -45,7 +45,8 @@ void tridiagonalise(Out<double> a, Eigen::Ref<Eigen::VectorXd> b,
 // B = L^-1 B and B = L^-T B.
 void solve_lower(const In<double>& l, Out<double> b);
 void solve_lower_transposed(const In<double>& l, Out<double> b);
-// B = B L^-T
+// B = B L^-1 and B = B L^-T.
+void solve_lower_right(const In<double>& l, Out<double> b);
 void solve_lower_transposed_right(const In<double>& l, Out<double> b);
 void solve_lower_transposed_right(const In<float>& l, Out<float> b);
 // y += alpha x, n entries

@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <mutex>
+#include <span>
 #include <sstream>
 
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas_threads.hpp"
+#include "common/linalg/block_substitution.hpp"
 
 namespace brainshift::linalg {
 namespace {
@@ -44,6 +47,28 @@ cholmod_dense view_of(const double* data, std::size_t rows, std::size_t columns)
   return view;
 }
 
+SupernodalView view_of(const cholmod_factor& factor) {
+  const auto list = [&](const void* data) {
+    return std::span(static_cast<const long*>(data), factor.nsuper + 1);
+  };
+  return {list(factor.super), list(factor.pi), list(factor.px), static_cast<const long*>(factor.s),
+          static_cast<const double*>(factor.x)};
+}
+
+// Calls move(unknown, place, first, count) for every unknown and its place in the factor's order,
+// a cache line of right-hand sides at a time: for copies between columns and a block of rows.
+template <typename Move>
+void for_all_lines(const cholmod_factor& factor, Eigen::Index columns, const Move& move) {
+  constexpr Eigen::Index kLine = 8;
+  const auto* order = static_cast<const long*>(factor.Perm);
+  for (Eigen::Index first = 0; first < columns; first += kLine) {
+    const Eigen::Index count = std::min(kLine, columns - first);
+    for (std::size_t i = 0; i < factor.n; ++i) {
+      move(order[i], static_cast<Eigen::Index>(i), first, count);
+    }
+  }
+}
+
 // Smallest ratio of a pivot L_jj^2 to the diagonal K_jj: what elimination has cancelled. Rounding
 // leaves a pivot wrong by some 1e-14 K_jj (`make stability`, weak support: 85 unit roundoffs), so
 // with a ratio below this its error is more than a thousandth. Unlike the reciprocal condition
@@ -51,16 +76,13 @@ cholmod_dense view_of(const double* data, std::size_t rows, std::size_t columns)
 constexpr double kLeastPivotShare = 1e-11;
 
 double least_pivot_share(const cholmod_factor& factor, const SymmetricMatrix& lower) {
-  const auto* super = static_cast<const long*>(factor.super);
-  const auto* rows = static_cast<const long*>(factor.pi);
-  const auto* values = static_cast<const long*>(factor.px);
+  const SupernodalView view = view_of(factor);
   const auto* order = static_cast<const long*>(factor.Perm);
-  const auto* x = static_cast<const double*>(factor.x);
   double least = 1.0;
   for (std::size_t s = 0; s < factor.nsuper; ++s) {
-    const long stride = rows[s + 1] - rows[s] + 1;  // down the diagonal of the supernode
-    for (long k = super[s]; k < super[s + 1]; ++k) {
-      const double l = x[values[s] + (k - super[s]) * stride];
+    const long stride = view.rows[s + 1] - view.rows[s] + 1;  // down the diagonal of the supernode
+    for (long k = view.first[s]; k < view.first[s + 1]; ++k) {
+      const double l = view.values[view.at[s] + (k - view.first[s]) * stride];
       const double diagonal = lower.valuePtr()[lower.outerIndexPtr()[order[k]]];
       least = std::min(least, l * l / diagonal);
     }
@@ -99,6 +121,7 @@ struct SparseCholesky::Workspace::Impl {
   cholmod_dense* x = nullptr;
   cholmod_dense* y = nullptr;
   cholmod_dense* e = nullptr;
+  Eigen::MatrixXd block, scratch;  // of substitute()
 
   Impl() {
     cholmod_l_start(&common);
@@ -113,9 +136,8 @@ struct SparseCholesky::Workspace::Impl {
     cholmod_l_finish(&common);
   }
   // The solution, valid until the next call.
-  const double* solve(cholmod_factor* factor, const Eigen::Ref<const Eigen::MatrixXd>& b) {
-    cholmod_dense rhs =
-        view_of(b.data(), static_cast<std::size_t>(b.rows()), static_cast<std::size_t>(b.cols()));
+  const double* solve(cholmod_factor* factor, const VecX& b) {
+    cholmod_dense rhs = view_of(b.data(), static_cast<std::size_t>(b.size()), 1);
     const int ok = cholmod_l_solve2(CHOLMOD_A, factor, &rhs, nullptr, &x, nullptr, &y, &e, &common);
     assert(ok);
     (void)ok;
@@ -171,7 +193,12 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
   Impl& impl = *cholesky.impl_;
   const Stopwatch watch;
   cholmod_sparse view = view_of(lower);
-  impl.factor = cholmod_l_analyze(&view, &impl.common);
+  {
+    // METIS draws from rand(): two analyses at once would give other orderings than one by one.
+    static std::mutex one_at_a_time;
+    const std::lock_guard lock(one_at_a_time);
+    impl.factor = cholmod_l_analyze(&view, &impl.common);
+  }
   impl.analyse_s = watch.seconds();
   impl.nonzeros = static_cast<std::uint64_t>(impl.common.lnz);
   if (impl.factor == nullptr) {
@@ -243,8 +270,17 @@ VecX SparseCholesky::solve(const VecX& b) const {
 void SparseCholesky::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x,
                                 Workspace& workspace) const {
   assert(b.rows() == size());
-  x = Eigen::Map<const Eigen::MatrixXd>(workspace.impl_->solve(impl_->factor, b), b.rows(),
-                                        b.cols());
+  const cholmod_factor& factor = *impl_->factor;
+  Eigen::MatrixXd& block = workspace.impl_->block;
+  block.resize(b.cols(), b.rows());
+  for_all_lines(factor, b.cols(), [&](long unknown, Eigen::Index place, auto first, auto count) {
+    for (Eigen::Index j = first; j < first + count; ++j) block(j, place) = b(unknown, j);
+  });
+  substitute(view_of(factor), block, workspace.impl_->scratch);
+  x.resize(b.rows(), b.cols());
+  for_all_lines(factor, b.cols(), [&](long unknown, Eigen::Index place, auto first, auto count) {
+    for (Eigen::Index j = first; j < first + count; ++j) x(unknown, j) = block(j, place);
+  });
 }
 
 Eigen::MatrixXd SparseCholesky::solve_many(const Eigen::MatrixXd& b) const {

@@ -23,33 +23,6 @@ using Eigen::MatrixXf;
 constexpr double kLeft = 0.29;
 constexpr double kMostByte = 127.0, kMostWord = 32767.0;
 
-// Halves [begin, end) of `order` across its longest extent until every part is small enough.
-void split(const Points& nodes, std::vector<NodeIndex>& order, Index begin, Index end,
-           std::vector<int>& sizes) {
-  const Index count = end - begin;
-  if (count <= CompactColumns::kBlockNodes) {
-    if (count > 0) sizes.push_back(static_cast<int>(count));
-    return;
-  }
-  Vec3 low = nodes.col(order[static_cast<std::size_t>(begin)]), high = low;
-  for (Index i = begin; i < end; ++i) {
-    low = low.cwiseMin(nodes.col(order[static_cast<std::size_t>(i)]));
-    high = high.cwiseMax(nodes.col(order[static_cast<std::size_t>(i)]));
-  }
-  Index axis = 0;
-  (high - low).maxCoeff(&axis);
-  // Parts of whole blocks, so that all blocks are about as large.
-  const Index blocks = (count + CompactColumns::kBlockNodes - 1) / CompactColumns::kBlockNodes;
-  const Index middle = begin + count * (blocks / 2) / blocks;
-  std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
-                   [&](NodeIndex a, NodeIndex b) {
-                     return nodes(axis, a) != nodes(axis, b) ? nodes(axis, a) < nodes(axis, b)
-                                                             : a < b;
-                   });
-  split(nodes, order, begin, middle, sizes);
-  split(nodes, order, middle, end, sizes);
-}
-
 // What one block adds to the arrays of CompactParts.
 struct Block {
   int wide = 0, others = 0;
@@ -162,8 +135,12 @@ class Encoder {
   Encoder(const std::vector<ColumnGroup>& groups, const Eigen::VectorXf& steps)
       : groups_(groups), steps_(steps) {}
 
-  Result<Block> encode(std::span<const NodeIndex> nodes) const {
-    const MatrixXd rows = in_steps(nodes);
+  // nodes: those that stand at `place` and behind it in the order of all blocks.
+  Result<Block> encode(std::span<const NodeIndex> nodes, Index place) const {
+    MatrixXd rows(3 * static_cast<Index>(nodes.size()), steps_.size());
+    if (auto status = read_in_steps(nodes, place, rows); !status) {
+      return tl::unexpected(status.error());
+    }
     MatrixXd w = MatrixXd::Zero(rows.rows(), rows.rows()), decoded(rows.rows(), rows.cols());
     linalg::blas::subtract_outer(rows, w);
     w = (-w).eval();
@@ -199,7 +176,7 @@ class Encoder {
     double worst = 0.0;
     Index first = 0;
     for (const ColumnGroup& group : groups_) {
-      const Index count = group.columns->cols();
+      const Index count = group.count;
       if (rows.rows() > 0 && count > 0) {
         const double apart = (rows.middleCols(first, count) - decoded.middleCols(first, count))
                                  .cwiseAbs()
@@ -211,20 +188,18 @@ class Encoder {
     return worst;
   }
 
-  MatrixXd in_steps(std::span<const NodeIndex> nodes) const {
-    MatrixXd rows(3 * static_cast<Index>(nodes.size()), steps_.size());
-    Index to = 0;
+  Status read_in_steps(std::span<const NodeIndex> nodes, Index place, MatrixXd& rows) const {
+    MatrixXf read;
+    Index first = 0;
     for (const ColumnGroup& group : groups_) {
-      for (Index j = 0; j < group.columns->cols(); ++j, ++to) {
-        const double per_step = 1.0 / static_cast<double>(steps_[to]);
-        for (std::size_t i = 0; i < nodes.size(); ++i) {
-          const auto at = static_cast<Index>(3 * i);
-          rows.col(to).segment<3>(at) =
-              per_step * group.columns->col(j).segment<3>(3L * nodes[i]).cast<double>();
-        }
+      read.resize(rows.rows(), group.count);
+      if (auto status = group.rows(nodes, place, read); !status) return status;
+      for (Index j = 0; j < group.count; ++j, ++first) {
+        const double per_step = 1.0 / static_cast<double>(steps_[first]);
+        rows.col(first) = per_step * read.col(j).cast<double>();
       }
     }
-    return rows;
+    return {};
   }
 
   const std::vector<ColumnGroup>& groups_;
@@ -258,23 +233,47 @@ void join(std::vector<Block>& blocks, CompactParts& parts) {
 
 // A step for every column of a group; above 0 also where it has no other numbers than 0.
 Status append_steps(const ColumnGroup& group, Eigen::VectorXf& steps) {
-  const MatrixXf& columns = *group.columns;
-  if (!columns.allFinite()) {
+  if (!std::isfinite(group.greatest)) {
     return fail(ErrorCode::kNotFinite, "compact columns: a number is not finite");
   }
-  const float greatest = columns.size() > 0 ? columns.cwiseAbs().maxCoeff() : 0.0F;
   const Index before = steps.size();
-  steps.conservativeResize(before + columns.cols());
-  steps.tail(columns.cols())
-      .setConstant(std::max(group.step * greatest, std::numeric_limits<float>::min()));
+  steps.conservativeResize(before + group.count);
+  steps.tail(group.count)
+      .setConstant(std::max(group.step * group.greatest, std::numeric_limits<float>::min()));
   return {};
 }
 
 }  // namespace
 
-Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<ColumnGroup>& groups,
-                                      ThreadTeam& team, const Progress& progress,
-                                      const std::stop_token& stop) {
+float greatest_of(const MatrixXf& numbers) {
+  if (!numbers.allFinite()) return std::numeric_limits<float>::quiet_NaN();
+  return numbers.size() > 0 ? numbers.cwiseAbs().maxCoeff() : 0.0F;
+}
+
+ColumnGroup group_of(const MatrixXf& columns, float step) {
+  ColumnGroup group;
+  group.count = static_cast<int>(columns.cols());
+  group.step = step;
+  group.greatest = greatest_of(columns);
+  group.rows = [&columns](std::span<const NodeIndex> nodes, Index, MatrixXf& rows) -> Status {
+    for (Index j = 0; j < columns.cols(); ++j) {
+      for (std::size_t i = 0; i < nodes.size(); ++i) {
+        rows.col(j).segment<3>(3 * static_cast<Index>(i)) =
+            columns.col(j).segment<3>(3L * nodes[i]);
+      }
+    }
+    return {};
+  };
+  return group;
+}
+
+SpatialBlocks node_blocks(const Points& nodes) {
+  return spatial_blocks(nodes, CompactColumns::kBlockNodes);
+}
+
+Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
+                                      const std::vector<ColumnGroup>& groups, ThreadTeam& team,
+                                      const Progress& progress, const std::stop_token& stop) {
   linalg::use_single_threaded_blas();
   CompactParts parts;
   for (const ColumnGroup& group : groups) {
@@ -282,33 +281,27 @@ Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<Col
       return tl::unexpected(status.error());
     }
   }
-  parts.order.resize(static_cast<std::size_t>(nodes.cols()));
-  std::iota(parts.order.begin(), parts.order.end(), 0);
-  std::vector<int> sizes;
-  split(nodes, parts.order, 0, nodes.cols(), sizes);
-  parts.blocks.setZero(3, static_cast<Index>(sizes.size()));
-  std::vector<int> first(sizes.size() + 1, 0);
-  std::partial_sum(sizes.begin(), sizes.end(), first.begin() + 1);
+  parts.order = nodes.order;
+  parts.blocks.setZero(3, nodes.size());
 
-  std::vector<Block> blocks(sizes.size());
+  std::vector<Block> blocks(static_cast<std::size_t>(nodes.size()));
   std::vector<Status> statuses(static_cast<std::size_t>(team.size()));
-  std::atomic<std::size_t> done{0};
+  std::atomic<int> done{0};
   const Encoder encoder(groups, parts.steps);
   auto task = [&](int member) {
-    for (auto b = static_cast<std::size_t>(member); b < blocks.size();
-         b += static_cast<std::size_t>(team.size())) {
+    for (int b = member; b < nodes.size(); b += team.size()) {
       if (stop.stop_requested()) return;
-      auto made =
-          encoder.encode({parts.order.data() + first[b], static_cast<std::size_t>(sizes[b])});
+      const auto at = static_cast<std::size_t>(b);
+      auto made = encoder.encode(nodes.block(b), nodes.first[at]);
       if (!made) {
         statuses[static_cast<std::size_t>(member)] = tl::unexpected(made.error());
         return;
       }
-      blocks[b] = std::move(*made);
+      blocks[at] = std::move(*made);
+      parts.blocks(0, b) = static_cast<int>(nodes.block(b).size());
       ++done;
       if (member == 0) {
-        report(progress, "compact columns",
-               static_cast<double>(done) / static_cast<double>(blocks.size()));
+        report(progress, "compact columns", static_cast<double>(done) / nodes.size());
       }
     }
   };
@@ -318,8 +311,7 @@ Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<Col
   for (const Status& status : statuses) {
     if (!status) return tl::unexpected(status.error());
   }
-  if (done != blocks.size()) return fail(ErrorCode::kUnavailable, "preparation was stopped");
-  for (std::size_t b = 0; b < sizes.size(); ++b) parts.blocks(0, static_cast<Index>(b)) = sizes[b];
+  if (done != nodes.size()) return fail(ErrorCode::kUnavailable, "preparation was stopped");
   join(blocks, parts);
   return CompactColumns::from_parts(std::move(parts));
 }

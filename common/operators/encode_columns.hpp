@@ -6,7 +6,7 @@
 // number are finer than sums in single precision: the limit is then that of kFinest.
 // docs/decisions/0028 says what that does to fields.
 //
-// Blocks: nodes are halved across the longest extent until a part has kBlockNodes at most. With M_b
+// Blocks: neighbours, kBlockNodes at most (spatial_blocks.hpp). With M_b
 // the rows of a block in steps, W = M_b M_b^T is factorised by Cholesky with pivoting until the
 // rows that are left are below kLeft in the root mean square, W ~ L L^T (Harbrecht, Peters and
 // Schneider 2012, Appl. Numer. Math. 62:428); the basis is that of L's columns (Householder), and
@@ -14,6 +14,8 @@
 // the block is done again with more columns.
 #pragma once
 
+#include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -22,22 +24,37 @@
 #include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
 #include "common/operators/compact_columns.hpp"
+#include "common/operators/spatial_blocks.hpp"
 
 namespace brainshift {
 
 inline constexpr double kMostErrorSteps = 4.0;     // steps
 inline constexpr float kFinest = 1.0F / 16777216;  // 2^-24
 
+// Columns that need not lie in memory: they are read once, by the rows of a block.
 struct ColumnGroup {
-  const Eigen::MatrixXf* columns = nullptr;  // 3n rows
-  float step = 0.0F;  // of their greatest number; at least 2^-26: coefficients fit 31 bits
+  int count = 0;
+  float step = 0.0F;      // of the greatest number; at least 2^-26: coefficients fit 31 bits
+  float greatest = 0.0F;  // greatest_of() all columns
+  // The rows of the given nodes, which stand at `place` and behind it in the order of all blocks,
+  // into `rows`, 3m x count. Called by several threads at once.
+  std::function<Status(std::span<const NodeIndex> nodes, Eigen::Index place, Eigen::MatrixXf& rows)>
+      rows;
 };
+// Of columns in memory, 3n rows, which the group refers to.
+ColumnGroup group_of(const Eigen::MatrixXf& columns, float step);
+// The greatest absolute number; NaN when one is not finite.
+float greatest_of(const Eigen::MatrixXf& numbers);
 
-// groups: one after the other. nodes: 3 x n, mm. Dealt to the team by blocks; the result does not
-// depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
-// kMostErrorSteps is not kept. progress: stage "compact columns".
-Result<CompactColumns> encode_columns(const Points& nodes, const std::vector<ColumnGroup>& groups,
-                                      ThreadTeam& team, const Progress& progress = {},
+// The blocks of encode_columns(). nodes: 3 x n, mm.
+SpatialBlocks node_blocks(const Points& nodes);
+
+// groups: one after the other. nodes: node_blocks() of the mesh. Dealt to the team by blocks; the
+// result does not depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
+// kMostErrorSteps is not kept; errors of the groups. progress: stage "compact columns".
+Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
+                                      const std::vector<ColumnGroup>& groups, ThreadTeam& team,
+                                      const Progress& progress = {},
                                       const std::stop_token& stop = {});
 
 // Rows of the given nodes (3 each, in their order) of the given columns, in single precision.

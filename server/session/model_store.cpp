@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "common/contact/forward_model.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -72,7 +72,7 @@ Result<ModelStore::FullSolve> ModelStore::full_solve(Boundary boundary,
   }
   const auto measure = [&](const contact::ForwardModel& forward) {
     const FullSolve measured{forward.factor().factor_seconds(),
-                             inversion::measure_full_solve_ms(forward)};
+                             contact::measure_full_solve_ms(forward)};
     full_solves_.emplace(boundary, measured);
     return measured;
   };

@@ -36,10 +36,10 @@
 
 #include "client/bridge/bridge.hpp"
 #include "client/lib/client.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
 #include "common/igtl/message.hpp"
 #include "common/igtl/stream_reader.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
@@ -295,7 +295,7 @@ bool run(const std::string& case_file, double minutes) {
   const double t_solve_ms = [&, &settings = config] {
     auto prepared =
         value_or_exit(inversion::PreparedModel::prepare(model, settings, Boundary::kContact));
-    return inversion::measure_full_solve_ms(prepared.forward());
+    return contact::measure_full_solve_ms(prepared.forward());
   }();
   std::printf("%s: %d nodes, t_solve %.1f ms, %u cores\n", model->case_id.c_str(),
               model->mesh.num_nodes(), t_solve_ms, std::thread::hardware_concurrency());

@@ -12,6 +12,7 @@
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
+#include "common/operators/spatial_blocks.hpp"
 #include "common/patient/read_patient.hpp"
 
 namespace brainshift {
@@ -79,6 +80,33 @@ void SolveInBlocksOf64(benchmark::State& state) {
       64.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(SolveInBlocksOf64)->Unit(benchmark::kMillisecond);
+
+// Loads of 64 slaves that are neighbours, as the contact columns are solved: the forward half skips
+// what they do not reach.
+void SolveNeighboursInBlocksOf64(benchmark::State& state) {
+  const auto& pairs = forward().contact().pairs();
+  Points slaves(3, static_cast<Eigen::Index>(pairs.size()));
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    slaves.col(static_cast<Eigen::Index>(i)) = head().model.mesh.nodes.col(pairs[i].slave);
+  }
+  const SpatialBlocks blocks = spatial_blocks(slaves, 64);
+  const auto first = blocks.block(blocks.size() / 2);
+  Points nodal;
+  VecX column;
+  Eigen::MatrixXd b(forward().dofs().num_unknowns(), static_cast<Eigen::Index>(first.size()));
+  for (std::size_t j = 0; j < first.size(); ++j) {
+    const auto& pair = pairs[static_cast<std::size_t>(first[j])];
+    nodal.setZero(3, head().model.mesh.num_nodes());
+    nodal.col(pair.slave) = pair.normal;
+    forward().dofs().restrict_to(nodal, column);
+    b.col(static_cast<Eigen::Index>(j)) = column;
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(forward().factor().solve_many(b));
+  state.counters["per_column"] = benchmark::Counter(
+      static_cast<double>(first.size()),
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(SolveNeighboursInBlocksOf64)->Unit(benchmark::kMillisecond);
 
 void ApplyPrior(benchmark::State& state) {
   static const auto prepared = inversion::PreparedModel::prepare(

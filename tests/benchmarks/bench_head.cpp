@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "tests/benchmarks/median_time.hpp"
 
@@ -93,7 +93,7 @@ std::vector<std::string> mesh_row(const Head& head) {
           csv_number(head.mesh_s),
           csv_number(timings.analyse_s + timings.factor_s),
           csv_number(timings.total_s),
-          csv_number(inversion::measure_full_solve_ms(head.prepared->forward())),
+          csv_number(contact::measure_full_solve_ms(head.prepared->forward())),
           csv_number(head.condense_s),
           std::to_string(head.operators->bytes()),
           std::to_string(timings.bytes),

@@ -329,6 +329,11 @@ Result<Results> read_results(const fs::path& folder) {
   if (Status ok = read_json(folder / "prepare.json", prepare, results.facts); !ok) {
     return tl::unexpected(ok.error());
   }
+  const std::map<std::string, std::string> large = {{"large_prepare_s", "/total_s"},
+                                                    {"large_peak_bytes", "/peak_memory_bytes"}};
+  if (Status ok = read_json(folder / "prepare-100k.json", large, results.facts); !ok) {
+    return tl::unexpected(ok.error());
+  }
   for (const std::string scenario : {"paper", "distension"}) {
     const fs::path file = folder / ("direct-" + scenario + ".json");
     if (Status ok = read_direct(file, scenario, results.facts); !ok) {

@@ -10,6 +10,7 @@
 //   facts.csv                        name,value: what the script measured itself
 //   left_out.csv                     what the script did not run, a line each
 //   prepare.json                     `brainshiftd prepare --json`
+//   prepare-100k.json                the same with edges for 100 thousand nodes
 //   direct-NAME.json                 bench_exactness --scenario NAME
 #pragma once
 

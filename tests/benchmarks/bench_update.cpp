@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/inverter.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
@@ -58,7 +58,7 @@ Head load(const std::string& file) {
   head.locator = std::make_shared<const geometry::TetLocator>(head.model->mesh);
   const auto prepared =
       value_or_exit(inversion::PreparedModel::prepare(head.model, head.config, Boundary::kContact));
-  head.t_solve_ms = inversion::measure_full_solve_ms(prepared.forward());
+  head.t_solve_ms = contact::measure_full_solve_ms(prepared.forward());
   return head;
 }
 

@@ -16,11 +16,11 @@
 #include "client/replay/score.hpp"
 #include "client/twin/surgery.hpp"
 #include "client/twin/variation.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 
 namespace brainshift::bench {
 namespace {
@@ -150,7 +150,7 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   if (!inverter) return tl::unexpected(inverter.error());
   Row row;
   row.rank = rank;
-  row.t_solve_ms = inversion::measure_full_solve_ms(head.prepared->forward());
+  row.t_solve_ms = contact::measure_full_solve_ms(head.prepared->forward());
   Estimate estimate;
   // Memory is claimed and caches are filled by an update that does not count.
   if (Status ok = inverter->update(trial.surgeries.back().data, estimate); !ok) return ok;
@@ -205,7 +205,7 @@ Status run_method(const Head& head, const Trial& trial, Method method, const Pri
   Row row;
   row.method = method;
   row.prior = prior.name;
-  row.t_solve_ms = inversion::measure_full_solve_ms(prior.prepared->forward());
+  row.t_solve_ms = contact::measure_full_solve_ms(prior.prepared->forward());
   const auto invert = one_update(*prior.prepared, method);
   if (!invert) return tl::unexpected(invert.error());
   const Stopwatch all;

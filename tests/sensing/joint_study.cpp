@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/plot/bars.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
 #include "tests/support/study_record.hpp"
@@ -133,7 +133,7 @@ Status measure(const bench::Head& head, const std::string& study) {
     joint_ms.insert(joint_ms.end(), times.begin(), times.end());
     results.push_back(std::move(*stages));
   }
-  const double solve_ms = inversion::measure_full_solve_ms(head.prepared->forward());
+  const double solve_ms = contact::measure_full_solve_ms(head.prepared->forward());
   const double solves = percentile(joint_ms, 50) / solve_ms;
   record_check(study, "update with three sources over one solve: p50", solves, "<= 2",
                solves <= 2.0, "t_solve of the same process");

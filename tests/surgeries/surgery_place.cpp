@@ -8,8 +8,8 @@
 
 #include "client/twin/surgery.hpp"
 #include "client/twin/variation.hpp"
+#include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/inversion/prepared/full_solve.hpp"
 #include "server/pipeline/pipeline.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/sleeping_inverter.hpp"
@@ -144,7 +144,7 @@ Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows,
   facts.patient_seed = plan.patient_seed;
   facts.nodes = head.model->mesh.num_nodes();
   facts.slaves = static_cast<int>(head.model->slaves.size());
-  facts.full_solve_ms = inversion::measure_full_solve_ms(head.prepared->forward());
+  facts.full_solve_ms = contact::measure_full_solve_ms(head.prepared->forward());
   for (const std::uint64_t seed : plan.seeds) {
     PlayedBrains brains(head, seed);
     for (const std::string& name : plan.scenarios) {

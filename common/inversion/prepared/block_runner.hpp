@@ -21,9 +21,16 @@ namespace brainshift::inversion {
 
 class BlockRunner {
  public:
-  // Right-hand sides per block: from here on a solve is bound by arithmetic, no longer by reading
-  // the factor.
-  static constexpr int kBlock = 64;
+  // Right-hand sides per block at most: from here on a solve is bound by arithmetic, no longer by
+  // reading the factor.
+  static constexpr int kBlock = 96;
+  // Columns of each block but the last, which may have fewer. An even number of blocks of the same
+  // size, so that two or four cores end at the same time; whatever their number is, since a block's
+  // numbers depend on its size in their last bits.
+  static int block_size(int columns) {
+    const int pairs = std::max(1, (columns + 2 * kBlock - 1) / (2 * kBlock));
+    return std::max(1, (columns + 2 * pairs - 1) / (2 * pairs));
+  }
 
   // What one core works with. The matrices are for `work` below to use as it likes; they keep
   // their memory from one block to the next.
@@ -47,16 +54,16 @@ class BlockRunner {
   // stopped; else the error of a block, after which no other is begun.
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
-    const int blocks = (columns + kBlock - 1) / kBlock;
+    const int size = block_size(columns), blocks = (columns + size - 1) / size;
     std::atomic<int> done{0};
     std::atomic<bool> failed{false};
     std::vector<Status> statuses(static_cast<std::size_t>(team_.size()));
     auto task = [&](int member) {
       for (int block = member; block < blocks; block += team_.size()) {
         if (stop_.stop_requested() || failed) return;
-        const int first = block * kBlock;
+        const int first = block * size;
         Status& status = statuses[static_cast<std::size_t>(member)];
-        status = work(first, std::min(kBlock, columns - first),
+        status = work(first, std::min(size, columns - first),
                       *members_[static_cast<std::size_t>(member)]);
         if (!status) {
           failed = true;

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <mutex>
 #include <numeric>
+#include <thread>
 #include <vector>
 
 #include "common/core/random.hpp"
 #include "common/geometry/spread_nodes.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
+#include "common/inversion/prepared/contact_columns.hpp"
 #include "common/inversion/prepared/data_region.hpp"
 #include "common/inversion/prepared/memory_limit.hpp"
 #include "common/linalg/blas.hpp"
@@ -39,76 +40,49 @@ constexpr int kVarianceNodes = 128;
 constexpr float kLeastControlWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
-// Step 1: G and Phi.
-Status contact_columns(const PreparedModel& model, const CondenseOptions& options,
-                       BlockRunner& runner, MatrixXf& all_columns, CondensedOperators& result) {
-  const auto& pairs = model.forward().contact().pairs();
-  const int s = static_cast<int>(pairs.size());
-  const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
-  all_columns.resize(rows, s);
-  result.compliance.resize(s, s);
-  result.slave_normals.resize(3, s);
-  result.initial_penetration_mm.resize(s);
-  for (int i = 0; i < s; ++i) {
-    const auto& pair = pairs[static_cast<std::size_t>(i)];
-    result.slaves.push_back(pair.slave);
-    result.slave_normals.col(i) = pair.normal;
-    result.initial_penetration_mm[i] = pair.initial_penetration_mm;
-  }
-  std::mutex store_mutex;
-  auto status = runner.run("contact columns", s, [&](int first, int count, auto& own) -> Status {
-    MatrixXf columns(rows, count);
-    MatrixXd compliance(s, count);
-    bool kept = false;
-    if (options.store.load) {
-      const std::lock_guard lock(store_mutex);
-      kept = options.store.load(first / kBlock, columns, compliance);
-    }
-    if (!kept) {
-      own.loads.setZero(rows, count);
-      for (int j = 0; j < count; ++j) {
-        const auto slave = static_cast<std::size_t>(first) + static_cast<std::size_t>(j);
-        own.loads.col(j).template segment<3>(3 * result.slaves[slave]) =
-            result.slave_normals.col(first + j);
-      }
-      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-      const MatrixXd& u = own.solved;
-      for (int j = 0; j < count; ++j) {
-        for (int i = 0; i < s; ++i) {
-          compliance(i, j) = result.slave_normals.col(i).dot(
-              u.col(j).segment<3>(3 * result.slaves[static_cast<std::size_t>(i)]));
-        }
-      }
-      columns = u.cast<float>();
-      if (options.store.save) {
-        const std::lock_guard lock(store_mutex);
-        options.store.save(first / kBlock, columns, compliance);
-      }
-    }
-    all_columns.middleCols(first, count) = columns;
-    result.compliance.middleCols(first, count) = compliance;
-    return {};
-  });
-  // Symmetric but for rounding.
-  for (int j = 0; j < s; ++j) {
-    for (int i = 0; i < j; ++i) {
-      result.compliance(i, j) = result.compliance(j, i) =
-          0.5 * (result.compliance(i, j) + result.compliance(j, i));
-    }
-  }
-  return status;
-}
+// Omega: normally distributed near the data and, weaker, along the slaves' normals. 0 at all other
+// nodes, which are not kept.
+struct TestVectors {
+  std::vector<NodeIndex> nodes;  // sorted
+  MatrixXd numbers;              // 3 nodes x vectors
 
-// Omega: normally distributed near the data and, weaker, along the slaves' normals.
-MatrixXd test_vectors(const CondensedOperators& operators, Eigen::Index rows, int count) {
+  // Columns [first, first + count) with all rows.
+  void write(int first, int count, Eigen::Index rows, MatrixXd& out) const {
+    out.setZero(rows, count);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      out.middleRows<3>(3L * nodes[i]) =
+          numbers.block(3 * static_cast<Eigen::Index>(i), first, 3, count);
+    }
+  }
+  // The rows of a matrix at `nodes`.
+  MatrixXd rows_of(const MatrixXd& all) const {
+    MatrixXd rows(numbers.rows(), all.cols());
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = all.middleRows<3>(3L * nodes[i]);
+    }
+    return rows;
+  }
+};
+
+TestVectors test_vectors(const CondensedOperators& operators, int count) {
+  TestVectors omega;
+  omega.nodes = operators.region;
+  omega.nodes.insert(omega.nodes.end(), operators.slaves.begin(), operators.slaves.end());
+  std::sort(omega.nodes.begin(), omega.nodes.end());
+  omega.nodes.erase(std::unique(omega.nodes.begin(), omega.nodes.end()), omega.nodes.end());
+  const auto row = [&](NodeIndex node) {
+    return 3 *
+           (std::lower_bound(omega.nodes.begin(), omega.nodes.end(), node) - omega.nodes.begin());
+  };
   Random random(kSeed);
-  MatrixXd omega = MatrixXd::Zero(rows, count);
+  omega.numbers.setZero(3 * static_cast<Eigen::Index>(omega.nodes.size()), count);
   for (int j = 0; j < count; ++j) {
+    auto column = omega.numbers.col(j);
     for (const NodeIndex node : operators.region) {
-      for (int axis = 0; axis < 3; ++axis) omega(3 * node + axis, j) = random.normal();
+      for (int axis = 0; axis < 3; ++axis) column[row(node) + axis] = random.normal();
     }
     for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
-      omega.col(j).segment<3>(3 * operators.slaves[i]) +=
+      column.segment<3>(row(operators.slaves[i])) +=
           kSlaveWeight * random.normal() *
           operators.slave_normals.col(static_cast<Eigen::Index>(i));
     }
@@ -135,10 +109,10 @@ std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eig
 
 // The leading modes of F with F = C Omega: F V Lambda^-1/2 with Omega^T F = V Lambda V^T. At most
 // `kept`.
-Result<MatrixXd> leading_modes(const MatrixXd& omega, const MatrixXd& sketch, int kept) {
-  const Eigen::Index tested = omega.cols();
+Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch, int kept) {
+  const Eigen::Index tested = sketch.cols();
   MatrixXd core(tested, tested);
-  linalg::blas::multiply_transposed(1.0, omega, sketch, 0.0, core);
+  linalg::blas::multiply_transposed(1.0, omega.numbers, omega.rows_of(sketch), 0.0, core);
   core = (0.5 * (core + core.transpose())).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
@@ -161,8 +135,22 @@ Result<MatrixXd> leading_modes(const MatrixXd& omega, const MatrixXd& sketch, in
   return modes;
 }
 
-// Steps 2 and 3: U.
-Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& all_modes,
+// Puts displacement fields behind the modes that are there.
+void append_modes(const MatrixXd& fields, MatrixXf& modes, CondensedOperators& result) {
+  const Eigen::Index before = modes.cols();
+  modes.conservativeResize(fields.rows(), before + fields.cols());
+  modes.rightCols(fields.cols()) = fields.cast<float>();
+  result.slave_modes.conservativeResize(static_cast<Eigen::Index>(result.slaves.size()),
+                                        modes.cols());
+  for (std::size_t i = 0; i < result.slaves.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    result.slave_modes.row(row).tail(fields.cols()) =
+        result.slave_normals.col(row).transpose() * fields.middleRows<3>(3L * result.slaves[i]);
+  }
+}
+
+// Steps 1 and 2: U.
+Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& modes,
                    CondensedOperators& result) {
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   const prior::ForcePrior& prior = model.prior();
@@ -171,54 +159,47 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& al
   const int tested = static_cast<int>(
       std::min<Eigen::Index>(*std::max_element(kept.begin(), kept.end()) + kOversampling, rows));
 
-  const MatrixXd omega = test_vectors(result, rows, tested);
-  std::array<MatrixXd, kRemainders> sketches;
-  for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] > 0) sketches[g].resize(rows, tested);
-  }
   MatrixXd load_columns(rows, loads);
-  auto status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
-    own.loads = omega.middleCols(first, count);
-    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-    for (int g = 0; g < kRemainders; ++g) {
-      if (kept[static_cast<std::size_t>(g)] == 0) continue;
-      prior.kernel(g).apply(own.solved, own.forces);
-      if (auto solved = own.solver.solve(own.forces, own.loads); !solved) return solved;
-      sketches[static_cast<std::size_t>(g)].middleCols(first, count) = own.loads;
-    }
-    return {};
-  });
-  if (!status) return status;
-  status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
+  auto status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
     own.loads = prior.modes().middleCols(first, count);
     if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
     load_columns.middleCols(first, count) = own.solved;
     return {};
   });
   if (!status) return status;
+  append_modes(load_columns, modes, result);
+  load_columns.resize(0, 0);
 
+  const TestVectors omega = test_vectors(result, tested);
+  std::array<MatrixXd, kRemainders> sketches;
+  for (std::size_t g = 0; g < kept.size(); ++g) {
+    if (kept[g] > 0) sketches[g].resize(rows, tested);
+  }
+  status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
+    omega.write(first, count, rows, own.loads);
+    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+    for (int g = 0; g < kRemainders; ++g) {
+      if (kept[static_cast<std::size_t>(g)] == 0) continue;
+      prior.kernel(g).apply(own.solved, own.loads);
+      if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
+      sketches[static_cast<std::size_t>(g)].middleCols(first, count) = own.loads;
+    }
+    return {};
+  });
+  if (!status) return status;
   result.part_columns = prior.columns_of_part();
-  MatrixXd modes = std::move(load_columns);
   for (std::size_t g = 0; g < kept.size(); ++g) {
     if (kept[g] == 0) continue;
     const auto leading = leading_modes(omega, sketches[g], kept[g]);
     if (!leading) return tl::unexpected(leading.error());
     sketches[g].resize(0, 0);
     result.part_columns[kLoadParts + g] = static_cast<int>(leading->cols());
-    modes.conservativeResize(rows, modes.cols() + leading->cols());
-    modes.rightCols(leading->cols()) = *leading;
-  }
-  all_modes = modes.cast<float>();
-  result.slave_modes.resize(static_cast<Eigen::Index>(result.slaves.size()), modes.cols());
-  for (std::size_t i = 0; i < result.slaves.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    result.slave_modes.row(row) =
-        result.slave_normals.col(row).transpose() * modes.middleRows<3>(3 * result.slaves[i]);
+    append_modes(*leading, modes, result);
   }
   return {};
 }
 
-// Step 4: what the modes leave out of the prior variance, at the control nodes.
+// Step 3: what the modes leave out of the prior variance, at the control nodes.
 Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const MatrixXf& modes,
                          CondensedOperators& result) {
   const Points& nodes = model.model().mesh.nodes;
@@ -235,6 +216,7 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
         }
         if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
         for (int g = 0; g < kRemainders; ++g) {
+          if (result.columns(static_cast<PriorPart>(kLoadParts + g)) == 0) continue;  // is off
           variance.col(g).segment(first, count) =
               model.prior().kernel(g).variance_along(own.solved);
         }
@@ -277,19 +259,6 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
   return status;
 }
 
-}  // namespace
-
-std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config, int threads) {
-  const auto n3 = static_cast<std::uint64_t>(3) * static_cast<std::uint64_t>(nodes);
-  const auto s = static_cast<std::uint64_t>(slaves);
-  const auto q = static_cast<std::uint64_t>(config.condensed.max_rank) + kOversampling;
-  const std::uint64_t blocks = 8 * n3 * kBlock * 6 * static_cast<std::uint64_t>(threads);
-  // G, also compact; Phi; test vectors, sketches, modes (double) and modes (float)
-  return 6 * n3 * s + 8 * s * s + ((2 + kRemainders) * 8 + 4) * n3 * q + blocks;
-}
-
-namespace {
-
 double largest_motion_sd_mm(const MatrixXf& modes) {
   const VecX squares = modes.rowwise().squaredNorm().cast<double>();
   double largest = 0.0;
@@ -312,18 +281,110 @@ Status check_motion(const MatrixXf& modes) {
   return fail(ErrorCode::kInvalidArgument, text);
 }
 
-// Rows of [U G] at the given nodes.
-MatrixXf region_rows(const std::vector<NodeIndex>& nodes, const MatrixXf& modes,
-                     const MatrixXf& columns) {
-  MatrixXf rows(3 * static_cast<Eigen::Index>(nodes.size()), modes.cols() + columns.cols());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    auto own = rows.middleRows<3>(3 * static_cast<Eigen::Index>(i));
-    own << modes.middleRows<3>(3L * nodes[i]), columns.middleRows<3>(3L * nodes[i]);
+// Keeps the rows of the data region as a group is read: columns [first, first + count) of
+// region_responses. Every node is read once, so that threads write to different places.
+ColumnGroup keeping_region(ColumnGroup group, Eigen::Index first, CondensedOperators& result) {
+  group.rows = [read = std::move(group.rows), first, count = group.count, &result](
+                   std::span<const NodeIndex> nodes, Eigen::Index place, MatrixXf& rows) -> Status {
+    if (auto status = read(nodes, place, rows); !status) return status;
+    const auto& region = result.region;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const auto found = std::lower_bound(region.begin(), region.end(), nodes[i]);
+      if (found == region.end() || *found != nodes[i]) continue;
+      result.region_responses.block(3 * (found - region.begin()), first, 3, count) =
+          rows.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+    }
+    return {};
+  };
+  return group;
+}
+
+// All that is solved with the factor.
+struct Solved {
+  CondensedOperators operators;  // without responses
+  SpatialBlocks nodes;
+  MatrixXf modes;
+  ContactColumns contact;
+};
+
+int threads_of(const CondenseOptions& options) {
+  return options.threads > 0 ? options.threads
+                             : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
+Result<Solved> solve(const PreparedModel& model, const CondenseOptions& options, bool free_model) {
+  CondenseSizes sizes;
+  sizes.nodes = model.model().mesh.num_nodes();
+  sizes.slaves = model.forward().contact().num_slaves();
+  Solved solved;
+  CondensedOperators& result = solved.operators;
+  result.boundary = model.boundary();
+  result.model_id = model.model().model_id;
+  result.region = data_region(model.model());
+  sizes.region = static_cast<int>(result.region.size());
+  sizes.modes = model.config().condensed.max_rank;
+  sizes.threads = threads_of(options);
+  sizes.model_bytes = model.timings().bytes;
+  sizes.model_stays = !free_model;
+  sizes.columns_in_memory = !options.store.keeps();
+  if (auto status = check_memory(model, condense_memory_bytes(sizes)); !status) {
+    return tl::unexpected(status.error());
   }
-  return rows;
+  solved.nodes = node_blocks(model.model().mesh.nodes);
+  BlockRunner runner(model, options.progress, options.stop, options.threads);
+  add_slaves(model, result);
+  // The modes first: the test vectors are gone before the first column is there.
+  if (auto status = prior_modes(model, runner, solved.modes, result); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (auto status = check_motion(solved.modes); !status) return tl::unexpected(status.error());
+  if (auto status = left_out_variance(model, runner, solved.modes, result); !status) {
+    return tl::unexpected(status.error());
+  }
+  auto columns = solve_contact_columns(model, solved.nodes, options.store, runner, result);
+  if (!columns) return tl::unexpected(columns.error());
+  solved.contact = std::move(*columns);
+  return solved;
+}
+
+Result<CondensedOperators> make_compact(Result<Solved> solved, const CondenseOptions& options) {
+  if (!solved) return tl::unexpected(solved.error());
+  CondensedOperators& result = solved->operators;
+  const Eigen::Index modes = solved->modes.cols();
+  const auto slaves = static_cast<Eigen::Index>(result.slaves.size());
+  result.region_responses.resize(3 * static_cast<Eigen::Index>(result.region.size()),
+                                 modes + slaves);
+  ThreadTeam team(options.threads);
+  auto responses =
+      encode_columns(solved->nodes,
+                     {keeping_region(group_of(solved->modes, kModeStep), 0, result),
+                      keeping_region(solved->contact.group(kContactStep), modes, result)},
+                     team, options.progress, options.stop);
+  if (!responses) return tl::unexpected(responses.error());
+  result.responses = std::move(*responses);
+  return std::move(result);
 }
 
 }  // namespace
+
+std::uint64_t condense_memory_bytes(const CondenseSizes& sizes) {
+  const auto of = [](int count) { return static_cast<std::uint64_t>(count); };
+  const std::uint64_t rows = 3 * of(sizes.nodes), s = of(sizes.slaves), m = of(sizes.modes);
+  const std::uint64_t tested = m / 2 + kOversampling;
+  const std::uint64_t columns = sizes.columns_in_memory ? 4 * rows * s : 0;
+  // Two matrices of a member, three of its solver.
+  const std::uint64_t blocks = 5 * 8 * rows * kBlock * of(sizes.threads);
+  const std::uint64_t modes = 4 * rows * m, compliance = 8 * s * s;
+  // Two remainders, as the default case has them; the third is rare.
+  const std::uint64_t sketches = 8 * tested * (2 * rows + 3 * (of(sizes.region) + s));
+  const std::uint64_t solving =
+      sizes.model_bytes + modes + blocks + std::max(sketches, compliance + columns);
+  // Compact columns take less than half of single precision, and are there twice when joined.
+  const std::uint64_t compact = 2 * rows * (s + m), region = 4 * 3 * of(sizes.region) * (s + m);
+  const std::uint64_t packing =
+      (sizes.model_stays ? sizes.model_bytes : 0) + modes + compliance + columns + compact + region;
+  return std::max(solving, packing);
+}
 
 double largest_motion_sd_mm(const CondensedOperators& operators) {
   std::vector<NodeIndex> all(static_cast<std::size_t>(operators.num_nodes()));
@@ -334,41 +395,13 @@ double largest_motion_sd_mm(const CondensedOperators& operators) {
 }
 
 Result<CondensedOperators> condense(const PreparedModel& model, const CondenseOptions& options) {
-  const int slaves = model.forward().contact().num_slaves();
-  const int threads = options.threads > 0
-                          ? options.threads
-                          : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const int nodes = model.model().mesh.num_nodes();
-  const std::uint64_t bytes = condense_memory_bytes(nodes, slaves, model.config(), threads);
-  if (auto status = check_memory(model, bytes); !status) return tl::unexpected(status.error());
-  CondensedOperators result;
-  result.boundary = model.boundary();
-  result.model_id = model.model().model_id;
-  result.region = data_region(model.model());
-  BlockRunner runner(model, options.progress, options.stop, options.threads);
-  MatrixXf columns, modes;  // G, U
-  if (auto status = contact_columns(model, options, runner, columns, result); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (!result.compliance.allFinite()) {
-    return fail(ErrorCode::kNotFinite,
-                "contact columns: the compliance of the slaves is not finite");
-  }
-  if (auto status = prior_modes(model, runner, modes, result); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (auto status = check_motion(modes); !status) return tl::unexpected(status.error());
-  if (auto status = left_out_variance(model, runner, modes, result); !status) {
-    return tl::unexpected(status.error());
-  }
-  ThreadTeam team(options.threads);
-  auto responses =
-      encode_columns(model.model().mesh.nodes, {{&modes, kModeStep}, {&columns, kContactStep}},
-                     team, options.progress, options.stop);
-  if (!responses) return tl::unexpected(responses.error());
-  result.region_responses = region_rows(result.region, modes, columns);
-  result.responses = std::move(*responses);
-  return result;
+  return make_compact(solve(model, options, false), options);
+}
+
+Result<CondensedOperators> condense(PreparedModel&& model, const CondenseOptions& options) {
+  auto solved = solve(model, options, true);
+  { const PreparedModel gone = std::move(model); }
+  return make_compact(std::move(solved), options);
 }
 
 }  // namespace brainshift::inversion

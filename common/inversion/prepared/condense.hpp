@@ -3,35 +3,26 @@
 // solves.
 //
 // Right-hand sides are solved in blocks of kBlock columns, blocks dealt to the cores in a fixed
-// partition, one BLAS thread each, so the result is bit-identical from run to run. Only G (float),
-// the sketch (3n x q, double) and two blocks per core are held at a time.
-//   1. G = K^-1 N block by block; Phi from the same blocks
+// partition, one BLAS thread each, so the result is bit-identical from run to run.
+//   1. load modes K^-1 M
 //   2. for each remainder g of the prior, with one set of test vectors: sketch F = K^-1 Sigma_g
 //      K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading columns
-//   3. load modes K^-1 M
-//   4. diag(C_g) at the control nodes: |Sigma_g^1/2 K^-1 e|^2 by one more solve per control dof
+//   3. diag(C_g) at the control nodes: |Sigma_g^1/2 K^-1 e|^2 by one more solve per control dof
+//   4. G = K^-1 N block by block; Phi from the same blocks (contact_columns.hpp)
 //   5. [U G] made small (encode_columns.hpp)
+// With a store on disk G is in memory by blocks only; and the sketches of step 2 are gone by then.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <stop_token>
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/inversion/prepared/contact_columns.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
-
-// Keeps finished blocks of contact columns, so that an interrupted preparation can go on. Called by
-// one thread at a time.
-struct BlockStore {
-  // Fills both arrays, which have the shape of the block; false when block `index` is not kept.
-  std::function<bool(int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance)> load;
-  std::function<void(int index, const Eigen::MatrixXf& columns, const Eigen::MatrixXd& compliance)>
-      save;
-};
 
 // Steps of compact columns (docs/decisions/0028): of the greatest number of G and of U. An extreme
 // field is a sum of modes with factors of hundreds, which cancel; they are few, and finer.
@@ -39,21 +30,29 @@ inline constexpr float kContactStep = 1.0F / 8388608;  // 2^-23
 inline constexpr float kModeStep = 1.0F / 33554432;    // 2^-25
 
 struct CondenseOptions {
-  Progress progress;     // stages "contact columns", "prior modes", "load modes", "uncertainty",
+  Progress progress;     // stages "load modes", "prior modes", "uncertainty", "contact columns",
                          // "compact columns"
   std::stop_token stop;  // checked between blocks
-  BlockStore store;      // both empty: nothing is kept
+  BlockStore store;      // keeps nothing: G stays in memory
   int threads = 0;       // 0: as many as cores
 };
 
-// kInvalidArgument when condensed.memory_limit_gib is below the factor and condense_memory_bytes
-// (the sentence names both), and when the case's prior allows no motion at all or ten times as much
-// as a skull does (the sentence has the figure); kUnavailable when stopped; kNotFinite.
+// kInvalidArgument when condensed.memory_limit_gib is below condense_memory_bytes (the sentence
+// names both), and when the case's prior allows no motion at all or ten times as much as a skull
+// does (the sentence has the figure); kUnavailable when stopped; kNotFinite; errors of the store.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
+// The same; frees the model, whose factor is as large as all else, before step 5.
+Result<CondensedOperators> condense(PreparedModel&& model, const CondenseOptions& options = {});
 
-// Peak memory of the arrays of condense(), bytes.
-std::uint64_t condense_memory_bytes(int nodes, int slaves, const CaseConfig& config, int threads);
+struct CondenseSizes {
+  int nodes = 0, slaves = 0, region = 0, modes = 0, threads = 1;
+  std::uint64_t model_bytes = 0;  // PrepareTimings::bytes
+  bool model_stays = true;        // during step 5
+  bool columns_in_memory = true;
+};
+// Peak memory of condense() and of its model, bytes.
+std::uint64_t condense_memory_bytes(const CondenseSizes& sizes);
 
 // The largest standard deviation of a node's motion under the prior, mm: root of the sum over its
 // components.

@@ -7,8 +7,7 @@ namespace brainshift::inversion {
 
 Status check_memory(const PreparedModel& model, std::uint64_t bytes) {
   const double limit_gib = model.config().condensed.memory_limit_gib;
-  const double needed_gib =
-      static_cast<double>(model.timings().bytes + bytes) / (1024.0 * 1024.0 * 1024.0);
+  const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
   if (needed_gib <= limit_gib) return {};
   std::ostringstream text;
   text.precision(3);

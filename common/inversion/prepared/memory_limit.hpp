@@ -9,8 +9,8 @@
 
 namespace brainshift::inversion {
 
-// Ok, or kInvalidArgument when the model and `bytes` more exceed condensed.memory_limit_gib of its
-// case. The sentence names both sizes.
+// Ok, or kInvalidArgument when `bytes` exceed condensed.memory_limit_gib of the model's case. The
+// sentence names both sizes.
 Status check_memory(const PreparedModel& model, std::uint64_t bytes);
 
 }  // namespace brainshift::inversion

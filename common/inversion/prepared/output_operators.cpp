@@ -56,9 +56,9 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   const int nodes = model.model().mesh.num_nodes(), h = static_cast<int>(outputs.size());
   const int used_threads =
       threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  if (auto status = check_memory(model, output_operators_bytes(nodes, h, used_threads)); !status) {
-    return tl::unexpected(status.error());
-  }
+  const std::uint64_t bytes =
+      model.timings().bytes + output_operators_bytes(nodes, h, used_threads);
+  if (auto status = check_memory(model, bytes); !status) return tl::unexpected(status.error());
 
   BlockRunner runner(model, progress, stop, threads);
   MatrixXd x(3 * nodes, h);  // K^-1 H^T

@@ -77,17 +77,25 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   }
   if (!forward) return tl::unexpected(forward.error());
 
-  PreparedModel prepared(std::move(model), config, std::move(*forward), std::move(prior));
+  PreparedModel prepared = of(std::move(model), config, std::move(*forward), std::move(prior));
+  prepared.timings_.prior_s = prior_s;
+  prepared.timings_.total_s = whole.seconds();
+  report(progress, "ready", 1.0);
+  return prepared;
+}
+
+PreparedModel PreparedModel::of(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                                contact::ForwardModel forward,
+                                std::shared_ptr<const prior::ForcePrior> prior) {
+  PreparedModel prepared(std::move(model), config, std::move(forward), std::move(prior));
   const fem::StiffnessFactor& factor = prepared.forward_.factor();
   PrepareTimings& timings = prepared.timings_;
   timings.assemble_s = prepared.forward_.assemble_seconds();
   timings.analyse_s = factor.analyse_seconds();
   timings.factor_s = factor.factor_seconds();
-  timings.prior_s = prior_s;
+  timings.total_s = timings.assemble_s + timings.analyse_s + timings.factor_s;
   timings.factor_nonzeros = factor.nonzeros();
   timings.bytes = prepared.forward_.bytes() + prepared.prior().bytes();
-  timings.total_s = whole.seconds();
-  report(progress, "ready", 1.0);
   return prepared;
 }
 

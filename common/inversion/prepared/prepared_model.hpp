@@ -42,6 +42,11 @@ class PreparedModel {
                                        const Progress& progress = {},
                                        std::shared_ptr<const prior::ForcePrior> prior = nullptr);
 
+  // The same from a forward model and a prior that were made elsewhere.
+  static PreparedModel of(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                          contact::ForwardModel forward,
+                          std::shared_ptr<const prior::ForcePrior> prior);
+
   const BrainModel& model() const { return *model_; }
   const CaseConfig& config() const { return config_; }
   Boundary boundary() const { return forward_.boundary(); }

@@ -23,7 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kMagic[8] = {'b', 's', 'h', 'i', 'f', 't', 'c', 'p'};
-constexpr std::uint32_t kVersion = 1;
+// 2: blocks hold the columns as rows, neighbouring slaves together.
+constexpr std::uint32_t kVersion = 2;
 
 struct FileHeader {
   char magic[8];
@@ -98,6 +99,20 @@ bool whole_block(int file, std::uint64_t at, std::uint64_t file_size, Block& blo
   return crc == header.payload_crc;
 }
 
+// What of a matrix lies in one piece of memory: all of it, or a column.
+template <typename Matrix>
+struct Pieces {
+  Eigen::Index count;
+  std::size_t bytes;  // of each
+
+  explicit Pieces(const Matrix& matrix)
+      : count(matrix.outerStride() == matrix.rows() ? 1 : matrix.cols()),
+        bytes(count == 0 ? 0
+                         : static_cast<std::size_t>(matrix.size() / count) *
+                               sizeof(typename Matrix::Scalar)) {}
+  std::uint64_t from(Eigen::Index i) const { return static_cast<std::uint64_t>(i) * bytes; }
+};
+
 std::uint64_t payload_bytes(const BlockHeader& header) {
   return header.rows * header.columns * header.scalar_bytes;
 }
@@ -122,6 +137,7 @@ struct CheckpointFile::Impl {
   Status append(int index, const Matrix& matrix);
   template <typename Matrix>
   Status read(int index, Matrix& out) const;
+  Result<Block> find(int index) const;
 };
 
 // Header read, or written where there is none of this key; what is no whole block cut off.
@@ -161,15 +177,15 @@ void CheckpointFile::Impl::find_blocks(std::uint64_t size) {
 template <typename Matrix>
 Status CheckpointFile::Impl::append(int index, const Matrix& matrix) {
   using Scalar = typename Matrix::Scalar;
-  const std::size_t column_bytes = static_cast<std::size_t>(matrix.rows()) * sizeof(Scalar);
+  const Pieces pieces(matrix);
+  const auto piece = [&](Eigen::Index i) { return matrix.data() + i * matrix.outerStride(); };
   Block block{};
   block.header.index = index;
   block.header.scalar_bytes = sizeof(Scalar);
   block.header.rows = static_cast<std::uint64_t>(matrix.rows());
   block.header.columns = static_cast<std::uint64_t>(matrix.cols());
-  for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-    block.header.payload_crc =
-        crc32_of(matrix.col(j).data(), column_bytes, block.header.payload_crc);
+  for (Eigen::Index i = 0; i < pieces.count; ++i) {
+    block.header.payload_crc = crc32_of(piece(i), pieces.bytes, block.header.payload_crc);
   }
   block.header.crc = header_crc(block.header);
 
@@ -180,9 +196,8 @@ Status CheckpointFile::Impl::append(int index, const Matrix& matrix) {
   }
   block.payload_at = end + sizeof block.header;
   bool good = write_at(file.get(), &block.header, sizeof block.header, end);
-  for (Eigen::Index j = 0; good && j < matrix.cols(); ++j) {
-    good = write_at(file.get(), matrix.col(j).data(), column_bytes,
-                    block.payload_at + static_cast<std::uint64_t>(j) * column_bytes);
+  for (Eigen::Index i = 0; good && i < pieces.count; ++i) {
+    good = write_at(file.get(), piece(i), pieces.bytes, block.payload_at + pieces.from(i));
   }
   if (!good) {
     const auto error = write_error("append block " + std::to_string(index));
@@ -195,18 +210,19 @@ Status CheckpointFile::Impl::append(int index, const Matrix& matrix) {
   return {};
 }
 
+Result<Block> CheckpointFile::Impl::find(int index) const {
+  const std::lock_guard lock(mutex);
+  const auto found = blocks.find(index);
+  if (found != blocks.end()) return found->second;
+  return file_error(ErrorCode::kNotFound, path, "has no block " + std::to_string(index));
+}
+
 template <typename Matrix>
 Status CheckpointFile::Impl::read(int index, Matrix& out) const {
   using Scalar = typename Matrix::Scalar;
-  Block block{};
-  {
-    const std::lock_guard lock(mutex);
-    const auto found = blocks.find(index);
-    if (found == blocks.end()) {
-      return file_error(ErrorCode::kNotFound, path, "has no block " + std::to_string(index));
-    }
-    block = found->second;
-  }
+  const auto found = find(index);
+  if (!found) return tl::unexpected(found.error());
+  const Block& block = *found;
   const BlockHeader& header = block.header;
   if (header.scalar_bytes != sizeof(Scalar) ||
       header.rows != static_cast<std::uint64_t>(out.rows()) ||
@@ -218,16 +234,15 @@ Status CheckpointFile::Impl::read(int index, Matrix& out) const {
                           std::to_string(out.rows()) + " x " + std::to_string(out.cols()) + " of " +
                           std::to_string(sizeof(Scalar)));
   }
-  const std::size_t column_bytes = static_cast<std::size_t>(out.rows()) * sizeof(Scalar);
+  const Pieces pieces(out);
   std::uint32_t crc = 0;
-  for (Eigen::Index j = 0; j < out.cols(); ++j) {
-    Scalar* column = out.data() + j * out.outerStride();
-    if (!read_at(file.get(), column, column_bytes,
-                 block.payload_at + static_cast<std::uint64_t>(j) * column_bytes)) {
+  for (Eigen::Index i = 0; i < pieces.count; ++i) {
+    Scalar* piece = out.data() + i * out.outerStride();
+    if (!read_at(file.get(), piece, pieces.bytes, block.payload_at + pieces.from(i))) {
       return file_error(ErrorCode::kUnreadable, path,
                         "block " + std::to_string(index) + " cannot be read");
     }
-    crc = crc32_of(column, column_bytes, crc);
+    crc = crc32_of(piece, pieces.bytes, crc);
   }
   if (crc == header.payload_crc) return {};
   return file_error(ErrorCode::kUnreadable, path,
@@ -278,6 +293,25 @@ Status CheckpointFile::read(int index, Eigen::Ref<Eigen::MatrixXf> out) const {
 }
 Status CheckpointFile::read(int index, Eigen::Ref<Eigen::MatrixXd> out) const {
   return impl_->read(index, out);
+}
+
+Status CheckpointFile::read_columns(int index, Eigen::Index first, Eigen::MatrixXf& out) const {
+  const auto block = impl_->find(index);
+  if (!block) return tl::unexpected(block.error());
+  const BlockHeader& header = block->header;
+  const auto begin = static_cast<std::uint64_t>(first);
+  if (header.scalar_bytes != sizeof(float) ||
+      header.rows != static_cast<std::uint64_t>(out.rows()) ||
+      begin + static_cast<std::uint64_t>(out.cols()) > header.columns) {
+    return file_error(ErrorCode::kInvalidArgument, impl_->path,
+                      "block " + std::to_string(index) + " has no such columns");
+  }
+  if (read_at(impl_->file.get(), out.data(), sizeof(float) * static_cast<std::size_t>(out.size()),
+              block->payload_at + begin * header.rows * sizeof(float))) {
+    return {};
+  }
+  return file_error(ErrorCode::kUnreadable, impl_->path,
+                    "block " + std::to_string(index) + " cannot be read");
 }
 
 Status CheckpointFile::remove() {

@@ -9,7 +9,7 @@
 // Native byte order: it is no file to keep or to give away.
 //
 // Not synced block by block: a block that a power failure lost fails its checksum and is computed
-// again. append() and read() may be called from several threads at once.
+// again. append() and the reads may be called from several threads at once.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,6 +45,10 @@ class CheckpointFile {
   // numbers).
   Status read(int index, Eigen::Ref<Eigen::MatrixXf> out) const;
   Status read(int index, Eigen::Ref<Eigen::MatrixXd> out) const;
+
+  // Columns [first, first + out.cols()) of a block with out.rows() rows, without a look at its
+  // checksum, which covers the whole block. Errors as read().
+  Status read_columns(int index, Eigen::Index first, Eigen::MatrixXf& out) const;
 
   // Deletes the file; nothing can be appended or read afterwards.
   Status remove();

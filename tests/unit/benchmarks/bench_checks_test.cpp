@@ -223,6 +223,7 @@ TEST(BenchResults, ReadsTheLargestRankOfTheComparisonWithTheDirectPosterior) {
              "reduced": [{"rank": 32, "max_mm": 0.5}, {"rank": 128, "max_mm": 0.002}]})";
   std::ofstream(folder.path() / "prepare.json")
       << R"({"total_s": 12.5, "mesh": {"nodes": 7}, "peak_memory_bytes": 100})";
+  std::ofstream(folder.path() / "prepare-100k.json") << R"({"total_s": 340, "mesh": {}})";
   const auto results = read_results(folder.path());
   ASSERT_TRUE(results) << results.error().message;
   EXPECT_DOUBLE_EQ(results->fact("direct_max_mm distension"), 0.002);
@@ -230,6 +231,7 @@ TEST(BenchResults, ReadsTheLargestRankOfTheComparisonWithTheDirectPosterior) {
   EXPECT_TRUE(std::isnan(results->fact("direct_max_mm paper")));
   EXPECT_DOUBLE_EQ(results->fact("prepare_s"), 12.5);
   EXPECT_TRUE(std::isnan(results->fact("model_file_bytes")));
+  EXPECT_DOUBLE_EQ(results->fact("large_prepare_s"), 340.0);
   std::ofstream(folder.path() / "direct-paper.json") << "[";
   EXPECT_EQ(read_results(folder.path()).error().code, ErrorCode::kUnreadable);
   EXPECT_EQ(read_results(folder.path() / "none").error().code, ErrorCode::kNotFound);

@@ -52,8 +52,8 @@ CompactColumns encoded(const Points& nodes, const std::vector<const MatrixXf*>& 
                        int threads = 1, float step = kStep) {
   ThreadTeam team(threads);
   std::vector<ColumnGroup> given;
-  for (const MatrixXf* group : groups) given.push_back({group, step});
-  auto made = encode_columns(nodes, given, team);
+  for (const MatrixXf* group : groups) given.push_back(group_of(*group, step));
+  auto made = encode_columns(node_blocks(nodes), given, team);
   EXPECT_TRUE(made.has_value()) << made.error().message;
   return std::move(*made);
 }
@@ -211,7 +211,7 @@ TEST(EncodeColumns, NumbersThatAreNotFiniteAreRefused) {
     MatrixXf fields = noise(60, 2, 1.0F, random);
     fields(31, 1) = bad;
     ThreadTeam team(1);
-    const auto refused = encode_columns(nodes, {{&fields, kStep}}, team);
+    const auto refused = encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team);
     ASSERT_FALSE(refused.has_value());
     EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
   }
@@ -264,7 +264,8 @@ TEST(EncodeColumns, CanBeStopped) {
   std::stop_source stop;
   stop.request_stop();
   ThreadTeam team(1);
-  const auto stopped = encode_columns(nodes, {{&fields, kStep}}, team, {}, stop.get_token());
+  const auto stopped =
+      encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team, {}, stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
 }

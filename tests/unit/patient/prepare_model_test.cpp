@@ -51,7 +51,7 @@ TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
   std::stop_source stop;
   options.stop = stop.get_token();
   options.progress = [&](std::string_view stage, double) {
-    if (stage == "contact: prior modes") stop.request_stop();  // the contact columns are done
+    if (stage == "contact: compact columns") stop.request_stop();  // the contact columns are done
   };
   const auto interrupted = prepare_model(config(), options);
   ASSERT_FALSE(interrupted.has_value());

@@ -60,7 +60,8 @@ TEST_F(EstimateCheck, AFieldThatContradictsItsContactForcesIsRefused) {
   Eigen::MatrixXf columns = decode_rows(wrong->responses, column_range(0, wrong->num_nodes()),
                                         column_range(0, wrong->responses.num_columns()), team);
   columns.col(wrong->contact_column(static_cast<int>(slave))) *= 1.5F;
-  wrong->responses = *encode_columns(patient()->mesh.nodes, {{&columns, kModeStep}}, team);
+  wrong->responses =
+      *encode_columns(node_blocks(patient()->mesh.nodes), {group_of(columns, kModeStep)}, team);
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
   auto broken = CondensedInverter::build(wrong, locator, config(), {});
   ASSERT_TRUE(broken.has_value());

@@ -3,7 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <map>
+#include <tuple>
+#include <utility>
 
 #include "common/operators/encode_columns.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
@@ -119,30 +122,98 @@ TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
   EXPECT_TRUE(serial->truncated_variance_mm2 == parallel->truncated_variance_mm2);
 }
 
-TEST_F(Condensed, FinishedBlocksAreNotSolvedAgain) {
+// A store in memory that also remembers compliances, as a checkpoint does.
+struct RememberingStore {
   std::map<int, std::pair<Eigen::MatrixXf, Eigen::MatrixXd>> kept;
-  CondenseOptions options;
-  options.store.load = [&](int index, Eigen::MatrixXf& columns, Eigen::MatrixXd& compliance) {
-    const auto found = kept.find(index);
-    if (found == kept.end()) return false;
-    std::tie(columns, compliance) = found->second;
-    return true;
-  };
   int saved = 0;
-  options.store.save = [&](int index, const Eigen::MatrixXf& columns,
-                           const Eigen::MatrixXd& compliance) {
-    kept[index] = {columns, compliance};
-    ++saved;
-  };
-  const auto first = condense(prepared(Boundary::kContact), options);
+
+  CondenseOptions options() {
+    CondenseOptions options;
+    options.store.load = [this](int index, Eigen::MatrixXf& rows, Eigen::MatrixXd& compliance) {
+      const auto found = kept.find(index);
+      if (found == kept.end()) return false;
+      std::tie(rows, compliance) = found->second;
+      return true;
+    };
+    options.store.save = [this](int index, const Eigen::MatrixXf& rows,
+                                const Eigen::MatrixXd& compliance) -> Status {
+      kept[index] = {rows, compliance};
+      ++saved;
+      return {};
+    };
+    options.store.read = [this](int index, Eigen::Index first, Eigen::MatrixXf& out) -> Status {
+      out = kept.at(index).first.middleCols(first, out.cols());
+      return {};
+    };
+    return options;
+  }
+};
+
+TEST_F(Condensed, FinishedBlocksAreNotSolvedAgainAndNeedNoMemoryOfTheirOwn) {
+  RememberingStore store;
+  const auto first = condense(prepared(Boundary::kContact), store.options());
   ASSERT_TRUE(first);
-  ASSERT_GT(saved, 0);
-  saved = 0;
-  const auto second = condense(prepared(Boundary::kContact), options);
+  ASSERT_GT(store.saved, 0);
+  store.saved = 0;
+  const auto second = condense(prepared(Boundary::kContact), store.options());
   ASSERT_TRUE(second);
-  EXPECT_EQ(saved, 0);
-  EXPECT_TRUE(first->responses.parts() == second->responses.parts());
-  EXPECT_TRUE(first->compliance == second->compliance);
+  EXPECT_EQ(store.saved, 0);
+  const auto in_memory = operators(Boundary::kContact);
+  for (const auto& made : {&*first, &*second}) {
+    EXPECT_TRUE(made->responses.parts() == in_memory->responses.parts());
+    EXPECT_TRUE(made->compliance == in_memory->compliance);
+    EXPECT_TRUE(made->region_responses == in_memory->region_responses);
+  }
+}
+
+TEST_F(Condensed, AModelThatIsGivenAwayGivesTheSame) {
+  auto model = PreparedModel::prepare(patient(), config(), Boundary::kContact);
+  ASSERT_TRUE(model);
+  const auto made = condense(std::move(*model));
+  ASSERT_TRUE(made);
+  EXPECT_TRUE(made->responses.parts() == operators(Boundary::kContact)->responses.parts());
+}
+
+TEST_F(Condensed, AStoreThatFailsEndsItWithTheStoresWords) {
+  RememberingStore store;
+  CondenseOptions full = store.options();
+  full.store.save = [](int, const Eigen::MatrixXf&, const Eigen::MatrixXd&) -> Status {
+    return fail(ErrorCode::kWriteFailed, "m.h5.partial: no space");
+  };
+  CondenseOptions torn = store.options();
+  torn.store.read = [](int, Eigen::Index, Eigen::MatrixXf&) -> Status {
+    return fail(ErrorCode::kUnreadable, "m.h5.partial: cannot be read");
+  };
+  const auto not_saved = condense(prepared(Boundary::kContact), full);
+  ASSERT_FALSE(not_saved);
+  EXPECT_EQ(not_saved.error().message, "m.h5.partial: no space");
+  const auto not_read = condense(prepared(Boundary::kContact), torn);
+  ASSERT_FALSE(not_read);
+  EXPECT_EQ(not_read.error().message, "m.h5.partial: cannot be read");
+}
+
+TEST_F(Condensed, AStoreWithANumberThatIsNotFiniteIsRefused) {
+  RememberingStore store;
+  ASSERT_TRUE(condense(prepared(Boundary::kContact), store.options()));
+  store.kept.begin()->second.first(0, 5) = std::numeric_limits<float>::quiet_NaN();
+  const auto refused = condense(prepared(Boundary::kContact), store.options());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
+}
+
+// A store and a model that is given away are what a large mesh needs.
+TEST(CondenseMemory, OfAHundredThousandNodesIsWithinTheDefaultWithColumnsOnDisk) {
+  CondenseSizes sizes;
+  sizes.nodes = 94000;
+  sizes.slaves = 7200;
+  sizes.region = 12000;
+  sizes.modes = 116;
+  sizes.threads = 2;
+  sizes.model_bytes = 4250000000;
+  const auto gib = [&] { return static_cast<double>(condense_memory_bytes(sizes)) / (1 << 30); };
+  EXPECT_GT(gib(), 12.0);
+  sizes.model_stays = sizes.columns_in_memory = false;
+  EXPECT_LT(gib(), CaseConfig{}.condensed.memory_limit_gib);
 }
 
 TEST_F(Condensed, MemoryLimitIsRespectedBeforeWorkBegins) {
@@ -176,7 +247,7 @@ TEST_F(Condensed, ProgressRunsFromZeroToOneInEveryStage) {
   };
   ASSERT_TRUE(condense(prepared(Boundary::kContact), options));
   for (const char* stage :
-       {"contact columns", "prior modes", "load modes", "uncertainty", "compact columns"}) {
+       {"load modes", "prior modes", "uncertainty", "contact columns", "compact columns"}) {
     ASSERT_TRUE(stages.count(stage)) << stage;
     EXPECT_EQ(stages[stage].first, 0.0);
     EXPECT_EQ(stages[stage].second, 1.0);

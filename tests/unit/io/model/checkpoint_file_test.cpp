@@ -198,6 +198,26 @@ TEST_F(CheckpointFileTest, WhatIsNotThereIsNotRead) {
             ErrorCode::kInvalidArgument);
 }
 
+TEST_F(CheckpointFileTest, ColumnsOfABlockAreReadByThemselves) {
+  CheckpointFile file = open();
+  const Eigen::MatrixXf whole = block<float>(3, 4, 6);
+  ASSERT_TRUE(file.append(3, whole));
+  ASSERT_TRUE(file.append(4, block<double>(4, 4, 6)));
+  for (const auto& [first, count] :
+       {std::pair{0, 6}, std::pair{0, 1}, std::pair{2, 3}, std::pair{5, 1}, std::pair{6, 0}}) {
+    Eigen::MatrixXf out(4, count);
+    ASSERT_TRUE(file.read_columns(3, first, out)) << first;
+    EXPECT_EQ(out, whole.middleCols(first, count));
+  }
+  Eigen::MatrixXf two(4, 2), short_rows(3, 2);
+  EXPECT_EQ(file.read_columns(3, 5, two).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(file.read_columns(3, 0, short_rows).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(file.read_columns(4, 0, two).error().code, ErrorCode::kInvalidArgument) << "doubles";
+  EXPECT_EQ(file.read_columns(9, 0, two).error().code, ErrorCode::kNotFound);
+  std::filesystem::resize_file(path_, kFileHeader + kBlockHeader + 4);
+  EXPECT_EQ(file.read_columns(3, 0, two).error().code, ErrorCode::kUnreadable);
+}
+
 TEST_F(CheckpointFileTest, BlockAlteredWhileOpenIsNotRead) {
   const auto ends = write_three();
   const CheckpointFile file = open();

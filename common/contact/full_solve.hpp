@@ -4,10 +4,10 @@
 
 #include "common/contact/forward_model.hpp"
 
-namespace brainshift::inversion {
+namespace brainshift::contact {
 
 // Median of 9 single solves after one that warms up, ms. Takes 10 solves of time: a third of a
 // second on the default head.
-double measure_full_solve_ms(const contact::ForwardModel& forward);
+double measure_full_solve_ms(const ForwardModel& forward);
 
-}  // namespace brainshift::inversion
+}  // namespace brainshift::contact

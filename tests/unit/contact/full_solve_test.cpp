@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/prepared/full_solve.hpp"
+#include "common/contact/full_solve.hpp"
 
 #include "common/core/stopwatch.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
-namespace brainshift::inversion {
+namespace brainshift::contact {
 namespace {
 
 TEST(FullSolve, IsPositiveAndShorterThanAllItsSolvesTogether) {
-  const PreparedModel model = prepare(Boundary::kContact);
+  const auto model = inversion::prepare(Boundary::kContact);
   const Stopwatch watch;
   const double solve_ms = measure_full_solve_ms(model.forward());
   EXPECT_GT(solve_ms, 0.0);
@@ -16,4 +16,4 @@ TEST(FullSolve, IsPositiveAndShorterThanAllItsSolvesTogether) {
 }
 
 }  // namespace
-}  // namespace brainshift::inversion
+}  // namespace brainshift::contact

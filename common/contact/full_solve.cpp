@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/prepared/full_solve.hpp"
+#include "common/contact/full_solve.hpp"
 
 #include <vector>
 
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 
-namespace brainshift::inversion {
+namespace brainshift::contact {
 
-double measure_full_solve_ms(const contact::ForwardModel& forward) {
+double measure_full_solve_ms(const ForwardModel& forward) {
   constexpr int kRepetitions = 9;
   const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
   VecX x = forward.factor().solve(b);  // allocates the workspace
@@ -21,4 +21,4 @@ double measure_full_solve_ms(const contact::ForwardModel& forward) {
   return percentile(times_ms, 50.0);
 }
 
-}  // namespace brainshift::inversion
+}  // namespace brainshift::contact

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/prepared/contact_columns.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+namespace brainshift::inversion {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+
+// How the slaves are dealt.
+struct Blocks {
+  int size, count;
+  explicit Blocks(std::size_t slaves)
+      : size(BlockRunner::block_size(static_cast<int>(slaves))),
+        count((static_cast<int>(slaves) + size - 1) / size) {}
+};
+
+Points slave_positions(const PreparedModel& model, const CondensedOperators& result) {
+  Points positions(3, static_cast<Eigen::Index>(result.slaves.size()));
+  for (std::size_t i = 0; i < result.slaves.size(); ++i) {
+    positions.col(static_cast<Eigen::Index>(i)) = model.model().mesh.nodes.col(result.slaves[i]);
+  }
+  return positions;
+}
+
+// Columns of displacements -> rows, nodes in the order of their blocks.
+void turn(const MatrixXd& columns, const SpatialBlocks& nodes, MatrixXf& rows) {
+  Eigen::Index place = 0;
+  for (int b = 0; b < nodes.size(); ++b) {
+    const auto block = nodes.block(b);
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) {  // a block's rows stay in the cache
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        rows.row(j).segment<3>(place + 3 * static_cast<Eigen::Index>(i)) =
+            columns.col(j).segment<3>(3L * block[i]).cast<float>().transpose();
+      }
+    }
+    place += 3 * static_cast<Eigen::Index>(block.size());
+  }
+}
+
+// Phi's columns of the slaves that have the responses u.
+void compliance_of(const MatrixXd& u, const CondensedOperators& operators, MatrixXd& compliance) {
+  for (Eigen::Index j = 0; j < u.cols(); ++j) {
+    for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      compliance(row, j) =
+          operators.slave_normals.col(row).dot(u.col(j).segment<3>(3L * operators.slaves[i]));
+    }
+  }
+}
+
+// Phi is symmetric but for rounding.
+void make_symmetric(MatrixXd& phi) {
+  for (Eigen::Index j = 0; j < phi.cols(); ++j) {
+    for (Eigen::Index i = 0; i < j; ++i) phi(i, j) = phi(j, i) = 0.5 * (phi(i, j) + phi(j, i));
+  }
+}
+
+}  // namespace
+
+BlockStore memory_store(int blocks) {
+  const auto kept = std::make_shared<std::vector<MatrixXf>>(static_cast<std::size_t>(blocks));
+  BlockStore store;
+  store.load = [](int, MatrixXf&, MatrixXd&) { return false; };
+  store.save = [kept](int index, const MatrixXf& rows, const MatrixXd&) -> Status {
+    (*kept)[static_cast<std::size_t>(index)] = rows;
+    return {};
+  };
+  store.read = [kept](int index, Eigen::Index first, MatrixXf& out) -> Status {
+    out = (*kept)[static_cast<std::size_t>(index)].middleCols(first, out.cols());
+    return {};
+  };
+  return store;
+}
+
+ColumnGroup ContactColumns::group(float step) const {
+  ColumnGroup group;
+  group.count = static_cast<int>(order.size());
+  group.step = step;
+  group.greatest = greatest;
+  group.rows = [this](std::span<const NodeIndex>, Eigen::Index place, MatrixXf& out) -> Status {
+    MatrixXf part;
+    const Blocks blocks(order.size());
+    for (int block = 0; block < blocks.count; ++block) {
+      const auto slaves = std::span(order).subspan(static_cast<std::size_t>(block * blocks.size));
+      part.resize(std::min<Eigen::Index>(blocks.size, static_cast<Eigen::Index>(slaves.size())),
+                  out.rows());
+      if (auto status = store.read(block, 3 * place, part); !status) return status;
+      for (Eigen::Index j = 0; j < part.rows(); ++j) {
+        out.col(slaves[static_cast<std::size_t>(j)]) = part.row(j).transpose();
+      }
+    }
+    return {};
+  };
+  return group;
+}
+
+void add_slaves(const PreparedModel& model, CondensedOperators& result) {
+  const auto& pairs = model.forward().contact().pairs();
+  const auto s = static_cast<Eigen::Index>(pairs.size());
+  result.slave_normals.resize(3, s);
+  result.initial_penetration_mm.resize(s);
+  for (Eigen::Index i = 0; i < s; ++i) {
+    const auto& pair = pairs[static_cast<std::size_t>(i)];
+    result.slaves.push_back(pair.slave);
+    result.slave_normals.col(i) = pair.normal;
+    result.initial_penetration_mm[i] = pair.initial_penetration_mm;
+  }
+}
+
+Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const SpatialBlocks& nodes,
+                                             BlockStore store, BlockRunner& runner,
+                                             CondensedOperators& result) {
+  const auto s = static_cast<Eigen::Index>(result.slaves.size());
+  const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
+  const Blocks blocks(result.slaves.size());
+  ContactColumns columns;
+  columns.order = spatial_blocks(slave_positions(model, result), blocks.size).order;
+  columns.store = store.keeps() ? std::move(store) : memory_store(blocks.count);
+  result.compliance.resize(s, s);
+  std::mutex mutex;  // of the store, the greatest number and what was not finite
+  bool finite = true;
+  const auto work = [&](int first, int count, BlockRunner::Member& own) -> Status {
+    const auto slave = [&](int j) { return columns.order[static_cast<std::size_t>(first + j)]; };
+    MatrixXf turned(count, rows);
+    MatrixXd compliance(s, count);
+    bool kept = false;
+    {
+      const std::lock_guard lock(mutex);
+      kept = columns.store.load(first / blocks.size, turned, compliance);
+    }
+    if (!kept) {
+      own.loads.setZero(rows, count);
+      for (int j = 0; j < count; ++j) {
+        own.loads.col(j).segment<3>(3L * result.slaves[static_cast<std::size_t>(slave(j))]) =
+            result.slave_normals.col(slave(j));
+      }
+      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+      compliance_of(own.solved, result, compliance);
+      turn(own.solved, nodes, turned);
+    }
+    const float greatest = greatest_of(turned);
+    for (int j = 0; j < count; ++j) result.compliance.col(slave(j)) = compliance.col(j);
+    const std::lock_guard lock(mutex);
+    finite = finite && std::isfinite(greatest) && compliance.allFinite();
+    columns.greatest = std::max(columns.greatest, greatest);
+    return kept ? Status{} : columns.store.save(first / blocks.size, turned, compliance);
+  };
+  if (auto status = runner.run("contact columns", static_cast<int>(s), work); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (!finite) {
+    return fail(ErrorCode::kNotFinite,
+                "contact columns: the compliance of the slaves is not finite");
+  }
+  make_symmetric(result.compliance);
+  return columns;
+}
+
+}  // namespace brainshift::inversion
