@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -199,13 +200,24 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   return {};
 }
 
+// Neighbours are solved together (contact_columns.hpp says why).
+void bring_neighbours_together(const Points& nodes, std::span<NodeIndex> some) {
+  const std::vector<NodeIndex> before(some.begin(), some.end());
+  const SpatialBlocks blocks =
+      spatial_blocks(nodes(Eigen::all, before), std::max(1, BlockRunner::kBlock / 3));
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    some[i] = before[static_cast<std::size_t>(blocks.order[i])];
+  }
+}
+
 // Step 3: what the modes leave out of the prior variance, at the control nodes.
 Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const MatrixXf& modes,
                          CondensedOperators& result) {
   const Points& nodes = model.model().mesh.nodes;
-  const std::vector<NodeIndex> spread =
+  std::vector<NodeIndex> spread =
       geometry::spread_nodes(nodes, model.config().condensed.uncertainty_nodes);
   const int probed = std::min<int>(kVarianceNodes, static_cast<int>(spread.size()));
+  bring_neighbours_together(nodes, std::span(spread).first(static_cast<std::size_t>(probed)));
   MatrixXd variance = MatrixXd::Zero(3 * probed, kRemainders);
   auto status =
       runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& own) -> Status {

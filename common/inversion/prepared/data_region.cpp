@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/data_region.hpp"
 
+#include <Eigen/Geometry>
+
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/tet_locator.hpp"
 
@@ -9,9 +11,14 @@ namespace brainshift::inversion {
 std::vector<NodeIndex> data_region(const BrainModel& model) {
   std::vector<char> near(static_cast<std::size_t>(model.mesh.num_nodes()), 0);
   const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  Eigen::AlignedBox3d box;  // no node outside is within the margin of the tumour
+  for (const auto& vertex : model.tumour.vertices.colwise()) box.extend(vertex);
+  box.min().array() -= kRegionMargin_mm;
+  box.max().array() += kRegionMargin_mm;
   for (int i = 0; i < model.mesh.num_nodes(); ++i) {
     const Vec3 node = model.mesh.nodes.col(i);
-    bool within = tumour && (tumour->closest(node).point - node).norm() < kRegionMargin_mm;
+    bool within = tumour && box.contains(node) &&
+                  (tumour->closest(node).point - node).norm() < kRegionMargin_mm;
     for (std::size_t k = 0; !within && k < model.craniotomy.size(); ++k) {
       within = (model.mesh.nodes.col(model.craniotomy[k]) - node).norm() < kRegionMargin_mm;
     }
