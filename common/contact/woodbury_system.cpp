@@ -33,22 +33,22 @@ Status WoodburySystem::solve_columns(const std::vector<int>& slaves) {
   Eigen::MatrixXd x;
   for (std::size_t begin = 0; begin < slaves.size(); begin += kBlock) {
     const auto width = static_cast<Eigen::Index>(std::min(kBlock, slaves.size() - begin));
-    rhs.setZero(dofs.num_unknowns(), width);
+    rhs.setZero(width, dofs.num_unknowns());
     for (Eigen::Index j = 0; j < width; ++j) {
       const ContactPair& pair = pairs[slaves[begin + j]];
       for (int axis = 0; axis < 3; ++axis) {
-        rhs(dofs.unknown(pair.slave, axis), j) = pair.normal[axis];
+        rhs(j, dofs.unknown(pair.slave, axis)) = pair.normal[axis];
       }
     }
-    forward().factor().solve_many(rhs, x, workspace_);
-    const auto quality = fem::check_many(forward().stiffness(), forward().stiffness_norm(),
+    forward().factor().solve_rows(rhs, x, workspace_);
+    const auto quality = fem::check_rows(forward().stiffness(), forward().stiffness_norm(),
                                          forward().factor(), rhs, x, workspace_);
     if (!quality) return tl::unexpected(quality.error());
     for (Eigen::Index j = 0; j < width; ++j) {
       const int column = slaves[begin + j];
       for (Eigen::Index i = 0; i < phi_.rows(); ++i) {
         const int first = dofs.unknown(pairs[i].slave, 0);
-        phi_(i, column) = pairs[i].normal.dot(x.col(j).segment<3>(first));
+        phi_(i, column) = x.row(j).segment<3>(first).dot(pairs[i].normal);
       }
       known_[column] = 1;
     }

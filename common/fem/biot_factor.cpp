@@ -40,14 +40,14 @@ void BiotFactor::solve(const VecX& b, VecX& x) const {
   }
 }
 
-void BiotFactor::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const {
-  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(factor_.size(), b.cols());
-  whole.topRows(size()) = b;
+void BiotFactor::solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const {
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(factor_.size(), b.rows());
+  whole.topRows(size()) = b.transpose();
   Eigen::MatrixXd solution;
   if (factor_.solve_many(whole, solution)) {
-    x = solution.topRows(size());
+    x = solution.topRows(size()).transpose();
   } else {
-    x = Eigen::MatrixXd::Constant(size(), b.cols(), kNan);
+    x = Eigen::MatrixXd::Constant(b.rows(), size(), kNan);
   }
 }
 

@@ -25,7 +25,7 @@ class BiotFactor {
 
   // A solve that fails its checks (SymmetricIndefinite::solve) returns NaN everywhere.
   void solve(const VecX& b, VecX& x) const;
-  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const;
+  void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const;
 
   int size() const { return matrix_.displacement_unknowns; }
   double rcond() const { return factor_.rcond(); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// BlockSolver: K^-1 applied to several nodal load columns at once. One per thread; the threads
+// BlockSolver: K^-1 applied to several nodal loads at once. One per thread; the threads
 // share the factor.
 #pragma once
 
@@ -15,8 +15,8 @@ class BlockSolver {
   BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor,
               const DofMap& dofs);
 
-  // U = T K^-1 T^T F. Columns are nodal vectors, node-major, 3n rows; F in N, U in mm; both may
-  // be the same matrix. Errors as check_many.
+  // U = T K^-1 T^T F, transposed: a field per row, k x 3n, node-major. F in N, U in mm; both may be
+  // the same matrix. Errors as check_rows.
   Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
 
  private:

@@ -50,12 +50,8 @@ void DofMap::finalise() {
 }
 
 void DofMap::expand(const VecX& q, Points& u) const {
+  assert(q.size() == num_unknowns_);
   u.resize(3, num_nodes());
-  expand_into(q, u);
-}
-
-void DofMap::expand_into(const Eigen::Ref<const VecX>& q, Eigen::Ref<Points> u) const {
-  assert(q.size() == num_unknowns_ && u.cols() == num_nodes());
   for (int node = 0; node < num_nodes(); ++node) {
     Vec3 local;
     for (int axis = 0; axis < 3; ++axis) {
@@ -73,12 +69,8 @@ Points DofMap::expand(const VecX& q) const {
 }
 
 void DofMap::restrict_to(const Points& f, VecX& q) const {
+  assert(f.cols() == num_nodes());
   q.resize(num_unknowns_);
-  restrict_into(f, q);
-}
-
-void DofMap::restrict_into(const Eigen::Ref<const Points>& f, Eigen::Ref<VecX> q) const {
-  assert(f.cols() == num_nodes() && q.size() == num_unknowns_);
   for (int node = 0; node < num_nodes(); ++node) {
     const Vec3 local =
         identity_[node] ? Vec3(f.col(node)) : Vec3(frames_[node].transpose() * f.col(node));
@@ -92,6 +84,45 @@ VecX DofMap::restrict_to(const Points& f) const {
   VecX q;
   restrict_to(f, q);
   return q;
+}
+
+void DofMap::expand_rows(const Eigen::MatrixXd& q, Eigen::MatrixXd& u) const {
+  assert(q.cols() == num_unknowns_);
+  u.resize(q.rows(), 3 * static_cast<Eigen::Index>(num_nodes()));
+  Eigen::Matrix<double, Eigen::Dynamic, 3> turned;
+  for (int node = 0; node < num_nodes(); ++node) {
+    auto own = u.middleCols<3>(3L * node);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int k = index_[node][axis];
+      if (k >= 0) {
+        own.col(axis) = q.col(k);
+      } else {
+        own.col(axis).setZero();
+      }
+    }
+    if (identity_[node]) continue;
+    turned = own * frames_[node].transpose();
+    own = turned;
+  }
+}
+
+void DofMap::restrict_rows(const Eigen::MatrixXd& f, Eigen::MatrixXd& q) const {
+  assert(f.cols() == 3 * static_cast<Eigen::Index>(num_nodes()));
+  q.resize(f.rows(), num_unknowns_);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> local;
+  for (int node = 0; node < num_nodes(); ++node) {
+    const auto own = f.middleCols<3>(3L * node);
+    if (!identity_[node]) local = own * frames_[node];
+    for (int axis = 0; axis < 3; ++axis) {
+      const int k = index_[node][axis];
+      if (k < 0) continue;
+      if (identity_[node]) {
+        q.col(k) = own.col(axis);
+      } else {
+        q.col(k) = local.col(axis);
+      }
+    }
+  }
 }
 
 }  // namespace brainshift::fem

@@ -46,9 +46,9 @@ class DofMap {
   Points expand(const VecX& q) const;
   void restrict_to(const Points& f, VecX& q) const;
   VecX restrict_to(const Points& f) const;
-  // The same into memory of the right size, such as a column of a matrix.
-  void expand_into(const Eigen::Ref<const VecX>& q, Eigen::Ref<Points> u) const;
-  void restrict_into(const Eigen::Ref<const Points>& f, Eigen::Ref<VecX> q) const;
+  // The same for several fields at once, one per row: k x 3n (node-major) and k x unknowns.
+  void expand_rows(const Eigen::MatrixXd& q, Eigen::MatrixXd& u) const;
+  void restrict_rows(const Eigen::MatrixXd& f, Eigen::MatrixXd& q) const;
 
  private:
   std::vector<Mat3> frames_;

@@ -13,14 +13,15 @@ Result<linalg::SolveQuality> checked_solve(const linalg::SymmetricMatrix& lower,
   return linalg::SolveQuality{};
 }
 
-Result<linalg::SolveQuality> check_many(const linalg::SymmetricMatrix& lower, double norm,
+Result<linalg::SolveQuality> check_rows(const linalg::SymmetricMatrix& lower, double norm,
                                         const StiffnessFactor& factor, const Eigen::MatrixXd& b,
                                         Eigen::MatrixXd& x, StiffnessFactor::Workspace& workspace) {
   if (const linalg::SparseCholesky* drained = factor.drained()) {
-    return linalg::check_many(lower, norm, *drained, b, x, workspace);
+    return linalg::check_rows(lower, norm, *drained, b, x, workspace);
   }
   if (x.allFinite()) return linalg::SolveQuality{};
-  return tl::unexpected(linalg::solve_refusal(b.rowwise().sum(), x.rowwise().sum(), {}));
+  return tl::unexpected(
+      linalg::solve_refusal(b.colwise().sum().transpose(), x.colwise().sum().transpose(), {}));
 }
 
 }  // namespace brainshift::fem

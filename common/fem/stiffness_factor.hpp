@@ -46,17 +46,17 @@ class StiffnessFactor {
     solve(b, x);
     return x;
   }
-  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const {
+  void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const {
     if (const auto* cholesky = std::get_if<linalg::SparseCholesky>(&factor_)) {
-      cholesky->solve_many(b, x, workspace);
+      cholesky->solve_rows(b, x, workspace);
     } else {
-      std::get<BiotFactor>(factor_).solve_many(b, x);
+      std::get<BiotFactor>(factor_).solve_rows(b, x);
     }
   }
-  Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const {
+  Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& b) const {
     Workspace workspace;
     Eigen::MatrixXd x;
-    solve_many(b, x, workspace);
+    solve_rows(b, x, workspace);
     return x;
   }
 
@@ -88,8 +88,8 @@ class StiffnessFactor {
 // solve. Then the error is kNotFinite; otherwise the backward error is given as 0.
 Result<linalg::SolveQuality> checked_solve(const linalg::SymmetricMatrix& lower, double norm,
                                            const StiffnessFactor& factor, const VecX& b, VecX& x);
-// The same for the columns of B, after factor.solve_many(B, X, workspace).
-Result<linalg::SolveQuality> check_many(const linalg::SymmetricMatrix& lower, double norm,
+// The same for the rows of B, after factor.solve_rows(B, X, workspace).
+Result<linalg::SolveQuality> check_rows(const linalg::SymmetricMatrix& lower, double norm,
                                         const StiffnessFactor& factor, const Eigen::MatrixXd& b,
                                         Eigen::MatrixXd& x, StiffnessFactor::Workspace& workspace);
 

@@ -57,26 +57,27 @@ Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
   return quality;
 }
 
-Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
+Result<SolveQuality> check_rows(const SymmetricMatrix& lower, double norm,
                                 const SparseCholesky& factor, const Eigen::MatrixXd& b,
                                 Eigen::MatrixXd& x, SparseCholesky::Workspace& workspace) {
   Random random(kSeed);
-  VecX signs(b.cols()), product, column;
+  VecX signs(b.rows()), product;
   for (Eigen::Index j = 0; j < signs.size(); ++j) signs[j] = random.uniform() < 0.5 ? -1.0 : 1.0;
-  const VecX rhs = b * signs;
+  const VecX rhs = b.transpose() * signs;
   SolveQuality quality;
-  VecX combined = x * signs;
+  VecX combined = x.transpose() * signs;
   quality.backward_error = backward_error(lower, norm, rhs, combined, product);
   Eigen::MatrixXd residual, correction;
   while (quality.backward_error > kRefineAbove && quality.refinements < kMaxRefinements) {
     residual.resizeLike(b);
-    for (Eigen::Index j = 0; j < b.cols(); ++j) {
-      column.noalias() = lower.selfadjointView<Eigen::Lower>() * x.col(j);
-      residual.col(j) = b.col(j) - column;
+    for (Eigen::Index j = 0; j < b.rows(); ++j) {
+      const VecX row = x.row(j).transpose();
+      product.noalias() = lower.selfadjointView<Eigen::Lower>() * row;
+      residual.row(j) = b.row(j) - product.transpose();
     }
-    factor.solve_many(residual, correction, workspace);
+    factor.solve_rows(residual, correction, workspace);
     ++quality.refinements;
-    combined.noalias() = (x + correction) * signs;
+    combined.noalias() = (x + correction).transpose() * signs;
     const double error = backward_error(lower, norm, rhs, combined, product);
     if (!(error < quality.backward_error)) break;
     x += correction;

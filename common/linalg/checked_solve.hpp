@@ -39,8 +39,8 @@ double backward_error(const SymmetricMatrix& lower, double norm, const VecX& b, 
 Result<SolveQuality> checked_solve(const SymmetricMatrix& lower, double norm,
                                    const SparseCholesky& factor, const VecX& b, VecX& x);
 
-// The same for the columns of B, after factor.solve_many(B, X, workspace). Refines all columns.
-Result<SolveQuality> check_many(const SymmetricMatrix& lower, double norm,
+// The same for the rows of B, after factor.solve_rows(B, X, workspace). Refines all rows.
+Result<SolveQuality> check_rows(const SymmetricMatrix& lower, double norm,
                                 const SparseCholesky& factor, const Eigen::MatrixXd& b,
                                 Eigen::MatrixXd& x, SparseCholesky::Workspace& workspace);
 

@@ -55,20 +55,6 @@ SupernodalView view_of(const cholmod_factor& factor) {
           static_cast<const double*>(factor.x)};
 }
 
-// Calls move(unknown, place, first, count) for every unknown and its place in the factor's order,
-// a cache line of right-hand sides at a time: for copies between columns and a block of rows.
-template <typename Move>
-void for_all_lines(const cholmod_factor& factor, Eigen::Index columns, const Move& move) {
-  constexpr Eigen::Index kLine = 8;
-  const auto* order = static_cast<const long*>(factor.Perm);
-  for (Eigen::Index first = 0; first < columns; first += kLine) {
-    const Eigen::Index count = std::min(kLine, columns - first);
-    for (std::size_t i = 0; i < factor.n; ++i) {
-      move(order[i], static_cast<Eigen::Index>(i), first, count);
-    }
-  }
-}
-
 // Smallest ratio of a pivot L_jj^2 to the diagonal K_jj: what elimination has cancelled. Rounding
 // leaves a pivot wrong by some 1e-14 K_jj (`make stability`, weak support: 85 unit roundoffs), so
 // with a ratio below this its error is more than a thousandth. Unlike the reciprocal condition
@@ -267,26 +253,24 @@ VecX SparseCholesky::solve(const VecX& b) const {
   return x;
 }
 
-void SparseCholesky::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x,
+void SparseCholesky::solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x,
                                 Workspace& workspace) const {
-  assert(b.rows() == size());
+  assert(b.cols() == size());
   const cholmod_factor& factor = *impl_->factor;
+  const Eigen::Map<const Eigen::Matrix<long, Eigen::Dynamic, 1>> order(
+      static_cast<const long*>(factor.Perm), b.cols());
   Eigen::MatrixXd& block = workspace.impl_->block;
-  block.resize(b.cols(), b.rows());
-  for_all_lines(factor, b.cols(), [&](long unknown, Eigen::Index place, auto first, auto count) {
-    for (Eigen::Index j = first; j < first + count; ++j) block(j, place) = b(unknown, j);
-  });
+  block.resize(b.rows(), b.cols());
+  for (Eigen::Index i = 0; i < b.cols(); ++i) block.col(i) = b.col(order[i]);
   substitute(view_of(factor), block, workspace.impl_->scratch);
   x.resize(b.rows(), b.cols());
-  for_all_lines(factor, b.cols(), [&](long unknown, Eigen::Index place, auto first, auto count) {
-    for (Eigen::Index j = first; j < first + count; ++j) x(unknown, j) = block(j, place);
-  });
+  for (Eigen::Index i = 0; i < b.cols(); ++i) x.col(order[i]) = block.col(i);
 }
 
-Eigen::MatrixXd SparseCholesky::solve_many(const Eigen::MatrixXd& b) const {
+Eigen::MatrixXd SparseCholesky::solve_rows(const Eigen::MatrixXd& b) const {
   Workspace workspace;
   Eigen::MatrixXd x;
-  solve_many(b, x, workspace);
+  solve_rows(b, x, workspace);
   return x;
 }
 

@@ -37,8 +37,9 @@ class SparseCholesky {
   // x = K^-1 b. Not thread-safe: workspace is reused between calls.
   void solve(const VecX& b, VecX& x) const;
   VecX solve(const VecX& b) const;
-  // Several right-hand sides at once, one per column; cheaper per column than single solves.
-  Eigen::MatrixXd solve_many(const Eigen::MatrixXd& b) const;
+  // Several right-hand sides at once, one per row (k x n, also the solutions); cheaper per
+  // right-hand side than single solves (block_substitution.hpp).
+  Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& b) const;
 
   // Scratch memory for one thread that solves with a factor shared by several threads.
   class Workspace {
@@ -53,9 +54,8 @@ class SparseCholesky {
     struct Impl;
     std::unique_ptr<Impl> impl_;
   };
-  // X = K^-1 B, one right-hand side per column. Thread-safe if every thread has its own
-  // workspace.
-  void solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
+  // The same. Thread-safe if every thread has its own workspace.
+  void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
 
   int size() const;
   double rcond() const;            // CHOLMOD's estimate: squared ratio of extreme pivots of L

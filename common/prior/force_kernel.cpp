@@ -96,8 +96,7 @@ ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, d
   return kernel;
 }
 
-void ForceKernel::multiply(const RowMajor& in, RowMajor& out) const {
-  out.resize(in.rows(), in.cols());
+void ForceKernel::multiply(const Fields& in, Eigen::Map<RowMajor> out) const {
   if (compact_.rows() > 0) {
     out.noalias() = compact_ * in;
     return;
@@ -107,7 +106,7 @@ void ForceKernel::multiply(const RowMajor& in, RowMajor& out) const {
 }
 
 // BLAS wants columns: all is transposed.
-Eigen::MatrixXd ForceKernel::project(const RowMajor& in) const {
+Eigen::MatrixXd ForceKernel::project(const Fields& in) const {
   const Eigen::Map<const Eigen::MatrixXd> basis(basis_.data(), basis_.cols(), basis_.rows());
   const Eigen::Map<const Eigen::MatrixXd> given(in.data(), in.cols(), in.rows());
   Eigen::MatrixXd projected(in.cols(), basis_.cols());
@@ -116,58 +115,30 @@ Eigen::MatrixXd ForceKernel::project(const RowMajor& in) const {
 }
 
 void ForceKernel::add_to(const Points& w, Points& f) const {
-  RowMajor out;
-  multiply(w.transpose(), out);
-  f += out.transpose();
+  Points out(3, w.cols());
+  multiply(Fields(w.data(), w.cols(), 3), {out.data(), w.cols(), 3});
+  f += out;
 }
 
-// Not all fields at once: memory. work(first, fields): the three components of field first + j are
-// columns 3 j to 3 j + 2 of `fields`, n rows.
-template <typename Work>
-void ForceKernel::for_some_fields(const Eigen::MatrixXd& w, const Work& work) {
-  constexpr Eigen::Index kFields = 32;
-  const Eigen::Index n = w.rows() / 3;
-  RowMajor fields;
-  for (Eigen::Index first = 0; first < w.cols(); first += kFields) {
-    const Eigen::Index count = std::min(kFields, w.cols() - first);
-    fields.resize(n, 3 * count);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      fields.middleCols<3>(3 * j) =
-          Eigen::Map<const Points>(w.col(first + j).data(), 3, n).transpose();
-    }
-    work(first, fields);
-  }
+// k x 3n, columns of a node one after the other, is n x 3k by rows: component a of field j is column
+// a k + j.
+void ForceKernel::apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
+  f.resize(w.rows(), w.cols());
+  assert(f.data() != w.data());
+  multiply(Fields(w.data(), w.cols() / 3, 3 * w.rows()), {f.data(), w.cols() / 3, 3 * w.rows()});
 }
 
 VecX ForceKernel::variance_along(const Eigen::MatrixXd& w) const {
-  VecX variance(w.cols());
-  RowMajor forces;
-  for_some_fields(w, [&](Eigen::Index first, const RowMajor& fields) {
-    VecX each;
-    if (compact_.rows() > 0) {
-      multiply(fields, forces);
-      each = fields.cwiseProduct(forces).colwise().sum();
-    } else {
-      each = project(fields).rowwise().squaredNorm();
-    }
-    for (Eigen::Index j = 0; j < each.size() / 3; ++j) {
-      variance[first + j] = each.segment<3>(3 * j).sum();
-    }
-  });
-  return variance;
-}
-
-void ForceKernel::apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
-  const Eigen::Index n = w.rows() / 3;
-  f.resize(w.rows(), w.cols());
-  RowMajor out;
-  for_some_fields(w, [&](Eigen::Index first, const RowMajor& fields) {
-    const Eigen::Index count = fields.cols() / 3;
-    multiply(fields, out);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      Eigen::Map<Points>(f.col(first + j).data(), 3, n) = out.middleCols<3>(3 * j).transpose();
-    }
-  });
+  const Fields fields(w.data(), w.cols() / 3, 3 * w.rows());
+  VecX each;
+  if (compact_.rows() > 0) {
+    RowMajor forces(fields.rows(), fields.cols());
+    multiply(fields, {forces.data(), forces.rows(), forces.cols()});
+    each = fields.cwiseProduct(forces).colwise().sum();
+  } else {
+    each = project(fields).rowwise().squaredNorm();
+  }
+  return each.reshaped(w.rows(), 3).rowwise().sum();
 }
 
 Eigen::MatrixXd ForceKernel::dense() const {

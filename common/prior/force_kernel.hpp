@@ -37,10 +37,11 @@ class ForceKernel {
 
   // f += Sigma w for one nodal field; w, f: 3 x n.
   void add_to(const Points& w, Points& f) const;
-  // f = Sigma w for several fields at once: 3n rows, node-major (x0 y0 z0 x1 ...). Thread-safe.
+  // f = Sigma w for several fields at once, one per row: k x 3n, node-major (x0 y0 z0 x1 ...).
+  // Thread-safe.
   void apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
-  // w^T Sigma w of each field: the variance of the work that the random forces do on it. w: 3n rows
-  // as above; -> one number per column, mm^2 N^2. Half the cost of apply(). Thread-safe.
+  // w^T Sigma w of each field: the variance of the work that the random forces do on it. w: k x 3n as
+  // above; -> k numbers, mm^2 N^2. Half the cost of apply(). Thread-safe.
   VecX variance_along(const Eigen::MatrixXd& w) const;
   // sigma_f^2 V R V, n x n, both triangles.
   Eigen::MatrixXd dense() const;
@@ -52,12 +53,12 @@ class ForceKernel {
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  template <typename Work>
-  static void for_some_fields(const Eigen::MatrixXd& w, const Work& work);
-  // out = sigma_f^2 V R V in: n rows, a field's three components in columns of their own.
-  void multiply(const RowMajor& in, RowMajor& out) const;
-  // basis_^T in, transposed: a row per field and component.
-  Eigen::MatrixXd project(const RowMajor& in) const;
+  // A component of a field in a column of its own.
+  using Fields = Eigen::Map<const RowMajor>;
+  // out = sigma_f^2 V R V in: n rows, both apart in memory.
+  void multiply(const Fields& in, Eigen::Map<RowMajor> out) const;
+  // basis_^T in, transposed: a row per component.
+  Eigen::MatrixXd project(const Fields& in) const;
 
   Eigen::SparseMatrix<double, Eigen::RowMajor> compact_;  // sigma_f^2 V R V, or empty
   RowMajor basis_;  // sigma_f V k_nc L_cc^-T with L_cc L_cc^T = k_cc, or empty

@@ -29,8 +29,8 @@ class ForcePrior {
   void apply(const Points& w, Points& f) const;
   Points apply(const Points& w) const;
 
-  // f = (Sigma_fine + Sigma_medium + Sigma_coarse) w for several nodal columns at once: 3n rows,
-  // node-major. Thread-safe.
+  // f = (Sigma_fine + Sigma_medium + Sigma_coarse) w for several nodal fields at once, one per row:
+  // k x 3n, node-major. Thread-safe.
   void apply_remainders(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
 
   // remainder: 0 fine, 1 medium, 2 coarse.

@@ -116,30 +116,31 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
   const auto weights =
       fem::sampling_matrix(model.locator(), nodes, data.positions, inversion::kOutsideTolerance_mm);
   if (!weights) return tl::unexpected(weights.error());
-  MatrixXd a_transposed = MatrixXd::Zero(3 * nodes, rows), v, block, forces(3 * nodes, rows);
+  MatrixXd a = MatrixXd::Zero(rows, 3 * nodes), v, forces(rows, 3 * nodes);
   for (int i = 0; i < data.size(); ++i) {
     for (fem::SamplingMatrix::InnerIterator it(*weights, i); it; ++it) {
       for (int axis = 0; axis < 3; ++axis) {
-        a_transposed(3 * it.col() + axis, 3 * i + axis) = it.value();
+        a(3 * i + axis, 3 * it.col() + axis) = it.value();
       }
     }
   }
-  if (auto status = fem::BlockSolver(k_p, factor, forward.dofs()).solve(a_transposed, v); !status) {
+  if (auto status = fem::BlockSolver(k_p, factor, forward.dofs()).solve(a, v); !status) {
     return tl::unexpected(status.error());
   }
   for (int j = 0; j < rows; ++j) {
-    forces.col(j) = flat(prior.apply(Eigen::Map<const Points>(v.col(j).data(), 3, nodes)));
+    const VecX one = v.row(j).transpose();
+    forces.row(j) = flat(prior.apply(Eigen::Map<const Points>(one.data(), 3, nodes))).transpose();
   }
   MatrixXd covariance(rows, rows);
-  linalg::blas::multiply_transposed(1.0, v, forces, 0.0, covariance);
+  linalg::blas::multiply_by_transposed(1.0, v, forces, 0.0, covariance);
   for (int i = 0; i < rows; ++i) covariance(i, i) += data.sd_mm[i / 3] * data.sd_mm[i / 3];
 
   Points gap_load = Points::Zero(3, nodes);
   forward.contact().add_load(gap_load, active);
   const Points shift = solve(gap_load);
-  const VecX misfit = flat(data.displacements) - a_transposed.transpose() * flat(shift);
+  const VecX misfit = flat(data.displacements) - a * flat(shift);
   const VecX mu = covariance.llt().solve(misfit);
-  const VecX load = forces * mu;
+  const VecX load = forces.transpose() * mu;
   const Points mean = shift + solve(Eigen::Map<const Points>(load.data(), 3, nodes));
   if (!mean.allFinite()) return fail(ErrorCode::kNotFinite, "the direct posterior is not finite");
   return mean;

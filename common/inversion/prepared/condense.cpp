@@ -45,23 +45,23 @@ constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 // nodes, which are not kept.
 struct TestVectors {
   std::vector<NodeIndex> nodes;  // sorted
-  MatrixXd numbers;              // 3 nodes x vectors
+  MatrixXd numbers;              // vectors x 3 nodes
 
-  // Columns [first, first + count) with all rows.
-  void write(int first, int count, Eigen::Index rows, MatrixXd& out) const {
-    out.setZero(rows, count);
+  // Vectors [first, first + count) at all nodes.
+  void write(int first, int count, Eigen::Index components, MatrixXd& out) const {
+    out.setZero(count, components);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-      out.middleRows<3>(3L * nodes[i]) =
-          numbers.block(3 * static_cast<Eigen::Index>(i), first, 3, count);
+      out.middleCols<3>(3L * nodes[i]) =
+          numbers.block(first, 3 * static_cast<Eigen::Index>(i), count, 3);
     }
   }
-  // The rows of a matrix at `nodes`.
-  MatrixXd rows_of(const MatrixXd& all) const {
-    MatrixXd rows(numbers.rows(), all.cols());
+  // The columns of fields at `nodes`.
+  MatrixXd columns_of(const MatrixXd& fields) const {
+    MatrixXd columns(fields.rows(), numbers.cols());
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-      rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = all.middleRows<3>(3L * nodes[i]);
+      columns.middleCols<3>(3 * static_cast<Eigen::Index>(i)) = fields.middleCols<3>(3L * nodes[i]);
     }
-    return rows;
+    return columns;
   }
 };
 
@@ -71,21 +71,21 @@ TestVectors test_vectors(const CondensedOperators& operators, int count) {
   omega.nodes.insert(omega.nodes.end(), operators.slaves.begin(), operators.slaves.end());
   std::sort(omega.nodes.begin(), omega.nodes.end());
   omega.nodes.erase(std::unique(omega.nodes.begin(), omega.nodes.end()), omega.nodes.end());
-  const auto row = [&](NodeIndex node) {
+  const auto place = [&](NodeIndex node) {
     return 3 *
            (std::lower_bound(omega.nodes.begin(), omega.nodes.end(), node) - omega.nodes.begin());
   };
   Random random(kSeed);
-  omega.numbers.setZero(3 * static_cast<Eigen::Index>(omega.nodes.size()), count);
+  omega.numbers.setZero(count, 3 * static_cast<Eigen::Index>(omega.nodes.size()));
   for (int j = 0; j < count; ++j) {
-    auto column = omega.numbers.col(j);
+    auto vector = omega.numbers.row(j);
     for (const NodeIndex node : operators.region) {
-      for (int axis = 0; axis < 3; ++axis) column[row(node) + axis] = random.normal();
+      for (int axis = 0; axis < 3; ++axis) vector[place(node) + axis] = random.normal();
     }
     for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
-      column.segment<3>(row(operators.slaves[i])) +=
+      vector.segment<3>(place(operators.slaves[i])) +=
           kSlaveWeight * random.normal() *
-          operators.slave_normals.col(static_cast<Eigen::Index>(i));
+          operators.slave_normals.col(static_cast<Eigen::Index>(i)).transpose();
     }
   }
   return omega;
@@ -109,11 +109,11 @@ std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eig
 }
 
 // The leading modes of F with F = C Omega: F V Lambda^-1/2 with Omega^T F = V Lambda V^T. At most
-// `kept`.
+// `kept`. sketch, modes: a field per row.
 Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch, int kept) {
-  const Eigen::Index tested = sketch.cols();
+  const Eigen::Index tested = sketch.rows();
   MatrixXd core(tested, tested);
-  linalg::blas::multiply_transposed(1.0, omega.numbers, omega.rows_of(sketch), 0.0, core);
+  linalg::blas::multiply_by_transposed(1.0, omega.numbers, omega.columns_of(sketch), 0.0, core);
   core = (0.5 * (core + core.transpose())).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
@@ -131,22 +131,22 @@ Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch,
     scaled.col(j) =
         eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
   }
-  MatrixXd modes(sketch.rows(), rank);
-  linalg::blas::multiply(1.0, sketch, scaled, 0.0, modes);
+  MatrixXd modes(rank, sketch.cols());
+  linalg::blas::multiply_transposed(1.0, scaled, sketch, 0.0, modes);
   return modes;
 }
 
-// Puts displacement fields behind the modes that are there.
+// Puts displacement fields, one per row, behind the modes that are there.
 void append_modes(const MatrixXd& fields, MatrixXf& modes, CondensedOperators& result) {
   const Eigen::Index before = modes.cols();
-  modes.conservativeResize(fields.rows(), before + fields.cols());
-  modes.rightCols(fields.cols()) = fields.cast<float>();
+  modes.conservativeResize(fields.cols(), before + fields.rows());
+  modes.rightCols(fields.rows()) = fields.transpose().cast<float>();
   result.slave_modes.conservativeResize(static_cast<Eigen::Index>(result.slaves.size()),
                                         modes.cols());
   for (std::size_t i = 0; i < result.slaves.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    result.slave_modes.row(row).tail(fields.cols()) =
-        result.slave_normals.col(row).transpose() * fields.middleRows<3>(3L * result.slaves[i]);
+    result.slave_modes.row(row).tail(fields.rows()) =
+        (fields.middleCols<3>(3L * result.slaves[i]) * result.slave_normals.col(row)).transpose();
   }
 }
 
@@ -160,21 +160,21 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   const int tested = static_cast<int>(
       std::min<Eigen::Index>(*std::max_element(kept.begin(), kept.end()) + kOversampling, rows));
 
-  MatrixXd load_columns(rows, loads);
+  MatrixXd load_modes(loads, rows);
   auto status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
-    own.loads = prior.modes().middleCols(first, count);
+    own.loads = prior.modes().middleCols(first, count).transpose();
     if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-    load_columns.middleCols(first, count) = own.solved;
+    load_modes.middleRows(first, count) = own.solved;
     return {};
   });
   if (!status) return status;
-  append_modes(load_columns, modes, result);
-  load_columns.resize(0, 0);
+  append_modes(load_modes, modes, result);
+  load_modes.resize(0, 0);
 
   const TestVectors omega = test_vectors(result, tested);
   std::array<MatrixXd, kRemainders> sketches;
   for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] > 0) sketches[g].resize(rows, tested);
+    if (kept[g] > 0) sketches[g].resize(tested, rows);
   }
   status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
     omega.write(first, count, rows, own.loads);
@@ -183,7 +183,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
       if (kept[static_cast<std::size_t>(g)] == 0) continue;
       prior.kernel(g).apply(own.solved, own.loads);
       if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
-      sketches[static_cast<std::size_t>(g)].middleCols(first, count) = own.loads;
+      sketches[static_cast<std::size_t>(g)].middleRows(first, count) = own.loads;
     }
     return {};
   });
@@ -194,7 +194,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
     const auto leading = leading_modes(omega, sketches[g], kept[g]);
     if (!leading) return tl::unexpected(leading.error());
     sketches[g].resize(0, 0);
-    result.part_columns[kLoadParts + g] = static_cast<int>(leading->cols());
+    result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
     append_modes(*leading, modes, result);
   }
   return {};
@@ -221,10 +221,10 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
   MatrixXd variance = MatrixXd::Zero(3 * probed, kRemainders);
   auto status =
       runner.run("uncertainty", 3 * probed, [&](int first, int count, auto& own) -> Status {
-        own.loads.setZero(nodes.size(), count);
+        own.loads.setZero(count, nodes.size());
         for (int j = 0; j < count; ++j) {
           const int dof = first + j;
-          own.loads(3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3, j) = 1.0;
+          own.loads(j, 3 * spread[static_cast<std::size_t>(dof / 3)] + dof % 3) = 1.0;
         }
         if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
         for (int g = 0; g < kRemainders; ++g) {

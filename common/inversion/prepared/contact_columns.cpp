@@ -29,29 +29,20 @@ Points slave_positions(const PreparedModel& model, const CondensedOperators& res
   return positions;
 }
 
-// Columns of displacements -> rows, nodes in the order of their blocks.
-void turn(const MatrixXd& columns, const SpatialBlocks& nodes, MatrixXf& rows) {
-  Eigen::Index place = 0;
-  for (int b = 0; b < nodes.size(); ++b) {
-    const auto block = nodes.block(b);
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) {  // a block's rows stay in the cache
-      for (std::size_t i = 0; i < block.size(); ++i) {
-        rows.row(j).segment<3>(place + 3 * static_cast<Eigen::Index>(i)) =
-            columns.col(j).segment<3>(3L * block[i]).cast<float>().transpose();
-      }
-    }
-    place += 3 * static_cast<Eigen::Index>(block.size());
+// The columns of u in the order of the nodes' blocks.
+void sort_nodes(const MatrixXd& u, const SpatialBlocks& nodes, MatrixXf& sorted) {
+  for (std::size_t i = 0; i < nodes.order.size(); ++i) {
+    sorted.middleCols<3>(3 * static_cast<Eigen::Index>(i)) =
+        u.middleCols<3>(3L * nodes.order[i]).cast<float>();
   }
 }
 
-// Phi's columns of the slaves that have the responses u.
+// Phi's columns of the slaves that have the responses u, k x 3n.
 void compliance_of(const MatrixXd& u, const CondensedOperators& operators, MatrixXd& compliance) {
-  for (Eigen::Index j = 0; j < u.cols(); ++j) {
-    for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      compliance(row, j) =
-          operators.slave_normals.col(row).dot(u.col(j).segment<3>(3L * operators.slaves[i]));
-    }
+  for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    compliance.row(row) =
+        (u.middleCols<3>(3L * operators.slaves[i]) * operators.slave_normals.col(row)).transpose();
   }
 }
 
@@ -128,29 +119,29 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
   bool finite = true;
   const auto work = [&](int first, int count, BlockRunner::Member& own) -> Status {
     const auto slave = [&](int j) { return columns.order[static_cast<std::size_t>(first + j)]; };
-    MatrixXf turned(count, rows);
+    MatrixXf sorted(count, rows);
     MatrixXd compliance(s, count);
     bool kept = false;
     {
       const std::lock_guard lock(mutex);
-      kept = columns.store.load(first / blocks.size, turned, compliance);
+      kept = columns.store.load(first / blocks.size, sorted, compliance);
     }
     if (!kept) {
-      own.loads.setZero(rows, count);
+      own.loads.setZero(count, rows);
       for (int j = 0; j < count; ++j) {
-        own.loads.col(j).segment<3>(3L * result.slaves[static_cast<std::size_t>(slave(j))]) =
-            result.slave_normals.col(slave(j));
+        own.loads.row(j).segment<3>(3L * result.slaves[static_cast<std::size_t>(slave(j))]) =
+            result.slave_normals.col(slave(j)).transpose();
       }
       if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
       compliance_of(own.solved, result, compliance);
-      turn(own.solved, nodes, turned);
+      sort_nodes(own.solved, nodes, sorted);
     }
-    const float greatest = greatest_of(turned);
+    const float greatest = greatest_of(sorted);
     for (int j = 0; j < count; ++j) result.compliance.col(slave(j)) = compliance.col(j);
     const std::lock_guard lock(mutex);
     finite = finite && std::isfinite(greatest) && compliance.allFinite();
     columns.greatest = std::max(columns.greatest, greatest);
-    return kept ? Status{} : columns.store.save(first / blocks.size, turned, compliance);
+    return kept ? Status{} : columns.store.save(first / blocks.size, sorted, compliance);
   };
   if (auto status = runner.run("contact columns", static_cast<int>(s), work); !status) {
     return tl::unexpected(status.error());

@@ -61,14 +61,14 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   if (auto status = check_memory(model, bytes); !status) return tl::unexpected(status.error());
 
   BlockRunner runner(model, progress, stop, threads);
-  MatrixXd x(3 * nodes, h);  // K^-1 H^T
+  MatrixXd x(h, 3 * nodes);  // H K^-1
   result.compliance.resize(h, h);
   result.covariance.setZero(h, h);
   const auto solve_block = [&](int first, int count, BlockRunner::Member& own) -> Status {
-    own.loads.setZero(3 * nodes, count);
+    own.loads.setZero(count, 3 * nodes);
     for (int j = 0; j < count; ++j) {
       const Output& output = outputs[static_cast<std::size_t>(first + j)];
-      own.loads.col(j).segment<3>(3 * output.node) = output.direction;
+      own.loads.row(j).segment<3>(3 * output.node) = output.direction.transpose();
     }
     if (auto status = own.solver.solve(own.loads, own.solved); !status) return status;
     const MatrixXd& u = own.solved;
@@ -76,28 +76,27 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
       for (int i = first + j; i < h; ++i) {
         const Output& output = outputs[static_cast<std::size_t>(i)];
         result.compliance(i, first + j) =
-            output.direction.dot(u.col(j).segment<3>(3 * output.node));
+            u.row(j).segment<3>(3 * output.node).dot(output.direction);
       }
     }
-    x.middleCols(first, count) = u;
+    x.middleRows(first, count) = u;
     return {};
   };
   // Lower triangle only: rows from the block's first one on.
   const auto covariance_block = [&](int first, int count, BlockRunner::Member& own) -> Status {
     MatrixXd& forces = own.forces;
-    model.prior().apply_remainders(x.middleCols(first, count), forces);
-    linalg::blas::multiply_transposed(1.0, x.rightCols(h - first), forces, 0.0,
-                                      result.covariance.block(first, first, h - first, count));
+    model.prior().apply_remainders(x.middleRows(first, count), forces);
+    linalg::blas::multiply_by_transposed(1.0, x.bottomRows(h - first), forces, 0.0,
+                                         result.covariance.block(first, first, h - first, count));
     return {};
   };
   auto status = runner.run("influence columns", h, solve_block);
   if (status) status = runner.run("prior covariance", h, covariance_block);
   if (!status) return tl::unexpected(status.error());
   if (const MatrixXd& modes = model.prior().modes(); modes.cols() > 0) {
-    MatrixXd seen(h, modes.cols()), transposed;
-    linalg::blas::multiply_transposed(1.0, x, modes, 0.0, seen);
-    transposed = seen.transpose();
-    linalg::blas::multiply(1.0, seen, transposed, 1.0, result.covariance);
+    MatrixXd seen(h, modes.cols());
+    linalg::blas::multiply(1.0, x, modes, 0.0, seen);
+    linalg::blas::multiply_by_transposed(1.0, seen, seen, 1.0, result.covariance);
   }
   copy_lower_to_upper(result.compliance);
   copy_lower_to_upper(result.covariance);

@@ -101,24 +101,24 @@ TEST(CheckedSolve, RejectsARightHandSideThatIsNotFinite) {
   EXPECT_EQ(overflow.error().code, ErrorCode::kNotFinite);
 }
 
-TEST(CheckedSolve, OneWrongColumnAmongManyIsFoundAndRefined) {
+TEST(CheckedSolve, OneWrongSolutionAmongManyIsFoundAndRefined) {
   const Block block;
   const auto factor = SparseCholesky::factorise(block.stiffness);
   const double norm = max_norm(block.stiffness);
   std::srand(3);
-  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(block.dofs.num_unknowns(), 9);
-  const Eigen::MatrixXd expected = factor->solve_many(b);
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(9, block.dofs.num_unknowns());
+  const Eigen::MatrixXd expected = factor->solve_rows(b);
   SparseCholesky::Workspace workspace;
   for (const int wrong : {0, 4, 8}) {
     Eigen::MatrixXd x = expected;
-    x(11, wrong) += 1e-6;
-    const auto quality = check_many(block.stiffness, norm, *factor, b, x, workspace);
+    x(wrong, 11) += 1e-6;
+    const auto quality = check_rows(block.stiffness, norm, *factor, b, x, workspace);
     ASSERT_TRUE(quality.has_value());
     EXPECT_GE(quality->refinements, 1);
     EXPECT_LT((x - expected).norm(), 1e-12 * expected.norm());
   }
   Eigen::MatrixXd x = expected;
-  EXPECT_EQ(check_many(block.stiffness, norm, *factor, b, x, workspace)->refinements, 0);
+  EXPECT_EQ(check_rows(block.stiffness, norm, *factor, b, x, workspace)->refinements, 0);
 }
 
 TEST(CheckedSolve, BlocksOfAnotherMatrixAreRejected) {
@@ -126,7 +126,7 @@ TEST(CheckedSolve, BlocksOfAnotherMatrixAreRejected) {
   const fem::StiffnessFactor factor(block.factor_of_another(10.0));
   fem::BlockSolver solver(block.stiffness, factor, block.dofs);
   Eigen::MatrixXd u;
-  const Status status = solver.solve(Eigen::MatrixXd::Ones(3 * block.mesh.num_nodes(), 5), u);
+  const Status status = solver.solve(Eigen::MatrixXd::Ones(5, 3 * block.mesh.num_nodes()), u);
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kSingularMatrix);
 }

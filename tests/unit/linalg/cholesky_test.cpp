@@ -51,11 +51,11 @@ TEST(SparseCholesky, ManyRightHandSidesEqualSingleSolves) {
   const auto factor = SparseCholesky::factorise(block.stiffness());
   ASSERT_TRUE(factor.has_value());
   std::srand(3);
-  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(block.dofs.num_unknowns(), 7);
-  const Eigen::MatrixXd x = factor->solve_many(b);
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(7, block.dofs.num_unknowns());
+  const Eigen::MatrixXd x = factor->solve_rows(b);
   for (int c = 0; c < 7; ++c) {
-    const VecX single = factor->solve(VecX(b.col(c)));
-    EXPECT_LT((x.col(c) - single).norm(), 1e-12 * single.norm());
+    const VecX single = factor->solve(VecX(b.row(c).transpose()));
+    EXPECT_LT((x.row(c).transpose() - single).norm(), 1e-12 * single.norm());
   }
 }
 

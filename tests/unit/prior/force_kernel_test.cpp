@@ -104,22 +104,22 @@ TEST(ForceKernel, BasisKeepsMostOfTheVariance) {
   }
 }
 
-TEST(ForceKernel, AppliesToSeveralColumnsAsToOne) {
+TEST(ForceKernel, AppliesToSeveralFieldsAsToOne) {
   const TetMesh mesh = crooked_box(4, 40.0);
   const VecX volumes = fem::nodal_volumes(mesh);
   std::srand(9);
-  const Eigen::MatrixXd w = Eigen::MatrixXd::Random(3 * mesh.num_nodes(), 70);
+  const Eigen::MatrixXd w = Eigen::MatrixXd::Random(70, 3 * mesh.num_nodes());
   for (const ForceKernel& kernel : {ForceKernel::compact(mesh.nodes, volumes, 5.0, 0.1),
                                     ForceKernel::basis(mesh.nodes, volumes, 20.0, 0.1)}) {
     Eigen::MatrixXd f;
     kernel.apply(w, f);
     const VecX variance = kernel.variance_along(w);
-    for (Eigen::Index j = 0; j < w.cols(); ++j) {
-      const Points one =
-          applied(kernel, Eigen::Map<const Points>(w.col(j).data(), 3, w.rows() / 3));
+    for (Eigen::Index j = 0; j < w.rows(); ++j) {
+      const VecX field = w.row(j).transpose();
+      const Points one = applied(kernel, Eigen::Map<const Points>(field.data(), 3, w.cols() / 3));
       ASSERT_GT(one.norm(), 0.0);
-      EXPECT_LT((f.col(j) - one.reshaped()).norm(), 1e-12 * one.norm());
-      EXPECT_NEAR(variance[j], w.col(j).dot(one.reshaped()), 1e-12 * variance[j]);
+      EXPECT_LT((f.row(j).transpose() - one.reshaped()).norm(), 1e-12 * one.norm());
+      EXPECT_NEAR(variance[j], field.dot(one.reshaped()), 1e-12 * variance[j]);
     }
   }
 }
