@@ -120,8 +120,8 @@ void ForceKernel::add_to(const Points& w, Points& f) const {
   f += out;
 }
 
-// k x 3n, columns of a node one after the other, is n x 3k by rows: component a of field j is column
-// a k + j.
+// k x 3n, columns of a node one after the other, is n x 3k by rows: component a of field j is
+// column a k + j.
 void ForceKernel::apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
   f.resize(w.rows(), w.cols());
   assert(f.data() != w.data());

@@ -40,8 +40,8 @@ class ForceKernel {
   // f = Sigma w for several fields at once, one per row: k x 3n, node-major (x0 y0 z0 x1 ...).
   // Thread-safe.
   void apply(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
-  // w^T Sigma w of each field: the variance of the work that the random forces do on it. w: k x 3n as
-  // above; -> k numbers, mm^2 N^2. Half the cost of apply(). Thread-safe.
+  // w^T Sigma w of each field: the variance of the work that the random forces do on it. w: k x 3n
+  // as above; -> k numbers, mm^2 N^2. Half the cost of apply(). Thread-safe.
   VecX variance_along(const Eigen::MatrixXd& w) const;
   // sigma_f^2 V R V, n x n, both triangles.
   Eigen::MatrixXd dense() const;

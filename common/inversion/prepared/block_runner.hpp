@@ -32,8 +32,8 @@ class BlockRunner {
     return std::max(1, (columns + 2 * pairs - 1) / (2 * pairs));
   }
 
-  // What one core works with. The matrices are for `work` below to use as it likes, with a field per
-  // row (BlockSolver); they keep their memory from one block to the next.
+  // What one core works with. The matrices are for `work` below to use as it likes, with a field
+  // per row (BlockSolver); they keep their memory from one block to the next.
   struct Member {
     fem::BlockSolver solver;
     Eigen::MatrixXd loads, solved, forces;
