@@ -44,6 +44,14 @@ Status open_checkpoint(const PrepareOptions& options, const CaseConfig& config,
   return {};
 }
 
+// Of a block that is there and was not loaded: it is not to be read by parts.
+Status why_unreadable(const io::CheckpointFile& file, int index, const Eigen::MatrixXf& rows) {
+  Eigen::MatrixXf again(rows.rows(), rows.cols());
+  if (auto status = file.read(2 * index, again); !status) return status;
+  return fail(ErrorCode::kUnreadable,
+              "checkpoint: block " + std::to_string(2 * index + 1) + " cannot be read");
+}
+
 // Blocks 2 i and 2 i + 1 of the file are the columns and the compliance of block i. The file is
 // where the columns lie until they are made compact: a disk that is full ends the preparation, and
 // what is finished stays for the next one.
@@ -55,6 +63,7 @@ inversion::BlockStore block_store(io::CheckpointFile& file) {
   };
   store.save = [&file](int index, const Eigen::MatrixXf& rows,
                        const Eigen::MatrixXd& compliance) -> Status {
+    if (file.has(2 * index) && file.has(2 * index + 1)) return why_unreadable(file, index, rows);
     if (!file.has(2 * index)) {
       if (auto status = file.append(2 * index, rows); !status) return status;
     }

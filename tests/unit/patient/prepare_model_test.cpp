@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,28 @@ TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
   ASSERT_TRUE(finished->checkpoint.has_value());
   EXPECT_TRUE(finished->checkpoint->remove());
   EXPECT_FALSE(std::filesystem::exists(options.checkpoint));
+}
+
+// Columns are read by parts, which no checksum covers: what cannot be read as a whole must not be.
+TEST_F(BoxCase, ACheckpointThatIsAlteredWhileItIsOpenEndsThePreparation) {
+  PrepareOptions options;
+  options.checkpoint = folder_ / "m.h5.partial";
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  options.progress = [&](std::string_view stage, double) {
+    if (stage == "contact: compact columns") stop.request_stop();
+  };
+  ASSERT_FALSE(prepare_model(config(), options).has_value());
+  options.stop = {};
+  options.progress = {};
+  options.on_resume = [&] {
+    std::fstream bytes(options.checkpoint, std::ios::binary | std::ios::in | std::ios::out);
+    bytes.seekp(24 + 40 + 1).put('\x7f').flush();  // in the first block's numbers
+  };
+  const auto refused = prepare_model(config(), options);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnreadable);
+  EXPECT_THAT(refused.error().message, HasSubstr("was altered while the file was open"));
 }
 
 TEST_F(BoxCase, StopsBeforeTheLongWorkWhenAsked) {
