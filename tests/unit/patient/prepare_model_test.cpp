@@ -46,22 +46,27 @@ TEST_F(BoxCase, IsPreparedUnderBothBoundaries) {
   EXPECT_TRUE(io::write_model(folder_ / "m.h5", file));
 }
 
-TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
+// Leaves a checkpoint with all contact columns.
+void interrupt(const CaseConfig& config, const std::filesystem::path& checkpoint) {
   PrepareOptions options;
-  options.checkpoint = folder_ / "m.h5.partial";
+  options.checkpoint = checkpoint;
   std::stop_source stop;
   options.stop = stop.get_token();
   options.progress = [&](std::string_view stage, double) {
-    if (stage == "contact: compact columns") stop.request_stop();  // the contact columns are done
+    if (stage == "contact: compact columns") stop.request_stop();
   };
-  const auto interrupted = prepare_model(config(), options);
+  const auto interrupted = prepare_model(config, options);
   ASSERT_FALSE(interrupted.has_value());
   EXPECT_EQ(interrupted.error().code, ErrorCode::kUnavailable);
-  ASSERT_TRUE(std::filesystem::exists(options.checkpoint));
+  ASSERT_TRUE(std::filesystem::exists(checkpoint));
+}
+
+TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
+  PrepareOptions options;
+  options.checkpoint = folder_ / "m.h5.partial";
+  interrupt(config(), options.checkpoint);
 
   int resumed = 0;
-  options.stop = {};
-  options.progress = {};
   options.on_resume = [&] { ++resumed; };
   auto finished = prepare_model(config(), options);
   ASSERT_TRUE(finished.has_value()) << finished.error().message;
@@ -80,14 +85,7 @@ TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
 TEST_F(BoxCase, ACheckpointThatIsAlteredWhileItIsOpenEndsThePreparation) {
   PrepareOptions options;
   options.checkpoint = folder_ / "m.h5.partial";
-  std::stop_source stop;
-  options.stop = stop.get_token();
-  options.progress = [&](std::string_view stage, double) {
-    if (stage == "contact: compact columns") stop.request_stop();
-  };
-  ASSERT_FALSE(prepare_model(config(), options).has_value());
-  options.stop = {};
-  options.progress = {};
+  interrupt(config(), options.checkpoint);
   options.on_resume = [&] {
     std::fstream bytes(options.checkpoint, std::ios::binary | std::ios::in | std::ios::out);
     bytes.seekp(24 + 40 + 1).put('\x7f').flush();  // in the first block's numbers
