@@ -5,7 +5,7 @@
 # raw CSV and JSON (tests/benchmarks/bench_results.hpp), figures, tables.md, summary.json. Exit status
 # 0 only if every check holds.
 #   QUICK=1     one mesh, few repetitions, few updates; checks that need more do not hold
-#   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs 16 GiB
+#   SIZES=...   mesh sizes in thousand nodes, default 5,18,40,100 (QUICK: 18); 100 needs about 17 GiB
 #   BUDGET_S=.. time per method, mesh and scenario, default 400 s
 #   REFINED=... sizes that are meshed with refinement too, default 18 (QUICK: none)
 #   KERNEL=...  the other BLAS kernel that latencies are measured with, default Haswell

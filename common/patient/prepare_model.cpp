@@ -44,12 +44,12 @@ Status open_checkpoint(const PrepareOptions& options, const CaseConfig& config,
   return {};
 }
 
-// Of a block that is there and was not loaded: it is not to be read by parts.
-Status why_unreadable(const io::CheckpointFile& file, int index, const Eigen::MatrixXf& rows) {
-  Eigen::MatrixXf again(rows.rows(), rows.cols());
-  if (auto status = file.read(2 * index, again); !status) return status;
-  return fail(ErrorCode::kUnreadable,
-              "checkpoint: block " + std::to_string(2 * index + 1) + " cannot be read");
+// Of a block that is there and was not loaded: what cannot be read as a whole, with its checksum,
+// is not to be read by parts.
+Status read_again(const io::CheckpointFile& file, int index, Eigen::MatrixXf rows,
+                  Eigen::MatrixXd compliance) {
+  if (auto status = file.read(2 * index, rows); !status) return status;
+  return file.read(2 * index + 1, compliance);
 }
 
 // Blocks 2 i and 2 i + 1 of the file are the columns and the compliance of block i. The file is
@@ -63,7 +63,9 @@ inversion::BlockStore block_store(io::CheckpointFile& file) {
   };
   store.save = [&file](int index, const Eigen::MatrixXf& rows,
                        const Eigen::MatrixXd& compliance) -> Status {
-    if (file.has(2 * index) && file.has(2 * index + 1)) return why_unreadable(file, index, rows);
+    if (file.has(2 * index) && file.has(2 * index + 1)) {
+      return read_again(file, index, rows, compliance);
+    }
     if (!file.has(2 * index)) {
       if (auto status = file.append(2 * index, rows); !status) return status;
     }

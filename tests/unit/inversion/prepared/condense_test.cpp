@@ -109,6 +109,18 @@ TEST_F(Condensed, APriorWithFarTooMuchMotionOrNoneIsRefusedWithTheFigure) {
   EXPECT_THAT(refused(none), HasSubstr("above 0"));
 }
 
+TEST(BlockRunner, DealsAnEvenNumberOfBlocksOfAboutTheSameSize) {
+  EXPECT_EQ(BlockRunner::block_size(0), 1);
+  EXPECT_EQ(BlockRunner::block_size(1), 1);
+  for (const int columns : {2, 47, 95, 96, 97, 192, 193, 239, 384, 2394, 7151}) {
+    const int size = BlockRunner::block_size(columns), blocks = (columns + size - 1) / size;
+    EXPECT_LE(size, BlockRunner::kBlock) << columns;
+    EXPECT_LE(blocks * size - columns, blocks)
+        << columns << ": the last one lacks no more than that";
+    EXPECT_EQ(blocks % 2, 0) << columns;
+  }
+}
+
 TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
   CondenseOptions one;
   one.threads = 1;
