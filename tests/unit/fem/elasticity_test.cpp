@@ -170,5 +170,26 @@ TEST(DofMap, RestrictIsTheTransposeOfExpand) {
   EXPECT_TRUE(u.col(5).isZero(0.0));
 }
 
+TEST(DofMap, SeveralFieldsAreExpandedAndRestrictedAsOne) {
+  DofMap dofs(4);
+  dofs.fix_normal(0, Vec3(1.0, 2.0, -2.0) / 3.0);
+  dofs.fix_plane(1, Vec3(0.6, 0.8, 0.0), Vec3(-0.8, 0.6, 0.0));
+  dofs.fix_all(2);
+  dofs.finalise();
+  std::srand(4);
+  const Eigen::MatrixXd q = Eigen::MatrixXd::Random(5, dofs.num_unknowns());
+  const Eigen::MatrixXd f = Eigen::MatrixXd::Random(5, 12);
+  Eigen::MatrixXd u, restricted;
+  dofs.expand_rows(q, u);
+  dofs.restrict_rows(f, restricted);
+  for (Eigen::Index j = 0; j < 5; ++j) {
+    const Points one = dofs.expand(VecX(q.row(j).transpose()));
+    EXPECT_LT((u.row(j).transpose() - one.reshaped()).norm(), 1e-15) << j;
+    const VecX field = f.row(j).transpose();
+    const VecX expected = dofs.restrict_to(Points(Eigen::Map<const Points>(field.data(), 3, 4)));
+    EXPECT_LT((restricted.row(j).transpose() - expected).norm(), 1e-15) << j;
+  }
+}
+
 }  // namespace
 }  // namespace brainshift::fem
