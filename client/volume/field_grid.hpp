@@ -13,6 +13,7 @@
 #include <cstddef>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift::client {
@@ -27,16 +28,8 @@ struct FieldGrid {
   Vec3 origin_mm = Vec3::Zero();  // centre of voxel (0, 0, 0)
   double spacing_mm = 0.0;
 
-  std::size_t num_voxels() const {
-    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
-           static_cast<std::size_t>(dims[2]);
-  }
-  std::size_t index(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(dims[0]) *
-               (static_cast<std::size_t>(j) +
-                static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k));
-  }
+  std::size_t num_voxels() const { return grid_size(dims); }
+  std::size_t index(int i, int j, int k) const { return grid_index(dims, i, j, k); }
   Vec3 voxel_mm(int i, int j, int k) const { return origin_mm + spacing_mm * Vec3(i, j, k); }
   // Centre of the last voxel of every axis.
   Vec3 last_mm() const { return voxel_mm(dims[0] - 1, dims[1] - 1, dims[2] - 1); }

@@ -31,23 +31,26 @@ struct TriangleSurface {
   int num_triangles() const { return static_cast<int>(triangles.cols()); }
 };
 
-// Scalar voxel image; voxel (i,j,k) is values[i + dims[0]*(j + dims[1]*k)] and its centre lies at
-// T_ras_voxel * (i,j,k), mm RAS. The affine may be oblique or left-handed.
+// Of a regular grid: how many nodes or voxels it has, and the place of (i, j, k) among its values,
+// i + dims[0] * (j + dims[1] * k): x fastest. The indices lie within dims.
+inline std::size_t grid_size(const std::array<int, 3>& dims) {
+  return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+         static_cast<std::size_t>(dims[2]);
+}
+inline std::size_t grid_index(const std::array<int, 3>& dims, int i, int j, int k) {
+  const auto at = [](int n) { return static_cast<std::size_t>(n); };
+  return at(i) + at(dims[0]) * (at(j) + at(dims[1]) * at(k));
+}
+
+// Scalar voxel image; the centre of voxel (i, j, k) lies at T_ras_voxel * (i, j, k), mm RAS, its
+// value is values[grid_index(dims, i, j, k)]. The affine may be oblique or left-handed.
 struct VoxelImage {
   std::array<int, 3> dims{0, 0, 0};
   AffineTransform T_ras_voxel = AffineTransform::Identity();
   std::vector<float> values;
 
-  float at(int i, int j, int k) const {
-    return values[static_cast<std::size_t>(i) +
-                  static_cast<std::size_t>(dims[0]) *
-                      (static_cast<std::size_t>(j) +
-                       static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k))];
-  }
-  std::size_t num_voxels() const {
-    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
-           static_cast<std::size_t>(dims[2]);
-  }
+  float at(int i, int j, int k) const { return values[grid_index(dims, i, j, k)]; }
+  std::size_t num_voxels() const { return grid_size(dims); }
 };
 
 }  // namespace brainshift

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift {
@@ -23,16 +24,8 @@ struct DistanceGrid {
   std::vector<float> values;
 
   bool empty() const { return values.empty(); }
-  std::size_t num_nodes() const {
-    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
-           static_cast<std::size_t>(dims[2]);
-  }
-  std::size_t index(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(dims[0]) *
-               (static_cast<std::size_t>(j) +
-                static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k));
-  }
+  std::size_t num_nodes() const { return grid_size(dims); }
+  std::size_t index(int i, int j, int k) const { return grid_index(dims, i, j, k); }
   Vec3 node(int i, int j, int k) const { return origin_mm + spacing_mm * Vec3(i, j, k); }
 };
 

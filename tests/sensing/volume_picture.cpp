@@ -8,17 +8,12 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "common/core/mesh.hpp"
+
 namespace brainshift::test_support {
 namespace {
 
 constexpr int kZoom = 4;
-
-std::size_t voxel(const std::array<int, 3>& dims, int i, int j, int k) {
-  return static_cast<std::size_t>(i) +
-         static_cast<std::size_t>(dims[0]) *
-             (static_cast<std::size_t>(j) +
-              static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k));
-}
 
 cv::Mat slice_image(const std::vector<float>& values, const std::array<int, 3>& dims, int axis,
                     int slice) {
@@ -32,7 +27,7 @@ cv::Mat slice_image(const std::vector<float>& values, const std::array<int, 3>& 
       at[static_cast<std::size_t>(a)] = c;
       at[static_cast<std::size_t>(b)] = r;
       image.at<unsigned char>(r, c) =
-          cv::saturate_cast<unsigned char>(values[voxel(dims, at[0], at[1], at[2])]);
+          cv::saturate_cast<unsigned char>(values[grid_index(dims, at[0], at[1], at[2])]);
     }
   }
   cv::resize(image, image, cv::Size(), kZoom, kZoom, cv::INTER_NEAREST);
@@ -54,7 +49,7 @@ int fullest_slice(const std::vector<float>& weight, const std::array<int, 3>& di
     for (int j = 0; j < dims[1]; ++j) {
       for (int i = 0; i < dims[0]; ++i) {
         const std::array<int, 3> at{i, j, k};
-        if (weight[voxel(dims, i, j, k)] > 0.0F) {
+        if (weight[grid_index(dims, i, j, k)] > 0.0F) {
           ++count[static_cast<std::size_t>(at[static_cast<std::size_t>(axis)])];
         }
       }

@@ -107,7 +107,7 @@ Status write_nifti(const fs::path& path, const DisplacementField& field, VectorF
   set_text(header.intent_name, std::string(to_string(field.direction)));
   auto file = begin(path, header);
   if (!file) return tl::unexpected(file.error());
-  const auto slice = static_cast<std::size_t>(field.grid.dims[0] * field.grid.dims[1]);
+  const std::size_t slice = grid_size({field.grid.dims[0], field.grid.dims[1], 1});
   std::vector<float> values(slice);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float sign = vectors == VectorFrame::kLps && axis < 2 ? -1.0F : 1.0F;

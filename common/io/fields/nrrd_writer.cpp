@@ -55,7 +55,7 @@ Status write_nrrd(const std::filesystem::path& path, const DisplacementField& fi
   }
   auto file = GzipOutput::create(path, header_of(field), true);
   if (!file) return tl::unexpected(file.error());
-  const std::size_t slice = 3 * static_cast<std::size_t>(field.grid.dims[0] * field.grid.dims[1]);
+  const std::size_t slice = 3 * grid_size({field.grid.dims[0], field.grid.dims[1], 1});
   std::vector<float> values(slice);
   for (std::size_t first = 0; first < field.ras_mm.size(); first += slice) {
     for (std::size_t i = 0; i < slice; i += 3) {

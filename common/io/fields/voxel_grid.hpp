@@ -12,6 +12,7 @@
 #include <cstddef>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift::io {
@@ -25,16 +26,8 @@ struct VoxelGrid {
   std::array<int, 3> dims{0, 0, 0};
   AffineTransform T_ras_voxel = AffineTransform::Identity();
 
-  std::size_t num_voxels() const {
-    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
-           static_cast<std::size_t>(dims[2]);
-  }
-  std::size_t index(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(dims[0]) *
-               (static_cast<std::size_t>(j) +
-                static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(k));
-  }
+  std::size_t num_voxels() const { return grid_size(dims); }
+  std::size_t index(int i, int j, int k) const { return grid_index(dims, i, j, k); }
   Vec3 voxel_mm(int i, int j, int k) const { return T_ras_voxel * Vec3(i, j, k); }
   Vec3 spacing_mm() const { return T_ras_voxel.linear().colwise().norm().transpose(); }
   // Unit vectors along the voxel axes, RAS; one per column. The determinant is -1 when flipped.

@@ -10,18 +10,8 @@
 namespace brainshift::io {
 namespace {
 
-constexpr std::size_t kLargestHeader = std::size_t{256} << 20;
-
 tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
-}
-
-// Cuts the first line off, without its line feed.
-std::string_view take_line(std::string_view& rest) {
-  const std::size_t end = std::min(rest.find('\n'), rest.size());
-  const std::string_view line = rest.substr(0, end);
-  rest.remove_prefix(std::min(end + 1, rest.size()));
-  return line;
 }
 
 Status store_line(NrrdHeader& header, std::string_view line) {
@@ -68,6 +58,13 @@ Status understand(NrrdHeader& header) {
 
 }  // namespace
 
+std::string_view take_line(std::string_view& rest) {
+  const std::size_t end = std::min(rest.find('\n'), rest.size());
+  const std::string_view line = rest.substr(0, end);
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return line;
+}
+
 std::string NrrdHeader::field(const std::string& name) const {
   const auto found = fields.find(name);
   return found == fields.end() ? std::string() : found->second;
@@ -78,7 +75,7 @@ Result<NrrdHeader> parse_nrrd_header(std::string_view content) {
   std::string_view rest = content;
   if (!take_line(rest).starts_with("NRRD000")) return unreadable("is no NRRD file");
   while (true) {
-    if (rest.empty() || content.size() - rest.size() > kLargestHeader) {
+    if (rest.empty() || content.size() - rest.size() > kLargestNrrdHeader) {
       return unreadable("its NRRD header has no end (an empty line)");
     }
     const std::string_view line = trimmed(take_line(rest));

@@ -5,6 +5,7 @@
 // Source: teem.sourceforge.net/nrrd/format.html.
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <string>
 #include <string_view>
@@ -13,6 +14,12 @@
 #include "common/io/files/packed_values.hpp"
 
 namespace brainshift::io {
+
+// Bytes; a longer header is no header.
+inline constexpr std::size_t kLargestNrrdHeader = std::size_t{256} << 20;
+
+// Cuts the first line off and returns it, without its line feed.
+std::string_view take_line(std::string_view& rest);
 
 struct NrrdHeader : PackedValues {
   std::map<std::string, std::string> fields;  // of both kinds of line, as text

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
 
 #include "common/io/files/csv_numbers.hpp"
@@ -13,18 +12,9 @@ namespace brainshift::io {
 namespace {
 
 constexpr std::string_view kFramePrefix = "Seq_Frame";
-constexpr std::size_t kLargestHeader = std::size_t{256} << 20;
 
 tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
-}
-
-// Cuts the first line off, without its line feed.
-std::string_view take_line(std::string_view& rest) {
-  const std::size_t end = std::min(rest.find('\n'), rest.size());
-  const std::string_view line = rest.substr(0, end);
-  rest.remove_prefix(std::min(end + 1, rest.size()));
-  return line;
 }
 
 // Puts a key either among the file's fields or, "Seq_Frame0012_Name", among those of a frame.
@@ -101,7 +91,7 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
   SequenceHeader header;
   std::string_view rest = content;
   while (true) {
-    if (rest.empty() || content.size() - rest.size() > kLargestHeader) {
+    if (rest.empty() || content.size() - rest.size() > kLargestNrrdHeader) {
       return unreadable("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view line = take_line(rest);

@@ -26,6 +26,15 @@ std::string refusal(const std::string& text) {
   return header.error().message;
 }
 
+TEST(TakeLine, CutsAtTheLineFeedAndTakesTheRestWhereThereIsNone) {
+  std::string_view rest = "a: 1\n\nend";
+  EXPECT_EQ(take_line(rest), "a: 1");
+  EXPECT_EQ(take_line(rest), "");
+  EXPECT_EQ(rest, "end");
+  EXPECT_EQ(take_line(rest), "end");
+  EXPECT_EQ(take_line(rest), "");
+}
+
 TEST(NrrdHeader, KeepsFieldsAndKeysAndWhatFollows) {
   const auto header = parse_nrrd_header(kGood);
   ASSERT_TRUE(header) << header.error().message;
