@@ -6,15 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <utility>
 #include <vector>
 
-#include "client/plot/chart.hpp"
 #include "tests/ablations/ablation_truths.hpp"
 #include "tests/ablations/comparison.hpp"
 #include "tests/ablations/parts.hpp"
 #include "tests/support/study_record.hpp"
+#include "tests/surgeries/dot_chart.hpp"
 
 namespace brainshift::ablations {
 namespace {
@@ -111,17 +110,9 @@ Status draw(const std::vector<Held>& parts, const Picture& picture,
     }
     spec.series.push_back(std::move(series));
   }
-  client::Series equal;
-  equal.colour = palette::kInk;
-  equal.marker = client::Marker::kNone;
-  equal.line = true;
-  equal.dash_px = 10.0;
-  equal.points = {{-0.5, 1.0, ""}, {static_cast<double>(parts.size()) - 0.5, 1.0, ""}};
-  spec.series.push_back(equal);
+  spec.series.push_back(surgeries::bound_line(1.0, parts.size(), ""));
   for (const Held& held : parts) spec.x.names.push_back(held.part->variant.name);
-  const std::filesystem::path file = folder / picture.file;
-  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
-  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+  return surgeries::write_chart(spec, folder / picture.file);
 }
 
 }  // namespace

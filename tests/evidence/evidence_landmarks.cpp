@@ -6,18 +6,17 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
 #include "client/landmarks/import_landmarks.hpp"
-#include "client/plot/chart.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/io/landmarks/pair_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "tests/benchmarks/paired_test.hpp"
 #include "tests/evidence/landmark_study.hpp"
 #include "tests/support/study_record.hpp"
+#include "tests/surgeries/dot_chart.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::evidence {
@@ -109,8 +108,7 @@ Status draw(const std::vector<LeftOutLandmark>& landmarks, const fs::path& file)
     }
     spec.series.push_back(series);
   }
-  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
-  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+  return surgeries::write_chart(spec, file);
 }
 
 Status run(const Arguments& arguments) {

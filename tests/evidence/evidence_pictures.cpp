@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/evidence/evidence_pictures.hpp"
 
-#include <functional>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "client/plot/chart.hpp"
 #include "tests/evidence/evidence_checks.hpp"
 #include "tests/evidence/evidence_truths.hpp"
+#include "tests/surgeries/dot_chart.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
 namespace brainshift::evidence {
@@ -22,14 +20,14 @@ struct Picture {
   const char* title;
   const char* data;
   client::Axis y;
-  std::function<double(const Rows&, std::size_t)> value;
+  surgeries::RowValue value;
   std::vector<double> bounds;  // dashed
 };
 
 struct Dots {
   const char* boundary;
   const char* legend;
-  double left, right;  // ends within a truth's column, which is 1 wide
+  surgeries::Strip strip;
   cv::Scalar colour;
   client::Marker marker;
 };
@@ -42,24 +40,8 @@ client::Series dots_of(const Rows& rows, const std::vector<std::string>& truths,
   series.marker = dots.marker;
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const Rows of = rows.where("truth", truths[t]).where("boundary", dots.boundary);
-    for (std::size_t i = 0; i < of.size(); ++i) {
-      const double at =
-          of.size() > 1 ? static_cast<double>(i) / static_cast<double>(of.size() - 1) : 0.5;
-      series.points.push_back({static_cast<double>(t) + dots.left + at * (dots.right - dots.left),
-                               picture.value(of, i), ""});
-    }
+    surgeries::add_dots(series, of, t, dots.strip, picture.value);
   }
-  return series;
-}
-
-client::Series bound_line(double bound, std::size_t truths, bool first) {
-  client::Series series;
-  series.legend = first ? "bounds of the means (docs/evidence.md)" : "";
-  series.colour = palette::kInk;
-  series.marker = client::Marker::kNone;
-  series.line = true;
-  series.dash_px = 10.0;
-  series.points = {{-0.5, bound, ""}, {static_cast<double>(truths) - 0.5, bound, ""}};
   return series;
 }
 
@@ -75,16 +57,15 @@ Status draw(const Rows& all, const Picture& picture, const std::filesystem::path
   spec.y = picture.y;
   spec.size = {3400, 1000};  // room for the names
   for (const Dots& dots :
-       {Dots{"contact", "contact", -0.36, -0.04, palette::kBlue, client::Marker::kCircle},
-        Dots{"fixed", "fixed", 0.04, 0.36, palette::kVermillion, client::Marker::kTriangle}}) {
+       {Dots{"contact", "contact", {-0.36, -0.04}, palette::kBlue, client::Marker::kCircle},
+        Dots{"fixed", "fixed", {0.04, 0.36}, palette::kVermillion, client::Marker::kTriangle}}) {
     spec.series.push_back(dots_of(rows, truths, dots, picture));
   }
   for (std::size_t i = 0; i < picture.bounds.size(); ++i) {
-    spec.series.push_back(bound_line(picture.bounds[i], truths.size(), i == 0));
+    spec.series.push_back(surgeries::bound_line(
+        picture.bounds[i], truths.size(), i == 0 ? "bounds of the means (docs/evidence.md)" : ""));
   }
-  const std::filesystem::path file = folder / picture.file;
-  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
-  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+  return surgeries::write_chart(spec, folder / picture.file);
 }
 
 // Mean over the patients' means, as the checks have it.
@@ -134,9 +115,7 @@ Status draw_reliability(const Rows& all, const std::filesystem::path& folder) {
       palette::kVermillion, client::Marker::kTriangle);
   add(of([](const std::string& truth) { return truth == "calculix"; }), "CalculiX",
       palette::kPurple, client::Marker::kSquare);
-  const std::filesystem::path file = folder / "evidence-reliability.png";
-  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
-  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+  return surgeries::write_chart(spec, folder / "evidence-reliability.png");
 }
 
 }  // namespace

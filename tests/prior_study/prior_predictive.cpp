@@ -13,11 +13,11 @@
 #include "common/core/statistics.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "tests/prior_study/prior_draws.hpp"
 #include "tests/prior_study/prior_pictures.hpp"
 #include "tests/prior_study/prior_table.hpp"
 #include "tests/support/study_record.hpp"
+#include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::prior_study {
 namespace {
@@ -52,7 +52,6 @@ Status run(const Arguments& arguments) {
   }
   const auto strengths = parse_strengths(arguments.strengths);
   if (!strengths) return tl::unexpected(strengths.error());
-  linalg::use_single_threaded_blas();
   const auto config = io::read_case_config(arguments.head);
   if (!config) return tl::unexpected(config.error());
   const auto head = bench::make_head(*config, {config->case_id, arguments.thousand_nodes});
@@ -97,20 +96,6 @@ int main(int argc, char** argv) {
   app.add_option("--strength", arguments.strengths,
                  "PART=NUMBER, in units of the case's standard deviations: what if");
   app.add_option("--out", arguments.out, "folder of table and pictures")->capture_default_str();
-  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage or targets.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "prior_predictive: %s (see prior_predictive --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::prior_study::run(arguments);
-  if (ok) return 0;
-  std::fprintf(stderr, "prior_predictive: %s\n", ok.error().message.c_str());
-  const auto code = ok.error().code;
-  return code == brainshift::ErrorCode::kNotFound || code == brainshift::ErrorCode::kUnreadable ||
-                 code == brainshift::ErrorCode::kInvalidArgument
-             ? 2
-             : 1;
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::prior_study::run(arguments); });
 }

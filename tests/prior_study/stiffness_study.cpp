@@ -28,10 +28,10 @@
 #include "common/fem/swelling.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/benchmarks/csv_table.hpp"
+#include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::prior_study {
 namespace {
@@ -185,7 +185,6 @@ void print(const std::vector<Fields>& expected, const std::vector<std::array<Rat
 }
 
 Status run(const Arguments& arguments) {
-  linalg::use_single_threaded_blas();
   auto config = io::read_case_config(arguments.head);
   if (!config) return tl::unexpected(config.error());
   bench::MeshWish wish;
@@ -259,15 +258,6 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 300.0));
   app.add_option("--out", arguments.out, "table to write")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "stiffness_study: %s (see stiffness_study --help)\n", error.what());
-    return 2;
-  }
-  const auto ok = brainshift::prior_study::run(arguments);
-  if (ok) return 0;
-  std::fprintf(stderr, "stiffness_study: %s\n", ok.error().message.c_str());
-  return 1;
+  return brainshift::surgeries::run_study(app, argc, argv,
+                                          [&] { return brainshift::prior_study::run(arguments); });
 }

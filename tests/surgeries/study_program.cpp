@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "common/core/exit_status.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
@@ -43,19 +44,19 @@ Result<CaseConfig> read_head(const fs::path& path) {
 
 int run_study(CLI::App& app, int argc, char** argv, const std::function<Status()>& run) {
   const std::string name = app.get_name();
-  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage.");
+  app.footer("Exit status: 0 measured, 1 failure, 2 bad usage or bad input.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     std::fprintf(stderr, "%s: %s (see %s --help)\n", name.c_str(), error.what(), name.c_str());
-    return 2;
+    return kExitBadInput;
   }
   linalg::use_single_threaded_blas();
   const Status ok = run();
-  if (ok) return 0;
+  if (ok) return kExitSuccess;
   std::fprintf(stderr, "%s: %s\n", name.c_str(), ok.error().message.c_str());
-  return 1;
+  return exit_status(ok.error().code);
 }
 
 }  // namespace brainshift::surgeries

@@ -27,7 +27,7 @@ void add_study_options(CLI::App& app, StudyArguments& arguments);
 Result<CaseConfig> read_head(const std::filesystem::path& path);
 
 // Parses the options, then runs. BLAS is single-threaded: the study's own threads share the work.
-// -> exit status: 0 measured, 1 failure, 2 bad usage. Failures go to stderr, one line.
+// -> the exit status of core/exit_status.hpp. Failures go to stderr, one line.
 int run_study(CLI::App& app, int argc, char** argv, const std::function<Status()>& run);
 
 }  // namespace brainshift::surgeries

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/surgeries/surgery_pictures.hpp"
 
-#include <cmath>
-#include <functional>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "client/plot/chart.hpp"
+#include "tests/surgeries/dot_chart.hpp"
 
 namespace brainshift::surgeries {
 namespace {
@@ -18,45 +15,15 @@ struct Picture {
   const char* file;
   const char* title;
   client::Axis y;
-  std::function<double(const Rows&, std::size_t)> value;
+  RowValue value;
   std::vector<double> bounds;  // dashed
 };
 
-// Left and right ends of the dots of one head in a scenario's column, which is 1 wide.
-struct Strip {
-  double left = 0.0, right = 0.0;
-};
+// Of one head.
 Strip strip_of(std::size_t head, std::size_t heads) {
   const double width = 0.8 / static_cast<double>(heads);
   const double left = -0.4 + width * static_cast<double>(head);
   return {left + 0.1 * width, left + 0.9 * width};
-}
-
-client::Series dots(const Rows& rows, const std::vector<std::string>& scenarios, Strip strip,
-                    const Picture& picture) {
-  client::Series series;
-  for (std::size_t s = 0; s < scenarios.size(); ++s) {
-    const Rows of = rows.where("scenario", scenarios[s]);
-    for (std::size_t i = 0; i < of.size(); ++i) {
-      const double at =
-          of.size() > 1 ? static_cast<double>(i) / static_cast<double>(of.size() - 1) : 0.5;
-      series.points.push_back(
-          {static_cast<double>(s) + strip.left + at * (strip.right - strip.left),
-           picture.value(of, i), ""});
-    }
-  }
-  return series;
-}
-
-client::Series bound_line(double bound, std::size_t scenarios, bool first) {
-  client::Series series;
-  series.legend = first ? "bound of the mean" : "";
-  series.colour = palette::kInk;
-  series.marker = client::Marker::kNone;
-  series.line = true;
-  series.dash_px = 10.0;
-  series.points = {{-0.5, bound, ""}, {static_cast<double>(scenarios) - 0.5, bound, ""}};
-  return series;
 }
 
 Status draw(const Rows& rows, const Picture& picture, const std::filesystem::path& folder) {
@@ -73,19 +40,22 @@ Status draw(const Rows& rows, const Picture& picture, const std::filesystem::pat
   const client::Marker markers[] = {client::Marker::kCircle, client::Marker::kTriangle,
                                     client::Marker::kSquare};
   for (std::size_t h = 0; h < heads.size(); ++h) {
-    client::Series series =
-        dots(rows.where("head", heads[h]), scenarios, strip_of(h, heads.size()), picture);
+    const Rows of = rows.where("head", heads[h]);
+    const Strip strip = strip_of(h, heads.size());
+    client::Series series;
+    for (std::size_t s = 0; s < scenarios.size(); ++s) {
+      add_dots(series, of.where("scenario", scenarios[s]), s, strip, picture.value);
+    }
     series.legend = heads[h];
     series.colour = colours[h % std::size(colours)];
     series.marker = markers[h % std::size(markers)];
     spec.series.push_back(std::move(series));
   }
   for (std::size_t i = 0; i < picture.bounds.size(); ++i) {
-    spec.series.push_back(bound_line(picture.bounds[i], scenarios.size(), i == 0));
+    spec.series.push_back(
+        bound_line(picture.bounds[i], scenarios.size(), i == 0 ? "bound of the mean" : ""));
   }
-  const std::filesystem::path file = folder / picture.file;
-  if (cv::imwrite(file.string(), client::draw_chart(spec))) return {};
-  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+  return write_chart(spec, folder / picture.file);
 }
 
 }  // namespace
