@@ -47,7 +47,7 @@ Follower::Follower(FollowerOptions options, FollowerCalls calls)
 
 Status Follower::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    const Status status = follow(stop);
+    Status status = follow(stop);
     if (stop.stop_requested()) break;
     if (!status) {
       const bool may_pass = status.error().code == ErrorCode::kUnavailable ||

@@ -79,7 +79,7 @@ Status run(const Arguments& arguments) {
                  to_string(address).c_str());
   }
   catch_signals(bridge->get());
-  const Status status = (*bridge)->run();
+  Status status = (*bridge)->run();
   catch_signals(nullptr);
   return status;
 }

@@ -13,7 +13,7 @@
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;
 }
 

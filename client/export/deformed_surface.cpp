@@ -9,11 +9,11 @@
 namespace brainshift::client {
 namespace {
 
-DeformedSurface moved(TriangleSurface surface, Points u, VecX sd_mm) {
+DeformedSurface moved(TriangleSurface surface, const Points& u, const VecX& sd_mm) {
   DeformedSurface out;
   out.surface = std::move(surface);
   out.surface.vertices += u;
-  out.vertex_fields.push_back({"displacement_mm", std::move(u)});
+  out.vertex_fields.push_back({"displacement_mm", u});
   if (sd_mm.size() > 0) out.vertex_fields.push_back({"sd_mm", sd_mm.transpose()});
   return out;
 }
@@ -29,7 +29,7 @@ DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const 
     at_vertices.col(v) = geometry::value_at(at, u);
     if (sd.size() > 0) sd[v] = geometry::value_at(at, sd_mm);
   }
-  return moved(model.tumour, std::move(at_vertices), std::move(sd));
+  return moved(model.tumour, at_vertices, sd);
 }
 
 DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm) {
@@ -42,7 +42,7 @@ DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const 
     at_vertices.col(v) = u.col(node);
     if (sd.size() > 0) sd[v] = sd_mm[node];
   }
-  return moved(std::move(surface), std::move(at_vertices), std::move(sd));
+  return moved(std::move(surface), at_vertices, sd);
 }
 
 }  // namespace brainshift::client

@@ -112,13 +112,11 @@ Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path
   fs::create_directories(folder, failed);
   if (failed) return io::file_error(ErrorCode::kWriteFailed, folder, failed.message());
   std::string list;
-  const auto fields =
-      visit_fields(file, path, model, [&](const Update& update, double time_s) -> Status {
-        const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), update.sequence);
-        list +=
-            fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
-        return write_field(folder / name, model, update.estimate);
-      });
+  auto fields = visit_fields(file, path, model, [&](const Update& update, double time_s) -> Status {
+    const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), update.sequence);
+    list += fmt::format("    <DataSet timestep=\"{:.6f}\" file=\"{}\"/>\n", time_s, xml_text(name));
+    return write_field(folder / name, model, update.estimate);
+  });
   if (!fields) return fields;
   const std::string pvd =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n" +
@@ -134,7 +132,7 @@ Result<int> write_field_file(const io::SurgeryFile& file, const fs::path& path,
   if (!model) return tl::unexpected(model.error());
   auto series = io::FieldSeriesFile::create(out, *model);
   if (!series) return tl::unexpected(series.error());
-  const auto fields = visit_fields(
+  auto fields = visit_fields(
       file, path, *model,
       [&](const Update& update, double time_s) -> Status { return series->add(update, time_s); });
   if (!fields) return fields;

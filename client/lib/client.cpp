@@ -224,7 +224,7 @@ Status Client::Impl::confirm(Deadline deadline) {
     if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
       if (auto status = renew(); !status) return status;
     }
-    const auto status = receive_push(std::min(deadline, next_renewal()));
+    auto status = receive_push(std::min(deadline, next_renewal()));
     if (!status && gives_up(status.error(), deadline)) return status;
   }
   updates.drop_older_than(*watch.state());

@@ -244,7 +244,7 @@ Status Builder::set_conditions() {
     if (spec.normal_displacement_mm) {
       condition.what = NormalDisplacement{*spec.normal_displacement_mm};
     } else if (spec.traction_pa) {
-      const Vec3 t = *spec.traction_pa * units::stress_from_pa(1.0);
+      Vec3 t = *spec.traction_pa * units::stress_from_pa(1.0);
       condition.what = Traction{[t](const Vec3&) { return t; }};
     } else if (spec.pressure_pa) {
       condition.what = Pressure{units::stress_from_pa(*spec.pressure_pa)};

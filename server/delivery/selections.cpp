@@ -40,7 +40,7 @@ Result<SelectionPtr> Selections::resolve(const FieldChoice& choice) {
       nodes = thin_nodes(model_->mesh.nodes, nodes, on_boundary_, choice.spacing_mm);
     }
     const int count = static_cast<int>(model_->mesh.nodes.cols());
-    const SelectionPtr selection =
+    SelectionPtr selection =
         std::make_shared<const Selection>(Selection{choice, count, std::move(nodes)});
     known_.push_back(selection);
     return selection;

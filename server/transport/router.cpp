@@ -61,7 +61,7 @@ struct Router::Impl {
   std::optional<Reply> ask_handler(const std::string& peer, const wire::Frame& frame);
   void complain(const Incoming& incoming, const Error& error);
   void subscribe(const std::string& routing_id, const Reply& answer);
-  void reply(const std::string& peer, const Bytes& bytes);
+  void reply(const std::string& routing_id, const Bytes& bytes);
   void deliver(const Outgoing& message);
   void forget_session();
   void push(const std::string& routing_id, Viewer& viewer, const Outgoing& message);
@@ -321,6 +321,7 @@ void Router::Impl::pay_owed() {
 
 // The name may be the removed peer's own: it is copied first.
 void Router::Impl::remove(const std::string& routing_id) {
+  // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
   const std::string name = routing_id;
   if (peers.find(name) == nullptr) return;
   peers.remove(name);

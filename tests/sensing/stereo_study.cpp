@@ -7,6 +7,9 @@
 //     calibration, also with pairs that took no part in it;
 //   - a simulated cortical patch: error of the surface at several distances, beside Z^2 / (f b)
 //     sd_d.
+
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -158,17 +161,16 @@ struct Boards {
 Boards photographed_boards(const stereo::ChessBoard& board) {
   Boards boards;
   for (int i = 1; i <= 14; ++i) {
-    char number[8];
-    std::snprintf(number, sizeof number, "%02d", i);
-    const auto left = client::read_picture(kPictures / (std::string("left") + number + ".jpg"));
-    const auto right = client::read_picture(kPictures / (std::string("right") + number + ".jpg"));
+    const std::string number = fmt::format("{:02}", i);
+    const auto left = client::read_picture(kPictures / ("left" + number + ".jpg"));
+    const auto right = client::read_picture(kPictures / ("right" + number + ".jpg"));
     if (!left || !right) continue;  // the set has no tenth pair
     boards.width = left->width;
     boards.height = left->height;
     stereo::BoardCorners pair{number, stereo::find_corners(*left, board),
                               stereo::find_corners(*right, board)};
     if (pair.left.cols() == 0 || pair.right.cols() == 0) {
-      std::printf("chessboard %s: board not found\n", number);
+      std::printf("chessboard %s: board not found\n", number.c_str());
       continue;
     }
     boards.pairs.push_back(std::move(pair));

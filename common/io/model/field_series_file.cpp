@@ -85,7 +85,7 @@ Status FieldSeriesFile::add(const Update& update, double time_s) {
 }
 
 Status FieldSeriesFile::commit() {
-  const Status flushed = impl_->attempt([&](Hdf5Writer&) {
+  Status flushed = impl_->attempt([&](Hdf5Writer&) {
     check_hdf5(H5Fflush(impl_->h5.get(), H5F_SCOPE_GLOBAL), "buffers");
     if (!impl_->h5.close()) throw Hdf5Problem{"buffers"};
   });

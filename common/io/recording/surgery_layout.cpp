@@ -50,8 +50,8 @@ CREATE TABLE truth_scalar(
 constexpr const char* kTables[] = {
     "SELECT id, kind, sequence, recorded_ns, payload FROM record",
     "SELECT observation_sequence, nodes, displacement FROM truth_field",
-    "SELECT observation_sequence, kind, node0, node1, node2, node3, weight0, weight1, weight2,"
-    " weight3 FROM truth_point",
+    ("SELECT observation_sequence, kind, node0, node1, node2, node3, weight0, weight1, weight2, "
+     "weight3 FROM truth_point"),
     "SELECT observation_sequence, name, value FROM truth_scalar"};
 constexpr const char* kTablesSince2[] = {"SELECT crc FROM record", "SELECT crc FROM truth_field",
                                          "SELECT name, records, crc FROM seal"};

@@ -19,7 +19,7 @@ client::SimulatedSurgery two_moments() {
     observation.case_id = "c";
     observation.source = i % 3 == 0 ? "ius" : i % 3 == 1 ? "stereopsis" : "tracks";
     observation.sequence = static_cast<std::uint64_t>(i) + 1;
-    observation.acquired_ns = 300'000'000'000 * (i / 3) + 2'000'000'000 * (i % 3);
+    observation.acquired_ns = 300'000'000'000 * (i / 3) + 2'000'000'000L * (i % 3);
     observation.body = TumourBoundary{Points::Constant(3, 4, i), 0.5};
     surgery.observations.push_back(observation);
   }
