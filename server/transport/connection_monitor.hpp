@@ -18,8 +18,9 @@ namespace brainshift::server {
 
 class ConnectionMonitor {
  public:
+  // watched: outlives this.
   ConnectionMonitor(zmq::context_t& context, zmq::socket_t& watched)
-      : receiver_(context, zmq::socket_type::pair) {
+      : watched_(watched), receiver_(context, zmq::socket_type::pair) {
     constexpr const char* kAddress = "inproc://brainshiftd-connections";
     if (zmq_socket_monitor(watched.handle(), kAddress, ZMQ_EVENT_DISCONNECTED) != 0) {
       throw zmq::error_t();
@@ -27,6 +28,10 @@ class ConnectionMonitor {
     receiver_.set(zmq::sockopt::linger, 0);
     receiver_.connect(kAddress);
   }
+  // libzmq loses the memory of an event that it reports after the receiver has closed.
+  ~ConnectionMonitor() { zmq_socket_monitor(watched_.handle(), nullptr, 0); }
+  ConnectionMonitor(const ConnectionMonitor&) = delete;
+  ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;
 
   zmq::socket_t& socket() { return receiver_; }
 
@@ -48,6 +53,7 @@ class ConnectionMonitor {
   }
 
  private:
+  zmq::socket_t& watched_;
   zmq::socket_t receiver_;
 };
 
