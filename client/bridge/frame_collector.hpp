@@ -74,7 +74,7 @@ class FrameCollector {
 
   Moment* moment_at(igtl::Timestamp time, TimePoint arrived);
   void take_image(const igtl::Image& image, Moment& moment, TimePoint arrived);
-  void take_transform(const std::string& name, const igtl::Matrix34f& matrix,
+  void take_transform(const std::string& name, const igtl::Matrix34f& values,
                       const std::string* status, Moment& moment);
   void leave_out(const std::string& reason) { ++left_out_[reason]; }
 

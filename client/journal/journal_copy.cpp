@@ -66,7 +66,7 @@ class NewSurgery {
   NewSurgery(fs::path out, fs::path temporary, io::SurgeryFile file)
       : out_(std::move(out)), temporary_(std::move(temporary)), file_(std::move(file)) {}
   Status flush() {
-    const Status status = group_.empty() ? Status() : file_.append(group_);
+    Status status = group_.empty() ? Status() : file_.append(group_);
     group_.clear();
     bytes_ = 0;
     return status;

@@ -8,9 +8,9 @@
 namespace brainshift::client {
 namespace {
 
-using json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;
 
-json to_json(const wire::LatencyFigures& figures) {
+Json to_json(const wire::LatencyFigures& figures) {
   return {{"count", figures.count},
           {"p50_ms", figures.p50_ms},
           {"p95_ms", figures.p95_ms},
@@ -18,20 +18,20 @@ json to_json(const wire::LatencyFigures& figures) {
           {"max_ms", figures.max_ms}};
 }
 
-json to_json(const wire::SourceCounts& counts) {
+Json to_json(const wire::SourceCounts& counts) {
   return {{"source", counts.source},   {"received", counts.received}, {"answered", counts.answered},
           {"failed", counts.failed},   {"replaced", counts.replaced}, {"skipped", counts.skipped},
           {"refused", counts.refused}, {"repeated", counts.repeated}, {"waiting", counts.waiting},
           {"age_ms", counts.age_ms}};
 }
 
-json to_json(const wire::ViewerFigures& viewer) {
+Json to_json(const wire::ViewerFigures& viewer) {
   return {{"peer", viewer.peer}, {"window", viewer.window},
           {"sent", viewer.sent}, {"received", viewer.received},
           {"owed", viewer.owed}, {"replies_waiting", viewer.replies_waiting}};
 }
 
-json to_json(const wire::StageLatency& stage) {
+Json to_json(const wire::StageLatency& stage) {
   return {{"stage", stage.stage},
           {"recent", to_json(stage.recent)},
           {"all", to_json(stage.all)},
@@ -39,26 +39,26 @@ json to_json(const wire::StageLatency& stage) {
           {"bucket_counts", stage.bucket_counts}};
 }
 
-json to_json(const SessionState& state) {
+Json to_json(const SessionState& state) {
   return {{"boot_id", state.session.boot_id},
           {"session_id", state.session.session_id},
           {"model_id", state.session.model_id},
           {"phase", to_string(state.phase)},
           {"newest_update", state.newest_update},
           {"newest_usable", state.newest_usable},
-          {"age_ms", state.newest_usable > 0 ? json(state.age_ms) : json(nullptr)},
+          {"age_ms", state.newest_usable > 0 ? Json(state.age_ms) : Json(nullptr)},
           {"reason", state.reason},
           {"preparing", state.preparing}};
 }
 
-json to_json(const wire::JournalFigures& journal) {
+Json to_json(const wire::JournalFigures& journal) {
   return {{"recording", journal.recording}, {"reason", journal.reason},   {"file", journal.file},
           {"bytes", journal.bytes},         {"records", journal.records}, {"lost", journal.lost}};
 }
 
 template <typename Value>
-json list(const std::vector<Value>& values) {
-  json result = json::array();
+Json list(const std::vector<Value>& values) {
+  Json result = Json::array();
   for (const Value& value : values) result.push_back(to_json(value));
   return result;
 }
@@ -67,7 +67,7 @@ json list(const std::vector<Value>& values) {
 
 std::string report_json(const wire::DaemonReport& report) {
   const auto trouble = complaint(report);
-  json out;
+  Json out;
   out["well"] = !trouble;
   out["complaint"] = trouble.value_or("");
   out["version"] = report.version;
@@ -93,14 +93,14 @@ std::string report_json(const wire::DaemonReport& report) {
   out["recent_updates"] = report.recent_updates;
   out["bounds_ms"] = report.bounds_ms;
   out["stages"] = list(report.stages);
-  out["journal"] = report.journal ? to_json(*report.journal) : json(nullptr);
+  out["journal"] = report.journal ? to_json(*report.journal) : Json(nullptr);
   out["log_lines_lost"] = report.log_lines_lost;
   out["process"] = {{"resident_bytes", report.process.resident_bytes},
                     {"peak_bytes", report.process.peak_bytes},
                     {"descriptors", report.process.descriptors},
                     {"descriptor_limit", report.process.descriptor_limit},
                     {"threads", report.process.threads}};
-  return out.dump(2, ' ', false, json::error_handler_t::replace);
+  return out.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace brainshift::client

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/report/html_page.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdio>
 
@@ -102,12 +104,14 @@ std::string slide(const PageSlide& slide, std::size_t number) {
   for (std::size_t i = 0; i < slide.positions.size(); ++i) {
     const std::string id = name + "-" + std::to_string(i);
     const std::string label = escape_html(slide.positions[i].label);
-    inputs += "<input type=\"radio\" name=\"" + name + "\" id=\"" + id + "\" class=\"p" +
-              std::to_string(i) + "\"" + (i == 1 ? " checked" : "") + "><label for=\"" + id +
-              "\">" + label + "</label>\n";
-    images += "<img class=\"p" + std::to_string(i) + "\" alt=\"" + label + "\" width=\"" +
-              std::to_string(slide.width) + "\" height=\"" + std::to_string(slide.height) +
-              "\" src=\"data:image/png;base64," + io::base64_encode(slide.positions[i].png) + "\">";
+    inputs += fmt::format(
+        "<input type=\"radio\" name=\"{}\" id=\"{}\" class=\"p{}\"{}><label "
+        "for=\"{}\">{}</label>\n",
+        name, id, i, i == 1 ? " checked" : "", id, label);
+    images += fmt::format(
+        "<img class=\"p{}\" alt=\"{}\" width=\"{}\" height=\"{}\" "
+        "src=\"data:image/png;base64,{}\">",
+        i, label, slide.width, slide.height, io::base64_encode(slide.positions[i].png));
   }
   return "<figure class=\"slide\">" + inputs + "<div class=\"stack\">" + images +
          "</div><figcaption>" + escape_html(slide.caption) + "</figcaption></figure>\n";

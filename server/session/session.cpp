@@ -307,12 +307,12 @@ void Session::work(const std::stop_token& stop) {
       working_since_ = std::chrono::steady_clock::now();
       deadline_s_ = box && running_ ? running_->model->deadline_s : 0.0;
     }
-    if (prepared) begin(std::move(*prepared));
+    if (prepared) begin(*prepared);
     if (box) process(*box);
   }
 }
 
-void Session::begin(Prepared prepared) {
+void Session::begin(const Prepared& prepared) {
   const auto& [start, model] = prepared;
   model->pipeline.reset();
   wire::SessionInfo info = model->info;

@@ -102,15 +102,15 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // `owner`: who asks; empty: nobody, and anybody may end it. `done` is called exactly once. On the
-  // calling thread: kInvalidArgument for another case, kUnavailable for a session that belongs to
-  // another client (both leave the running session alone) and after stop(). Else on the preparer
+  // asking: the client; empty: nobody, and anybody may end it. `done` is called exactly once. On
+  // the calling thread: kInvalidArgument for another case, kUnavailable for a session that belongs
+  // to another client (both leave the running session alone) and after stop(). Else on the preparer
   // or the worker; kUnavailable when a later start or stop() came first.
   void start(const wire::SessionRequest& request, const StartDone& done,
-             const std::string& owner = {});
+             const std::string& asking = {});
 
   // This client has gone: what it owns belongs to nobody.
-  void leave(const std::string& owner);
+  void leave(const std::string& gone);
 
   // Called once before the worker can see an accepted observation; must be quick and must not call
   // back. The observation's daemon_ns is set.
@@ -118,8 +118,7 @@ class Session {
 
   // kModelNotReady without a running session; the errors of check_observation and of
   // Sources::admit. The source's last observation once more gets its receipt once more, and nothing
-  // happens. Precondition: the observation's numbers
-  // are finite (wire::decode_observation).
+  // happens. Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<wire::ObservationReceipt> submit(Observation observation,
                                           const OnAccepted& on_accepted = {});
 
@@ -160,7 +159,7 @@ class Session {
 
   void prepare(const std::stop_token& stop);
   void work(const std::stop_token& stop);
-  void begin(Prepared prepared);
+  void begin(const Prepared& prepared);
   Result<SessionModel*> model_for(const wire::SessionRequest& request, const std::stop_token& stop);
   void process(const Box& box);
   bool finish(const Box& box, const wire::UpdateMessage& message, const std::stop_token& stop);

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "server/session/observation_rules.hpp"
 
 namespace brainshift::server {
@@ -36,7 +34,7 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
   source.last_acquired_ns = observation.acquired_ns;
   source.receipt = {observation.sequence, replaces_pending};
   const Admission admission{source.receipt, *daemon_ns, false};
-  sources_.insert_or_assign(observation.source, std::move(source));
+  sources_.insert_or_assign(observation.source, source);
   return admission;
 }
 
