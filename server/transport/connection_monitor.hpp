@@ -28,7 +28,8 @@ class ConnectionMonitor {
     receiver_.set(zmq::sockopt::linger, 0);
     receiver_.connect(kAddress);
   }
-  // libzmq loses the memory of an event that it reports after the receiver has closed.
+  // Watching ends first: libzmq loses the memory of an event that it reports after the receiver has
+  // closed.
   ~ConnectionMonitor() { zmq_socket_monitor(watched_.handle(), nullptr, 0); }
   ConnectionMonitor(const ConnectionMonitor&) = delete;
   ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;

@@ -75,7 +75,7 @@ Result<NrrdHeader> parse_nrrd_header(std::string_view content) {
   std::string_view rest = content;
   if (!take_line(rest).starts_with("NRRD000")) return unreadable("is no NRRD file");
   while (true) {
-    if (rest.empty() || content.size() - rest.size() > kLargestNrrdHeader) {
+    if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
       return unreadable("its NRRD header has no end (an empty line)");
     }
     const std::string_view line = trimmed(take_line(rest));

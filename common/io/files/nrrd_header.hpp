@@ -15,8 +15,8 @@
 
 namespace brainshift::io {
 
-// Bytes; a longer header is no header.
-inline constexpr std::size_t kLargestNrrdHeader = std::size_t{256} << 20;
+// Bytes, of MetaImage headers too; a file whose header does not end before that is refused.
+inline constexpr std::size_t kLargestTextHeader = std::size_t{256} << 20;
 
 // Cuts the first line off and returns it, without its line feed.
 std::string_view take_line(std::string_view& rest);

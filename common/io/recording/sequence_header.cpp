@@ -91,7 +91,7 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
   SequenceHeader header;
   std::string_view rest = content;
   while (true) {
-    if (rest.empty() || content.size() - rest.size() > kLargestNrrdHeader) {
+    if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
       return unreadable("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view line = take_line(rest);
