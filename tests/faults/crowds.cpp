@@ -68,7 +68,8 @@ void raw_connections(const Settings& settings, Tally& tally) {
   tally.shown("of them refused by the kernel", refused);
   tally.at_most("raw connections: slowest answer to a client s", slowest_s, kMostWait_s);
   tally.equals("raw connections: descriptors left behind", leaked(daemon, before), 0);
-  tally.at_most("raw connections: processor time of 5 idle s", idle_cpu_s(daemon), kMostIdle_s);
+  tally.cost_at_most("raw connections: processor time of 5 idle s", idle_cpu_s(daemon),
+                     kMostIdle_s);
 }
 
 // As many as the daemon serves clients. Each says one byte that is no message, and stays.
@@ -86,7 +87,7 @@ void bad_peers(const Settings& settings, Tally& tally) {
   tally.shown("bad peers that stay", kPeers);
   tally.at_most("bad peers: slowest answer to a client s", slowest_answer_s(daemon.endpoint()),
                 kMostWait_s);
-  tally.at_most("bad peers: processor time of 5 idle s", idle_cpu_s(daemon), kMostIdle_s);
+  tally.cost_at_most("bad peers: processor time of 5 idle s", idle_cpu_s(daemon), kMostIdle_s);
   peers.clear();
   tally.equals("bad peers: descriptors left behind", leaked(daemon, before), 0);
 }
@@ -119,8 +120,8 @@ void few_descriptors(const Settings& settings, Tally& tally) {
   tally.shown("few descriptors: silent peers", kConnections);
   tally.shown("few descriptors: in use then", daemon.descriptors());
   tally.at_most("few descriptors: slowest answer to a client s", waited_s, kMostWait_s);
-  tally.at_most("few descriptors: processor time while crowded % of a core", busy_pct,
-                100.0 * kMostIdle_s / kIdle_s);
+  tally.cost_at_most("few descriptors: processor time while crowded % of a core", busy_pct,
+                     100.0 * kMostIdle_s / kIdle_s);
   bool records = false;
   if (waited_s <= kMostWait_s) {
     // The journal opens its files when a session starts.

@@ -45,6 +45,15 @@ void Tally::time_at_most(const std::string& name, double value, double limit) {
   }
 }
 
+void Tally::cost_at_most(const std::string& name, double value, double limit) {
+#ifdef BRAINSHIFT_SANITIZED
+  static_cast<void>(limit);
+  shown(name, value);
+#else
+  at_most(name, value, limit);
+#endif
+}
+
 void Tally::at_least(const std::string& name, double value, double limit) {
   check(name, value, ">= " + number(limit), value >= limit);
 }

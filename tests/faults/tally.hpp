@@ -21,6 +21,8 @@ class Tally {
   void at_least(const std::string& name, double value, double limit);
   // Of a time, or of a ratio of times.
   void time_at_most(const std::string& name, double value, double limit);
+  // Of memory or processor time. A sanitizer spends its own: under one it is shown, not checked.
+  void cost_at_most(const std::string& name, double value, double limit);
   void equals(const std::string& name, double value, double expected);
   // Without a bound.
   void shown(const std::string& name, double value);

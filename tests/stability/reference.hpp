@@ -26,6 +26,13 @@ using Vec3R = Eigen::Matrix<Real, 3, 1>;
 using Mat3R = Eigen::Matrix<Real, 3, 3>;
 using PointsR = Eigen::Matrix<Real, 3, Eigen::Dynamic>;
 
+// May be copied before compute(): Eigen leaves the success of a factor not computed yet undefined.
+class CholeskyFactor : public Eigen::LLT<MatrixR> {
+ public:
+  CholeskyFactor() : Eigen::LLT<MatrixR>(MatrixR::Identity(1, 1)) {}
+  explicit CholeskyFactor(const MatrixR& matrix) : Eigen::LLT<MatrixR>(matrix) {}
+};
+
 // u_node = frame * q_node; index: of the unknown, or -1 where a component is zero.
 struct Unknowns {
   std::vector<Mat3R> frames;
@@ -91,8 +98,8 @@ class Reference {
   std::vector<ReferencePair> pairs_;
   Real beta_;
   contact::ActiveSet active_;
-  Eigen::LLT<MatrixR> free_, factor_;  // of K and, for a set that is not empty, of K_p
-  MatrixR matrix_;                     // K_p
+  CholeskyFactor free_, factor_;  // of K and, for a set that is not empty, of K_p
+  MatrixR matrix_;                // K_p
 };
 
 // |u - v|_2 / |v|_2; v: 3n.

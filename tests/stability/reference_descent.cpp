@@ -74,7 +74,7 @@ class PenalisedSolver {
   contact::ActiveSet set_;
   std::vector<int> slaves_;
   MatrixR columns_;
-  Eigen::LLT<MatrixR> factor_;
+  CholeskyFactor factor_;
 };
 
 Real mean_norm(const VectorR& nodal) {

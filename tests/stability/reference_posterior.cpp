@@ -107,9 +107,9 @@ MatrixR sampling_rows(const TetMesh& mesh, const Points& positions) {
 //   B = [I, -Z] over (data, slaves of the set),   right = d - Z 0p_A
 struct ReferencePosterior::SetModel {
   std::vector<int> slaves;
-  Eigen::LLT<MatrixR> compliance;  // D
-  MatrixR z;                       // 3m x k
-  VectorR gaps;                    // 0p of the set
+  CholeskyFactor compliance;  // D
+  MatrixR z;                  // 3m x k
+  VectorR gaps;               // 0p of the set
   VectorR right;
 };
 
