@@ -340,7 +340,7 @@ Status SymmetricIndefinite::solve(const VecX& b, VecX& x) const {
   x = scaled_b;
   impl_->raw_solve(x.data(), 1);
   SolveCheck check;
-  const Status refined = impl_->refine(scaled_b, x, check);
+  Status refined = impl_->refine(scaled_b, x, check);
   impl_->keep(check);
   if (!refined) return refined;
   x = x.cwiseProduct(impl_->scale).eval();

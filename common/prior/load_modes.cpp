@@ -168,7 +168,7 @@ struct Opening {
     std::vector<Vec3> centres = {centre};
     for (int k = 0; k < kBumpsOfRing; ++k) {
       const double angle = 2.0 * std::numbers::pi * k / kBumpsOfRing;
-      centres.push_back(
+      centres.emplace_back(
           centre + kRing * (std::cos(angle) * long_half_axis + std::sin(angle) * short_half_axis));
     }
     return centres;
@@ -185,17 +185,18 @@ struct Opening {
 void fit_ellipse(const TriangleSurface& surface, Opening& opening) {
   const double area = opening.areas_mm2.sum();
   opening.centre = surface.vertices * opening.areas_mm2 / area;
-  const auto [first, second] = across(geometry::vector_area(surface).normalized());
+  const auto plane = across(geometry::vector_area(surface).normalized());
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
   for (Eigen::Index i = 0; i < surface.vertices.cols(); ++i) {
     const Vec3 away = surface.vertices.col(i) - opening.centre;
-    const Eigen::Vector2d place(away.dot(first), away.dot(second));
+    const Eigen::Vector2d place(away.dot(plane.first), away.dot(plane.second));
     moments += opening.areas_mm2[i] / area * place * place.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(moments);
   const auto half_axis = [&](int k) -> Vec3 {
     const double length = 2.0 * std::sqrt(std::max(0.0, axes.eigenvalues()[k]));
-    return length * (axes.eigenvectors()(0, k) * first + axes.eigenvectors()(1, k) * second);
+    return length *
+           (axes.eigenvectors()(0, k) * plane.first + axes.eigenvectors()(1, k) * plane.second);
   };
   opening.short_half_axis = half_axis(0);
   opening.long_half_axis = half_axis(1);

@@ -190,7 +190,7 @@ RemainderVariances CondensedInverter::Impl::remainder_variances() const {
   const PriorScaleValues squares = strengths.mean_square();
   RemainderVariances variances;
   for (int g = 0; g < kRemainders; ++g) {
-    variances[g] = squares[static_cast<std::size_t>(kLoadParts + g)];
+    variances[g] = squares[static_cast<std::size_t>(Eigen::Index{kLoadParts} + g)];
   }
   return variances;
 }
@@ -453,32 +453,32 @@ const OmissionErrors& CondensedInverter::omission_errors() const { return impl_-
 VecX CondensedInverter::weights() const { return impl_->weights.values(); }
 const UpdateProfile& CondensedInverter::profile() const { return impl_->profile; }
 
-Status CondensedInverter::update(const SparseData& given, Estimate& estimate,
+Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
                                  const InversionOptions& asked) {
   Impl& impl = *impl_;
   impl.watch = Stopwatch();
   impl.descent.forget();
   impl.history.clear();
   impl.profile = {};
-  if (auto status = impl.accept(given); !status) return status;
-  impl.weights.reset(given.size());
-  const SparseData* data = &given;
-  const auto outcome = impl.settle(data, asked);
+  if (auto status = impl.accept(data); !status) return status;
+  impl.weights.reset(data.size());
+  const SparseData* followed = &data;
+  const auto outcome = impl.settle(followed, asked);
   if (!outcome) return tl::unexpected(outcome.error());
   if (!impl.descent.z().allFinite() || !impl.descent.contact().forces().allFinite()) {
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
-  if (auto status = impl.finish(*data, estimate); !status) {
+  if (auto status = impl.finish(*followed, estimate); !status) {
     estimate.status = EstimateStatus::kNotRun;
     return status;
   }
   estimate.status = *outcome;
   set_reason(*outcome, impl.condensed.deadline_ms, estimate);
   append_sources(estimate);
-  if (data->sources.empty()) {
-    append_outliers(impl.weights.outliers(0, data->size()), data->size(), estimate.reason);
+  if (followed->sources.empty()) {
+    append_outliers(impl.weights.outliers(0, followed->size()), followed->size(), estimate.reason);
   }
-  append_contradiction(impl.contradictions.find(*data), *data, estimate.reason);
+  append_contradiction(impl.contradictions.find(*followed), *followed, estimate.reason);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};
 }

@@ -79,7 +79,8 @@ ColumnGroup ContactColumns::group(float step) const {
     MatrixXf part;
     const Blocks blocks(order.size());
     for (int block = 0; block < blocks.count; ++block) {
-      const auto slaves = std::span(order).subspan(static_cast<std::size_t>(block * blocks.size));
+      const auto slaves =
+          std::span(order).subspan(static_cast<std::size_t>(Eigen::Index{block} * blocks.size));
       part.resize(std::min<Eigen::Index>(blocks.size, static_cast<Eigen::Index>(slaves.size())),
                   out.rows());
       if (auto status = store.read(block, 3 * place, part); !status) return status;
@@ -118,7 +119,9 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
   std::mutex mutex;  // of the store, the greatest number and what was not finite
   bool finite = true;
   const auto work = [&](int first, int count, BlockRunner::Member& own) -> Status {
-    const auto slave = [&](int j) { return columns.order[static_cast<std::size_t>(first + j)]; };
+    const auto slave = [&](int j) {
+      return columns.order[static_cast<std::size_t>(Eigen::Index{first} + j)];
+    };
     MatrixXf sorted(count, rows);
     MatrixXd compliance(s, count);
     bool kept = false;

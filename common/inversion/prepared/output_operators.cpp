@@ -67,7 +67,7 @@ Result<OutputOperators> output_operators(const PreparedModel& model, const Progr
   const auto solve_block = [&](int first, int count, BlockRunner::Member& own) -> Status {
     own.loads.setZero(count, 3 * nodes);
     for (int j = 0; j < count; ++j) {
-      const Output& output = outputs[static_cast<std::size_t>(first + j)];
+      const Output& output = outputs[static_cast<std::size_t>(Eigen::Index{first} + j)];
       own.loads.row(j).segment<3>(3 * output.node) = output.direction.transpose();
     }
     if (auto status = own.solver.solve(own.loads, own.solved); !status) return status;
