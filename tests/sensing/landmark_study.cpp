@@ -157,11 +157,11 @@ Status landmark_study(const bench::Head& head) {
     record_check("landmarks",
                  std::string(name) + ": leave-one-out error over that of the best rigid fit",
                  errors.model / errors.rigid, text, errors.model < errors.rigid,
-                 "twin; 12 surgeries, 15 pairs each");
+                 "twin; 12 surgeries of 15 pairs");
     test_support::record_figure(
         "landmarks",
         std::string(name) + ": leave-one-out error over the residual of the rigid fit of all 15",
-        errors.model / errors.rigid_of_all, "shown", "twin; 12 surgeries, 15 pairs each");
+        errors.model / errors.rigid_of_all, "shown", "twin; 12 surgeries of 15 pairs");
   }
   check_real_landmarks();
   return {};
