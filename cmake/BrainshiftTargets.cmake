@@ -40,17 +40,6 @@ if(BRAINSHIFT_SANITIZE)
   set(BRAINSHIFT_TIMEOUT_FACTOR 10)
 endif()
 
-# brainshift_describe_test(<name>... LABEL <label> SECONDS <limit> [ONE_THREAD])
-# Of tests that add_test made. SECONDS: without sanitizers.
-function(brainshift_describe_test)
-  cmake_parse_arguments(ARG "ONE_THREAD" "LABEL;SECONDS" "" ${ARGN})
-  math(EXPR timeout "${ARG_SECONDS} * ${BRAINSHIFT_TIMEOUT_FACTOR}")
-  set_tests_properties(${ARG_UNPARSED_ARGUMENTS} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${timeout})
-  if(ARG_ONE_THREAD)
-    set_tests_properties(${ARG_UNPARSED_ARGUMENTS} PROPERTIES ENVIRONMENT "OMP_NUM_THREADS=1;OPENBLAS_NUM_THREADS=1")
-  endif()
-endfunction()
-
 # brainshift_test(<name> SOURCES ... LINKS ... [LABEL unit] [TIMEOUT 120])
 # A GoogleTest program whose cases become CTest tests named <name>.<Suite>.<Case>.
 # TIMEOUT: seconds, without sanitizers.
@@ -70,6 +59,17 @@ function(brainshift_test name)
   brainshift_precompile(${name} brainshift_test_headers)
   gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# brainshift_describe_test(<name>... LABEL unit TIMEOUT 120 [ONE_THREAD])
+# The same properties for tests that add_test made; ONE_THREAD keeps their linear algebra to one.
+function(brainshift_describe_test)
+  cmake_parse_arguments(ARG "ONE_THREAD" "LABEL;TIMEOUT" "" ${ARGN})
+  math(EXPR timeout "${ARG_TIMEOUT} * ${BRAINSHIFT_TIMEOUT_FACTOR}")
+  set_tests_properties(${ARG_UNPARSED_ARGUMENTS} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${timeout})
+  if(ARG_ONE_THREAD)
+    set_tests_properties(${ARG_UNPARSED_ARGUMENTS} PROPERTIES ENVIRONMENT "OMP_NUM_THREADS=1;OPENBLAS_NUM_THREADS=1")
+  endif()
 endfunction()
 
 # brainshift_unit_tests(SOURCES ... LINKS ...): the one test program of a folder of tests/unit, unit_<folder>.
