@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Verdicts and strengths that a receiver must reject. Round trips: round_trip_test.cpp.
 #include <cmath>
-#include <limits>
 
 #include "brainshift/v1/brainshift.pb.h"
 #include "tests/unit/wire/refusals.hpp"
@@ -108,10 +107,7 @@ TEST(Verdict, PartsMayComeInAnyOrder) {
 }
 
 class NotFiniteVerdict : public ::testing::TestWithParam<double> {};
-INSTANTIATE_TEST_SUITE_P(Values, NotFiniteVerdict,
-                         ::testing::Values(std::numeric_limits<double>::quiet_NaN(),
-                                           std::numeric_limits<double>::infinity(),
-                                           -std::numeric_limits<double>::infinity()));
+INSTANTIATE_TEST_SUITE_P(Values, NotFiniteVerdict, ::testing::ValuesIn(kNotFinite), name_of_number);
 
 TEST_P(NotFiniteVerdict, IsRefusedNamingTheField) {
   const double bad = GetParam();

@@ -348,7 +348,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "subscribe_ball", "subscribe_tumour", "session_state", "observation_tumour",
                       "observation_cortex", "observation_landmarks", "observation_pose",
                       "observation_reply", "error_reply", "update", "update_unusable",
-                      "update_changes", "update_failed", "report_request", "report_reply"));
+                      "update_changes", "update_failed", "report_request", "report_reply"),
+    [](const auto& frame) { return std::string(frame.param); });
 
 }  // namespace
 }  // namespace brainshift::wire

@@ -42,10 +42,7 @@ Result<UpdateMessage> decode_changed_update(const std::function<void(pb::Update&
 // ---------- numbers that are not finite ----------
 
 class NotFinite : public ::testing::TestWithParam<double> {};
-INSTANTIATE_TEST_SUITE_P(Values, NotFinite,
-                         ::testing::Values(std::numeric_limits<double>::quiet_NaN(),
-                                           std::numeric_limits<double>::infinity(),
-                                           -std::numeric_limits<double>::infinity()));
+INSTANTIATE_TEST_SUITE_P(Values, NotFinite, ::testing::ValuesIn(kNotFinite), name_of_number);
 
 TEST_P(NotFinite, InAnObservationIsRefusedNamingTheField) {
   const double bad = GetParam();

@@ -5,12 +5,23 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "common/core/error.hpp"
 
 namespace brainshift::wire {
+
+// The numbers that no message may carry, and what a test calls them.
+inline constexpr double kNotFinite[] = {std::numeric_limits<double>::quiet_NaN(),
+                                        std::numeric_limits<double>::infinity(),
+                                        -std::numeric_limits<double>::infinity()};
+inline std::string name_of_number(const ::testing::TestParamInfo<double>& number) {
+  if (std::isnan(number.param)) return "Nan";
+  return number.param > 0.0 ? "Infinity" : "MinusInfinity";
+}
 
 template <typename T>
 void expect_refused(const Result<T>& result, ErrorCode code, const std::string& text) {
