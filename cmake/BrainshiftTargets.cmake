@@ -57,7 +57,8 @@ function(brainshift_test name)
   target_link_libraries(${name} PRIVATE brainshift_warnings ${ARG_LINKS} GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE BRAINSHIFT_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
   brainshift_precompile(${name} brainshift_test_headers)
-  # Each case of a parametrised test has a name of its own; the value's bytes would hold addresses.
+  # A parametrised case is called what its INSTANTIATE_TEST_SUITE_P names it. The value's bytes, which CMake would
+  # add, hold addresses.
   gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60 NO_PRETTY_VALUES
     PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
 endfunction()
