@@ -1,8 +1,9 @@
 # A folder is a target. Its name follows from its path: common/io/config is brainshift_io_config
-# (alias brainshift::io_config), server/session is brainshift_server_session.
+# (alias brainshift::io_config), server/session is brainshift_server_session, client/tools/twin is brainshift_tools_twin.
 function(brainshift_folder_name result)
   file(RELATIVE_PATH path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
   string(REGEX REPLACE "^(common|tests)/" "" name "${path}")
+  string(REPLACE "client/tools" "tools" name "${name}")
   string(REPLACE "/" "_" name "${name}")
   set(${result} ${name} PARENT_SCOPE)
 endfunction()

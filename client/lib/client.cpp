@@ -86,7 +86,7 @@ struct Client::Impl {
   // Receives one message for nobody in particular.
   Status receive_push(Deadline deadline);
   // The oldest queued update, on its way to the caller.
-  std::optional<Result<wire::UpdateMessage>> hand_out();
+  std::optional<Result<UpdateMessage>> hand_out();
 
   tl::unexpected<Error> protocol_error(const std::string& detail) const {
     return fail(ErrorCode::kProtocol, dealer->endpoint() + ": " + detail);
@@ -231,7 +231,7 @@ Status Client::Impl::confirm(Deadline deadline) {
   return {};
 }
 
-std::optional<Result<wire::UpdateMessage>> Client::Impl::hand_out() {
+std::optional<Result<UpdateMessage>> Client::Impl::hand_out() {
   auto update = updates.pop();
   if (update && *update) latest_usable.take(**update);
   return update;
@@ -252,7 +252,7 @@ Result<Client> Client::connect(const std::string& endpoint, const ClientOptions&
   return Client(std::move(impl));
 }
 
-Result<wire::DaemonStatus> Client::status() {
+Result<DaemonStatus> Client::status() {
   return impl_
       ->request(MessageType::kStatusRequest, "", MessageType::kStatusReply,
                 impl_->options.request_timeout)
@@ -266,12 +266,12 @@ Result<wire::DaemonReport> Client::report() {
       .and_then([](const std::string& payload) { return wire::decode_report(payload); });
 }
 
-Result<wire::SessionInfo> Client::start_session(const wire::SessionRequest& request) {
+Result<SessionInfo> Client::start_session(const SessionRequest& request) {
   return impl_
       ->request(MessageType::kStartSessionRequest, wire::encode(request),
                 MessageType::kStartSessionReply, impl_->options.session_timeout)
       .and_then([](const std::string& payload) { return wire::decode_session_info(payload); })
-      .map([this](wire::SessionInfo info) {
+      .map([this](SessionInfo info) {
         impl_->latest_usable.begin(info.key());
         impl_->watch.expect_model(info.model_id);
         return info;
@@ -318,7 +318,7 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   return tl::unexpected(state.error());
 }
 
-Result<wire::ObservationReceipt> Client::submit(const Observation& observation) {
+Result<ObservationReceipt> Client::submit(const Observation& observation) {
   std::string payload;
   if (observation.session == SessionKey{}) {
     Observation named = observation;
@@ -333,7 +333,7 @@ Result<wire::ObservationReceipt> Client::submit(const Observation& observation) 
       .and_then([](const std::string& reply) { return wire::decode_observation_receipt(reply); });
 }
 
-Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
+Result<UpdateMessage> Client::next_update(milliseconds timeout) {
   Impl& self = *impl_;
   const Deadline deadline = deadline_after(timeout);
   self.notice_losses();
@@ -360,7 +360,7 @@ Result<wire::UpdateMessage> Client::next_update(milliseconds timeout) {
   }
 }
 
-const std::optional<wire::UpdateMessage>& Client::latest_usable() const {
+const std::optional<UpdateMessage>& Client::latest_usable() const {
   return impl_->latest_usable.get();
 }
 

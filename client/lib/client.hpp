@@ -124,7 +124,7 @@ class Client {
   ~Client();
 
   // Version, loaded case and model, and whether an inversion runs. The daemon always answers it.
-  Result<wire::DaemonStatus> status();
+  Result<DaemonStatus> status();
 
   // How the daemon fares, for people and monitors: session, counts, latencies, journal, memory. The
   // daemon always answers it. What may be shown follows from field_status() alone.
@@ -134,7 +134,7 @@ class Client {
   // with the sizes of the mesh and the times of the preparation. kInvalidArgument: the daemon
   // serves another case; kModelNotReady: it has no model; kUnavailable: also when another client's
   // start came later.
-  Result<wire::SessionInfo> start_session(const wire::SessionRequest& request);
+  Result<SessionInfo> start_session(const SessionRequest& request);
 
   // The undeformed mesh with its node sets, skull and tumour: some MiB.
   Result<BrainModel> model();
@@ -152,7 +152,7 @@ class Client {
   // inverted. The receipt tells whether it replaced an older one of the same source that still
   // waited. kInvalidArgument and others: the daemon rejects the observation and names the field.
   // Without a session in it, it is for this client's (see Sessions).
-  Result<wire::ObservationReceipt> submit(const Observation& observation);
+  Result<ObservationReceipt> submit(const Observation& observation);
 
   // The next pushed update in order of arrival: an iterate, a final update (Update::final) of any
   // quality, or the error that an observation ended in. Only Update::usable() ones may be shown.
@@ -160,12 +160,12 @@ class Client {
   // kUnavailable when none arrives within the timeout, and at once when the connection is lost.
   // The daemon's own error when it refuses to renew the subscription: after a restart with another
   // model the choice may hold no node.
-  Result<wire::UpdateMessage> next_update(std::chrono::milliseconds timeout);
+  Result<UpdateMessage> next_update(std::chrono::milliseconds timeout);
 
   // The newest usable update of the running session among those that next_update() has returned.
   // Neither errors, iterates and unusable updates nor a lost connection replace it; the start of
   // another session does. Empty before the first one.
-  const std::optional<wire::UpdateMessage>& latest_usable() const;
+  const std::optional<UpdateMessage>& latest_usable() const;
 
   // Whether that field may be shown as current, now.
   FieldStatus field_status() const;

@@ -18,7 +18,7 @@ void FieldAssembly::forget() {
   waiting_ = true;
 }
 
-FieldAssembly::Outcome FieldAssembly::complete(wire::UpdateMessage& message) {
+FieldAssembly::Outcome FieldAssembly::complete(UpdateMessage& message) {
   Update& update = message.update;
   if (update.part && update.part->base_sequence != 0) {
     if (!apply(message)) {
@@ -40,7 +40,7 @@ FieldAssembly::Outcome FieldAssembly::complete(wire::UpdateMessage& message) {
   return Outcome::kWhole;
 }
 
-bool FieldAssembly::apply(const wire::UpdateMessage& message) {
+bool FieldAssembly::apply(const UpdateMessage& message) {
   const Estimate& changes = message.update.estimate;
   const FieldPart& part = *message.update.part;
   if (!held_ || held_->session != message.key() || held_->sequence != part.base_sequence) {

@@ -29,7 +29,7 @@ class FieldAssembly {
   void begin(const FieldChoice& choice);
   // What is held no longer counts: the next changes are dropped until the whole choice comes.
   void forget();
-  Outcome complete(wire::UpdateMessage& message);
+  Outcome complete(UpdateMessage& message);
 
  private:
   struct Held {
@@ -40,7 +40,7 @@ class FieldAssembly {
     VecX sd_mm;
   };
   // Puts the message's nodes into what is held; false when they do not fit it.
-  bool apply(const wire::UpdateMessage& message);
+  bool apply(const UpdateMessage& message);
 
   bool holds_ = false;  // the choice has a tolerance
   bool waiting_ = false;

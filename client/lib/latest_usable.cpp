@@ -17,7 +17,7 @@ bool LatestUsable::belongs(const SessionKey& session) const {
   return session.boot_id == session_.boot_id && session.session_id > session_.session_id;
 }
 
-void LatestUsable::take(const wire::UpdateMessage& message) {
+void LatestUsable::take(const UpdateMessage& message) {
   if (!belongs(message.key())) return;
   follow(message.key());
   if (message.error || !message.update.usable()) return;

@@ -21,13 +21,13 @@ class LatestUsable {
   // Whether an update of this session is one of the running session, or of the next that its daemon
   // began. Before the first session: any.
   bool belongs(const SessionKey& session) const;
-  void take(const wire::UpdateMessage& message);
-  const std::optional<wire::UpdateMessage>& get() const { return latest_; }
+  void take(const UpdateMessage& message);
+  const std::optional<UpdateMessage>& get() const { return latest_; }
   const SessionKey& session() const { return session_; }
 
  private:
   SessionKey session_;
-  std::optional<wire::UpdateMessage> latest_;
+  std::optional<UpdateMessage> latest_;
 };
 
 }  // namespace brainshift::client

@@ -6,7 +6,7 @@
 
 namespace brainshift::client {
 
-void UpdateQueue::push(Result<wire::UpdateMessage> update) {
+void UpdateQueue::push(Result<UpdateMessage> update) {
   updates_.push_back(std::move(update));
   if (updates_.size() <= capacity_) return;
   const auto iterate = std::find_if(updates_.begin(), updates_.end(), [](const auto& entry) {
@@ -16,7 +16,7 @@ void UpdateQueue::push(Result<wire::UpdateMessage> update) {
 }
 
 void UpdateQueue::drop_older_than(const SessionState& state) {
-  std::erase_if(updates_, [&](const Result<wire::UpdateMessage>& entry) {
+  std::erase_if(updates_, [&](const Result<UpdateMessage>& entry) {
     if (!entry) return false;
     if (entry->key() != state.session) return true;
     const bool usable = !entry->error && entry->update.usable();
@@ -24,9 +24,9 @@ void UpdateQueue::drop_older_than(const SessionState& state) {
   });
 }
 
-std::optional<Result<wire::UpdateMessage>> UpdateQueue::pop() {
+std::optional<Result<UpdateMessage>> UpdateQueue::pop() {
   if (updates_.empty()) return std::nullopt;
-  std::optional<Result<wire::UpdateMessage>> front(std::move(updates_.front()));
+  std::optional<Result<UpdateMessage>> front(std::move(updates_.front()));
   updates_.pop_front();
   return front;
 }

@@ -20,9 +20,9 @@ class UpdateQueue {
  public:
   explicit UpdateQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  void push(Result<wire::UpdateMessage> update);
+  void push(Result<UpdateMessage> update);
   // The oldest entry; nullopt when there is none.
-  std::optional<Result<wire::UpdateMessage>> pop();
+  std::optional<Result<UpdateMessage>> pop();
   std::size_t size() const { return updates_.size(); }
   // Drops what the daemon has newer: usable fields before newest_usable, everything else before
   // newest_update, and all of another session than the state's. Entries that are errors stay.
@@ -30,7 +30,7 @@ class UpdateQueue {
 
  private:
   std::size_t capacity_;
-  std::deque<Result<wire::UpdateMessage>> updates_;
+  std::deque<Result<UpdateMessage>> updates_;
 };
 
 }  // namespace brainshift::client

@@ -3,10 +3,10 @@
 // names.
 #pragma once
 
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/progress.hpp"
-#include "common/values/case_inputs.hpp"
 
 namespace brainshift::anatomy {
 

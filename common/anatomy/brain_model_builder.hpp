@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_inputs.hpp"
 
 namespace brainshift::anatomy {
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::anatomy {
 

@@ -4,9 +4,9 @@
 
 #include <string>
 
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
-#include "common/values/case_inputs.hpp"
 
 namespace brainshift::anatomy {
 

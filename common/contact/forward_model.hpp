@@ -18,6 +18,7 @@
 // Each tissue has its own stiffness (tissues.hpp).
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/contact/contact_solver.hpp"
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
@@ -27,7 +28,6 @@
 #include "common/fem/poro_material.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::contact {

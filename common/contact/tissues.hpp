@@ -8,10 +8,10 @@
 // everywhere.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/fem/poro_material.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::contact {
 

@@ -8,9 +8,9 @@
 // with the factor of the whole matrix.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/fem/biot_matrix.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
 

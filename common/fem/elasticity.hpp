@@ -14,11 +14,11 @@
 
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/linalg/symmetric_matrix.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
 

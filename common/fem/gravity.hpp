@@ -7,9 +7,9 @@
 // plane that has sunk (drainage) makes the brain sag.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/displacement_space.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
 

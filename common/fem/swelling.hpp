@@ -16,10 +16,10 @@
 #include <functional>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/elasticity.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::fem {
 

@@ -5,9 +5,9 @@
 
 #include <vector>
 
+#include "common/configuration/problem_spec.hpp"
 #include "common/core/grouped_mesh.hpp"
 #include "common/forward/forward_problem.hpp"
-#include "common/values/problem_spec.hpp"
 
 namespace brainshift::forward {
 

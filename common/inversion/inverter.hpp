@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
@@ -17,7 +18,6 @@
 #include "common/inversion/contract/omission_errors.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
 

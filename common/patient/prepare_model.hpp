@@ -18,12 +18,12 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/io/model/checkpoint_file.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::patient {
 

@@ -4,10 +4,10 @@
 
 #include <filesystem>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::patient {
 

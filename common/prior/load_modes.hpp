@@ -28,9 +28,9 @@
 // zero mean and their columns are independent.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::prior {

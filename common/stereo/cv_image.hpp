@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/stereo/gray_image.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 

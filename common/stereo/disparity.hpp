@@ -20,10 +20,10 @@
 // do not.
 #pragma once
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/core/error.hpp"
 #include "common/stereo/gray_image.hpp"
 #include "common/stereo/rectify.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 

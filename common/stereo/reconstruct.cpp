@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/stereo/outliers.hpp"
 #include "common/stereo/parts.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 namespace {

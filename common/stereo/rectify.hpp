@@ -10,9 +10,9 @@
 // negative.
 #pragma once
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/core/error.hpp"
 #include "common/stereo/gray_image.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::stereo {
 

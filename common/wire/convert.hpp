@@ -27,6 +27,7 @@
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
+#include "common/values/session.hpp"
 #include "common/values/session_state.hpp"
 
 namespace brainshift::wire {
@@ -35,65 +36,6 @@ namespace brainshift::wire {
 inline constexpr int kMaxPoints = 2'000'000;
 // Most hypotheses of an update.
 inline constexpr int kMaxHypotheses = 4096;
-
-struct DaemonStatus {
-  std::string version;
-  bool model_ready = false;
-  std::string case_id;
-  std::string model_id;
-  bool busy = false;
-  std::uint64_t updates = 0;
-  std::uint64_t uptime_ms = 0;
-  // On what updates are computed: bits are comparable only where all three agree.
-  std::string build = {};
-  std::string machine = {};
-  std::string blas_kernel = {};
-};
-
-struct SessionRequest {
-  std::string case_id;
-  Method method = Method::kCondensed;
-  Boundary boundary = Boundary::kContact;
-  bool publish_iterates = false;
-  bool measure_full_solve = false;
-  // End the running session although another client that is still connected started it.
-  bool takeover = false;
-  // Ages by the observations' own clock, which all sources share (a replay); false: by arrival.
-  bool recorded_clock = false;
-};
-
-struct SessionInfo {
-  std::uint64_t session_id = 0;
-  std::string model_id;
-  int nodes = 0;
-  int tets = 0;
-  int slaves = 0;
-  double prepare_s = 0.0;
-  std::uint64_t model_bytes = 0;
-  double full_solve_ms = 0.0;
-  double factor_s = 0.0;
-  std::uint64_t boot_id = 0;  // of the daemon's process
-
-  SessionKey key() const { return {boot_id, session_id, model_id}; }
-};
-
-struct ObservationReceipt {
-  std::uint64_t observation_sequence = 0;
-  bool replaced_pending = false;
-};
-
-// An update as a client sees it: either an estimate, or the reason why there is none.
-struct UpdateMessage {
-  std::uint64_t session_id = 0;
-  Update update;
-  std::optional<Error> error;  // set when the observation gave no estimate
-  std::uint64_t boot_id = 0;   // of the daemon's process
-  // How it came, in a message that a client hands out: bytes of its payload, nodes in it.
-  std::size_t received_bytes = 0;
-  int received_nodes = 0;
-
-  SessionKey key() const { return {boot_id, session_id, update.model_id}; }
-};
 
 std::string encode(const DaemonStatus& status);
 std::string encode(const SessionRequest& request);

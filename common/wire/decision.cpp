@@ -9,16 +9,6 @@
 
 namespace brainshift::wire {
 
-std::string_view to_string(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kUsed: return "used";
-    case Outcome::kFailed: return "failed";
-    case Outcome::kSuperseded: return "superseded";
-    case Outcome::kSkipped: return "skipped";
-  }
-  return "";
-}
-
 std::string encode(const Decision& decision) {
   pb::Decision message;
   message.set_session_id(decision.session_id);

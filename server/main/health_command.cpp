@@ -16,7 +16,7 @@
 namespace brainshift::server {
 namespace {
 
-Result<wire::DaemonStatus> ask(const HealthArguments& arguments) {
+Result<DaemonStatus> ask(const HealthArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
   if (!config) return tl::unexpected(config.error());
   const auto endpoint = endpoint_to_ask(arguments.endpoint.value_or(config->endpoint));

@@ -15,9 +15,9 @@
 #include "common/io/files/output_path.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/prepare_model.hpp"
+#include "common/pipeline/scene_plan.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
-#include "server/pipeline/scene_plan.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -42,7 +42,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   }
   const auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
-  if (auto plan = plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
+  if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
   for (const std::string& note : config->notes) {

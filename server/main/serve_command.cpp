@@ -83,7 +83,7 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
                                    });
   // Reading and preparing leave free places in the heap, tens of MiB together.
   ::malloc_trim(0);
-  options.make_model = [store](const wire::SessionRequest& request, const std::stop_token& stop) {
+  options.make_model = [store](const SessionRequest& request, const std::stop_token& stop) {
     auto made = store->make(request, stop);
     ::malloc_trim(0);
     return made;

@@ -45,15 +45,15 @@ void Counters::repeated(std::string_view source, TimePoint now) {
   ++receive(row(source), now).counts.repeated;
 }
 
-void Counters::decided(const wire::Decision& decision) {
+void Counters::decided(const Decision& decision) {
   const std::lock_guard lock(mutex_);
   wire::SourceCounts& counts = row(decision.source).counts;
   --counts.waiting;
   switch (decision.outcome) {
-    case wire::Outcome::kUsed: ++counts.answered; break;
-    case wire::Outcome::kFailed: ++counts.failed; break;
-    case wire::Outcome::kSuperseded: ++counts.replaced; break;
-    case wire::Outcome::kSkipped: ++counts.skipped; break;
+    case Outcome::kUsed: ++counts.answered; break;
+    case Outcome::kFailed: ++counts.failed; break;
+    case Outcome::kSuperseded: ++counts.replaced; break;
+    case Outcome::kSkipped: ++counts.skipped; break;
   }
 }
 

@@ -55,7 +55,7 @@ class Counters {
   void refused(std::string_view source, TimePoint now);   // source: empty when it is not known
   void repeated(std::string_view source, TimePoint now);  // its receipt was sent once more
   // What became of an accepted one.
-  void decided(const wire::Decision& decision);
+  void decided(const Decision& decision);
 
   void answered(const Passage& passage);  // by an update with an estimate
   void failed();                          // by an update with an error

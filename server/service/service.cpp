@@ -70,10 +70,10 @@ Service::Service(ServiceOptions options, Outbox& outbox)
     hooks.on_ready = [this](const auto& request, const auto& info) {
       begin_journal(request, info);
     };
-    hooks.publish = [this](wire::UpdateMessage message, const Handled& handled) {
+    hooks.publish = [this](UpdateMessage message, const Handled& handled) {
       publish(std::move(message), handled);
     };
-    hooks.decided = [this](const wire::Decision& decision) {
+    hooks.decided = [this](const Decision& decision) {
       counters_.decided(decision);
       record_decision(decision);
     };
@@ -122,7 +122,7 @@ std::optional<Reply> Service::start_session(const std::string& peer, const wire:
   if (!session_) return model_not_ready();
   const auto request = wire::decode_session_request(frame.payload);
   if (!request) return error_reply(request.error());
-  const auto done = [this, peer, id = frame.request_id](Result<wire::SessionInfo> info) {
+  const auto done = [this, peer, id = frame.request_id](Result<SessionInfo> info) {
     std::string bytes;
     if (info) {
       spdlog::info("session ready session={} prepare_s={:.2f}", info->session_id, info->prepare_s);
@@ -205,8 +205,8 @@ void Service::left(const std::string& peer) {
   if (session_) session_->leave(peer);
 }
 
-wire::DaemonStatus Service::status() const {
-  wire::DaemonStatus status;
+DaemonStatus Service::status() const {
+  DaemonStatus status;
   status.version = options_.version;
   status.uptime_ms = static_cast<std::uint64_t>(uptime_.milliseconds());
   status.build = options_.build;
@@ -222,7 +222,7 @@ wire::DaemonStatus Service::status() const {
   return status;
 }
 
-void Service::begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info) {
+void Service::begin_journal(const SessionRequest& request, const SessionInfo& info) {
   if (!journal_) return;
   const auto path = journal_path(options_.journal_dir, request.case_id,
                                  fmt::format("{}-{}", utc_now("%Y%m%dT%H%M%SZ"), info.session_id));
@@ -243,13 +243,13 @@ void Service::begin_journal(const wire::SessionRequest& request, const wire::Ses
   spdlog::info("journal {}", path.string());
 }
 
-void Service::record_decision(const wire::Decision& decision) {
+void Service::record_decision(const Decision& decision) {
   if (!journal_) return;
   journal_->append(
       record(io::RecordKind::kDecision, decision.observation_sequence, wire::encode(decision)));
 }
 
-void Service::publish(wire::UpdateMessage message, const Handled& handled) {
+void Service::publish(UpdateMessage message, const Handled& handled) {
   using Clock = std::chrono::steady_clock;
   Update& update = message.update;
   const bool estimated = update.final && !message.error;

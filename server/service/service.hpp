@@ -61,7 +61,7 @@ struct ServiceOptions {
   MakeSessionModel make_model;              // needed with a model
   std::filesystem::path journal_dir;        // empty: no journal
   std::filesystem::path case_file;          // metadata of the journal
-  // On what updates are computed, for the journal and for clients (wire::DaemonStatus).
+  // On what updates are computed, for the journal and for clients (DaemonStatus).
   std::string build = {};
   std::string machine = {};
   std::string blas_kernel = {};
@@ -97,11 +97,11 @@ class Service final : public RequestHandler {
   Reply observe(const wire::Frame& frame);
   Reply subscribe(const wire::Frame& frame);
   void push_state();
-  wire::DaemonStatus status() const;
+  DaemonStatus status() const;
   std::optional<wire::JournalFigures> journal_figures() const;
-  void begin_journal(const wire::SessionRequest& request, const wire::SessionInfo& info);
-  void publish(wire::UpdateMessage message, const Handled& handled);
-  void record_decision(const wire::Decision& decision);
+  void begin_journal(const SessionRequest& request, const SessionInfo& info);
+  void publish(UpdateMessage message, const Handled& handled);
+  void record_decision(const Decision& decision);
 
   const ServiceOptions options_;  // boot_id is set
   Outbox& outbox_;

@@ -16,14 +16,15 @@ namespace {
 using inversion::PreparedModel;
 
 // The parts that the scene's plan leaves out, for the condensed method.
-inversion::CondensedOptions condensed_options(const ScenePlan& plan, const BrainModel& model,
-                                              const CaseConfig& config) {
+inversion::CondensedOptions condensed_options(const pipeline::ScenePlan& plan,
+                                              const BrainModel& model, const CaseConfig& config) {
   inversion::CondensedOptions options;
   options.contact = plan.contact;
   options.uncertainty = plan.uncertainty;
   options.gravity_modes = plan.gravity_modes;
   if (!plan.far_field) {
-    options.region_of_interest = region_of_interest(model, config.scene.region_of_interest_mm);
+    options.region_of_interest =
+        pipeline::region_of_interest(model, config.scene.region_of_interest_mm);
   }
   return options;
 }
@@ -110,8 +111,9 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
   return keep(std::move(*made));
 }
 
-Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(
-    const wire::SessionRequest& request, const ScenePlan& plan, const std::stop_token& stop) {
+Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(const SessionRequest& request,
+                                                                  const pipeline::ScenePlan& plan,
+                                                                  const std::stop_token& stop) {
   if (request.method == Method::kCondensed) {
     const auto operators = condensed(request.boundary, stop);
     if (!operators) return tl::unexpected(operators.error());
@@ -124,21 +126,21 @@ Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(
   return inversion::make_inverter(*factor, request.method, stop);
 }
 
-Result<std::unique_ptr<SessionModel>> ModelStore::make(const wire::SessionRequest& request,
+Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& request,
                                                        const std::stop_token& stop) {
   const Stopwatch watch;
-  const auto plan = plan_scene(config_, request.method, request.boundary);
+  const auto plan = pipeline::plan_scene(config_, request.method, request.boundary);
   if (!plan) return tl::unexpected(plan.error());
   auto made = inverter(request, *plan, stop);
   if (!made) return tl::unexpected(made.error());
-  wire::SessionInfo info;
+  SessionInfo info;
   info.model_id = model_->model_id;
   info.nodes = model_->mesh.num_nodes();
   info.tets = model_->mesh.num_tets();
   info.slaves = static_cast<int>(model_->slaves.size());
   info.model_bytes = (*made)->bytes();
-  auto pipeline =
-      Pipeline::build(model_, config_, request.method, request.boundary, std::move(*made));
+  auto pipeline = pipeline::Pipeline::build(model_, config_, request.method, request.boundary,
+                                            std::move(*made));
   if (!pipeline) return tl::unexpected(pipeline.error());
   info.prepare_s = watch.seconds();
   if (request.method == Method::kCondensed) {  // the work that was done before surgery counts

@@ -13,14 +13,14 @@
 #include <stop_token>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
+#include "common/pipeline/scene_plan.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
-#include "server/pipeline/scene_plan.hpp"
 #include "server/session/session.hpp"
 
 namespace brainshift::server {
@@ -39,7 +39,7 @@ class ModelStore {
   // the info is measured when a request first asks for it, and kept. Errors as plan_scene, `read`,
   // PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable when stopped, which
   // is asked for between a factorisation and the next, and between blocks of columns.
-  Result<std::unique_ptr<SessionModel>> make(const wire::SessionRequest& request,
+  Result<std::unique_ptr<SessionModel>> make(const SessionRequest& request,
                                              const std::stop_token& stop = {});
 
  private:
@@ -53,8 +53,8 @@ class ModelStore {
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary,
                                                               const std::stop_token& stop);
   std::shared_ptr<const CondensedOperators> keep(CondensedOperators operators);
-  Result<std::unique_ptr<inversion::Inverter>> inverter(const wire::SessionRequest& request,
-                                                        const ScenePlan& plan,
+  Result<std::unique_ptr<inversion::Inverter>> inverter(const SessionRequest& request,
+                                                        const pipeline::ScenePlan& plan,
                                                         const std::stop_token& stop);
 
   std::shared_ptr<const BrainModel> model_;

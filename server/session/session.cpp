@@ -19,7 +19,7 @@ constexpr const char* kLeft = "the client that asked for the session has left";
 constexpr const char* kSessionEnded = "the session ended";
 constexpr const char* kStopping = "the daemon is stopping";
 
-Result<wire::SessionInfo> unavailable(const std::string& why) {
+Result<SessionInfo> unavailable(const std::string& why) {
   return fail(ErrorCode::kUnavailable, why);
 }
 
@@ -52,10 +52,10 @@ const std::string* Session::owner() const {
 }
 
 // Of the session that runs, or has just ended: the worker begins the next one only after this.
-void Session::decide(const Observation& observation, wire::Outcome outcome, std::string reason,
+void Session::decide(const Observation& observation, Outcome outcome, std::string reason,
                      const Update* answer) const {
   if (!hooks_.decided) return;
-  wire::Decision decision;
+  Decision decision;
   decision.session_id = last_session_id_;
   decision.source = observation.source;
   decision.observation_sequence = observation.sequence;
@@ -70,7 +70,7 @@ void Session::decide(const Observation& observation, wire::Outcome outcome, std:
 
 void Session::end_running() {
   for (const auto& [source, box] : boxes_) {
-    decide(box.observation, wire::Outcome::kSkipped, kSessionEnded);
+    decide(box.observation, Outcome::kSkipped, kSessionEnded);
   }
   boxes_.clear();
   running_.reset();
@@ -81,7 +81,7 @@ void Session::changed() const {
   if (hooks_.on_change) hooks_.on_change();
 }
 
-void Session::start(const wire::SessionRequest& request, const StartDone& done,
+void Session::start(const SessionRequest& request, const StartDone& done,
                     const std::string& asking) {
   if (request.case_id != case_id_) {
     done(fail(ErrorCode::kInvalidArgument,
@@ -128,9 +128,8 @@ void Session::leave(const std::string& gone) {
   if (abandoned) abandoned->done(unavailable(kLeft));
 }
 
-Result<wire::ObservationReceipt> Session::submit(Observation observation,
-                                                 const OnAccepted& on_accepted) {
-  wire::ObservationReceipt receipt;
+Result<ObservationReceipt> Session::submit(Observation observation, const OnAccepted& on_accepted) {
+  ObservationReceipt receipt;
   {
     const std::lock_guard lock(mutex_);
     if (!running_) {
@@ -152,7 +151,7 @@ Result<wire::ObservationReceipt> Session::submit(Observation observation,
     observation.acquired_ns = observation.daemon_ns;  // one clock for all sources from here on
     const std::string name = observation.source;
     if (receipt.replaced_pending) {
-      decide(boxes_[name].observation, wire::Outcome::kSuperseded,
+      decide(boxes_[name].observation, Outcome::kSuperseded,
              fmt::format("observation {} came before it was begun", observation.sequence));
     }
     boxes_.insert_or_assign(name, Box{std::move(observation), ++arrivals_, arrived});
@@ -271,7 +270,7 @@ void Session::prepare(const std::stop_token& stop) {
   }
 }
 
-Result<SessionModel*> Session::model_for(const wire::SessionRequest& request,
+Result<SessionModel*> Session::model_for(const SessionRequest& request,
                                          const std::stop_token& stop) {
   const std::tuple key{request.boundary, request.method, request.measure_full_solve};
   if (const auto found = models_.find(key); found != models_.end()) return found->second.get();
@@ -315,7 +314,7 @@ void Session::work(const std::stop_token& stop) {
 void Session::begin(const Prepared& prepared) {
   const auto& [start, model] = prepared;
   model->pipeline.reset();
-  wire::SessionInfo info = model->info;
+  SessionInfo info = model->info;
   {
     const std::lock_guard lock(mutex_);
     info.session_id = ++last_session_id_;
@@ -346,14 +345,14 @@ void Session::process(const Box& box) {
   const Handled handled{box.arrived, std::chrono::steady_clock::now()};
   const Observation& observation = box.observation;
   SessionKey key;
-  wire::SessionRequest request;
+  SessionRequest request;
   SessionModel* model = nullptr;
   std::uint64_t number = 0;
-  RunOptions options;
+  pipeline::RunOptions options;
   {
     const std::lock_guard lock(mutex_);
     if (!running_) {  // ended between taking the observation and here
-      decide(observation, wire::Outcome::kSkipped, kSessionEnded);
+      decide(observation, Outcome::kSkipped, kSessionEnded);
       return;
     }
     number = ++running_->published;
@@ -371,7 +370,7 @@ void Session::process(const Box& box) {
   auto result = guarded(ErrorCode::kInternal, kUnexpected,
                         [&] { return model->pipeline.run(observation, options); });
 
-  wire::UpdateMessage message;
+  UpdateMessage message;
   message.session_id = key.session_id;
   message.boot_id = boot_id_;
   if (result) {
@@ -393,11 +392,10 @@ void Session::process(const Box& box) {
 }
 
 // False when the session has ended meanwhile: nobody hears of the message.
-bool Session::finish(const Box& box, const wire::UpdateMessage& message,
-                     const std::stop_token& stop) {
+bool Session::finish(const Box& box, const UpdateMessage& message, const std::stop_token& stop) {
   const std::lock_guard lock(mutex_);
   if (stop.stop_requested() || !running_) {
-    decide(box.observation, wire::Outcome::kSkipped, kSessionEnded);
+    decide(box.observation, Outcome::kSkipped, kSessionEnded);
     return false;
   }
   running_->newest_update = message.update.sequence;
@@ -409,7 +407,7 @@ bool Session::finish(const Box& box, const wire::UpdateMessage& message,
     running_->reason =
         message.error ? message.error->message : message.update.estimate.quality.reason;
   }
-  decide(box.observation, message.error ? wire::Outcome::kFailed : wire::Outcome::kUsed,
+  decide(box.observation, message.error ? Outcome::kFailed : Outcome::kUsed,
          running_->newest_usable == message.update.sequence ? std::string() : running_->reason,
          &message.update);
   return true;

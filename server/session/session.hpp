@@ -34,11 +34,11 @@
 #include <tuple>
 
 #include "common/core/error.hpp"
+#include "common/pipeline/pipeline.hpp"
 #include "common/values/observation.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
-#include "server/pipeline/pipeline.hpp"
 #include "server/session/sources.hpp"
 
 namespace brainshift::server {
@@ -49,14 +49,14 @@ inline constexpr double kNoDeadline_s = 3600.0;
 // All that a session of one method and boundary needs: what its clients are told, and the pipeline
 // with its state. The session keeps it for the next session of the same kind, and resets it then.
 struct SessionModel {
-  wire::SessionInfo info;  // boot_id and session_id are filled in by the session
-  Pipeline pipeline;
+  SessionInfo info;  // boot_id and session_id are filled in by the session
+  pipeline::Pipeline pipeline;
   double max_age_s = CaseConfig{}.sensing.max_age_s;  // older observations are not used
   double deadline_s = kNoDeadline_s;                  // an inversion ends by itself then
 };
 // On the preparer's thread, one at a time. kUnavailable when stopped.
 using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
-    const wire::SessionRequest&, const std::stop_token&)>;
+    const SessionRequest&, const std::stop_token&)>;
 
 // The way of an observation to its answer, monotonic clock.
 struct Handled {
@@ -70,21 +70,21 @@ struct Handled {
 struct SessionHooks {
   MakeSessionModel make_model;
   // A session is ready; called before its start is answered. May be empty.
-  std::function<void(const wire::SessionRequest&, const wire::SessionInfo&)> on_ready;
+  std::function<void(const SessionRequest&, const SessionInfo&)> on_ready;
   // On the worker: an iterate, a final update, or the error that an observation ended in.
-  std::function<void(wire::UpdateMessage, const Handled&)> publish;
+  std::function<void(UpdateMessage, const Handled&)> publish;
   // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
   // thread, after the update that changed it. May be empty.
   std::function<void()> on_change;
   // What became of an accepted observation; once for each, before its update is published. Called
   // on any thread and under the session's lock: it must be quick and must not call back. May be
   // empty.
-  std::function<void(const wire::Decision&)> decided;
+  std::function<void(const Decision&)> decided;
 };
 
 class Session {
  public:
-  using StartDone = std::function<void(Result<wire::SessionInfo>)>;
+  using StartDone = std::function<void(Result<SessionInfo>)>;
 
   struct State {
     SessionState shared;        // valid_ms is filled in by the service
@@ -106,8 +106,7 @@ class Session {
   // the calling thread: kInvalidArgument for another case, kUnavailable for a session that belongs
   // to another client (both leave the running session alone) and after stop(). Else on the preparer
   // or the worker; kUnavailable when a later start or stop() came first.
-  void start(const wire::SessionRequest& request, const StartDone& done,
-             const std::string& asking = {});
+  void start(const SessionRequest& request, const StartDone& done, const std::string& asking = {});
 
   // This client has gone: what it owns belongs to nobody.
   void leave(const std::string& gone);
@@ -119,8 +118,7 @@ class Session {
   // kModelNotReady without a running session; the errors of check_observation and of
   // Sources::admit. The source's last observation once more gets its receipt once more, and nothing
   // happens. Precondition: the observation's numbers are finite (wire::decode_observation).
-  Result<wire::ObservationReceipt> submit(Observation observation,
-                                          const OnAccepted& on_accepted = {});
+  Result<ObservationReceipt> submit(Observation observation, const OnAccepted& on_accepted = {});
 
   State state() const;
 
@@ -131,7 +129,7 @@ class Session {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   struct PendingStart {
-    wire::SessionRequest request;
+    SessionRequest request;
     StartDone done;
     std::string owner;
   };
@@ -141,7 +139,7 @@ class Session {
   };
   struct Running {
     SessionKey key;
-    wire::SessionRequest request;
+    SessionRequest request;
     std::string owner;
     SessionModel* model = nullptr;  // in models_
     Sources sources;
@@ -160,15 +158,15 @@ class Session {
   void prepare(const std::stop_token& stop);
   void work(const std::stop_token& stop);
   void begin(const Prepared& prepared);
-  Result<SessionModel*> model_for(const wire::SessionRequest& request, const std::stop_token& stop);
+  Result<SessionModel*> model_for(const SessionRequest& request, const std::stop_token& stop);
   void process(const Box& box);
-  bool finish(const Box& box, const wire::UpdateMessage& message, const std::stop_token& stop);
+  bool finish(const Box& box, const UpdateMessage& message, const std::stop_token& stop);
   // With the mutex held.
   const std::string* owner() const;
   void end_running();
   SessionState shared_state() const;
   void changed() const;
-  void decide(const Observation& observation, wire::Outcome outcome, std::string reason,
+  void decide(const Observation& observation, Outcome outcome, std::string reason,
               const Update* answer = nullptr) const;
 
   const std::string case_id_;

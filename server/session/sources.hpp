@@ -16,7 +16,7 @@
 namespace brainshift::server {
 
 struct Admission {
-  wire::ObservationReceipt receipt;
+  ObservationReceipt receipt;
   std::int64_t daemon_ns = 0;  // acquired_ns on the clock that all sources of the session share
   bool repeated = false;       // the source's last observation once more: nothing is to be done
 };
@@ -38,7 +38,7 @@ class Sources {
   struct Source {
     SourceClock clock;
     std::int64_t last_acquired_ns = 0;
-    wire::ObservationReceipt receipt;  // of its last observation
+    ObservationReceipt receipt;  // of its last observation
   };
 
   double max_age_s_;

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/values/case_config.hpp"
+#include "common/configuration/case_config.hpp"
 #include "tests/ablations/ablation_truths.hpp"
 #include "tests/ablations/parts.hpp"
 #include "tests/surgeries/row_file.hpp"

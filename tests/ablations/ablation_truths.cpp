@@ -5,7 +5,7 @@
 #include <array>
 #include <utility>
 
-#include "client/twin/variation.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "tests/evidence/paper_tables.hpp"
 #include "tests/support/gross_errors.hpp"

@@ -34,8 +34,8 @@
 #include <utility>
 #include <vector>
 
-#include "client/bridge/bridge.hpp"
 #include "client/lib/client.hpp"
+#include "client/tools/bridge/bridge.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
 #include "common/igtl/message.hpp"

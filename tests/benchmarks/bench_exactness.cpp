@@ -18,7 +18,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "client/twin/surgery.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/fem/block_solver.hpp"
 #include "common/fem/sampling.hpp"

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "client/plot/chart.hpp"
+#include "client/tools/pictures/chart.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/benchmarks/pareto.hpp"
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <numeric>
 
-#include "client/twin/surgery.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/prepared/condense.hpp"

@@ -6,13 +6,13 @@
 #include <memory>
 #include <string>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 
 namespace brainshift::bench {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "client/twin/simulate.hpp"
-#include "client/twin/surgery.hpp"
-#include "client/twin/truth_brain.hpp"
+#include "client/tools/twin/simulate.hpp"
+#include "client/tools/twin/surgery.hpp"
+#include "client/tools/twin/truth_brain.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"

@@ -21,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include "client/replay/run_report.hpp"
+#include "client/tools/replay/run_report.hpp"
 #include "common/core/error.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/benchmarks/paired_test.hpp"

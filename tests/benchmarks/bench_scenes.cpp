@@ -13,13 +13,13 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/surgery.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/core/statistics.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
-#include "server/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene_plan.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -72,7 +72,7 @@ void run(const std::string& case_file, const std::string& csv_file) {
   parts[3].options.gravity_modes = false;
   parts[4] = {"far_field", {}, &inversion::OmissionErrors::far_field_mm};
   parts[4].options.region_of_interest =
-      server::region_of_interest(*model, config.scene.region_of_interest_mm);
+      pipeline::region_of_interest(*model, config.scene.region_of_interest_mm);
   std::printf("%d nodes, %d slaves, %zu nodes within %.0f mm of the tumour\n",
               operators->num_nodes(), operators->num_slaves(),
               parts[4].options.region_of_interest.size(), config.scene.region_of_interest_mm);

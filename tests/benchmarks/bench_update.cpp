@@ -17,8 +17,8 @@
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
+#include "common/pipeline/pipeline.hpp"
 #include "common/wire/convert.hpp"
-#include "server/pipeline/pipeline.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {
@@ -68,11 +68,11 @@ struct Player {
     auto made =
         value_or_exit(inversion::condensed_inverter(head.operators, head.locator, head.config));
     inverter = made.get();
-    pipeline = std::make_unique<server::Pipeline>(value_or_exit(server::Pipeline::build(
+    pipeline = std::make_unique<pipeline::Pipeline>(value_or_exit(pipeline::Pipeline::build(
         head.model, head.config, Method::kCondensed, Boundary::kContact, std::move(made))));
   }
   const inversion::Inverter* inverter = nullptr;
-  std::unique_ptr<server::Pipeline> pipeline;
+  std::unique_ptr<pipeline::Pipeline> pipeline;
 };
 
 struct Timed {

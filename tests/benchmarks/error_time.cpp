@@ -13,9 +13,9 @@
 #include <thread>
 #include <utility>
 
-#include "client/replay/score.hpp"
-#include "client/twin/surgery.hpp"
-#include "client/twin/variation.hpp"
+#include "client/tools/replay/score.hpp"
+#include "client/tools/twin/surgery.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_exact.hpp"

@@ -2,7 +2,7 @@
 // Error and run time of inversion methods on simulated surgeries of one head.
 //
 // Every repetition is a surgery of its own: the scenario's first moment, varied (fluid level, pose,
-// stiffness, swelling; client/twin/variation.hpp), with points and noise of its own. All methods
+// stiffness, swelling; client/tools/twin/variation.hpp), with points and noise of its own. All methods
 // get the same surgeries, so that errors can be compared one by one. The estimate sees the
 // measurement only; the score sees the truth.
 #pragma once
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/scenario.hpp"
+#include "client/tools/twin/scenario.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"

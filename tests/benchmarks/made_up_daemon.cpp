@@ -21,7 +21,7 @@ SaggingHead::SaggingHead(std::shared_ptr<const BrainModel> model) : model_(std::
 }
 
 server::Bytes SaggingHead::frame(std::uint64_t sequence) {
-  wire::UpdateMessage message;
+  UpdateMessage message;
   message.session_id = 1;
   message.boot_id = 7;
   Update& update = message.update;

@@ -17,7 +17,7 @@
 
 #include <filesystem>
 
-#include "client/twin/truth_brain.hpp"
+#include "client/tools/twin/truth_brain.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 

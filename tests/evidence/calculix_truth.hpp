@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "client/twin/truth.hpp"
+#include "client/tools/twin/truth.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 

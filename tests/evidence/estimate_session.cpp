@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "client/replay/score.hpp"
+#include "client/tools/replay/score.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "tests/surgeries/surgery_score.hpp"
 
@@ -36,10 +36,10 @@ Result<EstimateSession> begin_session(const bench::Head& head, const Variant& va
   }
   auto inverter = inversion::condensed_inverter(session.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
-  auto pipeline = server::Pipeline::build(head.model, config, Method::kCondensed, variant.boundary,
-                                          std::move(*inverter));
+  auto pipeline = pipeline::Pipeline::build(head.model, config, Method::kCondensed,
+                                            variant.boundary, std::move(*inverter));
   if (!pipeline) return tl::unexpected(pipeline.error());
-  session.pipeline = std::make_unique<server::Pipeline>(std::move(*pipeline));
+  session.pipeline = std::make_unique<pipeline::Pipeline>(std::move(*pipeline));
   return session;
 }
 

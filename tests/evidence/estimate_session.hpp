@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "server/pipeline/pipeline.hpp"
+#include "common/pipeline/pipeline.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/evidence_rows.hpp"
 #include "tests/evidence/patient_twin.hpp"
@@ -23,7 +23,7 @@ struct EstimateSession {
   Variant variant;
   std::shared_ptr<const inversion::PreparedModel> prepared;
   std::shared_ptr<const CondensedOperators> operators;
-  std::unique_ptr<server::Pipeline> pipeline;
+  std::unique_ptr<pipeline::Pipeline> pipeline;
 };
 
 // head: with the mesh that the variant asks for, and with the operators of the contact boundary

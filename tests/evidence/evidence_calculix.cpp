@@ -11,8 +11,8 @@
 #include <string>
 #include <utility>
 
-#include "client/twin/load.hpp"
-#include "client/twin/truth_load.hpp"
+#include "client/tools/twin/load.hpp"
+#include "client/tools/twin/truth_load.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/linalg/blas_kernel.hpp"

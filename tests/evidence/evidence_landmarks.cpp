@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "client/landmarks/import_landmarks.hpp"
+#include "client/tools/import/import_landmarks.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/io/landmarks/pair_file.hpp"
 #include "common/linalg/blas_kernel.hpp"

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/case_config.hpp"
 #include "tests/evidence/evidence_rows.hpp"
 #include "tests/evidence/evidence_truths.hpp"
 

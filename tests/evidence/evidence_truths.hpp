@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/adverse.hpp"
+#include "client/tools/twin/adverse.hpp"
 
 namespace brainshift::evidence {
 

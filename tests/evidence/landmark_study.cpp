@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "common/inversion/inverter.hpp"
+#include "common/pipeline/pipeline.hpp"
 #include "common/registration/fiducials.hpp"
-#include "server/pipeline/pipeline.hpp"
 #include "tests/evidence/landmark_maps.hpp"
 
 namespace brainshift::evidence {
@@ -35,8 +35,8 @@ class Foreteller {
     config.sensing.landmark_pose_sd_deg = kLeftPose_deg;
     auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
     if (!inverter) return tl::unexpected(inverter.error());
-    auto pipeline = server::Pipeline::build(head.model, config, Method::kCondensed,
-                                            Boundary::kContact, std::move(*inverter));
+    auto pipeline = pipeline::Pipeline::build(head.model, config, Method::kCondensed,
+                                              Boundary::kContact, std::move(*inverter));
     if (!pipeline) return tl::unexpected(pipeline.error());
     return Foreteller(head, sd_mm, std::move(*pipeline));
   }
@@ -67,12 +67,12 @@ class Foreteller {
   }
 
  private:
-  Foreteller(const bench::Head& head, double sd_mm, server::Pipeline pipeline)
+  Foreteller(const bench::Head& head, double sd_mm, pipeline::Pipeline pipeline)
       : head_(&head), sd_mm_(sd_mm), pipeline_(std::move(pipeline)) {}
 
   const bench::Head* head_;
   double sd_mm_;
-  server::Pipeline pipeline_;
+  pipeline::Pipeline pipeline_;
 };
 
 }  // namespace

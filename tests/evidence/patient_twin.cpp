@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "client/replay/score.hpp"
+#include "client/tools/replay/score.hpp"
 #include "common/registration/icp.hpp"
 #include "tests/evidence/calculix_truth.hpp"
 

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "client/twin/surgery.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/core/error.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/evidence_truths.hpp"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "common/values/case_config.hpp"
+#include "common/configuration/case_config.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
 

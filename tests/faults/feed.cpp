@@ -95,7 +95,7 @@ Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded
   client::ClientOptions options;
   options.keys = keys;
   auto client = need(client::Client::connect(endpoint, options), "connect");
-  wire::SessionRequest request;
+  SessionRequest request;
   request.case_id = feed.case_id();
   request.recorded_clock = recorded_clock;
   request.takeover = true;
@@ -103,7 +103,7 @@ Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded
   return {std::move(client), std::move(info)};
 }
 
-wire::UpdateMessage answer_to(client::Client& client, const Observation& observation) {
+UpdateMessage answer_to(client::Client& client, const Observation& observation) {
   need(client.submit(observation), "submit");
   while (true) {
     auto message = need(client.next_update(milliseconds(60000)), "next update");

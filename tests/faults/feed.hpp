@@ -44,13 +44,13 @@ std::int64_t monotonic_ns();
 // A client with its own session, method condensed, boundary contact.
 struct Opened {
   client::Client client;
-  wire::SessionInfo info;
+  SessionInfo info;
 };
 Opened open_session(const std::string& endpoint, const Feed& feed, bool recorded_clock,
                     const std::optional<client::ClientKeys>& keys = std::nullopt);
 
 // Sends an observation and waits for the update that answers it; the client must have subscribed.
-wire::UpdateMessage answer_to(client::Client& client, const Observation& observation);
+UpdateMessage answer_to(client::Client& client, const Observation& observation);
 
 // Whether the fields have the same bits, standard deviations too.
 bool same_bits(const Update& one, const Update& other);

@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "client/replay/resume.hpp"
+#include "client/tools/replay/resume.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/faults/daemon_process.hpp"
@@ -85,8 +85,7 @@ class Replay {
 
 // Plays until the daemon is gone; what it claimed until then. Every answer to subscribe() says what
 // is on the disk at that moment.
-Claims play_into(client::Client& client, const wire::SessionInfo& info, const Feed& feed,
-                 bool paced) {
+Claims play_into(client::Client& client, const SessionInfo& info, const Feed& feed, bool paced) {
   using Clock = std::chrono::steady_clock;
   Claims claims;
   const auto gone = [&] {

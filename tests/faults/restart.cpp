@@ -83,7 +83,7 @@ void run_restart(const Settings& settings, Tally& tally) {
     daemon = std::make_unique<DaemonProcess>(options);
     // The next patient's session, with fields for those who ask.
     auto client = need(client::Client::connect(daemon->endpoint()), "connect");
-    wire::SessionRequest request;
+    SessionRequest request;
     request.case_id = need(client.status(), "status").case_id;
     const auto info = need(client.start_session(request), "start a session");
     need(client.subscribe(), "subscribe");

@@ -30,7 +30,7 @@ struct Account {
   std::vector<bool> marked;       // as late, by the daemon
   std::vector<double> beyond_ms;  // of these ages, what lies outside the daemon's own account
 
-  void take(const wire::UpdateMessage& message) {
+  void take(const UpdateMessage& message) {
     if (!message.update.final) return;
     const auto found = sent.find(message.update.observation_sequence);
     if (found == sent.end()) return;

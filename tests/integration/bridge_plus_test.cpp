@@ -16,9 +16,9 @@
 #include <sstream>
 #include <thread>
 
-#include "client/bridge/hub.hpp"
-#include "client/bridge/inbox.hpp"
-#include "client/ultrasound/import_boundaries.hpp"
+#include "client/tools/bridge/hub.hpp"
+#include "client/tools/bridge/inbox.hpp"
+#include "client/tools/import/import_boundaries.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/io/recording/sequence_file.hpp"

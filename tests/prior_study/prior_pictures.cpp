@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "client/plot/chart.hpp"
+#include "client/tools/pictures/chart.hpp"
 #include "common/core/statistics.hpp"
 
 namespace brainshift::prior_study {

@@ -2,7 +2,7 @@
 // stiffness_study: how far does a brain whose stiffness varies move otherwise than the model, under
 // the same forces or the same strain of swelling tissue?
 //
-//   d = u_true - s u_model       u_true: stiffness of a seed (client/twin/stiffness.hpp)
+//   d = u_true - s u_model       u_true: stiffness of a seed (client/tools/twin/stiffness.hpp)
 //                                u_model: the case's stiffness
 //   ratio = rms |d| / rms |u_model|, s = 1 or the best scalar of all nodes
 // over all nodes, nodes near the tumour and nodes of the craniotomy.
@@ -17,10 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/load.hpp"
-#include "client/twin/stiffness.hpp"
-#include "client/twin/truth.hpp"
-#include "client/twin/variation.hpp"
+#include "client/tools/twin/load.hpp"
+#include "client/tools/twin/stiffness.hpp"
+#include "client/tools/twin/truth.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/contact/tissues.hpp"
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "client/replay/play.hpp"
-#include "client/twin/scenario.hpp"
-#include "client/twin/surgery.hpp"
+#include "client/tools/replay/play.hpp"
+#include "client/tools/twin/scenario.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_record.hpp"
 

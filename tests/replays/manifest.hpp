@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "client/replay/play.hpp"
+#include "client/tools/replay/play.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::replays {

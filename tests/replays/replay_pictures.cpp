@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/chart.hpp"
+#include "client/tools/pictures/chart.hpp"
 #include "tests/replays/replay_rows.hpp"
 #include "tests/replays/replay_tables.hpp"
 

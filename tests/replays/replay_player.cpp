@@ -8,8 +8,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPatience{120000};  // without any answer
 constexpr double kOtherMesh_mm = 1e9;
 
-Result<wire::SessionInfo> start(client::Client& client, const std::string& endpoint,
-                                const Recording& recording, PassFacts& facts) {
+Result<SessionInfo> start(client::Client& client, const std::string& endpoint,
+                          const Recording& recording, PassFacts& facts) {
   const auto status = client.status();
   if (!status) return tl::unexpected(status.error());
   const io::SurgeryMeta& meta = recording.meta;
@@ -60,7 +60,7 @@ client::DaemonLink Tap::link() {
           }};
 }
 
-void Tap::note(const wire::UpdateMessage& message) {
+void Tap::note(const UpdateMessage& message) {
   const Update& update = message.update;
   if (message.session_id != session_id_ || message.error || !update.final) return;
   Passed& passed = passed_[update.observation_sequence];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Plays a recording of the corpus to a running daemon, as `brainshift replay` does
-// (client/replay/play.hpp), and keeps what that does not: when each observation was sent, the
+// (client/tools/replay/play.hpp), and keeps what that does not: when each observation was sent, the
 // daemon's own account of the time, and every field, for comparison.
 #pragma once
 
@@ -46,7 +46,7 @@ class Tap {
     std::string evidence;
     std::optional<double> difference_mm;
   };
-  void note(const wire::UpdateMessage& message);
+  void note(const UpdateMessage& message);
 
   client::DaemonLink link_;
   std::uint64_t session_id_;

@@ -27,7 +27,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/replay/play.hpp"
+#include "client/tools/replay/play.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/surgeries/row_file.hpp"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "client/twin/simulate.hpp"
+#include "client/tools/twin/simulate.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"

@@ -86,14 +86,14 @@ struct Figures {
 };
 using ByStage = std::array<Figures, 2>;
 
-Result<server::Pipeline> session_of(const bench::Head& head, const Guide& guide, int& rounds) {
+Result<pipeline::Pipeline> session_of(const bench::Head& head, const Guide& guide, int& rounds) {
   CaseConfig config = head.config;
   config.sensing.tumour = guide.tumour;
   config.sensing.probe_pose_sd_mm = config.sensing.probe_pose_sd_deg = guide.probe_pose_sd;
   config.inversion.sparse_points = guide.points;
   auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
-  return server::Pipeline::build(
+  return pipeline::Pipeline::build(
       head.model, config, Method::kCondensed, Boundary::kContact,
       std::make_unique<WatchedInverter>(std::move(*inverter), guide.cold, rounds));
 }

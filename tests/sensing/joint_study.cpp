@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surgeries of every joint scenario, each another truth (client/twin/variation.hpp). The first
+// Surgeries of every joint scenario, each another truth (client/tools/twin/variation.hpp). The first
 // update of a surgery knows the tumour's boundary only, the second the stereo camera's surface too,
 // the third the tracked points.
 #include <cstdio>
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/bars.hpp"
-#include "client/twin/variation.hpp"
+#include "client/tools/pictures/bars.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
 #include "tests/sensing/estimate_studies.hpp"

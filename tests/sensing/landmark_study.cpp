@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fifteen homologous landmarks around the tumour, each found with an error of 1 mm, as in clinical
-// data sets (Xiao et al. 2017); one set in each of twelve surgeries (client/twin/variation.hpp).
+// data sets (Xiao et al. 2017); one set in each of twelve surgeries (client/tools/twin/variation.hpp).
 // Each landmark in turn is left out and predicted from the others: by the model, and by the best
 // rigid motion.
 #include <cstdio>
@@ -9,9 +9,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "client/replay/score.hpp"
-#include "client/twin/measure.hpp"
-#include "client/twin/variation.hpp"
+#include "client/tools/replay/score.hpp"
+#include "client/tools/twin/measure.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "common/registration/fiducials.hpp"
 #include "tests/sensing/estimate_studies.hpp"
@@ -59,7 +59,7 @@ struct Errors {
 
 // One set of landmarks: the distances of the left-out ones from where they were measured.
 Status try_once(const bench::Head& head, const Points& truth, Random& random,
-                server::Pipeline& session, std::uint64_t& sequence, Errors& errors) {
+                pipeline::Pipeline& session, std::uint64_t& sequence, Errors& errors) {
   const std::vector<NodeIndex> nodes = choose_landmarks(*head.model, random);
   const LandmarkPairs all = client::measure_displacements(
       head.model->mesh.nodes(Eigen::all, nodes), truth(Eigen::all, nodes), kNoise_mm, random);

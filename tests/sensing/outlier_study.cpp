@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/variation.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
@@ -14,7 +14,7 @@
 namespace brainshift::sensing {
 namespace {
 
-constexpr int kTruths = 10;  // surgeries that differ as client/twin/variation.hpp has it
+constexpr int kTruths = 10;  // surgeries that differ as client/tools/twin/variation.hpp has it
 constexpr int kMeasurements = 2;
 
 using Surgeries = std::vector<client::SimulatedSurgery>;

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "client/twin/ultrasound.hpp"
+#include "client/tools/twin/ultrasound.hpp"
 #include "common/anatomy/tumour_surface.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"

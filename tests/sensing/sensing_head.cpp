@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "client/replay/score.hpp"
+#include "client/tools/replay/score.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_threads.hpp"
@@ -26,11 +26,11 @@ Result<bench::Head> make_default_head(double thousand_nodes) {
   return head;
 }
 
-Result<server::Pipeline> begin_surgery(const bench::Head& head, const CaseConfig& config) {
+Result<pipeline::Pipeline> begin_surgery(const bench::Head& head, const CaseConfig& config) {
   auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
-  return server::Pipeline::build(head.model, config, Method::kCondensed, Boundary::kContact,
-                                 std::move(*inverter));
+  return pipeline::Pipeline::build(head.model, config, Method::kCondensed, Boundary::kContact,
+                                   std::move(*inverter));
 }
 
 Result<client::RunReport> score_update(const bench::Head& head, const io::SurgeryTruth& truth,

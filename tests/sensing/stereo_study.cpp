@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "client/stereo/pictures.hpp"
+#include "client/tools/stereo/pictures.hpp"
 #include "common/stereo/calibrate.hpp"
 #include "common/stereo/disparity.hpp"
 #include "common/stereo/reconstruct.hpp"

@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "common/configuration/case_config.hpp"
 #include "common/fem/deformation.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/linalg/checked_solve.hpp"
-#include "common/values/case_config.hpp"
 #include "tests/stability/toy_problem.hpp"
 #include "tests/support/box_mesh.hpp"
 

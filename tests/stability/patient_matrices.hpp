@@ -12,9 +12,9 @@
 // Covers what the sweeps ask: one material, no swelling, drained.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/contact/contact_search.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/stability/reference.hpp"
 

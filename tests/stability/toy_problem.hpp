@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/values/case_config.hpp"
 #include "tests/stability/reference_posterior.hpp"
 #include "tests/stability/stability_point.hpp"
 

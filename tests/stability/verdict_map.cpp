@@ -5,8 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "client/plot/canvas.hpp"
-#include "client/plot/ticks.hpp"
+#include "client/tools/pictures/canvas.hpp"
+#include "client/tools/pictures/ticks.hpp"
 
 namespace brainshift::stability {
 namespace {

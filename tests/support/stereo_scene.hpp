@@ -7,10 +7,10 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/core/types.hpp"
 #include "common/stereo/calibrate.hpp"
 #include "common/stereo/gray_image.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::test_support {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/chart.hpp"
+#include "client/tools/pictures/chart.hpp"
 #include "common/io/files/file_access.hpp"
 #include "tests/benchmarks/bench_checks.hpp"
 #include "tests/benchmarks/csv_table.hpp"

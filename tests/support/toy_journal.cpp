@@ -46,9 +46,9 @@ Points toy_displacement(const Points& x, double scale) {
   return u;
 }
 
-wire::UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Quality quality,
-                               double scale) {
-  wire::UpdateMessage made;
+UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Quality quality,
+                         double scale) {
+  UpdateMessage made;
   made.session_id = 41;
   Update& update = made.update;
   update.case_id = model.case_id;
@@ -67,11 +67,11 @@ wire::UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, 
 }
 
 void write_toy_journal(const std::filesystem::path& path, const BrainModel& model,
-                       const std::vector<wire::UpdateMessage>& updates) {
+                       const std::vector<UpdateMessage>& updates) {
   auto file = io::SurgeryFile::create(path, {.case_id = "toy", .model_id = model.model_id});
   if (!file) throw std::runtime_error(file.error().message);
   require(file->append(toy_observation()));
-  for (const wire::UpdateMessage& one : updates) {
+  for (const UpdateMessage& one : updates) {
     require(file->append(
         {io::RecordKind::kUpdate, one.update.sequence, 2 * kSecond_ns, wire::encode(one)}));
   }

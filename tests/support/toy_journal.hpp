@@ -21,13 +21,13 @@ Points toy_displacement(const Points& x, double scale = 1.0);
 
 // A final update of session 41 with the field toy_displacement(., scale), a standard deviation of
 // 0.25 mm everywhere, and the flag, if any, that makes its quality.
-wire::UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Quality quality,
-                               double scale = 1.0);
+UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Quality quality,
+                         double scale = 1.0);
 
 // A closed file with one observation, and the updates a second after it. Throws
 // std::runtime_error.
 void write_toy_journal(const std::filesystem::path& path, const BrainModel& model,
-                       const std::vector<wire::UpdateMessage>& updates);
+                       const std::vector<UpdateMessage>& updates);
 void write_toy_model(const std::filesystem::path& path, const BrainModel& model);
 
 }  // namespace brainshift::test_support

@@ -2,8 +2,8 @@
 // A patient small enough for dense linear algebra: a box brain of 60 mm, gravity along -z.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::test_support {
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "client/plot/chart.hpp"
+#include "client/tools/pictures/chart.hpp"
 #include "common/core/error.hpp"
 #include "tests/surgeries/surgery_table.hpp"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "client/twin/surgery.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::surgeries {

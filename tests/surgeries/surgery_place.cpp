@@ -6,11 +6,11 @@
 #include <memory>
 #include <utility>
 
-#include "client/twin/surgery.hpp"
-#include "client/twin/variation.hpp"
+#include "client/tools/twin/surgery.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
-#include "server/pipeline/pipeline.hpp"
+#include "common/pipeline/pipeline.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/sleeping_inverter.hpp"
 #include "tests/surgeries/surgery_score.hpp"
@@ -56,8 +56,8 @@ class Sessions {
         build(head, std::make_unique<SleepingInverter>(std::move(*sleeper), sessions->awake_,
                                                        head.model->mesh.num_nodes()));
     if (!cold) return tl::unexpected(cold.error());
-    sessions->warm_ = std::make_unique<server::Pipeline>(std::move(*warm));
-    sessions->cold_ = std::make_unique<server::Pipeline>(std::move(*cold));
+    sessions->warm_ = std::make_unique<pipeline::Pipeline>(std::move(*warm));
+    sessions->cold_ = std::make_unique<pipeline::Pipeline>(std::move(*cold));
     return sessions;
   }
 
@@ -95,15 +95,15 @@ class Sessions {
   static Result<std::unique_ptr<inversion::Inverter>> inverter(const bench::Head& head) {
     return inversion::condensed_inverter(head.operators, head.locator, head.config);
   }
-  static Result<server::Pipeline> build(const bench::Head& head,
-                                        Result<std::unique_ptr<inversion::Inverter>> inverter) {
+  static Result<pipeline::Pipeline> build(const bench::Head& head,
+                                          Result<std::unique_ptr<inversion::Inverter>> inverter) {
     if (!inverter) return tl::unexpected(inverter.error());
-    return server::Pipeline::build(head.model, head.config, Method::kCondensed, Boundary::kContact,
-                                   std::move(*inverter));
+    return pipeline::Pipeline::build(head.model, head.config, Method::kCondensed,
+                                     Boundary::kContact, std::move(*inverter));
   }
 
   bool awake_ = false;
-  std::unique_ptr<server::Pipeline> warm_, cold_;
+  std::unique_ptr<pipeline::Pipeline> warm_, cold_;
 };
 
 Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts,

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/twin/scenario.hpp"
+#include "client/tools/twin/scenario.hpp"
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/estimate.hpp"

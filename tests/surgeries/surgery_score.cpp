@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "client/replay/score.hpp"
+#include "client/tools/replay/score.hpp"
 #include "common/core/statistics.hpp"
 #include "common/registration/fiducials.hpp"
 

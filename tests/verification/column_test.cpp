@@ -7,11 +7,11 @@
 
 #include <cmath>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/units.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/fem/gravity.hpp"
 #include "common/linalg/cholesky.hpp"
-#include "common/values/case_config.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"
 

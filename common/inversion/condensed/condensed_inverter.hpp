@@ -34,20 +34,20 @@
 #include <memory>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
 #include "common/inversion/contract/omission_errors.hpp"
 #include "common/operators/condensed_operators.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
 
 struct CondensedOptions {
-  // Parts that a scene may leave out (server/pipeline/scene_plan.hpp decides); omission_errors()
+  // Parts that a scene may leave out (common/pipeline/scene_plan.hpp decides); omission_errors()
   // estimates the price.
   bool contact = true;
   bool uncertainty = true;

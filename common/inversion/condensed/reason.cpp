@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "common/configuration/case_config.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/quality.hpp"
 
 namespace brainshift::inversion {

@@ -15,13 +15,13 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/operators/condensed_operators.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {

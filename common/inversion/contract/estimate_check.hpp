@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/fem/deformation.hpp"
 #include "common/operators/condensed_operators.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {

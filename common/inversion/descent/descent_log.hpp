@@ -8,11 +8,11 @@
 // where e^1 is the misfit before anything is estimated: the data themselves.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
 #include "common/contact/penalised_system.hpp"
 #include "common/core/error.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
 

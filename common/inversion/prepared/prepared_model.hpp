@@ -11,13 +11,13 @@
 #include <cstdint>
 #include <memory>
 
+#include "common/configuration/case_config.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/prior/force_prior.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {

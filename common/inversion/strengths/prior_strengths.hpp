@@ -32,6 +32,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
@@ -39,7 +40,6 @@
 #include "common/inversion/strengths/strength_evidence.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/linalg/growing_matrix.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {

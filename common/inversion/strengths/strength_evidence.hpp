@@ -24,10 +24,10 @@
 #include <array>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/types.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/linalg/growing_matrix.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {

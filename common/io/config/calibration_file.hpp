@@ -20,8 +20,8 @@
 #include <filesystem>
 #include <string>
 
+#include "common/configuration/stereo_calibration.hpp"
 #include "common/core/error.hpp"
-#include "common/values/stereo_calibration.hpp"
 
 namespace brainshift::io {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/config/case_inputs_file.hpp"
 
+#include "common/configuration/case_keys.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/values/case_keys.hpp"
 
 namespace brainshift::io {
 namespace {

@@ -2,9 +2,9 @@
 // The files that a case names, read.
 #pragma once
 
+#include "common/configuration/case_config.hpp"
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
-#include "common/values/case_config.hpp"
-#include "common/values/case_inputs.hpp"
 
 namespace brainshift::io {
 

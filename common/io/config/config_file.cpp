@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "common/configuration/case_keys.hpp"
 #include "common/io/config/key_reader.hpp"
 #include "common/io/config/key_writer.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/values/case_keys.hpp"
 
 namespace brainshift::io {
 namespace {

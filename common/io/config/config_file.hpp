@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <string>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::io {
 

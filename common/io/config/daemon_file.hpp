@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/key_table.hpp"
 #include "common/core/error.hpp"
-#include "common/values/key_table.hpp"
 
 namespace brainshift::io {
 

@@ -11,8 +11,8 @@
 #include <variant>
 #include <vector>
 
+#include "common/configuration/key_table.hpp"
 #include "common/io/files/yaml_section.hpp"
-#include "common/values/key_table.hpp"
 
 namespace brainshift::io {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/values/key_table.hpp"
+#include "common/configuration/key_table.hpp"
 
 namespace brainshift::io {
 

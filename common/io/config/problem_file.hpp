@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <string>
 
+#include "common/configuration/problem_spec.hpp"
 #include "common/core/error.hpp"
-#include "common/values/problem_spec.hpp"
 
 namespace brainshift::io {
 

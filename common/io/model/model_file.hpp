@@ -54,11 +54,11 @@
 #include <optional>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/io/model/model_inputs.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::io {
 

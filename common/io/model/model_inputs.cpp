@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
+#include "common/configuration/case_keys.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/files/checksum.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/values/case_keys.hpp"
 
 namespace brainshift::io {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::io {
 

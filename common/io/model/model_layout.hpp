@@ -5,10 +5,10 @@
 
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/io/model/hdf5_access.hpp"
 #include "common/io/model/model_inputs.hpp"
 #include "common/values/brain_model.hpp"
-#include "common/values/case_config.hpp"
 
 namespace brainshift::io {
 

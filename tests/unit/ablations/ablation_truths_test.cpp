@@ -6,7 +6,7 @@
 
 #include <set>
 
-#include "client/twin/scenario.hpp"
+#include "client/tools/twin/scenario.hpp"
 #include "tests/evidence/evidence_truths.hpp"
 
 namespace brainshift::ablations {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "common/values/case_inputs.hpp"
+#include "common/configuration/case_inputs.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::anatomy::testing {

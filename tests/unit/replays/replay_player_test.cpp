@@ -4,15 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/client/replay/scripted_daemon.hpp"
+#include "tests/unit/client/tools/replay/scripted_daemon.hpp"
 
 namespace brainshift::replays {
 namespace {
 
 using client::kSession;
 
-wire::UpdateMessage answer(std::uint64_t observation, double displacement_mm) {
-  wire::UpdateMessage message = client::update(observation, true);
+UpdateMessage answer(std::uint64_t observation, double displacement_mm) {
+  UpdateMessage message = client::update(observation, true);
   message.update.estimate.displacement = Points::Constant(3, 2, displacement_mm);
   SourceSummary source;
   source.source = "ius";
@@ -26,7 +26,7 @@ wire::UpdateMessage answer(std::uint64_t observation, double displacement_mm) {
 std::vector<PlayedRow> rows_of(double displacement_mm, KnownFields& fields) {
   client::ScriptedDaemon daemon;
   daemon.script = [&](const Observation& o) {
-    wire::UpdateMessage stranger = answer(o.sequence, 99.0);
+    UpdateMessage stranger = answer(o.sequence, 99.0);
     stranger.session_id = kSession + 1;
     return std::vector{client::update(o.sequence, false), stranger,
                        answer(o.sequence, displacement_mm)};

@@ -11,11 +11,11 @@
 namespace brainshift::server {
 
 inline Result<std::unique_ptr<SessionModel>> fake_session(
-    std::unique_ptr<inversion::Inverter> inverter, const wire::SessionRequest& request = {}) {
+    std::unique_ptr<inversion::Inverter> inverter, const SessionRequest& request = {}) {
   auto pipeline =
       Pipeline::build(small_model(), {}, request.method, request.boundary, std::move(inverter));
   if (!pipeline) return tl::unexpected(pipeline.error());
-  wire::SessionInfo info;
+  SessionInfo info;
   info.model_id = kModelId;
   return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
 }

@@ -120,7 +120,7 @@ class TransportTest : public testing::Test {
     options.version = "1.2.3";
     options.model = small_model();
     options.boot_id = kBootId;
-    options.make_model = [nodes](const wire::SessionRequest& request, const auto&) {
+    options.make_model = [nodes](const SessionRequest& request, const auto&) {
       return fake_session(std::make_unique<FakeInverter>(nodes), request);
     };
     return options;
@@ -133,9 +133,8 @@ class TransportTest : public testing::Test {
   }
 
   static void start_session(RawPeer& peer) {
-    peer.request(
-        MessageType::kStartSessionRequest,
-        wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
+    peer.request(MessageType::kStartSessionRequest,
+                 wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
     Received reply = peer.receive();
     while (reply.type == MessageType::kSessionState) reply = peer.receive();
     ASSERT_EQ(reply.type, MessageType::kStartSessionReply);
@@ -166,12 +165,12 @@ class TransportTest : public testing::Test {
     ASSERT_EQ(next_update(peer).update.observation_sequence, sequence);
   }
 
-  static wire::UpdateMessage next_update(RawPeer& peer) {
+  static UpdateMessage next_update(RawPeer& peer) {
     Received received = peer.receive();
     while (received.type != MessageType::kUpdate) received = peer.receive();
     auto message = wire::decode_update(received.payload);
     EXPECT_TRUE(message.has_value());
-    return message ? *message : wire::UpdateMessage{};
+    return message ? *message : UpdateMessage{};
   }
 
   void expect_alive() {

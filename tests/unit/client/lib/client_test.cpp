@@ -27,14 +27,14 @@ Client connect(const std::string& endpoint, milliseconds timeout = kPatient) {
 }
 
 std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3") {
-  wire::DaemonStatus status;
+  DaemonStatus status;
   status.version = version;
   return encode_frame(MessageType::kStatusReply, id, encode(status));
 }
 
 std::string update_frame(std::uint64_t sequence, bool final = true,
                          Quality quality = Quality::kNotJudged) {
-  wire::UpdateMessage message;
+  UpdateMessage message;
   message.update.estimate.quality.quality = quality;
   if (quality == Quality::kUnusable) {
     message.update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
@@ -60,7 +60,7 @@ TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
     switch (request.type) {
       case MessageType::kStatusRequest: return {status_reply(request.request_id)};
       case MessageType::kStartSessionRequest: {
-        wire::SessionInfo info;
+        SessionInfo info;
         info.model_id = wire::decode_session_request(request.payload).value().case_id;
         return reply(MessageType::kStartSessionReply, encode(info));
       }
@@ -75,7 +75,7 @@ TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
       case MessageType::kObservation: {
         const auto observation = wire::decode_observation(request.payload).value();
         return reply(MessageType::kObservationReply,
-                     encode(wire::ObservationReceipt{observation.sequence, true}));
+                     encode(ObservationReceipt{observation.sequence, true}));
       }
       default: ADD_FAILURE() << "unexpected request"; return {};
     }
@@ -120,7 +120,7 @@ TEST(Client, LateRepliesOfTimedOutRequestsAreIgnored) {
   Client impatient = connect(daemon.endpoint(), kShort);
   expect_error(impatient.status(), ErrorCode::kUnavailable, daemon.endpoint());
   // The second request may be slow on a loaded machine; ask until it is not.
-  Result<wire::DaemonStatus> status = impatient.status();
+  Result<DaemonStatus> status = impatient.status();
   for (int i = 0; i < 50 && !status; ++i) status = impatient.status();
   ASSERT_TRUE(status) << status.error().message;
   EXPECT_EQ(status->version, "in time");
@@ -215,7 +215,7 @@ TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
   FakeDaemon daemon([](const Frame& request) -> Answers {
     const std::uint64_t id = request.request_id;
     if (request.type == MessageType::kStartSessionRequest) {
-      return {encode_frame(MessageType::kStartSessionReply, id, encode(wire::SessionInfo{}))};
+      return {encode_frame(MessageType::kStartSessionReply, id, encode(SessionInfo{}))};
     }
     return {update_frame(1, true, Quality::kGood), update_frame(2, true, Quality::kUnusable),
             update_frame(3, false), status_reply(id)};

@@ -34,7 +34,7 @@ Client connect(const std::string& endpoint) {
 }
 
 std::string update_frame(const SessionKey& key, std::uint64_t sequence) {
-  wire::UpdateMessage message;
+  UpdateMessage message;
   message.session_id = key.session_id;
   message.boot_id = key.boot_id;
   message.update.model_id = key.model_id;
@@ -67,8 +67,7 @@ class Simulated {
         ++newest_;
         Answers answers;
         push(sent_, answers, /*credit=*/subscription_ != 0 && sent_ == acknowledged_);
-        answers.push_back(
-            encode_frame(MessageType::kStatusReply, id, encode(wire::DaemonStatus{})));
+        answers.push_back(encode_frame(MessageType::kStatusReply, id, encode(DaemonStatus{})));
         return answers;
       }
       default: return {};
@@ -211,7 +210,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
       last = observation.session;
     }
     return {encode_frame(MessageType::kObservationReply, request.request_id,
-                         encode(wire::ObservationReceipt{observation.sequence, false}))};
+                         encode(ObservationReceipt{observation.sequence, false}))};
   });
   Client source = connect(server.endpoint());
   Observation observation;

@@ -26,7 +26,7 @@ const FieldChoice kChoice{.region = BallRegion{Vec3(1, 2, 3), 4.0}, .tolerance_m
 
 // Nodes 2 and 5 of ten, both at `value`; or node 5 alone as a change of `base`.
 std::string part_frame(std::uint64_t sequence, double value, std::uint64_t base = 0) {
-  wire::UpdateMessage message;
+  UpdateMessage message;
   message.session_id = 1;
   message.boot_id = 7;
   message.update.model_id = "model";
@@ -97,7 +97,7 @@ struct Viewing {
   Client client;
 };
 
-Eigen::RowVectorXd x_of(const Result<wire::UpdateMessage>& message) {
+Eigen::RowVectorXd x_of(const Result<UpdateMessage>& message) {
   EXPECT_TRUE(message) << message.error().message;
   return message ? Eigen::RowVectorXd(message->update.estimate.displacement.row(0))
                  : Eigen::RowVectorXd();

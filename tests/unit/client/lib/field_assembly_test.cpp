@@ -15,9 +15,9 @@ using Outcome = FieldAssembly::Outcome;
 const SessionKey kSession{7, 1, "model"};
 
 // Every column of the displacement holds the value, every deviation a tenth of it.
-wire::UpdateMessage update(std::uint64_t sequence, double value, int columns,
-                           std::optional<FieldPart> part = std::nullopt) {
-  wire::UpdateMessage message;
+UpdateMessage update(std::uint64_t sequence, double value, int columns,
+                     std::optional<FieldPart> part = std::nullopt) {
+  UpdateMessage message;
   message.session_id = kSession.session_id;
   message.boot_id = kSession.boot_id;
   message.update.model_id = kSession.model_id;
@@ -29,8 +29,8 @@ wire::UpdateMessage update(std::uint64_t sequence, double value, int columns,
   return message;
 }
 
-wire::UpdateMessage changes(std::uint64_t sequence, double value, std::vector<NodeIndex> nodes,
-                            std::uint64_t base) {
+UpdateMessage changes(std::uint64_t sequence, double value, std::vector<NodeIndex> nodes,
+                      std::uint64_t base) {
   const int columns = static_cast<int>(nodes.size());
   return update(sequence, value, columns, FieldPart{10, std::move(nodes), base});
 }
@@ -76,7 +76,7 @@ TEST(FieldAssembly, ChangesOfTheWholeBrainNameNoPart) {
 }
 
 TEST(FieldAssembly, WhatDoesNotFitIsLostAndChangesNothing) {
-  using Damage = std::function<void(wire::UpdateMessage&)>;
+  using Damage = std::function<void(UpdateMessage&)>;
   const std::vector<std::pair<const char*, Damage>> damages = {
       {"another base", [](auto& m) { m.update.part->base_sequence = 3; }},
       {"another daemon", [](auto& m) { m.boot_id = 8; }},

@@ -8,9 +8,9 @@ namespace {
 
 SessionKey key(std::uint64_t session, std::uint64_t boot = 1) { return {boot, session, "m"}; }
 
-wire::UpdateMessage update(std::uint64_t session, std::uint64_t sequence,
-                           Quality quality = Quality::kGood, bool final = true) {
-  wire::UpdateMessage message;
+UpdateMessage update(std::uint64_t session, std::uint64_t sequence,
+                     Quality quality = Quality::kGood, bool final = true) {
+  UpdateMessage message;
   message.session_id = session;
   message.boot_id = 1;
   message.update.model_id = "m";

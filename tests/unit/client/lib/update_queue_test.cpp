@@ -6,8 +6,8 @@
 namespace brainshift::client {
 namespace {
 
-wire::UpdateMessage update(std::uint64_t sequence, bool final) {
-  wire::UpdateMessage message;
+UpdateMessage update(std::uint64_t sequence, bool final) {
+  UpdateMessage message;
   message.update.sequence = sequence;
   message.update.final = final;
   return message;
@@ -50,15 +50,15 @@ TEST(UpdateQueue, FinalUpdatesAndErrorsAreNeverDropped) {
 TEST(UpdateQueue, WhatTheDaemonHasNewerIsDropped) {
   UpdateQueue queue(10);
   const auto usable = [](std::uint64_t sequence, std::uint64_t session) {
-    wire::UpdateMessage message = update(sequence, true);
+    UpdateMessage message = update(sequence, true);
     message.session_id = session;
     message.update.estimate.quality.quality = Quality::kGood;
     return message;
   };
-  wire::UpdateMessage failure = update(4, true);
+  UpdateMessage failure = update(4, true);
   failure.session_id = 2;
   failure.error = Error{ErrorCode::kEmptySet, "no point"};
-  wire::UpdateMessage last = failure;
+  UpdateMessage last = failure;
   last.update.sequence = 5;
   for (const auto& message : {usable(9, 1), usable(2, 2), usable(3, 2), failure, last}) {
     queue.push(message);

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/configuration/case_config.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
-#include "common/values/case_config.hpp"
 #include "common/values/quality.hpp"
 
 namespace brainshift::inversion {

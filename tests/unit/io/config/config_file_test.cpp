@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "common/values/case_keys.hpp"
+#include "common/configuration/case_keys.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/config/documented_keys.hpp"
 

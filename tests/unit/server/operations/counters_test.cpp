@@ -10,7 +10,6 @@ namespace brainshift::server {
 namespace {
 
 using std::chrono::milliseconds;
-using wire::Outcome;
 using wire::SourceCounts;
 
 class CountersTest : public testing::Test {
@@ -28,7 +27,7 @@ class CountersTest : public testing::Test {
     return {};
   }
   void decide(const std::string& source, Outcome outcome) {
-    wire::Decision decision;
+    Decision decision;
     decision.source = source;
     decision.outcome = outcome;
     counters_.decided(decision);

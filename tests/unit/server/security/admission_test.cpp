@@ -106,7 +106,7 @@ TEST_F(Admission, ARoleThatDoesNotIncludeARequestIsToldSoAndStaysConnected) {
   RawPeer source = peer(Role::kSource);
   EXPECT_EQ(source.ask(MessageType::kObservation, wire::encode(landmarks(1))).type,
             MessageType::kObservationReply);
-  wire::SessionRequest takeover{kCase, Method::kPaper, Boundary::kContact, false};
+  SessionRequest takeover{kCase, Method::kPaper, Boundary::kContact, false};
   takeover.takeover = true;
   EXPECT_EQ(error_of(owner.ask(MessageType::kStartSessionRequest, wire::encode(takeover))).code,
             ErrorCode::kNotAllowed);
@@ -132,7 +132,7 @@ std::vector<Attempt> attempts() {
   other_model.session.model_id = "another-model";
   Observation other_session = landmarks(1);
   other_session.session.session_id += 7;
-  const wire::SessionRequest start{"someone-else", Method::kPaper, Boundary::kContact, false};
+  const SessionRequest start{"someone-else", Method::kPaper, Boundary::kContact, false};
   return {{"other case", MessageType::kObservation, wire::encode(other_case)},
           {"other frame", MessageType::kObservation, wire::encode(other_frame)},
           {"other model", MessageType::kObservation, wire::encode(other_model)},

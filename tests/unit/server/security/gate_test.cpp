@@ -27,7 +27,7 @@ Roles everyone() {
 wire::Frame frame(MessageType type, const std::string& payload = {}) { return {type, 1, payload}; }
 
 std::string start(bool takeover) {
-  wire::SessionRequest request;
+  SessionRequest request;
   request.case_id = "c";
   request.takeover = takeover;
   return wire::encode(request);

@@ -16,7 +16,7 @@ constexpr std::chrono::milliseconds kPatient(20000);
 // The four nodes of the small model lie at 0 and at 1 mm along x, y and z. Node i moves by 1 + i/10
 // of the datum.
 MakeSessionModel each_node_its_own() {
-  return [](const wire::SessionRequest& request, const std::stop_token&) {
+  return [](const SessionRequest& request, const std::stop_token&) {
     return fake_session(std::make_unique<FakeInverter>([](int, const SparseData& data, const auto&,
                                                           Estimate& estimate) -> Status {
                           const Status status = follow_the_data(data, estimate, 4);
@@ -52,7 +52,7 @@ class DeliveryTest : public TransportTest {
     return client;
   }
   // The whole field of an observation that moves its data by so much along x.
-  wire::UpdateMessage observe(double shift_mm) {
+  UpdateMessage observe(double shift_mm) {
     const auto taken =
         sender_->submit(in_session(session_, landmarks(++sequence_, "pointer", shift_mm)));
     EXPECT_TRUE(taken) << taken.error().message;

@@ -27,7 +27,7 @@ namespace {
 using testing::HasSubstr;
 
 MakeSessionModel second_update_fails() {
-  return [](const wire::SessionRequest& request, const std::stop_token&) {
+  return [](const SessionRequest& request, const std::stop_token&) {
     return fake_session(
         std::make_unique<FakeInverter>(
             [](int call, const SparseData& data, const auto&, Estimate& estimate) -> Status {
@@ -40,7 +40,7 @@ MakeSessionModel second_update_fails() {
 
 // An inversion that lasts for at least as long as `at_least` says.
 MakeSessionModel lasting(const std::shared_ptr<std::atomic<double>>& at_least_ms) {
-  return [at_least_ms](const wire::SessionRequest& request, const std::stop_token&) {
+  return [at_least_ms](const SessionRequest& request, const std::stop_token&) {
     return fake_session(
         std::make_unique<FakeInverter>(
             [at_least_ms](int, const SparseData& data, const auto&, Estimate& estimate) -> Status {
@@ -261,7 +261,7 @@ TEST_F(TransportTest, ASessionOfAnotherClientEndsOnlyByTakeoverOrWhenThatClientH
   auto owner = std::make_unique<RawPeer>(endpoint_);
   RawPeer other(endpoint_);
   start_session(*owner);
-  wire::SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
+  SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
   const auto ask = [&] {
     return other.ask(MessageType::kStartSessionRequest, wire::encode(request));
   };
@@ -411,7 +411,7 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
   for (std::uint64_t i = 0; i < 3; ++i) {
     const auto decision = wire::decode_decision(kept->decisions[i].payload);
     ASSERT_TRUE(decision.has_value()) << decision.error().message;
-    EXPECT_EQ(decision->outcome, wire::Outcome::kUsed);
+    EXPECT_EQ(decision->outcome, Outcome::kUsed);
     EXPECT_EQ(decision->observation_sequence, i + 1);
     EXPECT_EQ(decision->update_sequence, i + 1);
   }
@@ -481,7 +481,7 @@ TEST_F(TransportTest, EverySubscriberIsToldWhenTheDaemonDoesNotRecord) {
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
   ServiceOptions options = with_model();
   auto entered = std::make_shared<std::promise<void>>();
-  options.make_model = [entered](const wire::SessionRequest& request, const auto&) {
+  options.make_model = [entered](const SessionRequest& request, const auto&) {
     return fake_session(std::make_unique<FakeInverter>([entered](int, const SparseData&,
                                                                  const auto& asked, Estimate&) {
                           std::promise<void> stopped;

@@ -44,7 +44,7 @@ class ReportTest : public TransportTest {
   }
   static ServiceOptions with_inverter(FakeInverter::Update update) {
     ServiceOptions options = with_model();
-    options.make_model = [update](const wire::SessionRequest& request, const auto&) {
+    options.make_model = [update](const SessionRequest& request, const auto&) {
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
     return options;
@@ -174,7 +174,7 @@ TEST_F(ReportTest, WhatTheWorkerIsAtIsSeenWhileItIsAtIt) {
     return follow_the_data(data, out, 4);
   });
   const auto make = options.make_model;
-  options.make_model = [&, make](const wire::SessionRequest& request, const std::stop_token& stop) {
+  options.make_model = [&, make](const SessionRequest& request, const std::stop_token& stop) {
     preparing.set_value();
     prepared.get_future().wait();
     return make(request, stop);
@@ -182,9 +182,8 @@ TEST_F(ReportTest, WhatTheWorkerIsAtIsSeenWhileItIsAtIt) {
   serve(std::move(options));
   RawPeer peer(endpoint_);
   RawPeer watcher(endpoint_);
-  peer.request(
-      MessageType::kStartSessionRequest,
-      wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
+  peer.request(MessageType::kStartSessionRequest,
+               wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
   preparing.get_future().wait();
   EXPECT_EQ(report_of(watcher).working_ms, 0.0);
   prepared.set_value();
@@ -208,7 +207,7 @@ TEST_F(ReportTest, AWorkerThatIsBusyForLongerThanItMayHangsUntilItIsDone) {
     return follow_the_data(data, out, 4);
   });
   const auto make = options.make_model;
-  options.make_model = [make](const wire::SessionRequest& request, const std::stop_token& stop) {
+  options.make_model = [make](const SessionRequest& request, const std::stop_token& stop) {
     auto model = make(request, stop);
     // With the time that is allowed beside it: none at all.
     (*model)->deadline_s = -static_cast<double>(ServiceManager::kGrace.count());

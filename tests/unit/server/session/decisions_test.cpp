@@ -17,18 +17,16 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using wire::Decision;
-using wire::Outcome;
 
 class Decisions : public testing::Test {
  protected:
   SessionHooks hooks(FakeInverter::Update update) {
     SessionHooks hooks;
-    hooks.make_model = [update = std::move(update)](const wire::SessionRequest& request,
+    hooks.make_model = [update = std::move(update)](const SessionRequest& request,
                                                     const std::stop_token&) {
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
-    hooks.publish = [this](const wire::UpdateMessage& message, const Handled&) {
+    hooks.publish = [this](const UpdateMessage& message, const Handled&) {
       const std::lock_guard lock(mutex_);
       told_.push_back("update " + std::to_string(message.update.sequence));
       changed_.notify_all();
@@ -43,9 +41,9 @@ class Decisions : public testing::Test {
     return hooks;
   }
   static void start(Session& session) {
-    std::promise<Result<wire::SessionInfo>> ready;
+    std::promise<Result<SessionInfo>> ready;
     session.start({kCase, Method::kPaper, Boundary::kContact, false, false},
-                  [&](Result<wire::SessionInfo> info) { ready.set_value(std::move(info)); });
+                  [&](Result<SessionInfo> info) { ready.set_value(std::move(info)); });
     ASSERT_TRUE(ready.get_future().get());
   }
   std::vector<std::string> wait_for(std::size_t count) {

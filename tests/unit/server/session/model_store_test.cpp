@@ -48,11 +48,11 @@ Observation tumour_moved(std::uint64_t sequence) {
 TEST(ModelStore, MakesASessionOfEveryMethodAndTellsItsSize) {
   ModelStore store(patient(), config(), {operators()});
   for (const Method method : kAllMethods) {
-    wire::SessionRequest request;
+    SessionRequest request;
     request.method = method;
     const auto made = store.make(request);
     ASSERT_TRUE(made.has_value()) << to_string(method) << ": " << made.error().message;
-    const wire::SessionInfo& info = (*made)->info;
+    const SessionInfo& info = (*made)->info;
     EXPECT_EQ(info.model_id, patient()->model_id);
     EXPECT_EQ(info.nodes, patient()->mesh.num_nodes());
     EXPECT_EQ(info.slaves, static_cast<int>(patient()->slaves.size()));
@@ -65,7 +65,7 @@ TEST(ModelStore, MakesASessionOfEveryMethodAndTellsItsSize) {
 
 TEST(ModelStore, MeasuresAFullSolveOnRequest) {
   ModelStore store(patient(), config(), {operators()});
-  wire::SessionRequest request;
+  SessionRequest request;
   request.measure_full_solve = true;
   const auto made = store.make(request);
   ASSERT_TRUE(made.has_value());
@@ -78,7 +78,7 @@ TEST(ModelStore, MeasuresAFullSolveOnRequest) {
 
 TEST(ModelStore, KeepsTheFactorThatAMethodNeedsWhereItWasMeasuredToo) {
   ModelStore store(patient(), config(), {operators()});
-  wire::SessionRequest request;
+  SessionRequest request;
   request.measure_full_solve = true;
   ASSERT_TRUE(store.make(request).has_value());
   request.method = Method::kPaper;
@@ -175,19 +175,19 @@ TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
   auto inverter = std::make_unique<StoppedOnTheWay>(std::move(*real));
   StoppedOnTheWay& watched = *inverter;
   SessionHooks hooks;
-  hooks.make_model = [&](const wire::SessionRequest& request, const std::stop_token&) {
-    auto pipeline =
-        Pipeline::build(patient(), config(), request.method, request.boundary, std::move(inverter));
+  hooks.make_model = [&](const SessionRequest& request, const std::stop_token&) {
+    auto pipeline = pipeline::Pipeline::build(patient(), config(), request.method, request.boundary,
+                                              std::move(inverter));
     EXPECT_TRUE(pipeline.has_value());
-    wire::SessionInfo info;
+    SessionInfo info;
     return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
   };
-  std::promise<wire::UpdateMessage> published;
-  hooks.publish = [&](wire::UpdateMessage message, const Handled&) {
+  std::promise<UpdateMessage> published;
+  hooks.publish = [&](UpdateMessage message, const Handled&) {
     published.set_value(std::move(message));
   };
   Session session("toy", std::move(hooks), kBootId, kModelId);
-  wire::SessionRequest request;
+  SessionRequest request;
   request.case_id = "toy";
   const auto start = [&] {
     std::promise<bool> ready;
@@ -199,7 +199,7 @@ TEST(Cancellation, ANewSessionEndsARunningCondensedInversionEarly) {
   watched.entered.get_future().wait();
   ASSERT_TRUE(start());
   ASSERT_TRUE(session.submit(in_session(2, tumour_moved(2))).has_value());
-  const wire::UpdateMessage message = published.get_future().get();
+  const UpdateMessage message = published.get_future().get();
   session.stop();
   EXPECT_EQ(message.update.observation_sequence, 2u);  // the first one is not published
   EXPECT_FALSE(message.error.has_value());

@@ -6,7 +6,7 @@
 
 #include "common/fem/gravity.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "server/pipeline/left_out.hpp"
+#include "common/pipeline/left_out.hpp"
 #include "server/session/model_store.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/sample_values.hpp"
@@ -39,7 +39,7 @@ class SceneSession : public ::testing::Test {
   static Result<std::unique_ptr<SessionModel>> session(const CaseConfig& config,
                                                        Method method = Method::kCondensed) {
     ModelStore store(patient(), config, {operators()});
-    wire::SessionRequest request;
+    SessionRequest request;
     request.case_id = "toy";
     request.method = method;
     return store.make(request);
@@ -103,7 +103,7 @@ TEST_F(SceneSession, ByDefaultOnlyPressureIsLeftOutWhenTheBrainTouches) {
   // And the parts of the prior that the toy's case switches off.
   std::vector<std::string> parts;
   for (const Omission& one : update.left_out) parts.push_back(one.part);
-  const std::vector<Omission> off = prior_omissions(config().prior);
+  const std::vector<Omission> off = pipeline::prior_omissions(config().prior);
   ASSERT_EQ(off.size(), 6u);
   EXPECT_THAT(parts, testing::Contains("pressure"));
   EXPECT_EQ(parts.size(), 1 + off.size());
@@ -116,7 +116,7 @@ TEST_F(SceneSession, PressureDiffersByNoMoreThanIsReported) {
   const Points load =
       fem::buoyancy_load(patient()->mesh, config().material, {0, 0, -1}, 60.0, {0, 0, -1});
   const Points drained = limit->forward().solve(load);
-  const double relaxation_s = consolidation_time_s(patient()->mesh, config().material);
+  const double relaxation_s = pipeline::consolidation_time_s(patient()->mesh, config().material);
   double before = 1.0;
   for (const double relaxations : {0.3, 1.0, 10.0, 100.0}) {
     CaseConfig on = config();
@@ -126,8 +126,9 @@ TEST_F(SceneSession, PressureDiffersByNoMoreThanIsReported) {
     ASSERT_TRUE(model.has_value()) << model.error().message;
     const double missing = (drained - model->forward().solve(load)).colwise().norm().maxCoeff() /
                            drained.colwise().norm().maxCoeff();
-    EXPECT_LE(missing, implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
-    EXPECT_GT(missing, 0.02 * implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
+    EXPECT_LE(missing, pipeline::implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
+    EXPECT_GT(missing,
+              0.02 * pipeline::implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
     EXPECT_LT(missing, before);
     before = missing;
   }

@@ -24,13 +24,13 @@ using namespace std::chrono_literals;
 // Messages as they are published, to wait for.
 class Published {
  public:
-  void push(wire::UpdateMessage message) {
+  void push(UpdateMessage message) {
     const std::lock_guard lock(mutex_);
     messages_.push_back(std::move(message));
     changed_.notify_all();
   }
   // The first `count` messages; fewer when they do not come in time.
-  std::vector<wire::UpdateMessage> wait_for(std::size_t count) {
+  std::vector<UpdateMessage> wait_for(std::size_t count) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, 10s, [&] { return messages_.size() >= count; });
     return messages_;
@@ -39,7 +39,7 @@ class Published {
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<wire::UpdateMessage> messages_;
+  std::vector<UpdateMessage> messages_;
 };
 
 // A gate that a fake inversion waits at.
@@ -61,12 +61,12 @@ class SessionTest : public testing::Test {
   // One fake inverter per preparation.
   SessionHooks hooks(FakeInverter::Update update) {
     SessionHooks hooks;
-    hooks.make_model = [this, update = std::move(update)](const wire::SessionRequest& request,
+    hooks.make_model = [this, update = std::move(update)](const SessionRequest& request,
                                                           const std::stop_token&) {
       prepared_boundaries_.push_back(request.boundary);
       return fake_session(std::make_unique<FakeInverter>(update), request);
     };
-    hooks.publish = [this](wire::UpdateMessage message, const Handled&) {
+    hooks.publish = [this](UpdateMessage message, const Handled&) {
       published_.push(std::move(message));
     };
     return hooks;
@@ -77,14 +77,13 @@ class SessionTest : public testing::Test {
     return follow_the_data(data, estimate, 4);
   }
 
-  static Result<wire::SessionInfo> start(Session& session, Boundary boundary = Boundary::kContact,
-                                         const std::string& case_id = kCase,
-                                         bool publish_iterates = false) {
-    auto promise = std::make_shared<std::promise<Result<wire::SessionInfo>>>();
+  static Result<SessionInfo> start(Session& session, Boundary boundary = Boundary::kContact,
+                                   const std::string& case_id = kCase,
+                                   bool publish_iterates = false) {
+    auto promise = std::make_shared<std::promise<Result<SessionInfo>>>();
     auto future = promise->get_future();
-    session.start(
-        {case_id, Method::kPaper, boundary, publish_iterates, false},
-        [promise](Result<wire::SessionInfo> info) { promise->set_value(std::move(info)); });
+    session.start({case_id, Method::kPaper, boundary, publish_iterates, false},
+                  [promise](Result<SessionInfo> info) { promise->set_value(std::move(info)); });
     if (future.wait_for(10s) != std::future_status::ready) {
       return fail(ErrorCode::kInternal, "start was not answered");
     }
@@ -186,7 +185,7 @@ TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
   std::vector<std::size_t> sources;
   FakeInverter* inverter = nullptr;
   SessionHooks watched = hooks(echo);
-  watched.make_model = [&](const wire::SessionRequest& request, const std::stop_token&) {
+  watched.make_model = [&](const SessionRequest& request, const std::stop_token&) {
     auto made = std::make_unique<FakeInverter>(
         [&](int, const SparseData& data, const auto&, Estimate& out) {
           sources.push_back(data.sources.size());
@@ -334,7 +333,7 @@ TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   int attempts = 0;
   SessionHooks failing = hooks(echo);
   failing.make_model = [&, make = failing.make_model](
-                           const wire::SessionRequest& request,
+                           const SessionRequest& request,
                            const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
     if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
     return make(request, stop);
@@ -352,7 +351,7 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
   std::promise<void> leave;
   SessionHooks slow = hooks(echo);
   bool first = true;
-  slow.make_model = [&, make = slow.make_model](const wire::SessionRequest& request,
+  slow.make_model = [&, make = slow.make_model](const SessionRequest& request,
                                                 const std::stop_token& stop) {
     if (std::exchange(first, false)) {
       entered.set_value();
@@ -361,14 +360,14 @@ TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
     return make(request, stop);
   };
   TestSession session(std::move(slow));
-  std::promise<Result<wire::SessionInfo>> preparing;
+  std::promise<Result<SessionInfo>> preparing;
   session.start({kCase, Method::kPaper, Boundary::kContact},
-                [&](Result<wire::SessionInfo> info) { preparing.set_value(std::move(info)); });
+                [&](Result<SessionInfo> info) { preparing.set_value(std::move(info)); });
   entered.get_future().wait();
   EXPECT_TRUE(session.state().busy);
-  std::promise<Result<wire::SessionInfo>> later;
+  std::promise<Result<SessionInfo>> later;
   session.start({kCase, Method::kPaper, Boundary::kFixed},
-                [&](Result<wire::SessionInfo> info) { later.set_value(std::move(info)); });
+                [&](Result<SessionInfo> info) { later.set_value(std::move(info)); });
   leave.set_value();
   const auto superseded = preparing.get_future().get();
   ASSERT_FALSE(superseded.has_value());
@@ -386,7 +385,7 @@ struct SlowPreparation {
   // The second preparation waits.
   MakeSessionModel around(MakeSessionModel make) {
     return [this, make, call = std::make_shared<int>(0)](
-               const wire::SessionRequest& request,
+               const SessionRequest& request,
                const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
       if (++*call == 2) {
         const std::stop_callback wake(stop, [this] {
@@ -415,12 +414,12 @@ class PreparingTest : public SessionTest {
     ASSERT_TRUE(first.get_future().get());
     session_->start(
         {kCase, Method::kCondensed, Boundary::kFixed},
-        [this](Result<wire::SessionInfo> info) { next_.set_value(std::move(info)); }, "viewer");
+        [this](Result<SessionInfo> info) { next_.set_value(std::move(info)); }, "viewer");
     slow_.entered.get_future().wait();
   }
 
   SlowPreparation slow_;
-  std::promise<Result<wire::SessionInfo>> next_;
+  std::promise<Result<SessionInfo>> next_;
   std::unique_ptr<TestSession> session_;
 };
 

@@ -29,13 +29,13 @@ class Surgery {
  public:
   explicit Surgery(Random& random) : random_(random) { begin(); }
 
-  wire::UpdateMessage next() {
+  UpdateMessage next() {
     if (random_.uniform() < 0.05) begin();
     ++sequence_;
     const double what = random_.uniform();
     if (what < 0.1) return in_session(failure(sequence_));
     move();
-    wire::UpdateMessage message = in_session(usable(sequence_, kNodes));
+    UpdateMessage message = in_session(usable(sequence_, kNodes));
     message.update.estimate.displacement = field_;
     message.update.estimate.sd_mm = sd_mm_;
     if (random_.uniform() < 0.05) message.update.estimate.sd_mm.resize(0);
@@ -48,7 +48,7 @@ class Surgery {
     }
     return message;
   }
-  const Estimate& truth(const wire::UpdateMessage& message) const {
+  const Estimate& truth(const UpdateMessage& message) const {
     return truth_.at({message.session_id, message.update.sequence});
   }
 
@@ -68,7 +68,7 @@ class Surgery {
       sd_mm_[node] = std::abs(sd_mm_[node] + 0.02 * random_.normal());
     }
   }
-  wire::UpdateMessage in_session(wire::UpdateMessage message) const {
+  UpdateMessage in_session(UpdateMessage message) const {
     message.session_id = session_;
     return message;
   }
@@ -99,7 +99,7 @@ class Watched {
     renew();
   }
 
-  void publish(const wire::UpdateMessage& message, const Bytes& whole, Parcels& parcels) {
+  void publish(const UpdateMessage& message, const Bytes& whole, Parcels& parcels) {
     if (message.session_id != session_) {
       viewer_.owe_nothing();
       last_usable_.reset();
@@ -134,7 +134,7 @@ class Watched {
   }
   void receive_one(const Surgery& surgery, Fate fate) {
     if (under_way_.empty()) return;
-    wire::UpdateMessage message = decoded(under_way_.front());
+    UpdateMessage message = decoded(under_way_.front());
     under_way_.pop_front();
     ++subscription_.received;
     if (fate == Fate::kUnreadable) return ask_anew();
@@ -156,7 +156,7 @@ class Watched {
     subscription_.received = 0;
     assembly_.forget();
   }
-  void check(const wire::UpdateMessage& message, const Estimate& truth) const {
+  void check(const UpdateMessage& message, const Estimate& truth) const {
     const Estimate& held = message.update.estimate;
     std::vector<NodeIndex> nodes = selection_->nodes;
     if (message.update.part) {
@@ -207,7 +207,7 @@ TEST(HeldField, IsWithinTheToleranceOfTheNewestUpdateReceivedWhateverHappens) {
     for (const std::uint32_t window : {1u, 1u, 4u}) viewers.emplace_back(shared, window);
     viewers.emplace_back(random_selection(random), 256u);
     for (int step = 0; step < 120; ++step) {
-      const wire::UpdateMessage message = surgery.next();
+      const UpdateMessage message = surgery.next();
       const Bytes whole = frame_of(message);
       for (Watched& viewer : viewers) viewer.publish(message, whole, parcels);
       for (Watched& viewer : viewers) {

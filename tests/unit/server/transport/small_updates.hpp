@@ -15,8 +15,8 @@
 namespace brainshift::server {
 
 // Of session 1: every node moves by (1, 2, 3) mm, its standard deviation is 0.5 mm.
-inline wire::UpdateMessage usable(std::uint64_t sequence, int nodes) {
-  wire::UpdateMessage message;
+inline UpdateMessage usable(std::uint64_t sequence, int nodes) {
+  UpdateMessage message;
   message.session_id = 1;
   message.boot_id = 7;
   message.update.model_id = "model";
@@ -28,24 +28,24 @@ inline wire::UpdateMessage usable(std::uint64_t sequence, int nodes) {
   return message;
 }
 
-inline wire::UpdateMessage failure(std::uint64_t sequence) {
-  wire::UpdateMessage message = usable(sequence, 0);
+inline UpdateMessage failure(std::uint64_t sequence) {
+  UpdateMessage message = usable(sequence, 0);
   message.update.estimate = {};
   message.error = Error{ErrorCode::kEmptySet, "no point is inside the brain"};
   return message;
 }
 
-inline Bytes frame_of(const wire::UpdateMessage& message) {
+inline Bytes frame_of(const UpdateMessage& message) {
   return std::make_shared<const std::string>(
       wire::encode_frame(wire::MessageType::kUpdate, 0, wire::encode(message)));
 }
 
-inline wire::UpdateMessage decoded(const Bytes& bytes) {
+inline UpdateMessage decoded(const Bytes& bytes) {
   const auto frame = wire::decode_frame(*bytes);
   EXPECT_TRUE(frame);
   auto message = wire::decode_update(frame->payload);
   EXPECT_TRUE(message) << message.error().message;
-  return message ? std::move(*message) : wire::UpdateMessage{};
+  return message ? std::move(*message) : UpdateMessage{};
 }
 
 }  // namespace brainshift::server

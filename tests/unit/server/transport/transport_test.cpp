@@ -27,9 +27,9 @@ TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
   EXPECT_EQ(error_of(peer.ask(MessageType::kModelRequest)).code, ErrorCode::kModelNotReady);
   EXPECT_EQ(error_of(peer.ask(MessageType::kObservation, wire::encode(landmarks(1)))).code,
             ErrorCode::kModelNotReady);
-  const auto start = peer.ask(
-      MessageType::kStartSessionRequest,
-      wire::encode(wire::SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}), 77);
+  const auto start =
+      peer.ask(MessageType::kStartSessionRequest,
+               wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}), 77);
   EXPECT_EQ(start.request_id, 77u);
   EXPECT_EQ(error_of(start).code, ErrorCode::kModelNotReady);
   EXPECT_EQ(error_of(start).message, "no model is loaded");
@@ -78,7 +78,7 @@ TEST_F(TransportTest, RefusesAnObservationThatIsNotFinite) {
 TEST_F(TransportTest, RefusesASessionForAnotherCase) {
   serve(with_model());
   RawPeer peer(endpoint_);
-  const wire::SessionRequest request{"someone-else", Method::kPaper, Boundary::kContact, false};
+  const SessionRequest request{"someone-else", Method::kPaper, Boundary::kContact, false};
   const auto reply = peer.ask(MessageType::kStartSessionRequest, wire::encode(request), 5);
   EXPECT_EQ(reply.request_id, 5u);
   EXPECT_EQ(error_of(reply).code, ErrorCode::kInvalidArgument);
@@ -109,7 +109,7 @@ TEST_F(TransportTest, AnswersGarbageWithAProtocolError) {
 TEST_F(TransportTest, AnyDamagedByteOfARequestIsNoticed) {
   serve(with_model());
   RawPeer peer(endpoint_);
-  const wire::SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
+  const SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
   const std::string good =
       wire::encode_frame(MessageType::kStartSessionRequest, 3, wire::encode(request));
   for (std::size_t i = 0; i < good.size(); ++i) {

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Hub: the OpenIGTLink sockets of the bridge, in one thread: the server with its clients, and the
+// connection to PlusServer or 3D Slicer.
+//
+// post() hands over pictures from any thread. run() serves until it is told to stop; then it sends
+// every client a blank picture first.
+//
+// Requests: GET_STATUS is answered with the newest STATUS, GET_CAPABIL with the types that are
+// sent. Other messages go to the sink, in the hub's thread; types that nobody wants are read and
+// dropped.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/tools/bridge/peer.hpp"
+#include "client/tools/bridge/upstream.hpp"
+#include "common/core/error.hpp"
+
+namespace brainshift::client {
+
+struct HubOptions {
+  Address listen{"127.0.0.1", 18945};
+  std::optional<Address> from;
+  // More clients are turned away: each may hold two pictures.
+  std::size_t max_peers = 16;
+  // What is kept of the messages of own clients, and of `from`.
+  igtl::StreamLimits from_peers;
+  igtl::StreamLimits from_upstream;
+};
+
+class Hub {
+ public:
+  using Tell = std::function<void(const std::string&)>;  // a sentence for people
+  using Sink = Peer::Sink;
+
+  // Listens. Errors of Socket::listen.
+  static Result<std::unique_ptr<Hub>> open(const HubOptions& options, Tell tell, Sink sink);
+  ~Hub();
+  Hub(const Hub&) = delete;
+  Hub& operator=(const Hub&) = delete;
+
+  Address address() const { return listener_.local(); }
+
+  // Any thread. The newest picture replaces one that was not taken over yet.
+  void post(PicturePtr picture, Broadcast::Part part);
+  // Any thread; of the moment.
+  int peers() const { return peer_count_; }
+  std::uint64_t replaced() const { return replaced_; }
+
+  // Serves until stop_descriptor is readable; then sends a blank picture, waits for it to be taken
+  // for a second at most, and returns.
+  Status run(int stop_descriptor);
+
+ private:
+  Hub(Socket listener, const HubOptions& options, Tell tell, Sink sink);
+  struct Pending {
+    PicturePtr whole;
+    PicturePtr state;
+  };
+  void wake();
+  void take_posts();
+  void offer(PicturePtr picture, Broadcast::Part part);
+  void accept_peers();
+  void serve_peers(const std::vector<short>& events);
+  Status answer(Peer& peer, igtl::Message&& message);
+  void say_goodbye();
+
+  HubOptions options_;
+  Tell tell_;
+  Sink sink_;
+  Socket listener_;
+  int wake_descriptor_ = -1;
+  std::vector<std::unique_ptr<Peer>> peers_;
+  std::optional<Upstream> upstream_;
+  std::uint32_t message_id_ = 0;
+  BroadcastPtr newest_picture_;
+  PicturePtr newest_state_;
+  std::atomic<int> peer_count_{0};
+  std::atomic<std::uint64_t> replaced_{0};
+  std::uint64_t replaced_of_gone_ = 0;
+
+  std::mutex mutex_;
+  Pending pending_;  // behind the mutex
+};
+
+}  // namespace brainshift::client

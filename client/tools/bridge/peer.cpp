@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/bridge/peer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace brainshift::client {
+
+Peer::Peer(Socket socket, igtl::StreamLimits limits)
+    : socket_(std::move(socket)), name_(socket_.peer_name()), reader_(std::move(limits)) {}
+
+void Peer::offer(const BroadcastPtr& broadcast) {
+  if (!broadcast->whole()) {
+    waiting_state_ = broadcast;
+    return;
+  }
+  shown_ = broadcast;
+  if (waiting_picture_) ++replaced_;
+  waiting_picture_ = broadcast;
+  waiting_state_ = nullptr;
+}
+
+Status Peer::reply(const igtl::Envelope& envelope, const igtl::Content& content) {
+  if (replies_.size() >= kMaxReplies) {
+    return fail(ErrorCode::kUnavailable, "it asks and does not read");
+  }
+  std::string bytes;
+  if (auto ok = igtl::encode(envelope, content, bytes); !ok) return ok;
+  replies_.push_back(std::move(bytes));
+  return {};
+}
+
+bool Peer::wants_to_write() const {
+  return !message_.empty() || !replies_.empty() || current_ || waiting_picture_ || waiting_state_;
+}
+
+bool Peer::next_message() {
+  if (!replies_.empty()) {
+    reply_bytes_ = std::move(replies_.front());
+    replies_.pop_front();
+    message_ = reply_bytes_;
+    return true;
+  }
+  while (true) {
+    const bool blank_waits = waiting_picture_ && waiting_picture_->picture().state.blank;
+    const bool ended = !current_ || next_ >= current_->size();
+    if (ended || blank_waits) {
+      if (!ended) ++replaced_;
+      current_ = waiting_picture_ ? std::exchange(waiting_picture_, nullptr)
+                                  : std::exchange(waiting_state_, nullptr);
+      next_ = 0;
+      if (!current_) return false;
+    }
+    message_ = current_->bytes(next_++, version_);
+    holder_ = current_;
+    if (!message_.empty()) return true;  // empty: it cannot be encoded
+  }
+}
+
+Status Peer::write() {
+  while (true) {
+    if (message_.empty() && !next_message()) return {};
+    const auto taken = socket_.write(message_);
+    if (!taken) return tl::unexpected(taken.error());
+    if (*taken == 0) return {};
+    message_.remove_prefix(*taken);
+    if (message_.empty()) {
+      holder_ = nullptr;
+      if (current_ && next_ >= current_->size()) current_ = nullptr;
+    }
+  }
+}
+
+void Peer::take_version(std::uint16_t version) {
+  if (version < 2 || version_ >= 2) return;
+  version_ = 2;
+  if (shown_ && !waiting_picture_) waiting_picture_ = shown_;
+}
+
+Status Peer::read(const Sink& sink) {
+  std::array<char, 64 * 1024> buffer;
+  for (std::size_t sum = 0; sum < kMostReadAtOnce;) {
+    const auto count = socket_.read(buffer.data(), buffer.size());
+    if (!count) return tl::unexpected(count.error());
+    if (*count == 0) return {};
+    sum += *count;
+    std::string_view bytes(buffer.data(), *count);
+    while (!bytes.empty()) {
+      const auto packet = reader_.read(bytes);
+      if (!packet) return tl::unexpected(packet.error());
+      if (!*packet) continue;
+      take_version((*packet)->header.version);
+      if ((*packet)->skipped) continue;
+      auto message = igtl::decode((*packet)->header, (*packet)->body);
+      if (message) {
+        sink(std::move(*message));
+      } else {
+        ++not_understood_;
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace brainshift::client

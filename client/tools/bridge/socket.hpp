@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A TCP socket that never waits. Private to client/bridge.
+//
+// One thread polls the descriptors and calls read() and write() when they are ready. The send
+// buffer is kept small (kSendBuffer): what lies in it can no longer be replaced by something newer.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "client/tools/bridge/address.hpp"
+#include "common/core/error.hpp"
+
+namespace brainshift::client {
+
+class Socket {
+ public:
+  static constexpr int kSendBuffer = 512 * 1024;
+
+  // Listens. kInvalidArgument: a host that is no address of this computer; kUnavailable: the port
+  // is taken. The sentence names the address.
+  static Result<Socket> listen(const Address& address);
+  // Begins to connect; writable when it has connected or failed: look at connected(). kUnavailable.
+  static Result<Socket> connect(const Address& address);
+
+  explicit Socket(int descriptor) : descriptor_(descriptor) {}
+  Socket(Socket&& other) noexcept;
+  Socket& operator=(Socket&& other) noexcept;
+  ~Socket();
+
+  int descriptor() const { return descriptor_; }
+  // The address that it is bound to; the peer's address of an accepted one.
+  Address local() const;
+  std::string peer_name() const;
+
+  // The next connection that waits; none when no more do.
+  std::optional<Socket> accept();
+  // Of connect(), once writable. kUnavailable with the system's reason.
+  Status connected() const;
+  // Bytes read into the buffer: 0 when there are none now. kUnavailable: the peer has closed or the
+  // connection is lost.
+  Result<std::size_t> read(char* buffer, std::size_t size);
+  // Bytes taken: 0 when there is no room now. kUnavailable as above.
+  Result<std::size_t> write(std::string_view bytes);
+
+ private:
+  int descriptor_ = -1;
+};
+
+}  // namespace brainshift::client

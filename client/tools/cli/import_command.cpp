@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "client/tools/cli/command.hpp"
+#include "client/tools/import/import.hpp"
+#include "client/tools/import/import_landmarks.hpp"
+#include "common/io/files/output_path.hpp"
+
+namespace brainshift::client {
+namespace {
+
+// What the arguments say: a recording, or landmarks.
+struct Arguments {
+  ImportOptions options;
+  std::filesystem::path landmarks, landmarks_moved;
+};
+
+// Options that landmarks have no use for, by the paths given.
+Status check_landmarks_alone(const Arguments& arguments) {
+  const ImportOptions& options = arguments.options;
+  for (const auto& [name, path] :
+       {std::pair{"--recording", options.recording}, std::pair{"--device", options.device},
+        std::pair{"--contours", options.contours}, std::pair{"--seeds", options.seeds},
+        std::pair{"--registration", options.registration},
+        std::pair{"--fiducials", options.fiducials}}) {
+    if (path.empty()) continue;
+    return fail(ErrorCode::kInvalidArgument,
+                std::string(name) + " is for a recording: landmarks are in RAS already");
+  }
+  return {};
+}
+
+Status run_landmarks(const Arguments& arguments) {
+  if (Status ok = check_landmarks_alone(arguments); !ok) return ok;
+  LandmarkOptions options;
+  options.landmarks = arguments.landmarks;
+  options.landmarks_moved = arguments.landmarks_moved;
+  options.case_file = arguments.options.case_file;
+  options.model = arguments.options.model;
+  options.out = arguments.options.out;
+  options.sd_mm = arguments.options.sd_mm;
+  const auto report = import_landmarks(options, terminal_progress());
+  if (!report) return tl::unexpected(report.error());
+  for (const std::string& line : report_lines(*report)) std::printf("%s\n", line.c_str());
+  return {};
+}
+
+Status run(const Arguments& arguments) {
+  const ImportOptions& options = arguments.options;
+  if (!options.out.empty()) {  // import_recording names what is missing
+    if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
+  }
+  if (!arguments.landmarks.empty()) return run_landmarks(arguments);
+  if (!arguments.landmarks_moved.empty()) {
+    return fail(ErrorCode::kInvalidArgument, "--landmarks-moved needs --landmarks");
+  }
+  const auto report = import_recording(options, terminal_progress());
+  if (!report) return tl::unexpected(report.error());
+  for (const std::string& line : report_lines(*report)) std::printf("%s\n", line.c_str());
+  return {};
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Status& status) {
+  auto arguments = std::make_shared<Arguments>();
+  ImportOptions* options = &arguments->options;
+  CLI::App* command = app.add_subcommand(
+      "import",
+      "Make a surgery file from a recording of tracked ultrasound, or from landmarks "
+      "(docs/import.md).");
+  command->add_option("--recording", options->recording,
+                      "sequence of images with transforms (.mha, .nrrd)");
+  command->add_option(
+      "--device", options->device,
+      "PLUS device set (.xml) with ImageToProbe; not needed when the recording has it");
+  command->add_option("--contours", options->contours,
+                      "traced tumour contours: .csv frame,u_px,v_px or .json");
+  command->add_option("--seeds", options->seeds,
+                      "instead of contours: a point inside the tumour, .csv frame,u_px,v_px");
+  command->add_option("--registration", options->registration,
+                      "T_ras_reference: 16 numbers row by row (text, JSON or YAML)");
+  command->add_option("--fiducials", options->fiducials,
+                      "instead of --registration: .csv of paired points (reference x,y,z, RAS "
+                      "x,y,z), or of reference,x,y,z and ras,x,y,z rows in any order");
+  command->add_option("--landmarks", arguments->landmarks,
+                      "instead of --recording: landmarks before and during surgery, mm RAS (.csv, "
+                      "MNI .tag), or those before (Slicer's .mrk.json or .fcsv, .csv)");
+  command->add_option("--landmarks-moved", arguments->landmarks_moved,
+                      "the landmarks during surgery where --landmarks has those before; paired by "
+                      "name");
+  command->add_option("--case", options->case_file, "case file (YAML); its model is built again");
+  command->add_option("--model", options->model, "instead of --case: prepared model (.h5)");
+  command->add_option("--out", options->out, "surgery file to make; must not exist yet");
+  command
+      ->add_option("--sd-mm", options->sd_mm,
+                   "standard deviation of a boundary point or landmark, mm")
+      ->capture_default_str();
+  command
+      ->add_option("--latency-ms", options->latency_ms,
+                   "how much later images were stamped than seen, ms; poses are interpolated")
+      ->capture_default_str();
+  command
+      ->add_option("--max-age-ms", options->max_age_ms,
+                   "poses are not interpolated across a longer gap, ms")
+      ->capture_default_str();
+  command
+      ->add_option("--sweeps", options->sweep_gap_s,
+                   "a new sweep begins after so many seconds without a contour; 0: one sweep")
+      ->capture_default_str();
+  command->add_flag("--open-contours", options->open_contours,
+                    "contours of a .csv are open lines, not closed ones");
+  command->add_option("--image", options->image_frame, "name of the images' frame")
+      ->capture_default_str();
+  command
+      ->add_option("--reference", options->reference_frame, "name of the patient's reference frame")
+      ->capture_default_str();
+  command->add_option("--orientation", options->orientation,
+                      "of the images (MF, MN, UF, UN) when the recording does not say");
+  command->footer(
+      "Example: a sweep recorded with PLUS, contours traced on its images, replayed to the "
+      "daemon:\n"
+      "  brainshift import --recording sweep.igs.mha --device device.xml --contours tumour.csv \\\n"
+      "    --registration T_ras_reference.txt --model colin27.h5 --out sweep.surgery\n"
+      "  brainshift replay sweep.surgery --endpoint tcp://127.0.0.1:5555 --report sweep.json\n"
+      "Landmarks of a brain before and during surgery, placed in 3D Slicer under the same names:\n"
+      "  brainshift import --landmarks before.mrk.json --landmarks-moved during.mrk.json \\\n"
+      "    --model colin27.h5 --out landmarks.surgery\n"
+      "Frames are left out where the tracker lost sight; the report counts them by reason.");
+  command->callback([arguments, &status] { status = run(*arguments); });
+}
+
+}  // namespace brainshift::client

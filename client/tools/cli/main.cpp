@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <string>
+
+#include "client/tools/cli/command.hpp"
+#include "common/core/exit_status.hpp"
+#include "common/linalg/blas_kernel.hpp"
+
+int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
+  using namespace brainshift;
+  CLI::App app{
+      "brainshift: look at a case before it is prepared; simulate surgeries with known truth, "
+      "replay recorded ones to brainshiftd, and "
+      "report how "
+      "well the deformation was recovered; solve single forward problems on any mesh; import "
+      "recordings "
+      "of tracked ultrasound and landmarks; register patients by fiducials; check, export and mend "
+      "journals; watch a running brainshiftd; make "
+      "keys.\n"
+      "Research software for simulation, replay and laboratory use; no medical device.",
+      "brainshift"};
+  app.set_version_flag("--version", "brainshift " BRAINSHIFT_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "A whole run, with the daemon in a second terminal:\n"
+      "  brainshift preview --case config/cases/colin27.yaml --out preview\n"
+      "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
+      "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
+      "  brainshift simulate --case config/cases/colin27.yaml --scenario paper --seed 1 --out "
+      "paper.surgery\n"
+      "  brainshift replay paper.surgery --endpoint tcp://127.0.0.1:5555 --report paper.json\n"
+      "  brainshift report paper.json --out report\n"
+      "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
+
+  Status status;
+  client::add_preview(app, status);
+  client::add_simulate(app, status);
+  client::add_replay(app, status);
+  client::add_report(app, status);
+  client::add_solve(app, status);
+  client::add_import(app, status);
+  client::add_register(app, status);
+  client::add_stereo(app, status);
+  client::add_journal(app, status);
+  client::add_export(app, status);
+  client::add_watch(app, status);
+  client::add_bridge(app, status);
+  client::add_status(app, status);
+  client::add_top(app, status);
+  client::add_keys(app, status);
+  // CLI11 would only say that a subcommand is required.
+  const auto commands = app.get_subcommands(nullptr);
+  const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
+  if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
+    client::print_error("unknown command \"" + std::string(argv[1]) +
+                        "\": must be preview, simulate, replay, report, solve, import, register, "
+                        "stereo, journal, export, "
+                        "watch, bridge, status, top or keys (see brainshift --help)");
+    return kExitBadInput;
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    client::print_error(std::string(error.what()) + " (see brainshift --help)");
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    client::print_error(std::string("internal error: ") + error.what());
+    return kExitFailure;
+  }
+  if (status) return kExitSuccess;
+  client::print_error(status.error().message);
+  return exit_status(status.error().code);
+}

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/export/warp_image.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <vector>
+
+#include "common/core/thread_team.hpp"
+
+namespace brainshift::client {
+namespace {
+
+bool holds(const VoxelImage& image, const Vec3& index) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int voxels = image.dims[static_cast<std::size_t>(axis)];
+    if (!(index[axis] >= -0.5 && index[axis] < voxels - 0.5)) return false;
+  }
+  return true;
+}
+
+double finite_or_zero(float value) { return std::isfinite(value) ? value : 0.0; }
+
+// Precondition: holds(image, index).
+double interpolated(const VoxelImage& image, const Vec3& index) {
+  int low[3], high[3];
+  double part[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int last = image.dims[static_cast<std::size_t>(axis)] - 1;
+    const double place = std::clamp(index[axis], 0.0, static_cast<double>(last));
+    low[axis] = static_cast<int>(place);
+    high[axis] = std::min(low[axis] + 1, last);
+    part[axis] = place - low[axis];
+  }
+  double value = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1.0;
+    int at[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool upper = ((corner >> axis) & 1) != 0;
+      weight *= upper ? part[axis] : 1.0 - part[axis];
+      at[axis] = upper ? high[axis] : low[axis];
+    }
+    value += weight * finite_or_zero(image.at(at[0], at[1], at[2]));
+  }
+  return value;
+}
+
+}  // namespace
+
+Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::DisplacementField& field) {
+  if (Status ok = validate(field); !ok) return tl::unexpected(ok.error());
+  if (field.direction != io::FieldDirection::kResampling) {
+    return fail(ErrorCode::kInvalidArgument,
+                "an image is warped by a field of direction resampling, not modeling");
+  }
+  const io::VoxelGrid& grid = field.grid;
+  io::ScalarVolume warped{grid, std::vector<float>(grid.num_voxels(), 0.0F), field.note};
+  const AffineTransform T_voxel_ras(image.T_ras_voxel.inverse(Eigen::Affine));
+  std::atomic<bool> any{false};
+  ThreadTeam team;
+  team.split(grid.dims[2], [&](long begin, long end) {
+    bool found = false;
+    for (int k = static_cast<int>(begin); k < end; ++k) {
+      for (int j = 0; j < grid.dims[1]; ++j) {
+        for (int i = 0; i < grid.dims[0]; ++i) {
+          const std::size_t voxel = grid.index(i, j, k);
+          const float* v = field.ras_mm.data() + 3 * voxel;
+          const Vec3 index = T_voxel_ras * (grid.voxel_mm(i, j, k) + Vec3(v[0], v[1], v[2]));
+          if (!holds(image, index)) continue;
+          found = true;
+          warped.values[voxel] = static_cast<float>(interpolated(image, index));
+        }
+      }
+    }
+    if (found) any = true;
+  });
+  if (!any) {
+    return fail(ErrorCode::kInvalidArgument,
+                "no voxel of the grid lies in the image: are both in the patient's RAS frame?");
+  }
+  return warped;
+}
+
+}  // namespace brainshift::client

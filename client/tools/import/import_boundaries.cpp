@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/import/import_boundaries.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace brainshift::client {
+namespace {
+
+// Ultrasound pixels are 0.02 to 0.5 mm wide.
+constexpr double kLeastPixel_mm = 0.005;
+constexpr double kMostPixel_mm = 2.0;
+// A lesion's boundary; a head is 250 mm long.
+constexpr double kLeastExtent_mm = 1.0;
+constexpr double kMostExtent_mm = 300.0;
+
+Status check_pixel(const AffineTransform& T, int frame) {
+  for (int axis = 0; axis < 2; ++axis) {
+    const double width_mm = T.linear().col(axis).norm();
+    if (width_mm >= kLeastPixel_mm && width_mm <= kMostPixel_mm) continue;
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("a pixel of frame {} is {:.3g} mm {}: must be {} to {} mm; is a transform "
+                    "in metres or the calibration missing?",
+                    frame, width_mm, axis == 0 ? "wide" : "high", kLeastPixel_mm, kMostPixel_mm));
+  }
+  return {};
+}
+
+Status check_extent(const SweepBoundary& sweep) {
+  const Vec3 size = sweep.points.rowwise().maxCoeff() - sweep.points.rowwise().minCoeff();
+  if (size.norm() >= kLeastExtent_mm && size.norm() <= kMostExtent_mm) return {};
+  return fail(
+      ErrorCode::kInvalidArgument,
+      fmt::format("the boundary of frames {} to {} spans {:.3g} mm: must be {} to {} mm; are "
+                  "tracked transforms or contours in another unit?",
+                  sweep.first_frame, sweep.last_frame, size.norm(), kLeastExtent_mm,
+                  kMostExtent_mm));
+}
+
+std::string summary(const std::vector<tracking::Dropped>& dropped) {
+  std::string text;
+  for (const tracking::Dropped& entry : dropped) {
+    text += fmt::format("{}{} ({} frames, first {})", text.empty() ? "" : "; ", entry.reason,
+                        entry.count, entry.first_frame);
+  }
+  return text;
+}
+
+// Contours must lie on the image, which ends half a pixel beyond the outermost pixels' centres.
+Status check_contours(const tracking::Recording& recording,
+                      const std::vector<ultrasound::Contour>& contours) {
+  for (const ultrasound::Contour& contour : contours) {
+    if (contour.frame < 0 || contour.frame >= recording.num_frames()) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("contour on frame {}: the recording has frames 0 to {}",
+                              contour.frame, recording.num_frames() - 1));
+    }
+    for (Eigen::Index i = 0; i < contour.points_px.cols(); ++i) {
+      const double u = contour.points_px(0, i), v = contour.points_px(1, i);
+      if (u >= -0.5 && u <= recording.width - 0.5 && v >= -0.5 && v <= recording.height - 0.5) {
+        continue;
+      }
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("contour on frame {}: {} {} px lies outside the image of {} x {} pixels",
+                      contour.frame, u, v, recording.width, recording.height));
+    }
+  }
+  return {};
+}
+
+void append_columns(Points& points, const Points& more) {
+  const Eigen::Index before = points.cols();
+  points.conservativeResize(3, before + more.cols());
+  points.rightCols(more.cols()) = more;
+}
+
+}  // namespace
+
+Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
+                                     const std::vector<tracking::ConstantLink>& constants,
+                                     std::vector<ultrasound::Contour> contours,
+                                     const BoundaryOptions& options) {
+  if (!(options.sweep_gap_s >= 0.0)) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("gap between sweeps = {} s: must be >= 0", options.sweep_gap_s));
+  }
+  if (Status ok = check_contours(recording, contours); !ok) return tl::unexpected(ok.error());
+  auto chain = tracking::evaluate_chain(recording, constants, options.image_frame,
+                                        options.ras_frame, options.chain);
+  if (!chain) return tl::unexpected(chain.error());
+  std::stable_sort(contours.begin(), contours.end(),
+                   [](const auto& a, const auto& b) { return a.frame < b.frame; });
+  Boundaries result;
+  result.chain = std::move(*chain);
+  double last_time_s = 0.0;
+  for (const ultrasound::Contour& contour : contours) {
+    const auto frame = static_cast<std::size_t>(contour.frame);
+    const auto& T_ras_image = result.chain.T_target_source[frame];
+    if (!T_ras_image) {
+      count_dropped(result.lost_contours, result.chain.why_not[frame], contour.frame);
+      continue;
+    }
+    if (Status ok = check_pixel(*T_ras_image, contour.frame); !ok)
+      return tl::unexpected(ok.error());
+    const auto points = ultrasound::boundary_points(contour, *T_ras_image, options.spacing_mm);
+    if (!points) return tl::unexpected(points.error());
+    const double time_s = recording.time_s[frame] - recording.time_s.front();
+    const bool gap = options.sweep_gap_s > 0.0 && time_s - last_time_s > options.sweep_gap_s;
+    if (result.sweeps.empty() || gap) {
+      result.sweeps.push_back({contour.frame, contour.frame, 0, 0.0, Points(3, 0)});
+    }
+    SweepBoundary& sweep = result.sweeps.back();
+    sweep.last_frame = contour.frame;
+    sweep.time_s = last_time_s = time_s;
+    ++sweep.contours;
+    append_columns(sweep.points, *points);
+  }
+  if (result.sweeps.empty()) {
+    return fail(ErrorCode::kEmptySet, "no contour lies on a frame with a valid chain from " +
+                                          options.image_frame + " to " + options.ras_frame + ": " +
+                                          summary(result.lost_contours));
+  }
+  for (const SweepBoundary& sweep : result.sweeps) {
+    if (Status ok = check_extent(sweep); !ok) return tl::unexpected(ok.error());
+  }
+  return result;
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/monitor/watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "client/lib/client.hpp"
+#include "common/geometry/closest_point.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using std::chrono::milliseconds;
+
+// How long a line waits for the daemon to say how old its field is.
+constexpr milliseconds kForItsAge{20};
+constexpr milliseconds kBetweenLooks{250};
+
+nlohmann::json number_or_null(double value) {
+  if (std::isfinite(value)) return value;
+  return nullptr;
+}
+
+std::string json_line(const WatchedUpdate& update) {
+  nlohmann::ordered_json line = {{"sequence", update.sequence},
+                                 {"failure", update.failure},
+                                 {"quality", update.quality},
+                                 {"answer_ms", update.answer_time.ms},
+                                 {"late", update.answer_time.late()},
+                                 {"age_s", number_or_null(update.status.age_s)},
+                                 {"currency", to_string(update.status.currency)},
+                                 {"reason", update.status.reason},
+                                 {"nodes", update.nodes},
+                                 {"mesh_nodes", update.mesh_nodes},
+                                 {"received_nodes", update.received_nodes},
+                                 {"received_bytes", update.received_bytes},
+                                 {"tumour_mm", nullptr}};
+  if (update.tumour_mm) line["tumour_mm"] = *update.tumour_mm;
+  return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::string status_text(const FieldStatus& status) {
+  std::string text(to_string(status.currency));
+  if (!status.reason.empty()) text += ": " + status.reason;
+  return text;
+}
+
+std::string status_line(const FieldStatus& status, bool json) {
+  if (!json) return status_text(status);
+  const nlohmann::ordered_json line = {{"currency", to_string(status.currency)},
+                                       {"reason", status.reason},
+                                       {"age_s", number_or_null(status.age_s)}};
+  return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+// Tells updates and, between them, that the field is no longer current.
+class Watcher {
+ public:
+  Watcher(Client client, const WatchOptions& options,
+          const std::function<void(const std::string&)>& tell)
+      : client_(std::move(client)), options_(options), tell_(tell) {}
+
+  Status run() {
+    const auto model = client_.model();
+    if (!model) return tl::unexpected(model.error());
+    tumour_ = tumour_nodes(*model);
+    mesh_nodes_ = static_cast<int>(model->mesh.nodes.cols());
+    if (Status status = client_.subscribe(1, options_.choice); !status) return status;
+    while (options_.count == 0 || told_ < options_.count) {
+      auto message = std::exchange(next_, std::nullopt);
+      if (!message) message = client_.next_update(kBetweenLooks);
+      if (*message) {
+        tell(**message);
+      } else if (message->error().code == ErrorCode::kUnavailable) {
+        tell_change();
+      } else {
+        return tl::unexpected(message->error());
+      }
+    }
+    return {};
+  }
+
+ private:
+  void tell(const UpdateMessage& message) {
+    WatchedUpdate update = watched(message, tumour_, mesh_nodes_);
+    // Its age comes with the answer to the renewal that this wait sends, if nothing newer does.
+    auto newer = client_.next_update(kForItsAge);
+    if (newer) next_ = std::move(newer);
+    update.status = client_.field_status();
+    if (next_) update.status = {Currency::kSuperseded, "a newer update has come", std::nan("")};
+    last_ = update.status.currency;
+    tell_(watch_line(update, options_.json));
+    ++told_;
+  }
+
+  void tell_change() {
+    const FieldStatus status = client_.field_status();
+    if (status.currency == last_) return;
+    last_ = status.currency;
+    tell_(status_line(status, options_.json));
+  }
+
+  Client client_;
+  const WatchOptions& options_;
+  const std::function<void(const std::string&)>& tell_;
+  std::vector<NodeIndex> tumour_;
+  int mesh_nodes_ = 0;
+  std::uint64_t told_ = 0;
+  std::optional<Currency> last_;               // of the newest line
+  std::optional<Result<UpdateMessage>> next_;  // came while a line waited
+};
+
+}  // namespace
+
+std::vector<NodeIndex> tumour_nodes(const BrainModel& model) {
+  std::vector<NodeIndex> nodes;
+  const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  if (!tumour) return nodes;
+  for (NodeIndex node = 0; node < model.mesh.nodes.cols(); ++node) {
+    if (tumour->contains(model.mesh.nodes.col(node))) nodes.push_back(node);
+  }
+  return nodes;
+}
+
+WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>& tumour,
+                      int mesh_nodes) {
+  const Estimate& estimate = message.update.estimate;
+  WatchedUpdate update;
+  update.sequence = message.update.sequence;
+  update.received_nodes = message.received_nodes;
+  update.received_bytes = message.received_bytes;
+  update.mesh_nodes = mesh_nodes;
+  if (message.error) {
+    update.failure = message.error->message;
+    return update;
+  }
+  update.quality = to_string(estimate.quality.quality);
+  update.answer_time = message.update.answer_time;
+  update.nodes = static_cast<int>(estimate.displacement.cols());
+  double sum_mm = 0.0;
+  int found = 0;
+  for (Eigen::Index column = 0; column < estimate.displacement.cols(); ++column) {
+    const auto& part = message.update.part;
+    const auto node =
+        part ? part->nodes[static_cast<std::size_t>(column)] : static_cast<NodeIndex>(column);
+    if (!std::binary_search(tumour.begin(), tumour.end(), node)) continue;
+    sum_mm += estimate.displacement.col(column).norm();
+    ++found;
+  }
+  if (found > 0) update.tumour_mm = sum_mm / found;
+  return update;
+}
+
+std::string watch_line(const WatchedUpdate& update, bool json) {
+  if (json) return json_line(update);
+  std::string line = fmt::format("update {}", update.sequence);
+  if (std::isfinite(update.status.age_s)) {
+    line += fmt::format("  age {:.2f} s", update.status.age_s);
+  } else {
+    line += "  age unknown";
+  }
+  if (!update.failure.empty()) {
+    return line + "  no field: " + update.failure + "  " + status_text(update.status);
+  }
+  line += fmt::format("  {} of {} nodes ({} sent, {:.1f} kB)", update.nodes, update.mesh_nodes,
+                      update.received_nodes, 1e-3 * static_cast<double>(update.received_bytes));
+  if (update.tumour_mm) {
+    line += fmt::format("  tumour {:.2f} mm", *update.tumour_mm);
+  } else {
+    line += "  no tumour node";
+  }
+  line += "  " + update.quality + ", " + status_text(update.status);
+  if (update.answer_time.late()) line += "  LATE: " + sentence(update.answer_time);
+  return line;
+}
+
+Status watch(const WatchOptions& options, const std::function<void(const std::string&)>& tell) {
+  ClientOptions client_options;
+  client_options.keys = options.keys;
+  auto client = Client::connect(options.endpoint, client_options);
+  if (!client) return tl::unexpected(client.error());
+  return Watcher(std::move(*client), options, tell).run();
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Watches a daemon: subscribes with a choice and tells a line per update. It starts no session and
+// sends no observation. A daemon that goes away is told too, and watched again when it comes back.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/lib/client_keys.hpp"
+#include "client/lib/field_status.hpp"
+#include "common/core/error.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/session_state.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+
+struct WatchOptions {
+  std::string endpoint = "tcp://127.0.0.1:5555";
+  FieldChoice choice = {};
+  std::uint64_t count = 0;                        // updates to tell, failures too; 0: for ever
+  bool json = false;                              // a line is an object
+  std::optional<ClientKeys> keys = std::nullopt;  // for a daemon that asks for keys
+};
+
+// What a line tells of an update.
+struct WatchedUpdate {
+  std::uint64_t sequence = 0;
+  std::string failure;  // why there is no field; empty with a field
+  std::string quality;  // of the field
+  AnswerTime answer_time;
+  int nodes = 0;           // that the viewer now has
+  int mesh_nodes = 0;      // of the whole mesh
+  int received_nodes = 0;  // that travelled
+  std::size_t received_bytes = 0;
+  std::optional<double> tumour_mm;  // mean motion of the tumour's nodes among them
+  FieldStatus status;               // of the newest usable field, when the line was told
+};
+
+// Nodes inside the tumour, ascending; none without a tumour.
+std::vector<NodeIndex> tumour_nodes(const BrainModel& model);
+WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>& tumour,
+                      int mesh_nodes);
+std::string watch_line(const WatchedUpdate& update, bool json);
+
+// Tells lines until `count` updates are told. kUnavailable and others: no daemon at the beginning,
+// or it refuses the choice.
+Status watch(const WatchOptions& options, const std::function<void(const std::string&)>& tell);
+
+}  // namespace brainshift::client

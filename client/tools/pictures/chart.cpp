@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/pictures/chart.hpp"
+
+#include <algorithm>
+
+namespace brainshift::client {
+namespace {
+
+constexpr int kLineWidth = 4;
+constexpr double kLabelCap = 17.0;
+
+// A point of a series, where it is drawn. Points that cannot be shown have no place.
+struct Placed {
+  const ChartPoint* point = nullptr;
+  cv::Point2d at;
+};
+
+// The series' points in runs that no missing point interrupts.
+std::vector<std::vector<Placed>> runs_of(const Series& series, const Frame& frame) {
+  std::vector<std::vector<Placed>> runs(1);
+  for (const ChartPoint& p : series.points) {
+    if (can_show(p.x, frame.x.axis) && can_show(p.y, frame.y.axis)) {
+      runs.back().push_back({&p, frame(p.x, p.y)});
+    } else if (!runs.back().empty()) {
+      runs.emplace_back();
+    }
+  }
+  return runs;
+}
+
+void draw_series(cv::Mat& image, const Series& series,
+                 const std::vector<std::vector<Placed>>& runs) {
+  for (const auto& run : runs) {
+    std::vector<cv::Point2d> line;
+    for (const Placed& p : run) line.push_back(p.at);
+    if (series.line) draw_polyline(image, line, {series.colour, kLineWidth, series.dash_px});
+    for (const cv::Point2d& at : line)
+      draw_marker(image, at, series.marker, series.colour, kMarkerRadius);
+  }
+}
+
+// Writes labels beside their markers, each where it covers no other label and no marker.
+class Labels {
+ public:
+  Labels(cv::Mat& image, const cv::Rect& area) : image_(image), area_(area) {}
+
+  void keep_free(cv::Point2d marker) {
+    const cv::Point centre(static_cast<int>(marker.x), static_cast<int>(marker.y));
+    constexpr int kHalf = kMarkerRadius + 1;
+    taken_.emplace_back(centre - cv::Point(kHalf, kHalf), cv::Size(2 * kHalf, 2 * kHalf));
+  }
+
+  // At the first place of a list that is free and inside the data area; else nowhere.
+  void write(const std::string& text, cv::Point2d marker, const cv::Scalar& colour) {
+    const TextStyle style{.cap_px = kLabelCap, .colour = colour};
+    const int width = text_width(text, style);
+    const int height = static_cast<int>(kLabelCap) + 6;
+    const cv::Point p(static_cast<int>(marker.x), static_cast<int>(marker.y));
+    for (const int step : {0, 1, 2, 3}) {
+      const int up = step * height;
+      const cv::Point lower_left[] = {
+          {p.x + 16, p.y + 8 - up},         {p.x - 16 - width, p.y + 8 - up},
+          {p.x + 16, p.y + 8 + up},         {p.x - 16 - width, p.y + 8 + up},
+          {p.x - width / 2, p.y - 18 - up}, {p.x - width / 2, p.y + 34 + up}};
+      for (const cv::Point& place : lower_left) {
+        const cv::Rect box(place.x, place.y - height + 2, width, height);
+        if (!is_free(box)) continue;
+        draw_text(image_, place, text, style);
+        taken_.push_back(box);
+        return;
+      }
+    }
+  }
+
+ private:
+  bool is_free(const cv::Rect& box) const {
+    return (box & area_) == box &&
+           std::none_of(taken_.begin(), taken_.end(),
+                        [&](const cv::Rect& other) { return (box & other).area() > 0; });
+  }
+
+  cv::Mat& image_;
+  cv::Rect area_;
+  std::vector<cv::Rect> taken_;
+};
+
+struct Ranges {
+  Range x, left, right;
+};
+
+Ranges ranges_of(const ChartSpec& spec) {
+  Ranges ranges;
+  for (const Series& series : spec.series) {
+    const Axis& vertical = series.right_axis ? spec.right : spec.y;
+    for (const ChartPoint& p : series.points) {
+      if (!can_show(p.x, spec.x) || !can_show(p.y, vertical)) continue;
+      ranges.x.include(p.x);
+      (series.right_axis ? ranges.right : ranges.left).include(p.y);
+    }
+  }
+  return ranges;
+}
+
+std::vector<LegendSample> legend_of(const std::vector<Series>& all) {
+  std::vector<LegendSample> samples;
+  for (const Series& series : all) {
+    if (series.legend.empty()) continue;
+    const int width = series.line ? kLineWidth : 0;
+    samples.push_back(
+        {series.legend, {series.colour, width, series.dash_px}, series.marker, false});
+  }
+  return samples;
+}
+
+}  // namespace
+
+cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area) {
+  cv::Mat image(spec.size, CV_8UC3, palette::kWhite);
+  const auto on_the_right = std::find_if(spec.series.begin(), spec.series.end(),
+                                         [](const Series& s) { return s.right_axis; });
+  const bool has_right = on_the_right != spec.series.end();
+  const Ranges ranges = ranges_of(spec);
+  draw_titles(image, spec.title, spec.subtitle);
+  Frame left;
+  left.area = draw_legend(image, legend_of(spec.series), has_right);
+  left.x = {spec.x, padded(ranges.x, spec.x)};
+  left.y = {spec.y, padded(ranges.left, spec.y)};
+  Frame right = left;
+  right.y = {spec.right, padded(ranges.right, spec.right)};
+  draw_y_axis(image, left);
+  draw_x_axis(image, left);
+  draw_border(image, left);
+  if (has_right) draw_right_axis(image, right, on_the_right->colour);
+
+  Labels labels(image, left.area);
+  std::vector<std::vector<std::vector<Placed>>> runs;  // per series
+  for (const Series& series : spec.series) {
+    runs.push_back(runs_of(series, series.right_axis ? right : left));
+    draw_series(image, series, runs.back());
+    if (series.marker == Marker::kNone) continue;
+    for (const auto& run : runs.back())
+      for (const Placed& p : run) labels.keep_free(p.at);
+  }
+  for (std::size_t s = 0; s < runs.size(); ++s) {
+    for (const auto& run : runs[s]) {
+      for (const Placed& p : run) {
+        if (!p.point->label.empty()) labels.write(p.point->label, p.at, spec.series[s].colour);
+      }
+    }
+  }
+  if (area != nullptr) *area = left.area;
+  return image;
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/preview/case_view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "common/anatomy/brain_mesh.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
+#include "common/anatomy/node_sets.hpp"
+#include "common/anatomy/tumour_surface.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/io/config/case_inputs_file.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/geometry/image_file.hpp"
+
+namespace brainshift::client {
+namespace {
+
+constexpr double kMiddle_mm = 10.0;
+constexpr double kFarOpening_mm = 60.0;
+constexpr double kShortBrain_mm = 100.0;
+constexpr double kLongBrain_mm = 220.0;
+constexpr double kLargeTumour = 0.1;  // of the brain's volume
+constexpr double kFewSlaves = 0.01;   // of the surface's nodes
+constexpr double kMm3PerCc = 1000.0;
+
+void set_roles(CaseView& view, const std::vector<NodeIndex>& node_of_vertex,
+               const std::vector<NodeIndex>& craniotomy, const std::vector<NodeIndex>& brainstem,
+               const std::vector<NodeIndex>& slaves) {
+  std::map<NodeIndex, NodeRole> role_of;
+  for (const NodeIndex node : craniotomy) role_of[node] = NodeRole::kCraniotomy;
+  for (const NodeIndex node : brainstem) role_of[node] = NodeRole::kBrainstem;
+  for (const NodeIndex node : slaves) role_of[node] = NodeRole::kSlave;
+  for (const NodeIndex node : node_of_vertex) {
+    const auto found = role_of.find(node);
+    view.roles.push_back(found == role_of.end() ? NodeRole::kFixed : found->second);
+  }
+}
+
+void take_model(CaseView& view, const BrainModel& model) {
+  std::vector<NodeIndex> node_of_vertex;
+  view.tumour = model.tumour;
+  view.brain = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  view.nodes = model.mesh.num_nodes();
+  view.tets = model.mesh.num_tets();
+  set_roles(view, node_of_vertex, model.craniotomy, model.brainstem, model.slaves);
+  view.fluid_plane_depth_mm = model.fluid_plane_depth_mm;
+  view.slave_plane_depth_mm = model.slave_plane_depth_mm;
+}
+
+// The parts of a model that can be made although the whole cannot.
+void take_parts(CaseView& view, const CaseInputs& inputs, const Progress& progress) {
+  if (auto tumour = anatomy::make_tumour_surface(inputs)) view.tumour = std::move(*tumour);
+  const auto mesh = anatomy::make_brain_mesh(inputs, view.tumour, progress);
+  if (!mesh) return;
+  const anatomy::BrainSurface brain = anatomy::brain_surface_of(*mesh);
+  view.brain = brain.surface;
+  view.nodes = mesh->num_nodes();
+  view.tets = mesh->num_tets();
+  const auto sets = anatomy::select_node_sets(brain, inputs.config);
+  if (!sets) return;
+  set_roles(view, brain.node_of_vertex, sets->craniotomy, sets->brainstem, sets->slaves);
+  view.fluid_plane_depth_mm = sets->fluid_plane_depth_mm;
+  view.slave_plane_depth_mm = sets->slave_plane_depth_mm;
+}
+
+Vec3 middle_of(const TriangleSurface& surface) {
+  return 0.5 * (surface.vertices.rowwise().minCoeff() + surface.vertices.rowwise().maxCoeff());
+}
+
+Vec3 extent_of(const TriangleSurface& surface) {
+  return surface.vertices.rowwise().maxCoeff() - surface.vertices.rowwise().minCoeff();
+}
+
+double distance_to_vertices(const Vec3& x, const TriangleSurface& surface) {
+  return (surface.vertices.colwise() - x).colwise().norm().minCoeff();
+}
+
+long count(const CaseView& view, NodeRole role) {
+  return std::count(view.roles.begin(), view.roles.end(), role);
+}
+
+constexpr std::array<std::array<const char*, 2>, 3> kSides{
+    {{"left", "right"}, {"posterior", "anterior"}, {"inferior", "superior"}}};
+const char* side_of(int axis, double value) {
+  return kSides[static_cast<std::size_t>(axis)][value < 0.0 ? 0 : 1];
+}
+
+double degrees_between(const Vec3& a, const Vec3& b) {
+  const double cosine = a.normalized().dot(b.normalized());
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+}  // namespace
+
+Result<CaseView> view_case(const std::filesystem::path& case_file, const Progress& progress) {
+  auto config = io::read_case_config(case_file);
+  if (!config) return tl::unexpected(config.error());
+  const auto inputs = io::load_case_inputs(*config);
+  if (!inputs) return tl::unexpected(inputs.error());
+  CaseView view;
+  view.config = *config;
+  if (!config->mri.empty()) {
+    auto mri = io::read_nifti(config->mri);
+    if (!mri) return tl::unexpected(mri.error());
+    view.background = std::move(*mri);
+  } else if (inputs->brain) {
+    view.background = *inputs->brain;
+  }
+  const auto model = anatomy::build_brain_model(*inputs, progress, &view.notes);
+  if (model) {
+    take_model(view, *model);
+  } else {
+    view.problems.push_back(model.error().message);
+    take_parts(view, *inputs, progress);
+  }
+  return view;
+}
+
+Vec3 centre_of(const TriangleSurface& surface) {
+  if (surface.num_vertices() == 0) return Vec3::Zero();
+  return surface.vertices.rowwise().mean();
+}
+
+std::optional<OpeningView> opening_of(const CaseView& view) {
+  if (view.brain.num_vertices() == 0) return std::nullopt;
+  const Points normals = geometry::vertex_normals(view.brain);
+  if (view.roles.empty()) {
+    Eigen::Index nearest = 0;
+    const Craniotomy& craniotomy = view.config.craniotomy;
+    const double distance =
+        (view.brain.vertices.colwise() - craniotomy.centre_mm).colwise().norm().minCoeff(&nearest);
+    if (distance > 0.5 * craniotomy.long_axis_mm) return std::nullopt;
+    return OpeningView{view.brain.vertices.col(nearest), normals.col(nearest)};
+  }
+  OpeningView opening;
+  for (std::size_t v = 0; v < view.roles.size(); ++v) {
+    if (view.roles[v] != NodeRole::kCraniotomy) continue;
+    opening.centre += view.brain.vertices.col(static_cast<Eigen::Index>(v));
+    opening.normal += normals.col(static_cast<Eigen::Index>(v));
+  }
+  opening.centre /= static_cast<double>(count(view, NodeRole::kCraniotomy));
+  opening.normal.normalize();
+  return opening;
+}
+
+std::string place_text(const Vec3& x_ras) {
+  return fmt::format("{} {:.0f}, {} {:.0f}, {} {:.0f} mm", side_of(0, x_ras[0]), std::abs(x_ras[0]),
+                     side_of(1, x_ras[1]), std::abs(x_ras[1]), side_of(2, x_ras[2]),
+                     std::abs(x_ras[2]));
+}
+
+std::string direction_text(const Vec3& direction) {
+  const Vec3 unit = direction.normalized();
+  std::array<int, 3> order{0, 1, 2};
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::abs(unit[a]) > std::abs(unit[b]); });
+  std::string text;
+  for (const int axis : order) {
+    if (std::abs(unit[axis]) < 0.05) continue;
+    text += fmt::format("{}{} {:.2f}", text.empty() ? "" : ", ", side_of(axis, unit[axis]),
+                        std::abs(unit[axis]));
+  }
+  return text;
+}
+
+std::vector<std::string> facts(const CaseView& view) {
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("case {}", view.config.case_id));
+  if (view.brain.num_vertices() > 0) {
+    const Vec3 extent = extent_of(view.brain);
+    lines.push_back(fmt::format(
+        "brain: {:.0f} x {:.0f} x {:.0f} mm (R, A, S), {:.0f} cc; {} nodes, {} tetrahedra",
+        extent[0], extent[1], extent[2], geometry::enclosed_volume(view.brain) / kMm3PerCc,
+        view.nodes, view.tets));
+  }
+  if (view.tumour.num_vertices() > 0) {
+    lines.push_back(fmt::format("tumour: {:.1f} cc at {}",
+                                geometry::enclosed_volume(view.tumour) / kMm3PerCc,
+                                place_text(centre_of(view.tumour))));
+  }
+  if (const auto opening = opening_of(view)) {
+    lines.push_back(fmt::format("craniotomy: at {}; it faces {}", place_text(opening->centre),
+                                direction_text(opening->normal)));
+    if (view.tumour.num_vertices() > 0) {
+      lines.push_back(fmt::format("tumour's nearest point: {:.0f} mm from the craniotomy's centre",
+                                  distance_to_vertices(opening->centre, view.tumour)));
+    }
+    lines.push_back(
+        fmt::format("gravity: {}; {:.0f} degrees from the direction that the craniotomy faces",
+                    direction_text(view.config.gravity_direction),
+                    degrees_between(view.config.gravity_direction, opening->normal)));
+  } else {
+    lines.push_back("gravity: " + direction_text(view.config.gravity_direction));
+  }
+  if (!view.roles.empty()) {
+    lines.push_back(
+        fmt::format("surface nodes: {} craniotomy, {} may leave the skull, {} brainstem, {} fixed",
+                    count(view, NodeRole::kCraniotomy), count(view, NodeRole::kSlave),
+                    count(view, NodeRole::kBrainstem), count(view, NodeRole::kFixed)));
+  }
+  return lines;
+}
+
+namespace {
+
+void doubt_opening(const CaseView& view, const OpeningView& opening,
+                   std::vector<std::string>& lines) {
+  const double middle = middle_of(view.brain).x();
+  if (view.tumour.num_vertices() > 0) {
+    const double tumour = centre_of(view.tumour).x() - middle;
+    const double open = opening.centre.x() - middle;
+    if (tumour * open < 0.0 && std::min(std::abs(tumour), std::abs(open)) > kMiddle_mm) {
+      lines.push_back(fmt::format(
+          "the tumour lies on the {}, the craniotomy on the {}: is the side right in {} and "
+          "craniotomy.centre_mm?",
+          side_of(0, tumour), side_of(0, open), anatomy::tumour_key(view.config)));
+    }
+    const double distance = distance_to_vertices(opening.centre, view.tumour);
+    if (distance > kFarOpening_mm) {
+      lines.push_back(fmt::format(
+          "the craniotomy's centre is {:.0f} mm from the tumour: look at craniotomy.centre_mm",
+          distance));
+    }
+  }
+  const double angle = degrees_between(view.config.gravity_direction, opening.normal);
+  if (angle < 60.0) {
+    lines.push_back(fmt::format(
+        "the craniotomy faces down, {:.0f} degrees from gravity: look at gravity.direction, which "
+        "points to where things fall",
+        angle));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> doubts(const CaseView& view) {
+  std::vector<std::string> lines = view.notes;
+  if (view.brain.num_vertices() == 0) return lines;
+  const double longest = extent_of(view.brain).maxCoeff();
+  if (longest < kShortBrain_mm || longest > kLongBrain_mm) {
+    lines.push_back(fmt::format(
+        "the brain is {:.0f} mm long; an adult's is about 170: look at the units of its image or "
+        "mesh",
+        longest));
+  }
+  if (const auto opening = opening_of(view)) doubt_opening(view, *opening, lines);
+  const Vec3& stem = view.config.brainstem.centre_mm;
+  if (view.config.brainstem.radius_mm > 0.0 && stem.z() > middle_of(view.brain).z()) {
+    lines.emplace_back("the brainstem lies above the brain's middle: look at brainstem.centre_mm");
+  }
+  const double share =
+      geometry::enclosed_volume(view.tumour) / geometry::enclosed_volume(view.brain);
+  if (share > kLargeTumour) {
+    lines.push_back(fmt::format("the tumour takes {:.0f} % of the brain: look at {}", 100.0 * share,
+                                anatomy::tumour_key(view.config)));
+  }
+  const auto slaves = static_cast<double>(count(view, NodeRole::kSlave));
+  if (!view.roles.empty() && slaves < kFewSlaves * static_cast<double>(view.roles.size())) {
+    lines.push_back(
+        fmt::format("only {:.0f} surface nodes may leave the skull: look at gravity.direction and "
+                    "contact.slave_depth_mm",
+                    slaves));
+  }
+  return lines;
+}
+
+}  // namespace brainshift::client

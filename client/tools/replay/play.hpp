@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Plays recorded observations to a daemon session and collects the answers.
+//
+// Latency is taken on the client's monotonic clock, from just before an observation is sent until
+// its final update has been received and decoded. Fields and iterates are kept for the latest
+// observation with a usable answer only: the others leave some hundred bytes each, however large
+// the mesh.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/progress.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+
+// What play() needs of a daemon: Client's calls of the same names, or a test's own.
+struct DaemonLink {
+  std::function<Result<ObservationReceipt>(const Observation&)> submit;
+  // Blocks up to the timeout; kUnavailable when it has passed.
+  std::function<Result<UpdateMessage>(std::chrono::milliseconds)> next_update;
+};
+
+struct RecordedObservation {
+  std::int64_t recorded_ns = 0;  // monotonic clock of the recording
+  Observation observation;
+};
+
+// A recorded observation as it is sent to another session: without its own session, and acquired by
+// the clock of the daemon that journalled it, where one did (SessionRequest::recorded_clock).
+Observation for_replay(Observation recorded);
+
+enum class Speed {
+  kMax,       // next observation as soon as the former is answered
+  kRecorded,  // at the recorded times, relative to the first
+};
+
+struct PlayOptions {
+  // Updates of other sessions are ignored, e.g. the one that a late joiner gets.
+  std::uint64_t session_id = 0;
+  Speed speed = Speed::kMax;
+  std::chrono::milliseconds timeout{120000};  // longest wait for one answer
+  // The recording is played this many times, at least 1; more than 1 at Speed::kMax only. Sequence
+  // numbers count up from cycle to cycle (sequence_in_cycle), else the daemon would reject them.
+  int repeat = 1;
+};
+
+struct Iterate {
+  int iteration = 0;
+  Points displacement;
+};
+
+// One observation as it was sent. Exactly one of latency_ms, error and superseded tells how it
+// ended; the other values belong to latency_ms.
+struct PlayedObservation {
+  std::uint64_t sequence = 0;  // as sent
+  std::optional<double> latency_ms;
+  std::optional<double> first_iterate_ms;
+  StageTimings timings;
+  EstimateStatus status = EstimateStatus::kNotRun;
+  QualityVerdict quality;
+  int active = 0;              // slaves that carry a contact force
+  int contact_iterations = 0;  // active-set changes
+  std::optional<Error> error;
+  bool superseded = false;  // the daemon dropped it for a newer one before it had started
+};
+
+struct PlayedSession {
+  // In the order sent: `repeat` times the recording.
+  std::vector<PlayedObservation> observations;
+  std::optional<Update> last;                // the last usable update (Update::usable)
+  std::uint64_t last_recorded_sequence = 0;  // of the recorded observation that `last` answers
+  std::vector<Iterate> iterates;             // of the observation that `last` answers
+};
+
+// Sequence number with which a recorded observation is sent in a cycle, counted from 0:
+//   recorded number + cycle (last - first + 1)
+// Numbers that increase within the recording increase over all cycles.
+std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
+                                std::size_t index, int cycle);
+
+// Never fails as a whole: each observation carries its own error. After kUnavailable the remaining
+// observations are not sent and carry the same error.
+PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
+                   const PlayOptions& options, const Progress& progress = {});
+
+}  // namespace brainshift::client

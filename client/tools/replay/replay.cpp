@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/replay/replay.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "client/lib/client.hpp"
+#include "client/tools/replay/resume.hpp"
+#include "client/tools/replay/score.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/recording/surgery_file.hpp"
+
+namespace brainshift::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Surgery {
+  io::SurgeryFile file;
+  std::string case_id;
+  std::string model_id;
+  std::string case_file;
+  std::string scenario;
+  std::optional<std::uint64_t> seed;
+  std::vector<RecordedObservation> observations;
+  std::vector<std::string> notes;  // what is remarkable about the files
+};
+
+Status check_given(const fs::path& path, const char* key, const std::string& value) {
+  if (!value.empty()) return {};
+  return fail(ErrorCode::kUnreadable, path.string() + ": meta." + key + " is missing");
+}
+
+Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
+                                                           const fs::path& path) {
+  const auto records = file.records(io::RecordKind::kObservation);
+  if (!records) return tl::unexpected<Error>(records.error());
+  std::vector<RecordedObservation> observations;
+  for (const io::SurgeryRecord& record : *records) {
+    auto observation = wire::decode_observation(record.payload);
+    if (!observation) {
+      return fail(ErrorCode::kUnreadable, path.string() + ": observation " +
+                                              std::to_string(record.sequence) + ": " +
+                                              observation.error().message);
+    }
+    observations.push_back({record.recorded_ns, for_replay(std::move(*observation))});
+  }
+  if (observations.empty()) {
+    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation");
+  }
+  return observations;
+}
+
+Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted,
+                    std::vector<RecordedObservation>& observations) {
+  if (wanted.empty()) return {};
+  std::set<std::string> recorded;
+  for (const auto& one : observations) recorded.insert(one.observation.source);
+  const auto missing = std::find_if(wanted.begin(), wanted.end(), [&](const std::string& source) {
+    return recorded.count(source) == 0;
+  });
+  if (missing != wanted.end()) {
+    std::string known;
+    for (const std::string& one : recorded) known.append(known.empty() ? "" : ", ").append(one);
+    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation of source \"" +
+                                          *missing + "\"; it has: " + known);
+  }
+  std::erase_if(observations, [&](const RecordedObservation& one) {
+    return std::find(wanted.begin(), wanted.end(), one.observation.source) == wanted.end();
+  });
+  return {};
+}
+
+// Leaves what the interrupted session has not recorded.
+Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
+              std::vector<RecordedObservation>& observations, std::vector<std::string>& notes) {
+  if (options.resume.empty()) return {};
+  const auto point = read_resume_point(options.resume);
+  if (!point) return tl::unexpected<Error>(point.error());
+  if (point->meta.model_id != meta.model_id) {
+    return io::file_error(ErrorCode::kInvalidArgument, options.resume,
+                          "meta.model_id is \"" + point->meta.model_id + "\", that of " +
+                              options.surgery.string() + " is \"" + meta.model_id + "\"");
+  }
+  if (point->broken) notes.push_back(point->broken->message);
+  notes.push_back(options.resume.string() + ": " + describe(*point));
+  observations = remaining(observations, *point);
+  return {};
+}
+
+Result<Surgery> open_surgery(const ReplayOptions& options) {
+  const fs::path& path = options.surgery;
+  auto file = io::SurgeryFile::open(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  const io::SurgeryState& state = file->state();
+  std::vector<std::string> notes;
+  if (state.checksums && !state.closed) notes.push_back(path.string() + ": " + describe(state));
+  const io::SurgeryMeta meta = file->meta();
+  if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  if (Status ok = check_given(path, "model_id", meta.model_id); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  auto observations = read_observations(*file, path);
+  if (!observations) return tl::unexpected<Error>(observations.error());
+  if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  if (Status ok = resume(options, meta, *observations, notes); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+
+  const std::string scenario = meta.scenario.empty() ? path.stem().string() : meta.scenario;
+  Surgery surgery{
+      std::move(*file), meta.case_id, meta.model_id, meta.case_file, scenario, meta.seed, {}, {}};
+  surgery.observations = std::move(*observations);
+  surgery.notes = std::move(notes);
+  return surgery;
+}
+
+Status check_daemon(Client& client, const Surgery& surgery, const ReplayOptions& options) {
+  const auto status = client.status();
+  if (!status) return tl::unexpected<Error>(status.error());
+  if (!status->model_ready) {
+    return fail(ErrorCode::kModelNotReady, options.endpoint + ": the daemon has no model loaded");
+  }
+  const auto differs = [&](const char* key, const std::string& recorded,
+                           const std::string& served) {
+    return fail(ErrorCode::kInvalidArgument, options.surgery.string() + ": meta." + key + " is \"" +
+                                                 recorded + "\", but the daemon at " +
+                                                 options.endpoint + " serves \"" + served + "\"");
+  };
+  if (status->case_id != surgery.case_id)
+    return differs("case_id", surgery.case_id, status->case_id);
+  if (status->model_id != surgery.model_id) {
+    return differs("model_id", surgery.model_id, status->model_id);
+  }
+  return {};
+}
+
+struct Session {
+  Client client;
+  SessionInfo info;
+  BrainModel model;
+};
+
+// A client of its own per boundary: nothing of an earlier session can still be queued in it.
+Result<Session> start_session(const Surgery& surgery, const ReplayOptions& options,
+                              Boundary boundary) {
+  auto client = Client::connect(options.endpoint, {.keys = options.keys});
+  if (!client) return tl::unexpected<Error>(client.error());
+  if (Status ok = check_daemon(*client, surgery, options); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  auto info = client->start_session({.case_id = surgery.case_id,
+                                     .method = options.method,
+                                     .boundary = boundary,
+                                     .publish_iterates = options.repeat == 1,
+                                     .measure_full_solve = true,
+                                     .takeover = options.takeover,
+                                     .recorded_clock = true});
+  if (!info) return tl::unexpected<Error>(info.error());
+  auto model = client->model();
+  if (!model) return tl::unexpected<Error>(model.error());
+  // Every update counts here, and every iterate.
+  if (Status ok = client->subscribe(Subscription::kMaxWindow); !ok) {
+    return tl::unexpected<Error>(ok.error());
+  }
+  return Session{std::move(*client), std::move(*info), std::move(*model)};
+}
+
+Status write_fields(const fs::path& path, const BrainModel& model, const Points& estimated,
+                    const std::optional<io::SurgeryTruth>& truth) {
+  std::vector<io::NodeField> fields;
+  fields.push_back({"displacement_estimated", estimated});
+  if (truth) {
+    fields.push_back({"displacement_true", truth->displacement});
+    fields.push_back({"error_mm", (estimated - truth->displacement).colwise().norm()});
+  }
+  return io::write_vtu(path, model.mesh, fields);
+}
+
+RunReport describe_run(const Surgery& surgery, const Session& session, const ReplayOptions& options,
+                       Boundary boundary) {
+  RunReport run;
+  run.case_id = surgery.case_id;
+  run.scenario = surgery.scenario;
+  run.method = to_string(options.method);
+  run.boundary = to_string(boundary);
+  run.seed = surgery.seed;
+  run.model_id = surgery.model_id;
+  run.case_file = surgery.case_file;
+  run.surgery_file = options.surgery.string();
+  run.mesh = {session.info.nodes, session.info.tets, session.info.slaves};
+  run.prepare_s = session.info.prepare_s;
+  run.factor_s = session.info.factor_s;
+  run.model_bytes = session.info.model_bytes;
+  run.full_solve_ms = session.info.full_solve_ms;
+  return run;
+}
+
+// Everything that the last usable update says, with truth where the surgery carries it.
+Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSession& played,
+                const fs::path& field_file, RunReport& run) {
+  const Update& update = *played.last;
+  if (update.estimate.displacement.cols() != model.mesh.num_nodes()) {
+    return fail(ErrorCode::kProtocol,
+                "update " + std::to_string(update.sequence) + ": displacement of " +
+                    std::to_string(update.estimate.displacement.cols()) + " nodes, the model has " +
+                    std::to_string(model.mesh.num_nodes()));
+  }
+  const auto truth = read_truth(surgery.file, played.last_recorded_sequence, model);
+  if (!truth) return tl::unexpected<Error>(truth.error());
+  describe(model, update.estimate, run);
+  run.left_out = update.left_out;
+  run.sources = update.estimate.sources;
+  if (*truth) {
+    if (Status ok = score(model, **truth, update.estimate, run); !ok) return ok;
+  }
+  run.trace = trace_of(played, [&](const Points& displacement) {
+    return *truth ? cross_error(**truth, displacement) : std::nullopt;
+  });
+  run.field_file = field_file.filename().string();
+  return write_fields(field_file, model, update.estimate.displacement, *truth);
+}
+
+fs::path csv_path(const ReplayOptions& options, Boundary boundary) {
+  if (options.boundaries.size() == 1) return options.latency_csv;
+  fs::path path = options.latency_csv;
+  path.replace_filename(path.stem().string() + "-" + std::string(to_string(boundary)) +
+                        path.extension().string());
+  return path;
+}
+
+Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& options,
+                               Boundary boundary, const Progress& progress) {
+  report(progress, "prepare " + std::string(to_string(boundary)), 0.0);
+  auto session = start_session(surgery, options, boundary);
+  if (!session) return tl::unexpected<Error>(session.error());
+  report(progress, "prepare " + std::string(to_string(boundary)), 1.0);
+
+  const DaemonLink link{
+      [&](const Observation& observation) { return session->client.submit(observation); },
+      [&](std::chrono::milliseconds timeout) { return session->client.next_update(timeout); }};
+  const PlayOptions play_options{session->info.session_id, options.speed, options.timeout,
+                                 options.repeat};
+  const std::string stage = "replay " + std::string(to_string(boundary));
+  const PlayedSession played =
+      play(link, surgery.observations, play_options,
+           [&](std::string_view, double fraction) { report(progress, stage, fraction); });
+
+  RunReport run = describe_run(surgery, *session, options, boundary);
+  summarise(played, run);
+  if (!options.latency_csv.empty()) {
+    if (Status ok = io::write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
+      return tl::unexpected<Error>(ok.error());
+    }
+  }
+  if (played.last) {
+    const fs::path field_file =
+        options.report.parent_path() /
+        (options.report.stem().string() + "-" + run.scenario + "-" + run.boundary + ".vtu");
+    if (Status ok = evaluate(surgery, session->model, played, field_file, run); !ok) {
+      return tl::unexpected<Error>(ok.error());
+    }
+  }
+  return run;
+}
+
+Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
+  const std::string given = "repeat = " + std::to_string(options.repeat) + ": ";
+  if (options.repeat < 1) return fail(ErrorCode::kInvalidArgument, given + "must be at least 1");
+  if (options.repeat == 1) return {};
+  if (!options.resume.empty()) {
+    return fail(ErrorCode::kInvalidArgument, given + "a surgery that goes on is played once");
+  }
+  if (options.speed != Speed::kMax) {
+    return fail(ErrorCode::kInvalidArgument, given + "recorded times have no cycle; use speed max");
+  }
+  // Without this the cycles would overlap or leave the range of a surgery file's sequences.
+  const std::uint64_t first = surgery.observations.front().observation.sequence;
+  const std::uint64_t last = surgery.observations.back().observation.sequence;
+  const std::uint64_t limit = std::numeric_limits<std::int64_t>::max();
+  const auto more_cycles = static_cast<std::uint64_t>(options.repeat - 1);
+  if (last < first || last > limit || more_cycles > (limit - last) / (last - first + 1)) {
+    return fail(ErrorCode::kInvalidArgument,
+                given + "observation sequences " + std::to_string(first) + " to " +
+                    std::to_string(last) + " of " + options.surgery.string() +
+                    " cannot go on counting up");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status replay(const ReplayOptions& options, const Progress& progress,
+              const std::function<void(const RunReport&)>& on_run) {
+  const auto surgery = open_surgery(options);
+  if (!surgery) return tl::unexpected<Error>(surgery.error());
+  if (Status ok = check_repeat(options, *surgery); !ok) return ok;
+  for (const std::string& note : surgery->notes) {
+    if (options.on_note) options.on_note(note);
+  }
+  std::vector<RunReport> runs;
+  for (const Boundary boundary : options.boundaries) {
+    auto run = run_boundary(*surgery, options, boundary, progress);
+    if (!run) return tl::unexpected<Error>(run.error());
+    if (on_run) on_run(*run);
+    runs.push_back(std::move(*run));
+  }
+  if (Status ok = write_reports(options.report, runs); !ok) return ok;
+  for (const RunReport& run : runs) {
+    if (run.updates > 0) continue;
+    const std::string cause = run.failures.empty() ? "" : ": " + run.failures.front().message;
+    return fail(ErrorCode::kNotConverged, options.surgery.string() +
+                                              ": no observation was answered with an "
+                                              "estimate under the " +
+                                              run.boundary + " boundary" + cause);
+  }
+  return {};
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/replay/verify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "client/lib/client.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/wire/decision.hpp"
+
+namespace brainshift::client {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// Takes the records of a journal one after the other, so that only what waits for its decision or
+// its update is in memory.
+class Verifier {
+ public:
+  Verifier(const fs::path& path, const DaemonLink& link, const VerifySession& session)
+      : path_(path), link_(link), session_(session) {
+    verification_.agreement = session.agreement;
+  }
+
+  Status take(const io::SurgeryRecord& record) {
+    switch (record.kind) {
+      case io::RecordKind::kObservation: return keep(record);
+      case io::RecordKind::kDecision: return decide(record);
+      case io::RecordKind::kUpdate: return compare(record);
+    }
+    return {};
+  }
+  Verification result() { return std::move(verification_); }
+
+ private:
+  using Key = std::pair<std::string, std::uint64_t>;  // source, sequence
+
+  tl::unexpected<Error> unreadable(const io::SurgeryRecord& record, const std::string& why) const {
+    return io::file_error(ErrorCode::kUnreadable, path_,
+                          fmt::format("{} {}: {}", to_string(record.kind), record.sequence, why));
+  }
+
+  Status keep(const io::SurgeryRecord& record) {
+    auto observation = wire::decode_observation(record.payload);
+    if (!observation) return unreadable(record, observation.error().message);
+    Key key{observation->source, observation->sequence};
+    observations_.insert_or_assign(std::move(key), for_replay(std::move(*observation)));
+    return {};
+  }
+
+  Status decide(const io::SurgeryRecord& record) {
+    const auto decision = wire::decode_decision(record.payload);
+    if (!decision) return unreadable(record, decision.error().message);
+    const auto found = observations_.find({decision->source, decision->observation_sequence});
+    if (found == observations_.end()) {
+      return unreadable(record, fmt::format("observation {} of {} is not recorded",
+                                            decision->observation_sequence, decision->source));
+    }
+    const Observation observation = std::move(found->second);
+    observations_.erase(found);
+    const bool used = decision->outcome == Outcome::kUsed;
+    if (!used && decision->outcome != Outcome::kFailed) return {};
+    auto answer = send(observation);
+    if (!answer) return tl::unexpected(answer.error());
+    if (used) {
+      answers_.insert_or_assign(decision->update_sequence, std::move(*answer));
+      return {};
+    }
+    ++verification_.compared;
+    if (!answer->error) {
+      differs(decision->update_sequence, observation,
+              "failed when recorded (" + decision->reason + "), gives an estimate now");
+    }
+    return {};
+  }
+
+  Status compare(const io::SurgeryRecord& record) {
+    const auto recorded = wire::decode_update(record.payload);
+    if (!recorded) return unreadable(record, recorded.error().message);
+    auto answer = answers_.find(record.sequence);
+    if (answer == answers_.end()) {
+      if (Status ok = send_what_is_answered(record, *recorded); !ok) return ok;
+      answer = answers_.find(record.sequence);
+    }
+    const UpdateComparison comparison =
+        compare_updates(*recorded, answer->second, session_.agreement);
+    answers_.erase(answer);
+    ++verification_.compared;
+    verification_.max_difference_mm =
+        std::max(verification_.max_difference_mm, comparison.displacement_mm);
+    if (!comparison.differences.empty()) {
+      verification_.differences.push_back(fmt::format(
+          "update {} (observation {}): {}", record.sequence, recorded->update.observation_sequence,
+          fmt::join(comparison.differences, "; ")));
+    }
+    return {};
+  }
+
+  // No decision came before this update: the journal has none.
+  Status send_what_is_answered(const io::SurgeryRecord& record, const UpdateMessage& recorded) {
+    std::vector<const Observation*> candidates;
+    for (const auto& [key, observation] : observations_) {
+      if (key.second == recorded.update.observation_sequence) candidates.push_back(&observation);
+    }
+    if (candidates.size() != 1) {
+      return unreadable(record,
+                        fmt::format("{} observations have the sequence {} that it answers, "
+                                    "and no decision is recorded",
+                                    candidates.size(), recorded.update.observation_sequence));
+    }
+    const Observation observation = *candidates.front();
+    observations_.erase({observation.source, observation.sequence});
+    auto answer = send(observation);
+    if (!answer) return tl::unexpected(answer.error());
+    answers_.insert_or_assign(record.sequence, std::move(*answer));
+    return {};
+  }
+
+  // Sends one observation and waits for what it ends in.
+  Result<UpdateMessage> send(const Observation& observation) {
+    const std::string name =
+        fmt::format("observation {} of {}", observation.sequence, observation.source);
+    if (const auto receipt = link_.submit(observation); !receipt) {
+      return fail(receipt.error().code, name + ": " + receipt.error().message);
+    }
+    const auto deadline = Clock::now() + session_.timeout;
+    while (true) {
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+      if (left.count() <= 0) {
+        return fail(ErrorCode::kUnavailable,
+                    fmt::format("{}: no answer within {} ms", name, session_.timeout.count()));
+      }
+      auto message = link_.next_update(left);
+      if (!message) return fail(message.error().code, name + ": " + message.error().message);
+      const bool ours = message->session_id == session_.session_id &&
+                        message->update.observation_sequence == observation.sequence;
+      if (ours && (message->update.final || message->error)) return message;
+    }
+  }
+
+  void differs(std::uint64_t sequence, const Observation& observation, const std::string& how) {
+    verification_.differences.push_back(
+        fmt::format("update {} (observation {}): {}", sequence, observation.sequence, how));
+  }
+
+  const fs::path path_;
+  const DaemonLink& link_;
+  const VerifySession session_;
+  std::map<Key, Observation> observations_;         // not decided yet
+  std::map<std::uint64_t, UpdateMessage> answers_;  // by the recorded update's sequence
+  Verification verification_;
+};
+
+Result<SessionRequest> request_of(const io::SurgeryMeta& meta, const fs::path& path) {
+  SessionRequest request;
+  request.case_id = meta.case_id;
+  const auto unknown = [&](const char* key, const std::string& value) {
+    return io::file_error(ErrorCode::kUnreadable, path,
+                          fmt::format("meta.{} is \"{}\": it is no journal of a session that could "
+                                      "be repeated",
+                                      key, value));
+  };
+  const auto method = std::find_if(std::begin(kAllMethods), std::end(kAllMethods),
+                                   [&](Method m) { return meta.method == to_string(m); });
+  if (method == std::end(kAllMethods)) return unknown("method", meta.method);
+  request.method = *method;
+  const bool contact = meta.boundary == to_string(Boundary::kContact);
+  if (!contact && meta.boundary != to_string(Boundary::kFixed)) {
+    return unknown("boundary", meta.boundary);
+  }
+  request.boundary = contact ? Boundary::kContact : Boundary::kFixed;
+  request.recorded_clock = true;
+  return request;
+}
+
+// Bit for bit only where all three are known and the same.
+Agreement agreement_of(const io::SurgeryMeta& meta, const DaemonStatus& status,
+                       std::vector<std::string>& notes) {
+  Agreement agreement = Agreement::kBitForBit;
+  const auto compare = [&](const char* what, const std::string& recorded, const std::string& now) {
+    if (!recorded.empty() && recorded == now) return;
+    agreement = Agreement::kWithinRounding;
+    notes.push_back(fmt::format("{}: \"{}\" recorded, \"{}\" now", what, recorded, now));
+  };
+  compare("build", meta.build, status.build);
+  compare("machine", meta.machine, status.machine);
+  compare("BLAS kernel", meta.blas_kernel, status.blas_kernel);
+  return agreement;
+}
+
+Status check_served(const io::SurgeryMeta& meta, const DaemonStatus& status,
+                    const VerifyOptions& options) {
+  if (!status.model_ready) {
+    return fail(ErrorCode::kModelNotReady, options.endpoint + ": the daemon has no model loaded");
+  }
+  if (status.case_id == meta.case_id && status.model_id == meta.model_id) return {};
+  return io::file_error(
+      ErrorCode::kInvalidArgument, options.journal,
+      fmt::format("is of case \"{}\" and model \"{}\", but the daemon at {} serves \"{}\" and "
+                  "\"{}\"",
+                  meta.case_id, meta.model_id, options.endpoint, status.case_id, status.model_id));
+}
+
+}  // namespace
+
+std::vector<std::string> report_lines(const Verification& verification) {
+  std::vector<std::string> lines = verification.notes;
+  const bool exact = verification.agreement == Agreement::kBitForBit;
+  lines.push_back(fmt::format(
+      "{} of {} answers agree {}; greatest difference {:.3g} mm",
+      verification.compared - verification.differences.size(), verification.compared,
+      exact ? "bit for bit" : fmt::format("within {:.0e} mm and rounding to 32 bits", kRounding_mm),
+      verification.max_difference_mm));
+  lines.insert(lines.end(), verification.differences.begin(), verification.differences.end());
+  return lines;
+}
+
+Result<Verification> verify_records(const io::SurgeryFile& file, const DaemonLink& link,
+                                    const VerifySession& session, const Progress& progress) {
+  Verifier verifier(file.path(), link, session);
+  const auto total = static_cast<double>(std::max<std::uint64_t>(1, file.state().records));
+  std::uint64_t taken = 0;
+  const Status ok = file.visit([&](const io::SurgeryRecord& record) {
+    report(progress, "verify", std::min(1.0, static_cast<double>(taken++) / total));
+    return verifier.take(record);
+  });
+  report(progress, "verify", 1.0);
+  if (!ok) return tl::unexpected(ok.error());
+  Verification verification = verifier.result();
+  if (verification.compared == 0) {
+    return io::file_error(ErrorCode::kEmptySet, file.path(), "holds no update to compare with");
+  }
+  return verification;
+}
+
+Result<Verification> verify_journal(const VerifyOptions& options, const Progress& progress) {
+  const auto file = io::SurgeryFile::open(options.journal);
+  if (!file) return tl::unexpected(file.error());
+  const io::SurgeryMeta& meta = file->meta();
+  const auto request = request_of(meta, options.journal);
+  if (!request) return tl::unexpected(request.error());
+  auto client = Client::connect(options.endpoint, {.keys = options.keys});
+  if (!client) return tl::unexpected(client.error());
+  const auto status = client->status();
+  if (!status) return tl::unexpected(status.error());
+  if (Status ok = check_served(meta, *status, options); !ok) return tl::unexpected(ok.error());
+  std::vector<std::string> notes;
+  if (!meta.gap.empty()) notes.push_back("the journal has a gap: " + meta.gap);
+  const Agreement agreement = agreement_of(meta, *status, notes);
+
+  auto asked = *request;
+  asked.takeover = options.takeover;
+  const auto info = client->start_session(asked);
+  if (!info) return tl::unexpected(info.error());
+  if (Status ok = client->subscribe(Subscription::kMaxWindow); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  const DaemonLink link{
+      [&](const Observation& observation) { return client->submit(observation); },
+      [&](std::chrono::milliseconds timeout) { return client->next_update(timeout); }};
+  auto verification =
+      verify_records(*file, link, {info->session_id, agreement, options.timeout}, progress);
+  if (verification) {
+    verification->notes.insert(verification->notes.begin(), notes.begin(), notes.end());
+  }
+  return verification;
+}
+
+}  // namespace brainshift::client

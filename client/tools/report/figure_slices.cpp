@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "client/tools/pictures/sheet.hpp"
+#include "client/tools/pictures/slice_panel.hpp"
+#include "client/tools/pictures/ticks.hpp"
+#include "client/tools/report/figures.hpp"
+#include "client/tools/report/slice_windows.hpp"
+#include "common/geometry/surface.hpp"
+
+namespace brainshift::client {
+namespace {
+
+constexpr double kCloseUpHalf_mm = 34.0;
+constexpr double kCloseUp_px_per_mm = 12.0;
+constexpr double kArrowSpacing_mm = 9.0;
+constexpr double kMapSpacing_mm = 1.0;
+constexpr double kDifferenceFactor = 5.0;  // "magnified five times for visualization", paper Fig. 4
+
+const Stroke kBefore{palette::kWhite, 3, 12.0};
+const Stroke kTrue{palette::kSkyBlue, 8, 0.0};
+const Stroke kEstimated{palette::kOrange, 3, 0.0};
+
+struct Estimated {
+  std::string boundary;
+  const Points* displacement = nullptr;
+};
+
+// One group's fields on one mesh.
+struct Scene {
+  const Head& head;
+  const TetMesh& mesh;
+  geometry::TetLocator locator;
+  TriangleSurface brain;
+  std::vector<NodeIndex> node_of_vertex;  // of brain
+  const Points* truth = nullptr;
+  std::vector<Estimated> estimates;
+  std::string scenario;
+  std::string method;
+};
+
+// Longest projection on the slice: what an arrow shows of a displacement.
+double largest_in_plane(const SliceSamples& samples, const Points& field,
+                        const SliceWindow& window) {
+  double largest = 0.0;
+  for (const auto& location : samples.locations) {
+    Vec3 u = geometry::value_at(location, field);
+    u(window.normal_axis()) = 0.0;
+    largest = std::max(largest, u.norm());
+  }
+  return largest;
+}
+
+double largest_on(const SliceSamples& samples, const Points& field) {
+  double largest = 0.0;
+  for (const auto& location : samples.locations)
+    largest = std::max(largest, geometry::value_at(location, field).norm());
+  return largest;
+}
+
+// Up to the next half (or tenth, or hundredth) for a tidy colour scale.
+double round_up(double value) {
+  if (!(value > 0.0)) return 1.0;
+  const double unit = value > 2.0 ? 0.5 : value > 0.2 ? 0.1 : 0.01;
+  return std::ceil(value / unit - 1e-9) * unit;
+}
+
+// So that the longest arrow spans at least one grid cell.
+double arrow_magnification(double largest_mm) {
+  for (const double factor : {1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0}) {
+    if (factor * largest_mm >= kArrowSpacing_mm) return factor;
+  }
+  return 8.0;
+}
+
+std::string trimmed(double value) {
+  return value == std::floor(value) ? fixed_decimals(value, 0) : fixed_decimals(value, 1);
+}
+
+SlicePanel background(const Scene& scene, const SliceWindow& window, double brightness) {
+  SlicePanel panel(window);
+  if (scene.head.mri) panel.draw_mri(*scene.head.mri, brightness);
+  return panel;
+}
+
+TriangleSurface moved_brain(const Scene& scene, const Points& displacement) {
+  TriangleSurface moved = scene.brain;
+  for (std::size_t v = 0; v < scene.node_of_vertex.size(); ++v) {
+    moved.vertices.col(static_cast<Eigen::Index>(v)) += displacement.col(scene.node_of_vertex[v]);
+  }
+  return moved;
+}
+
+void draw_tumour(SlicePanel& panel, const Scene& scene, const Points& estimate) {
+  if (scene.head.tumour.num_triangles() == 0) return;
+  if (scene.truth != nullptr) {
+    panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, *scene.truth), kTrue);
+  }
+  panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, estimate), kEstimated);
+  panel.draw_section(scene.head.tumour, kBefore);
+}
+
+std::vector<LegendEntry> outline_legend(const Scene& scene, const std::string& what) {
+  std::vector<LegendEntry> legend = {{what + " before", kBefore},
+                                     {what + " estimated", kEstimated}};
+  if (scene.truth != nullptr) legend.push_back({what + " true", kTrue});
+  return legend;
+}
+
+std::string slice_name(const Scene& scene, const SliceWindow& window, const char* through) {
+  const bool axial = window.plane == Plane::kAxial;
+  return "method " + scene.method + "; " + (axial ? "axial" : "coronal") + " slice through the " +
+         through + ", " + (axial ? "S = " : "A = ") + fixed_decimals(window.offset_mm, 1) + " mm";
+}
+
+cv::Mat shift_sheet(const Scene& scene, Plane plane) {
+  const SliceWindow window = whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, plane);
+  const SliceSamples samples = sample_slice(scene.locator, window, kArrowSpacing_mm);
+  std::vector<const Points*> fields;
+  for (const Estimated& e : scene.estimates) fields.push_back(e.displacement);
+  if (scene.truth != nullptr) fields.push_back(scene.truth);
+  double largest = 0.0;
+  double largest_arrow = 0.0;
+  for (const Points* field : fields) {
+    largest = std::max(largest, largest_on(samples, *field));
+    largest_arrow = std::max(largest_arrow, largest_in_plane(samples, *field, window));
+  }
+  const double magnification = arrow_magnification(largest_arrow);
+  Sheet sheet;
+  sheet.title = "Brain shift: " + scene.scenario;
+  sheet.subtitle = slice_name(scene, window, "craniotomy centre") + "; arrows drawn " +
+                   trimmed(magnification) + "x: their part in the plane, coloured by full length";
+  sheet.colour_max = round_up(largest);
+  sheet.colour_label = "displacement (mm)";
+  sheet.legend = outline_legend(scene, "tumour");
+  if (scene.truth != nullptr)
+    sheet.legend.push_back({"true displacement", {palette::kWhite, 1, 0.0}});
+  for (const Estimated& e : scene.estimates) {
+    SlicePanel panel = background(scene, window, 0.7);
+    panel.draw_arrows(samples, *e.displacement, magnification, sheet.colour_max, false);
+    if (scene.truth != nullptr) {
+      panel.draw_arrows(samples, *scene.truth, magnification, sheet.colour_max, true);
+    }
+    draw_tumour(panel, scene, *e.displacement);
+    panel.draw_orientation(20.0);
+    panel.draw_gravity(scene.head.gravity_direction);
+    sheet.panels.push_back({e.boundary + " boundary", panel.image()});
+  }
+  return compose(sheet);
+}
+
+cv::Mat close_up_sheet(const Scene& scene, Plane plane) {
+  const SliceWindow window =
+      close_up(scene.head.tumour_centre, kCloseUpHalf_mm, kCloseUp_px_per_mm, plane);
+  Sheet sheet;
+  sheet.title = "Tumour and brain surface: " + scene.scenario;
+  sheet.subtitle = slice_name(scene, window, "tumour centre") + "; displacements at true scale";
+  sheet.legend = outline_legend(scene, "outline");
+  for (const Estimated& e : scene.estimates) {
+    SlicePanel panel = background(scene, window, 0.8);
+    if (scene.truth != nullptr) panel.draw_section(moved_brain(scene, *scene.truth), kTrue);
+    panel.draw_section(moved_brain(scene, *e.displacement), kEstimated);
+    panel.draw_section(scene.brain, kBefore);
+    draw_tumour(panel, scene, *e.displacement);
+    panel.draw_orientation(10.0);
+    sheet.panels.push_back({e.boundary + " boundary", panel.image()});
+  }
+  return compose(sheet);
+}
+
+// Differences comparable with the truth itself would cover the slice when magnified.
+double difference_factor(double largest_difference_mm, double largest_true_mm) {
+  return kDifferenceFactor * largest_difference_mm <= 1.5 * largest_true_mm ? kDifferenceFactor
+                                                                            : 1.0;
+}
+
+// Precondition: truth.
+cv::Mat difference_sheet(const Scene& scene) {
+  const SliceWindow window =
+      whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, Plane::kAxial);
+  const SliceSamples samples = sample_slice(scene.locator, window, kArrowSpacing_mm);
+  const double largest = largest_on(samples, *scene.truth);
+  const double magnification = arrow_magnification(largest_in_plane(samples, *scene.truth, window));
+  Sheet sheet;
+  sheet.title = "True displacement and the errors: " + scene.scenario;
+  sheet.subtitle = slice_name(scene, window, "craniotomy centre") + "; all arrows drawn " +
+                   trimmed(magnification) +
+                   "x, differences first multiplied by the factor in their title";
+  sheet.colour_max = round_up(largest);
+  sheet.colour_label = "length, with the title's factor (mm)";
+  const auto add = [&](const std::string& title, const Points& field) {
+    SlicePanel panel = background(scene, window, 0.7);
+    panel.draw_arrows(samples, field, magnification, sheet.colour_max, false);
+    panel.draw_orientation(20.0);
+    panel.draw_gravity(scene.head.gravity_direction);
+    sheet.panels.push_back({title, panel.image()});
+  };
+  add("true displacement", *scene.truth);
+  for (const Estimated& e : scene.estimates) {
+    const Points difference = *e.displacement - *scene.truth;
+    const double factor = difference_factor(largest_on(samples, difference), largest);
+    add(trimmed(factor) + " x (" + e.boundary + " estimate - true)", factor * difference);
+  }
+  return compose(sheet);
+}
+
+// Precondition: truth.
+cv::Mat error_sheet(const Scene& scene) {
+  const SliceWindow window =
+      whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, Plane::kAxial);
+  const SliceSamples samples = sample_slice(scene.locator, window, kMapSpacing_mm);
+  double largest = 0.0;
+  for (const Estimated& e : scene.estimates) {
+    largest = std::max(largest, largest_on(samples, *e.displacement - *scene.truth));
+  }
+  Sheet sheet;
+  sheet.title = "Error of the estimate: " + scene.scenario;
+  sheet.subtitle =
+      slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
+  sheet.colour_max = round_up(largest);
+  sheet.colour_label = "|estimated - true| (mm)";
+  sheet.legend = {{"tumour before", kBefore}};
+  for (const Estimated& e : scene.estimates) {
+    SlicePanel panel = background(scene, window, 0.9);
+    panel.draw_magnitude_map(samples, *e.displacement - *scene.truth, sheet.colour_max, 0.7);
+    panel.draw_section(scene.head.tumour, kBefore);
+    panel.draw_orientation(20.0);
+    sheet.panels.push_back({e.boundary + " boundary", panel.image()});
+  }
+  return compose(sheet);
+}
+
+}  // namespace
+
+std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<ReportedRun>& runs,
+                                  const Head& head) {
+  std::vector<const ReportedRun*> shown;
+  for (const auto& index : {group.contact, group.fixed}) {
+    if (index && runs[*index].field) shown.push_back(&runs[*index]);
+  }
+  if (shown.empty()) return {};
+  const RunField& first = *shown.front()->field;
+  Scene scene{head,
+              first.mesh,
+              geometry::TetLocator(first.mesh),
+              {},
+              {},
+              nullptr,
+              {},
+              shown.front()->report.scenario,
+              shown.front()->report.method};
+  scene.brain = geometry::boundary_surface(first.mesh, &scene.node_of_vertex);
+  scene.truth = first.truth ? &*first.truth : nullptr;
+  for (const ReportedRun* run : shown) {
+    if (run->field->estimated.cols() != first.mesh.num_nodes())
+      continue;  // not the same mesh after all
+    scene.estimates.push_back({run->report.boundary, &run->field->estimated});
+  }
+
+  const std::string what =
+      scene.scenario + ", method " + scene.method + ", " +
+      (scene.estimates.size() > 1 ? "contact and fixed boundary side by side"
+                                  : scene.estimates.front().boundary + " boundary");
+  std::vector<Figure> figures;
+  for (const auto& [plane, infix, shown_in] :
+       {std::tuple{Plane::kAxial, "", " (compare Fig. 4a and e)."},
+        std::tuple{Plane::kCoronal, "coronal-", " (compare Fig. 4b)."}}) {
+    figures.push_back(
+        {"shift-" + std::string(infix) + group.name + ".png",
+         "Estimated displacement (coloured arrows) and true displacement (thin white) on the MRI, "
+         "with the tumour's outline before, estimated and true; " +
+             what + shown_in,
+         shift_sheet(scene, plane)});
+    figures.push_back(
+        {"tumour-" + std::string(infix) + group.name + ".png",
+         "Close-up at the tumour: outlines of tumour and brain surface before, estimated and "
+         "true; " +
+             what + ".",
+         close_up_sheet(scene, plane)});
+  }
+  if (scene.truth == nullptr) return figures;
+  figures.push_back({"difference-" + group.name + ".png",
+                     "True displacement, and estimated minus true, magnified as its title says; " +
+                         what + " (compare Fig. 4c and d).",
+                     difference_sheet(scene)});
+  figures.push_back({"error-" + group.name + ".png",
+                     "Length of estimated minus true displacement; " + what + ".",
+                     error_sheet(scene)});
+  return figures;
+}
+
+}  // namespace brainshift::client

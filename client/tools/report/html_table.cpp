@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/report/html_table.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include "client/tools/report/escape_html.hpp"
+
+namespace brainshift::client {
+
+std::string number(double value, int decimals) {
+  if (!std::isfinite(value)) return kNothing;
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
+  return buffer;
+}
+
+std::string number(const std::optional<double>& value, int decimals) {
+  return value ? number(*value, decimals) : kNothing;
+}
+
+std::string number(const std::optional<MeanStd>& value) {
+  if (!value) return kNothing;
+  return number(value->mean, 2) + "&nbsp;&plusmn;&nbsp;" + number(value->std, 2);
+}
+
+std::string plain(const std::string& text) { return text.empty() ? kNothing : escape_html(text); }
+
+Table::Table(const std::vector<ReportedRun>& runs, bool with_paper)
+    : runs_(runs), with_paper_(with_paper) {
+  html_ = "<div class=\"scroll\"><table>\n<thead><tr><th></th>";
+  for (const ReportedRun& run : runs) {
+    html_ += "<th>" + escape_html(run.report.scenario) + "<br>" + escape_html(run.report.method) +
+             "<br>" + escape_html(run.report.boundary) + "</th>";
+  }
+  if (with_paper) {
+    for (const char* name : {"contact", "fixed", "ICP, contact"}) {
+      html_ += std::string("<th class=\"paper\">Ji et al.<br>") + name + "</th>";
+    }
+  }
+  html_ += "</tr></thead>\n<tbody>\n";
+}
+
+void Table::row(const std::string& name, const Cell& cell, const std::vector<std::string>& paper) {
+  html_ += "<tr><th>" + name + "</th>";
+  for (const ReportedRun& run : runs_) html_ += "<td>" + cell(run.report) + "</td>";
+  for (std::size_t i = 0; with_paper_ && i < 3; ++i) {
+    html_ += "<td class=\"paper\">" +
+             (i < paper.size() && !paper[i].empty() ? paper[i] : kNothing) + "</td>";
+  }
+  html_ += "</tr>\n";
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "client/tools/report/escape_html.hpp"
+#include "client/tools/report/html_page.hpp"
+#include "client/tools/report/html_table.hpp"
+#include "client/tools/report/paper_values.hpp"
+
+namespace brainshift::client {
+namespace {
+
+void add_tumour_rows(Table& table) {
+  table.row("tumour shift to recover (mm)",
+            [](const RunReport& r) { return number(r.error_mm.initial); },
+            {number(paper::kInitial_mm), number(paper::kInitial_mm), number(paper::kInitial_mm)});
+  table.row("misfit at the sparse data (mm)",
+            [](const RunReport& r) { return number(r.error_mm.sparse); },
+            {number(paper::kContactSparse_mm), number(paper::kFixedSparse_mm)});
+  table.row("error at the cross-validation points (mm)",
+            [](const RunReport& r) { return number(r.error_mm.cross); },
+            {number(paper::kContactCross_mm), number(paper::kFixedCross_mm),
+             number(paper::kIcpCross_mm)});
+  table.row("recovered at the tumour (%)",
+            [](const RunReport& r) { return number(r.recovery_pct, 1); },
+            {number(paper::kContactRecovery_pct, 0),
+             "(" + number(paper::kFixedRecovery_pct, 0) + ")", number(paper::kIcpRecovery_pct, 0)});
+}
+
+void add_craniotomy_rows(Table& table) {
+  table.row("craniotomy, closest-point distance before (mm)",
+            [](const RunReport& r) { return number(r.error_mm.craniotomy_initial); },
+            {number(paper::kCraniotomyInitial_mm)});
+  table.row("craniotomy, closest-point distance after (mm)",
+            [](const RunReport& r) { return number(r.error_mm.craniotomy); },
+            {number(paper::kContactCraniotomy_mm)});
+  table.row("recovered at the craniotomy, closest-point distance (%)",
+            [](const RunReport& r) { return number(r.craniotomy_recovery_pct, 1); },
+            {number(paper::kContactCraniotomyRecovery_pct, 0)});
+  table.row("craniotomy, displacement to recover (mm)",
+            [](const RunReport& r) { return number(r.error_mm.craniotomy_displacement_initial); });
+  table.row("craniotomy, displacement error (mm)",
+            [](const RunReport& r) { return number(r.error_mm.craniotomy_displacement); });
+  table.row("recovered at the craniotomy, displacement (%)",
+            [](const RunReport& r) { return number(r.craniotomy_displacement_recovery_pct, 1); });
+}
+
+void add_field_rows(Table& table) {
+  table.row("largest true displacement (mm)",
+            [](const RunReport& r) { return number(r.largest_true_displacement_mm, 1); },
+            {number(paper::kLargestTrue_mm, 1), number(paper::kLargestTrue_mm, 1)});
+  table.row("field error, median / 99th percentile / largest (% of the largest displacement)",
+            [](const RunReport& r) -> std::string {
+              if (!r.field_error_pct) return kNothing;
+              return number(r.field_error_pct->p50, 1) + " / " + number(r.field_error_pct->p99, 1) +
+                     " / " + number(r.field_error_pct->max, 1);
+            },
+            {"&ndash; / &lt;&nbsp;5 / up to 10"});
+  table.row("nodes with field error below 5 % (%)",
+            [](const RunReport& r) { return number(r.share_below_5_pct, 1); }, {"&gt;&nbsp;99"});
+  table.row("principal direction against gravity (&deg;)",
+            [](const RunReport& r) { return number(r.principal_direction_deg, 1); },
+            {number(paper::kContactDirection_deg, 1), number(paper::kFixedDirection_deg, 1)});
+  table.row("the same of the true field (&deg;)",
+            [](const RunReport& r) { return number(r.principal_direction_true_deg, 1); });
+  table.row("coverage of the 90 % interval (share)",
+            [](const RunReport& r) { return number(r.coverage_90, 2); });
+}
+
+void add_contact_rows(Table& table) {
+  const auto contact = [](auto member, int decimals) {
+    return [member, decimals](const RunReport& r) -> std::string {
+      return r.contact ? number(static_cast<double>((*r.contact).*member), decimals) : kNothing;
+    };
+  };
+  table.row("nodes in contact", contact(&ContactSummary::active, 0));
+  table.row("nodes still penetrating", contact(&ContactSummary::penetrating, 0),
+            {std::to_string(paper::kPenetrating)});
+  table.row("largest penetration (mm)", contact(&ContactSummary::max_penetration_mm, 3));
+  table.row("iterations",
+            [](const RunReport& r) -> std::string {
+              return r.trace.empty() ? kNothing : std::to_string(r.trace.back().iteration);
+            },
+            {std::to_string(paper::kIterations), "", std::to_string(paper::kIterations)});
+  table.row("status of the algorithm", [](const RunReport& r) { return plain(r.status); });
+}
+
+}  // namespace
+
+std::string error_table(const std::vector<ReportedRun>& runs) {
+  Table table(runs, true);
+  add_tumour_rows(table);
+  add_craniotomy_rows(table);
+  add_field_rows(table);
+  add_contact_rows(table);
+  table.row("time from observation to update (s)",
+            [](const RunReport& r) -> std::string {
+              return r.latency_ms ? number(1e-3 * r.latency_ms->p50, 3) : kNothing;
+            },
+            {number(paper::kTime_s, 0)});
+  return table.finish();
+}
+
+std::string timing_table(const std::vector<ReportedRun>& runs) {
+  Table table(runs, false);
+  table.row("mesh: nodes / tetrahedra / slaves", [](const RunReport& r) {
+    return std::to_string(r.mesh.nodes) + " / " + std::to_string(r.mesh.tets) + " / " +
+           std::to_string(r.mesh.slaves);
+  });
+  table.row("preparation (s)", [](const RunReport& r) { return number(r.prepare_s, 2); });
+  table.row("of it factorisation (s)", [](const RunReport& r) { return number(r.factor_s, 2); });
+  table.row("prepared model (MiB)", [](const RunReport& r) -> std::string {
+    return r.model_bytes ? number(static_cast<double>(*r.model_bytes) / (1 << 20), 0) : kNothing;
+  });
+  table.row("one full solve (ms)", [](const RunReport& r) { return number(r.full_solve_ms, 1); });
+  table.row("updates", [](const RunReport& r) { return std::to_string(r.updates); });
+  table.row("latency p50 / p95 / p99 / max (ms)", [](const RunReport& r) -> std::string {
+    if (!r.latency_ms) return kNothing;
+    return number(r.latency_ms->p50, 0) + " / " + number(r.latency_ms->p95, 0) + " / " +
+           number(r.latency_ms->p99, 0) + " / " + number(r.latency_ms->max, 0);
+  });
+  table.row("first update (ms)", [](const RunReport& r) { return number(r.cold_ms, 0); });
+  table.row("first streamed iterate (ms)",
+            [](const RunReport& r) { return number(r.first_iterate_ms, 0); });
+  const auto stage = [](double StageMedians::*member) {
+    return [member](const RunReport& r) -> std::string {
+      return r.stages_ms ? number((*r.stages_ms).*member, 1) : kNothing;
+    };
+  };
+  table.row("stage: register (ms)", stage(&StageMedians::register_ms));
+  table.row("stage: invert (ms)", stage(&StageMedians::invert_ms));
+  table.row("stage: rebuild (ms)", stage(&StageMedians::rebuild_ms));
+  table.row("stage: encode (ms)", stage(&StageMedians::encode_ms));
+  table.row("stage: journal (ms)", stage(&StageMedians::journal_ms));
+  return table.finish();
+}
+
+std::string source_table(const std::vector<ReportedRun>& runs) {
+  std::string rows;
+  for (const ReportedRun& run : runs) {
+    for (const SourceSummary& source : run.report.sources) {
+      const auto cell = [](const std::string& text) { return "<td>" + text + "</td>"; };
+      const bool compared = !std::isnan(source.p_value);
+      rows += "<tr>" + cell(escape_html(run.report.scenario + ", " + run.report.boundary)) +
+              cell(escape_html(source.source)) + cell(std::to_string(source.observation_sequence)) +
+              cell(number(source.age_s, 0)) + cell(std::to_string(source.data)) +
+              cell(std::to_string(source.outliers)) +
+              cell(compared
+                       ? number(source.chi_square, 1) + " / " + number(source.degrees_of_freedom, 1)
+                       : kNothing) +
+              cell(number(source.p_value, 4)) +
+              cell(source.consistent ? "yes" : "<strong>no</strong>") + "</tr>\n";
+    }
+  }
+  if (rows.empty()) return "";
+  return "<table "
+         "class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>observation</th><th>age "
+         "(s)</th>"
+         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr></"
+         "thead>\n<tbody>" +
+         rows + "</tbody></table>\n";
+}
+
+std::string left_out_list(const std::vector<ReportedRun>& runs) {
+  std::vector<std::string> items;
+  for (const ReportedRun& run : runs) {
+    for (const Omission& omission : run.report.left_out) {
+      std::string item =
+          "<li><strong>" + escape_html(omission.part) +
+          "</strong>: " + escape_html(omission.reason) +
+          " <span class=\"soft\">(estimated error: " + plain(omission.estimated_error) +
+          ")</span></li>\n";
+      if (std::find(items.begin(), items.end(), item) == items.end())
+        items.push_back(std::move(item));
+    }
+  }
+  if (items.empty()) return "";
+  std::string html = "<ul>\n";
+  for (const std::string& item : items) html += item;
+  return html + "</ul>\n";
+}
+
+std::string failure_list(const std::vector<ReportedRun>& runs) {
+  std::string items;
+  for (const ReportedRun& run : runs) {
+    for (const RunFailure& failure : run.report.failures) {
+      items += "<li>" + escape_html(run.report.scenario) + ", " + escape_html(run.report.boundary) +
+               ", observation " + std::to_string(failure.observation_sequence) + ": " +
+               escape_html(failure.message) + " (" + escape_html(failure.code) + ")</li>\n";
+    }
+  }
+  return items.empty() ? "" : "<ul class=\"failures\">\n" + items + "</ul>\n";
+}
+
+}  // namespace brainshift::client

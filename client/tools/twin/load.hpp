@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tissue that changes its volume in a simulated surgery, and the nodal forces it causes
+// (fem/swelling.hpp).
+#pragma once
+
+#include <functional>
+
+#include "common/configuration/case_config.hpp"
+#include "common/values/brain_model.hpp"
+
+namespace brainshift::client {
+
+// theta(r) = volume_strain (1 - (r / radius)^2)^2 for r < radius, else 0; r: distance to the
+// centre. Largest in the middle, fading out without an edge.
+struct Swelling {
+  double volume_strain = 0.0;  // > 0 swells, < 0 shrinks, 0: none
+  double radius_mm = 0.0;
+  // Of the centre, beyond the tumour's centroid as seen from the craniotomy.
+  double depth_mm = 0.0;
+  Vec3 offset_mm = Vec3::Zero();  // of the centre, RAS, beside that place
+};
+
+// One volume strain of the whole brain, or of the half that the tumour lies in, as when mannitol
+// draws water from it. The halves meet in the sagittal plane through the middle of the brain's
+// extent; there the strain fades like (1 + tanh(d / kFalx_mm)) / 2, d: distance into the half.
+struct VolumeChange {
+  double strain = 0.0;  // < 0 shrinks, 0: none
+  bool one_hemisphere = false;
+};
+inline constexpr double kFalx_mm = 5.0;
+
+// Mean of the craniotomy's nodes, mm.
+Vec3 craniotomy_centre(const BrainModel& model);
+// Centre of the swelling in this patient, mm.
+Vec3 swelling_centre(const BrainModel& model, const Swelling& swelling);
+
+// theta(r), no unit.
+double volume_strain_at(const Swelling& swelling, double distance_mm);
+
+// Nodal forces, 3 x n, N.
+Points swelling_load(const TetMesh& mesh, const Material& material, const Vec3& centre,
+                     const Swelling& swelling);
+
+// Strain of a volume change at any place, no unit. mesh: gives the middle of the brain. tumour: a
+// place in the half that changes.
+std::function<double(const Vec3&)> volume_change_field(const TetMesh& mesh, const Vec3& tumour,
+                                                       const VolumeChange& change);
+// The same for a volume change. tumour: a place in the half that changes.
+Points volume_change_load(const TetMesh& mesh, const Material& material, const Vec3& tumour,
+                          const VolumeChange& change);
+
+}  // namespace brainshift::client

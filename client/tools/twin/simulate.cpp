@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/twin/simulate.hpp"
+
+#include "client/tools/twin/adverse.hpp"
+#include "client/tools/twin/scenario.hpp"
+#include "client/tools/twin/surgery.hpp"
+#include "common/core/utc_time.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/linalg/blas_threads.hpp"
+#include "common/patient/read_patient.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using patient::Patient;
+
+Status write_surgery(const SimulateOptions& options, const std::string& scenario_name,
+                     const Patient& patient, const SimulatedSurgery& surgery) {
+  auto file = io::SurgeryFile::create(
+      options.out, simulated_meta(patient.model, options.case_file, scenario_name, options.seed,
+                                  "brainshift twin"));
+  if (!file) return tl::unexpected(file.error());
+  Status status;
+  for (std::size_t i = 0; status && i < surgery.observations.size(); ++i) {
+    const Observation& observation = surgery.observations[i];
+    status = file->append({io::RecordKind::kObservation, observation.sequence,
+                           observation.acquired_ns, wire::encode(observation)});
+    if (status) status = file->write_truth(observation.sequence, surgery.truths[i]);
+  }
+  if (status) status = file->close();
+  if (!status) io::discard_surgery(options.out);
+  return status;
+}
+
+}  // namespace
+
+io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::path& case_file,
+                               const std::string& scenario, std::uint64_t seed,
+                               const std::string& software) {
+  io::SurgeryMeta meta;
+  meta.case_id = model.case_id;
+  meta.model_id = model.model_id;
+  meta.case_file = std::filesystem::absolute(case_file).lexically_normal().string();
+  meta.scenario = scenario;
+  meta.seed = seed;
+  meta.created_utc = utc_now();
+  meta.software = software;
+  return meta;
+}
+
+std::vector<ScenarioInfo> scenarios() {
+  std::vector<ScenarioInfo> infos;
+  for (const Scenario& scenario : all_scenarios())
+    infos.push_back({scenario.name, scenario.description});
+  return infos;
+}
+
+std::vector<ScenarioInfo> adverse_ingredients() {
+  std::vector<ScenarioInfo> infos;
+  for (const IngredientInfo& info : all_ingredients()) {
+    infos.push_back({info.name, info.description});
+  }
+  return infos;
+}
+
+Status simulate(const SimulateOptions& options, const Progress& progress) {
+  const Scenario* scenario = find_scenario(options.scenario);
+  if (scenario == nullptr) {
+    std::string known;
+    for (const Scenario& each : all_scenarios()) known += (known.empty() ? "" : ", ") + each.name;
+    return fail(ErrorCode::kNotFound,
+                "scenario " + options.scenario + " is unknown; known: " + known);
+  }
+  Ingredients ingredients;
+  if (!options.adverse.empty()) {
+    const auto named = ingredients_from(options.adverse);
+    if (!named) return tl::unexpected(named.error());
+    ingredients = *named;
+  }
+  if (std::filesystem::exists(options.out)) {
+    return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
+  }
+  linalg::use_single_threaded_blas();  // before the first factorisation
+  const auto patient = patient::read_patient(options.case_file, progress);
+  if (!patient) return tl::unexpected(patient.error());
+  const auto adverse =
+      with_ingredients(*scenario, ingredients, patient->model.gravity_direction, options.seed);
+  if (!adverse) return tl::unexpected(adverse.error());
+  const auto surgery =
+      play_scenario(patient->model, patient->config, *adverse, options.seed, progress);
+  if (!surgery) return tl::unexpected(surgery.error());
+  report(progress, "write", 0.0);
+  const std::string suffix = ingredients.empty() ? "" : "+" + name_of(ingredients);
+  return write_surgery(options, options.scenario + suffix, *patient, *surgery);
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/twin/truth_load.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "client/tools/twin/load.hpp"
+#include "common/fem/gravity.hpp"
+#include "common/fem/swelling.hpp"
+
+namespace brainshift::client {
+namespace {
+
+constexpr double kPerDegree = std::numbers::pi / 180.0;
+
+Vec3 turned(const Vec3& direction, const Vec3& turn_deg) {
+  const Vec3 turn = kPerDegree * turn_deg;
+  return Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * direction;
+}
+
+Vec3 value_at(const io::ScorePoint& point, const Points& u) {
+  Vec3 value = Vec3::Zero();
+  for (int k = 0; k < 4; ++k) value += point.weights[k] * u.col(point.nodes[k]);
+  return value;
+}
+
+}  // namespace
+
+Vec3 tilted_gravity(const BrainModel& model, double tilt_deg) {
+  const Vec3 axis =
+      (craniotomy_centre(model) - Vec3(model.tumour.vertices.rowwise().mean())).normalized();
+  return Eigen::AngleAxisd(tilt_deg * kPerDegree, axis) * model.gravity_direction;
+}
+
+Gravity gravity_of(const BrainModel& model, const Scenario& scenario) {
+  const Vec3& error = scenario.adverse.gravity_error_deg;
+  if (scenario.gravity_tilt_deg == 0.0 && scenario.gravity_turn_deg.isZero(0.0) &&
+      error.isZero(0.0)) {
+    return {model.gravity_direction, model.fluid_plane_depth_mm};
+  }
+  const Vec3 direction = turned(
+      turned(tilted_gravity(model, scenario.gravity_tilt_deg), scenario.gravity_turn_deg), error);
+  const Points nodes = model.mesh.nodes(Eigen::all, model.craniotomy);
+  return {direction, (direction.transpose() * nodes).maxCoeff()};
+}
+
+Points gravity_load(const TruthBrain& brain, const Gravity& gravity, double fluid_level_mm) {
+  const double plane = gravity.fluid_plane_depth_mm + fluid_level_mm;
+  const Material& material = brain.config.material;
+  if (brain.elsewhere) {
+    return fem::buoyancy_load(brain.elsewhere->space, material, gravity.direction, plane);
+  }
+  return fem::buoyancy_load(brain.tissue, material, gravity.direction, plane, gravity.direction);
+}
+
+namespace {
+
+// With another mesh at its own vertices, which are the first nodes of its space.
+void add_retraction(const TruthBrain& brain, const Scenario& scenario, Points& load) {
+  if (!scenario.retraction) return;
+  const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
+  load.leftCols(body.mesh.num_nodes()) += retraction_load(body, *scenario.retraction);
+}
+
+Points volume_load(const TruthBrain& brain, const Scenario& scenario) {
+  const Material& material = brain.config.material;
+  const Vec3 centre = swelling_centre(brain.model, scenario.swelling);
+  const Vec3 tumour = brain.model.tumour.vertices.rowwise().mean();
+  if (brain.elsewhere) {
+    const auto change = volume_change_field(brain.model.mesh, tumour, scenario.volume);
+    return fem::swelling_load(brain.elsewhere->space, material, [&](const Vec3& x) {
+      return volume_strain_at(scenario.swelling, (x - centre).norm()) + change(x);
+    });
+  }
+  Points load = swelling_load(brain.tissue, material, centre, scenario.swelling);
+  if (scenario.volume.strain != 0.0) {
+    load += volume_change_load(brain.tissue, material, tumour, scenario.volume);
+  }
+  return load;
+}
+
+}  // namespace
+
+Points constant_load(const TruthBrain& brain, const Scenario& scenario) {
+  Points load = volume_load(brain, scenario);
+  add_retraction(brain, scenario, load);
+  return load;
+}
+
+Points displacement_at_nodes(const TruthBrain& brain, const Points& u) {
+  if (!brain.elsewhere) return u;
+  return brain.elsewhere->nodes.displacement(brain.elsewhere->space, u);
+}
+
+Points displacement_of_tumour(const TruthBrain& brain, const Points& u) {
+  if (brain.elsewhere) return brain.elsewhere->tumour.displacement(brain.elsewhere->space, u);
+  Points values(3, static_cast<Eigen::Index>(brain.tumour.size()));
+  for (std::size_t k = 0; k < brain.tumour.size(); ++k) {
+    values.col(static_cast<Eigen::Index>(k)) = value_at(brain.tumour[k], u);
+  }
+  return values;
+}
+
+}  // namespace brainshift::client

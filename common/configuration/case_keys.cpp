@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/configuration/case_keys.hpp"
+
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+namespace brainshift {
+namespace {
+
+struct Place {
+  std::string key;
+  const std::filesystem::path* path;
+};
+
+// Every path of a case, with its key.
+class PathCollector : public KeyWalker<PathCollector> {
+ public:
+  template <typename T, typename... More>
+  void operator()(const Key& key, const T& value, const More&...) {
+    if constexpr (std::is_same_v<T, std::filesystem::path>) {
+      places.push_back({full(key), &value});
+    } else if constexpr (std::is_same_v<T, std::optional<std::filesystem::path>>) {
+      if (value) places.push_back({full(key), &*value});
+    }
+  }
+  std::vector<Place> places;
+};
+
+std::vector<Place> places_of(const CaseConfig& config) {
+  PathCollector collector;
+  visit(collector, config);
+  return std::move(collector.places);
+}
+
+}  // namespace
+
+std::vector<NamedFile> named_files(const CaseConfig& config) {
+  const bool meshed = std::holds_alternative<MeshGeneration>(config.mesh);
+  std::vector<NamedFile> files;
+  for (const Place& place : places_of(config)) {
+    const bool read = meshed || place.path != &config.brain;
+    if (read && !place.path->empty()) files.push_back({place.key, *place.path});
+  }
+  return files;
+}
+
+std::string key_of(const CaseConfig& config, const std::filesystem::path& member) {
+  for (const Place& place : places_of(config)) {
+    if (place.path == &member) return place.key;
+  }
+  return {};
+}
+
+std::vector<KeyDocument> case_key_documents() {
+  KeyDocumenter documenter;
+  const CaseConfig defaults;
+  visit(documenter, defaults);
+  return documenter.documents();
+}
+
+// What follows the table, of case_config.hpp.
+
+Status validate(const CaseConfig& config) {
+  KeyChecker checker;
+  visit(checker, config);
+  checker.require(!config.brain.empty() || !std::holds_alternative<MeshGeneration>(config.mesh),
+                  "images.brain", "must name a brain mask to mesh");
+  return checker.status();
+}
+
+std::string_view to_string(SurfaceGuidance guidance) { return word_of(guidance, kGuidanceWords); }
+std::string_view to_string(OutsideRegion outside) { return word_of(outside, kOutsideWords); }
+std::string_view to_string(Carry carry) { return word_of(carry, kCarryWords); }
+
+}  // namespace brainshift

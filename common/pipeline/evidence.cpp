@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/pipeline/evidence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace brainshift::pipeline {
+namespace {
+
+SparseData named(SparseData data, const std::string& source) {
+  data.sources = {{source, 0, data.size()}};
+  return data;
+}
+
+}  // namespace
+
+void Evidence::clear() {
+  newest_.clear();
+  suspects_.clear();
+}
+
+void Evidence::put(RegisteredObservation observation) {
+  std::string source = observation.source;
+  suspects_.erase(source);
+  newest_.insert_or_assign(std::move(source), std::move(observation));
+}
+
+void Evidence::suspect(const std::string& source) { suspects_.insert(source); }
+
+void Evidence::trust() { suspects_.clear(); }
+
+std::vector<Omission> Evidence::drop_suspects(const std::string& source, std::int64_t now_ns) {
+  std::vector<Omission> omissions;
+  for (const std::string& suspect : std::set<std::string>(suspects_)) {
+    const auto found = newest_.find(suspect);
+    if (suspect == source || found == newest_.end() || age_s(found->second, now_ns) > max_age_s_) {
+      continue;
+    }
+    omissions.push_back({"source " + suspect,
+                         fmt::format("no usable estimate could be made with observation {}, alone "
+                                     "or beside this one",
+                                     found->second.sequence),
+                         "what it would have shown is not known"});
+    suspects_.erase(suspect);
+    newest_.erase(found);
+  }
+  return omissions;
+}
+
+// A replay that begins again jumps back in time. The future then counts as much as the past.
+double Evidence::age_s(const RegisteredObservation& observation, std::int64_t now_ns) const {
+  return std::abs(static_cast<double>(now_ns) - static_cast<double>(observation.acquired_ns)) / 1e9;
+}
+
+std::vector<const RegisteredObservation*> Evidence::fresh(std::int64_t now_ns) const {
+  std::vector<const RegisteredObservation*> result;
+  for (const auto& [source, observation] : newest_) {
+    if (age_s(observation, now_ns) <= max_age_s_) result.push_back(&observation);
+  }
+  return result;
+}
+
+std::vector<Omission> Evidence::stale(std::int64_t now_ns) const {
+  std::vector<Omission> omissions;
+  for (const auto& [source, observation] : newest_) {
+    const double age = age_s(observation, now_ns);
+    if (age <= max_age_s_) continue;
+    omissions.push_back({"source " + source,
+                         fmt::format("observation {} is {:.0f} s old, sensing.max_age_s = {:g}",
+                                     observation.sequence, age, max_age_s_),
+                         "what it would have shown is not known"});
+  }
+  return omissions;
+}
+
+CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations)
+    : observations_(std::move(observations)) {
+  for (const RegisteredObservation* observation : observations_) {
+    if (!observation->surface) {
+      parts_.push_back(observation->data);
+      continue;
+    }
+    followers_.push_back({parts_.size(), {}});
+    parts_.push_back(named(observation->surface->first(), observation->source));
+  }
+  gather_nodes();
+  data_ = combine(parts_);
+  moving_.relocate = [this](const Points& u, SparseData& data) { return relocate(u, data); };
+}
+
+// The union of the followers' nodes, and the place of each follower's nodes in it.
+void CombinedData::gather_nodes() {
+  std::vector<NodeIndex>& all = moving_.nodes;
+  const auto nodes_of = [&](const Follower& follower) -> const std::vector<NodeIndex>& {
+    return observations_[follower.part]->surface->nodes();
+  };
+  for (const Follower& follower : followers_) {
+    all.insert(all.end(), nodes_of(follower).begin(), nodes_of(follower).end());
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  for (Follower& follower : followers_) {
+    for (const NodeIndex node : nodes_of(follower)) {
+      const auto place = std::lower_bound(all.begin(), all.end(), node);
+      follower.columns.push_back(static_cast<int>(place - all.begin()));
+    }
+  }
+}
+
+bool CombinedData::relocate(const Points& u, SparseData& data) {
+  bool moved = false;
+  for (const Follower& follower : followers_) {
+    const RegisteredObservation& observation = *observations_[follower.part];
+    SparseData now =
+        named(observation.surface->at(u(Eigen::all, follower.columns)), observation.source);
+    if (!observation.surface->moved(parts_[follower.part], now)) continue;
+    parts_[follower.part] = std::move(now);
+    moved = true;
+  }
+  if (moved) data = combine(parts_);
+  return moved;
+}
+
+void CombinedData::describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const {
+  for (SourceSummary& summary : sources) {
+    for (const RegisteredObservation* observation : observations_) {
+      if (observation->source != summary.source) continue;
+      summary.observation_sequence = observation->sequence;
+      summary.outliers += observation->outliers;
+      summary.age_s = 1e-9 * static_cast<double>(now_ns - observation->acquired_ns);
+    }
+  }
+}
+
+}  // namespace brainshift::pipeline

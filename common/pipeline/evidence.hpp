@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Evidence: the newest registered observation of every source of a session, and what an update
+// makes of them.
+//
+// Sources are used together. An update that the tumour's boundary asks for also uses the newest
+// view of the cortex, as long as that view is not older than sensing.max_age_s by the observations'
+// own clock.
+//
+// An observation whose own update was unusable is *suspect*: it may be wrong, or other sources may
+// be missing. The next update tries with it. If that one is usable, it is trusted again; else it is
+// forgotten, and the update is made without it. Not thread-safe.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/inversion/contract/moving_data.hpp"
+#include "common/pipeline/registration_stage.hpp"
+#include "common/values/estimate.hpp"
+
+namespace brainshift::pipeline {
+
+class Evidence {
+ public:
+  explicit Evidence(double max_age_s) : max_age_s_(max_age_s) {}
+  void clear();
+  // Replaces the earlier observation of the same source, suspect or not.
+  void put(RegisteredObservation observation);
+  // Forgets the source's observation: no estimate could be made with it.
+  void drop(const std::string& source) { newest_.erase(source); }
+  // No usable estimate could be made with the source's observation and the others.
+  void suspect(const std::string& source);
+  // A usable estimate was made with all that are fresh.
+  void trust();
+  // Forgets the suspects that are fresh, but not that of `source`. Who they were and why they are
+  // not used, for Update::left_out; empty when there was none.
+  std::vector<Omission> drop_suspects(const std::string& source, std::int64_t now_ns);
+
+  // Observations to use together with one of this time, in the order of their sources' names.
+  std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
+  // Why the others are not used, for Update::left_out.
+  std::vector<Omission> stale(std::int64_t now_ns) const;
+
+ private:
+  double age_s(const RegisteredObservation& observation, std::int64_t now_ns) const;
+
+  double max_age_s_;
+  std::map<std::string, RegisteredObservation> newest_;
+  std::set<std::string> suspects_;  // sources
+};
+
+// Data of several observations as one. Data that follow the deformation begin where their
+// observation alone says (SurfaceDistances::first), so that an estimate does not depend on earlier
+// ones. They are measured anew whenever the inversion asks with a displacement.
+class CombinedData {
+ public:
+  explicit CombinedData(std::vector<const RegisteredObservation*> observations);
+
+  const SparseData& data() const { return data_; }
+  // Null when nothing moves. Valid as long as this object.
+  const inversion::MovingData* moving() const { return followers_.empty() ? nullptr : &moving_; }
+  // Fills observation_sequence and age of the estimate's sources, and adds the outliers of their
+  // alignment.
+  void describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const;
+
+  CombinedData(const CombinedData&) = delete;
+  CombinedData& operator=(const CombinedData&) = delete;
+
+ private:
+  // An observation (and part) that follows the deformation.
+  struct Follower {
+    std::size_t part = 0;
+    std::vector<int> columns;  // of its nodes among moving_.nodes
+  };
+  void gather_nodes();
+  bool relocate(const Points& u, SparseData& data);
+
+  std::vector<const RegisteredObservation*> observations_;
+  std::vector<SparseData> parts_;
+  std::vector<Follower> followers_;
+  inversion::MovingData moving_;
+  SparseData data_;
+};
+
+}  // namespace brainshift::pipeline

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What an update leaves out of the physics, why, and how much that costs.
+#pragma once
+
+#include <vector>
+
+#include "common/configuration/case_config.hpp"
+#include "common/inversion/contract/omission_errors.hpp"
+#include "common/registration/icp.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/estimate.hpp"
+
+namespace brainshift::pipeline {
+
+// Time after which pore pressure has drained: R^2 / c_v with c_v = k / (S + alpha^2 / (lambda + 2
+// G)), Biot's theory in one dimension. R: radius of the ball with the mesh's volume. Seconds.
+double consolidation_time_s(const TetMesh& mesh, const Material& material);
+
+// Upper bound of the part of a load's final displacement that is still missing `seconds` after it
+// was applied: exp(-(pi^2/4) t/T), T the consolidation time. Terzaghi's series for a layer of
+// thickness R that drains on one side, 8/pi^2 sum exp(-(2m+1)^2 (pi^2/4) t/T) / (2m+1)^2, with
+// every exponential replaced by the first.
+double undrained_fraction(double seconds, double consolidation_time_s);
+
+// The same for one backward-Euler step of that length from rest, which scene.pressure = on takes:
+// 1 / (1 + (pi^2/4) t/T), above the other for every t.
+double implicit_step_fraction(double seconds, double consolidation_time_s);
+
+// Parts of the prior that the case switches off, each with what it moves where it acts: median of
+// the motion under the default prior, at the cortex and at the tumour (docs/decisions/0018).
+std::vector<Omission> prior_omissions(const PriorConfig& prior);
+
+// Fixed by case, method and boundary: pressure, uncertainty, contact under the fixed boundary, and
+// parts of the prior.
+std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
+                                      Method method, Boundary boundary);
+
+// What one inversion left out: contact (forced off, or no slave touched), gravity modes, far field.
+std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary boundary,
+                                          const inversion::OmissionErrors& errors,
+                                          int active_slaves);
+
+// What the alignment of one observation did not estimate: rotation (switched off, or not
+// observable). start_only: the alignment is where distances start and says nothing else; the
+// inversion estimates what they show of a rotation. It is named too when it did not converge.
+std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
+                                             double rotation_prior_sd_deg, bool start_only);
+
+}  // namespace brainshift::pipeline

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pipeline: Observation -> register -> SparseData -> invert -> Estimate -> Update, for one patient,
+// one method and one boundary condition.
+//
+//   fixed at build    patient, case, method, boundary, surfaces to register to, omissions of the
+//                     scene
+//   state             evidence (the newest observation of every source) and what the inverter
+//                     reuses; reset() forgets both
+// It knows no socket, no log and no wire format. Not thread-safe: a session's worker owns it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "common/configuration/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/inversion/inverter.hpp"
+#include "common/pipeline/evidence.hpp"
+#include "common/pipeline/registration_stage.hpp"
+#include "common/values/brain_model.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
+
+namespace brainshift::pipeline {
+
+// Of one observation.
+struct RunOptions {
+  // Called on the running thread with each iterate (final == false); may be empty.
+  std::function<void(Update)> on_iterate;
+  std::stop_token stop;
+};
+
+class Pipeline {
+ public:
+  // Indexes the surfaces; kEmptySet or kNotFinite when the model has no usable one. inverter: for
+  // this method and boundary.
+  static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
+                                Method method, Boundary boundary,
+                                std::unique_ptr<inversion::Inverter> inverter);
+
+  // Fills everything of an Update except its sequence number and the encode and journal times,
+  // which belong to later stages. The inverter writes into the update's own estimate. Errors of
+  // registration and inversion pass through unchanged; such an observation is not used again. One
+  // without a usable estimate (values/quality.hpp) is tried once more beside the next
+  // (evidence.hpp), and no later update starts from an unusable field.
+  // Precondition: the observation's numbers are finite (wire::decode_observation).
+  Result<Update> run(const Observation& observation, const RunOptions& options = {});
+
+  // A session begins: forgets what earlier ones observed and estimated.
+  void reset();
+
+ private:
+  Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Method method,
+           Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
+           RegistrationTargets targets);
+  Status register_into(const Observation& observation, Update& update);
+  Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
+  // From what the evidence holds now.
+  Status try_estimate(const Observation& observation, const RunOptions& options, Update& update);
+
+  std::shared_ptr<const BrainModel> model_;
+  CaseConfig config_;
+  Method method_;
+  Boundary boundary_;
+  RegistrationTargets targets_;
+  std::vector<Omission> model_omissions_;  // the same for every update
+
+  Evidence evidence_;
+  std::unique_ptr<inversion::Inverter> inverter_;
+};
+
+}  // namespace brainshift::pipeline

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/pipeline/registration_stage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/core/random.hpp"
+#include "common/core/statistics.hpp"
+#include "common/registration/alignment_data.hpp"
+
+namespace brainshift::pipeline {
+namespace {
+
+// Any fixed number; it makes a replay repeatable.
+constexpr std::uint64_t kSubsetSeed = 20090627;
+
+// Welsch weight exp(-r^2 / 2 s^2) of a point two scales off. A point with less lies on something
+// else.
+const double kLeastWelschWeight = std::exp(-2.0);
+
+// The scale of a Welsch kernel in units of the median residual (2.7 standard deviations of a
+// Gaussian, whose median is 0.6745) and, at least, of the points' own standard deviation: either
+// way the estimate keeps 98 % of the efficiency that least squares has for Gaussian errors, (1 +
+// 1/s^2)^-3 (1 + 2/s^2)^(3/2) (Holland & Welsch 1977, Comm. Stat. A6:813).
+constexpr double kScaleOverMedian = 4.0;
+constexpr double kScaleOverSd = 3.0;
+// A residual of seven scales. Welsch weights underflow far behind it, and a median does not need
+// them.
+constexpr double kSmallestWelschWeight = 1e-12;
+// Points of a boundary that are averaged for each that guides the model.
+constexpr int kMeasuredPerPoint = 10;
+
+// Ascending, so that neighbouring data stay neighbours; the same for the same number of points.
+std::vector<int> some_of(const std::vector<int>& points, int wanted) {
+  std::vector<int> chosen = Random(kSubsetSeed).choose(wanted, static_cast<int>(points.size()));
+  std::sort(chosen.begin(), chosen.end());
+  for (int& one : chosen) one = points[static_cast<std::size_t>(one)];
+  return chosen;
+}
+
+SparseData select(const SparseData& data, const std::vector<int>& columns) {
+  const auto size = static_cast<Eigen::Index>(columns.size());
+  SparseData subset;
+  subset.positions.resize(3, size);
+  subset.displacements.resize(3, size);
+  subset.sd_mm.resize(size);
+  subset.common_error.resize(data.common_error.rows() > 0 ? 3 * size : 0, data.common_error.cols());
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const int column = columns[static_cast<std::size_t>(i)];
+    subset.positions.col(i) = data.positions.col(column);
+    subset.displacements.col(i) = data.displacements.col(column);
+    subset.sd_mm(i) = data.sd_mm(column);
+    if (subset.common_error.rows() > 0) {
+      subset.common_error.middleRows<3>(3 * i) = data.common_error.middleRows<3>(3 * column);
+    }
+  }
+  return subset;
+}
+
+double datum_sd_mm(double observed_mm, const InversionConfig& config, Method method) {
+  const bool condensed = method == Method::kCondensed || method == Method::kCondensedExact;
+  return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
+}
+
+// The scale that fits points with these Welsch weights, never wider than the scale they came from.
+double fitting_scale_mm(const VecX& weights, const registration::IcpOptions& options) {
+  std::vector<double> residuals;
+  for (const double weight : weights) {
+    residuals.push_back(options.welsch_scale_mm *
+                        std::sqrt(-2.0 * std::log(std::max(weight, kSmallestWelschWeight))));
+  }
+  const double median = percentile(residuals, 50.0);
+  const double least = std::min(kScaleOverSd * options.sd_mm, options.welsch_scale_mm);
+  return std::clamp(kScaleOverMedian * median, least, options.welsch_scale_mm);
+}
+
+struct Alignment {
+  registration::IcpResult icp;
+  std::vector<int> inliers;  // indices of the points that it holds for, ascending
+  int outliers = 0;          // points that the alignment leaves aside
+};
+
+// Aligned rigidly from the tracked pose, which is the identity: the points arrive in patient RAS.
+Result<Alignment> align(const Points& points, double observed_sd_mm,
+                        const registration::TargetSurface& surface, const CaseConfig& config) {
+  registration::IcpOptions options;
+  options.rotation = config.scene.rotation != Carry::kOff;
+  if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
+  if (observed_sd_mm > 0.0) options.sd_mm = observed_sd_mm;
+  auto icp = registration::align(points, surface, RigidTransform::Identity(), options);
+  if (!icp) return tl::unexpected(icp.error());
+  // Again with a scale that fits these points, so that gross errors of a few millimetres count for
+  // nothing.
+  options.welsch_scale_mm = fitting_scale_mm(icp->weights, options);
+  icp = registration::align(points, surface, icp->T_surface_points, options);
+  if (!icp) return tl::unexpected(icp.error());
+  std::vector<int> inliers;
+  for (int i = 0; i < icp->weights.size(); ++i) {
+    if (icp->weights[i] >= kLeastWelschWeight) inliers.push_back(i);
+  }
+  if (inliers.size() < 3) {
+    return fail(
+        ErrorCode::kNotConverged,
+        fmt::format("alignment: {} of {} points lie on the surface after it, at least 3 are "
+                    "needed; residual {:.1f} mm",
+                    inliers.size(), points.cols(), icp->rms_mm));
+  }
+  Alignment alignment;
+  alignment.outliers = static_cast<int>(points.cols()) - static_cast<int>(inliers.size());
+  alignment.inliers = std::move(inliers);
+  alignment.icp = std::move(*icp);
+  return alignment;
+}
+
+// Displacements by a rigid alignment (paper 2.7).
+RegisteredObservation from_alignment(const Points& points, double sd_mm, Alignment alignment,
+                                     int guiding) {
+  RegisteredObservation registered;
+  registered.data = select(registration::sparse_data_from_alignment(points, alignment.icp, sd_mm),
+                           some_of(alignment.inliers, guiding));
+  registered.outliers = alignment.outliers;
+  registered.icp = std::move(alignment.icp);
+  return registered;
+}
+
+bool follows_deformation(SurfaceGuidance guidance, Method method) {
+  return guidance == SurfaceGuidance::kDistances && method == Method::kCondensed;
+}
+
+Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
+                                            const RegistrationTargets& targets,
+                                            const CaseConfig& config, Method method) {
+  const auto target = targets.tumour_distance
+                          ? registration::TargetSurface(*targets.tumour_distance)
+                          : registration::TargetSurface(targets.tumour->surface().at_rest());
+  auto alignment = align(body.points, body.sd_mm, target, config);
+  if (!alignment) return tl::unexpected(alignment.error());
+  const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
+  if (!follows_deformation(config.sensing.tumour, method)) {
+    return from_alignment(body.points, sd_mm, std::move(*alignment),
+                          config.inversion.sparse_points);
+  }
+  registration::SurfaceDistanceOptions options;
+  options.points = config.inversion.sparse_points;
+  options.sd_mm = sd_mm;
+  options.shared_sd_mm = config.sensing.boundary_error_sd_mm;
+  options.average_mm = config.sensing.boundary_average_mm;
+  options.pose_sd_mm = config.sensing.probe_pose_sd_mm;
+  options.pose_sd_deg = config.sensing.probe_pose_sd_deg;
+  options.fewest = 3;
+  options.measured = "tumour boundary";
+  options.surface = "tumour";
+  const int per_point = options.average_mm > 0.0 ? kMeasuredPerPoint : 1;
+  const std::vector<int> used = some_of(alignment->inliers, per_point * options.points);
+  auto surface = registration::SurfaceDistances::build(
+      targets.tumour, body.points(Eigen::all, used), options, alignment->icp.T_surface_points);
+  if (!surface) return tl::unexpected(surface.error());
+  RegisteredObservation registered;
+  registered.surface = std::move(*surface);
+  registered.outliers = alignment->outliers;
+  registered.icp = std::move(alignment->icp);
+  return registered;
+}
+
+Result<RegisteredObservation> from_surface(const CorticalSurface& body,
+                                           const RegistrationTargets& targets,
+                                           const CaseConfig& config, Method method) {
+  if (!targets.site || targets.craniotomy == nullptr) {
+    return fail(ErrorCode::kEmptySet,
+                "cortical surface: the craniotomy of the model has no triangle to compare it with");
+  }
+  auto checked = geometry::check_cortical_surface(body.surface, *targets.site);
+  if (!checked) return tl::unexpected(checked.error());
+  const SensingConfig& sensing = config.sensing;
+  const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
+  if (!follows_deformation(sensing.surface, method)) {
+    auto alignment =
+        align(body.surface.vertices, body.sd_mm, targets.craniotomy->surface().at_rest(), config);
+    if (!alignment) return tl::unexpected(alignment.error());
+    return from_alignment(body.surface.vertices, sd_mm, std::move(*alignment),
+                          sensing.surface_points);
+  }
+  registration::SurfaceDistanceOptions options;
+  options.points = sensing.surface_points;
+  options.sd_mm = sd_mm;
+  options.pose_sd_mm = sensing.surface_pose_sd_mm;
+  options.pose_sd_deg = sensing.surface_pose_sd_deg;
+  auto surface =
+      registration::SurfaceDistances::build(targets.craniotomy, body.surface.vertices, options);
+  if (!surface) return tl::unexpected(surface.error());
+  RegisteredObservation registered;
+  registered.surface = std::move(*surface);
+  return registered;
+}
+
+Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const CaseConfig& config,
+                                             Method method) {
+  if (pairs.undeformed.cols() != pairs.deformed.cols()) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("landmark_pairs: {} undeformed but {} deformed points",
+                            pairs.undeformed.cols(), pairs.deformed.cols()));
+  }
+  if (pairs.undeformed.cols() < 3) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("landmark_pairs: {} pairs, at least 3 are needed", pairs.undeformed.cols()));
+  }
+  RegisteredObservation registered;
+  registered.data.positions = pairs.undeformed;
+  registered.data.displacements = pairs.deformed - pairs.undeformed;
+  registered.data.sd_mm =
+      VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config.inversion, method));
+  registered.data.common_error = registration::pose_errors(
+      pairs.undeformed, config.sensing.landmark_pose_sd_mm, config.sensing.landmark_pose_sd_deg);
+  return registered;
+}
+
+Result<RegisteredObservation> register_body(const Observation& observation,
+                                            const RegistrationTargets& targets,
+                                            const CaseConfig& config, Method method) {
+  if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
+    return from_boundary(*boundary, targets, config, method);
+  }
+  if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
+    return from_landmarks(*pairs, config, method);
+  }
+  if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
+    if (config.scene.surface == Carry::kOff) {
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
+                      observation.sequence));
+    }
+    return from_surface(*surface, targets, config, method);
+  }
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("observation {}: a patient_pose is not assimilated in this version",
+                          observation.sequence));
+}
+
+}  // namespace
+
+Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) {
+  RegistrationTargets targets;
+  auto tumour = registration::IndexedPatch::build(registration::tumour_patch(model));
+  if (!tumour) return tl::unexpected(tumour.error());
+  targets.tumour = std::move(*tumour);
+  if (auto distance = geometry::DistanceVolume::create(model.tumour_distance)) {
+    targets.tumour_distance = std::move(*distance);
+  }
+  if (auto patch = registration::IndexedPatch::build(registration::craniotomy_patch(model))) {
+    targets.craniotomy = std::move(*patch);
+  }
+  if (const auto site = geometry::craniotomy_site(model)) targets.site = *site;
+  return targets;
+}
+
+Result<RegisteredObservation> register_observation(const Observation& observation,
+                                                   const RegistrationTargets& targets,
+                                                   const CaseConfig& config, Method method) {
+  auto registered = register_body(observation, targets, config, method);
+  if (!registered) return registered;
+  registered->source = observation.source;
+  registered->sequence = observation.sequence;
+  registered->acquired_ns = observation.acquired_ns;
+  registered->data.sources = {{observation.source, 0, registered->data.size()}};
+  return registered;
+}
+
+}  // namespace brainshift::pipeline

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/bridge/inbox.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "common/geometry/surface.hpp"
+#include "common/igtl/surface.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/virtual_sweep.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using std::chrono::milliseconds;
+using test_support::VirtualSweep;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+const Inbox::TimePoint kBegin{std::chrono::hours(1)};
+
+igtl::Message message(const std::string& device, igtl::Content content) {
+  igtl::Message made;
+  made.envelope.device = device;
+  made.content = std::move(content);
+  return made;
+}
+
+TriangleSurface ball() { return geometry::ellipsoid_surface(Vec3(1, 2, 3), Vec3(8, 7, 6), 3.0); }
+
+igtl::PointList points(const std::vector<std::pair<std::string, Vec3>>& named) {
+  igtl::PointList list;
+  for (const auto& [name, at] : named) {
+    igtl::NamedPoint point;
+    point.name = name;
+    point.position = at.cast<float>();
+    list.points.push_back(point);
+  }
+  return list;
+}
+
+TEST(Inbox, ANamedModelIsTheTumoursBoundary) {
+  Inbox inbox = Inbox::open({.tumour_device = "TumourNow", .sd_mm = 0.7}).value();
+  EXPECT_THAT(inbox.take(message("Other", igtl::from_surface(ball())), kBegin).found, IsEmpty());
+  const Taken taken = inbox.take(message("TumourNow", igtl::from_surface(ball())), kBegin);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  EXPECT_THAT(taken.notes, IsEmpty());
+  const auto& boundary = std::get<TumourBoundary>(taken.found[0].body);
+  EXPECT_EQ(taken.found[0].source, "TumourNow");
+  EXPECT_EQ(boundary.sd_mm, 0.7);
+  EXPECT_TRUE(boundary.points.isApprox(ball().vertices, 1e-6));
+  EXPECT_EQ(taken.found[0].acquired, kBegin);
+}
+
+TEST(Inbox, ANamedModelIsTheCortexWithItsTriangles) {
+  Inbox inbox = Inbox::open({.surface_device = "Cortex"}).value();
+  const Taken taken = inbox.take(message("Cortex", igtl::from_surface(ball())), kBegin);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  const auto& cortex = std::get<CorticalSurface>(taken.found[0].body);
+  EXPECT_EQ(cortex.surface.num_triangles(), ball().num_triangles());
+  const Taken bare = inbox.take(message("Cortex", points({{"a", Vec3(1, 2, 3)}})), kBegin);
+  ASSERT_THAT(bare.found, SizeIs(1));
+  EXPECT_EQ(std::get<CorticalSurface>(bare.found[0].body).surface.num_triangles(), 0);
+}
+
+TEST(Inbox, PointsAreTheTumoursBoundaryToo) {
+  Inbox inbox = Inbox::open({.tumour_device = "F"}).value();
+  const Taken taken =
+      inbox.take(message("F", points({{"F-1", Vec3(1, 2, 3)}, {"F-2", Vec3(4, 5, 6)}})), kBegin);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  EXPECT_EQ(std::get<TumourBoundary>(taken.found[0].body).points.col(1), Vec3(4, 5, 6));
+  EXPECT_THAT(inbox.take(message("F", igtl::PointList{}), kBegin).notes,
+              ElementsAre("F: it has no point"));
+}
+
+TEST(Inbox, LandmarksArePairedByName) {
+  Inbox inbox = Inbox::open({.landmarks_before = "Before", .landmarks_after = "After"}).value();
+  const auto after = message("After", points({{"b", Vec3(2, 2, 3)}, {"c", Vec3(9, 9, 9)}}));
+  EXPECT_THAT(inbox.take(after, kBegin).notes, Contains(HasSubstr("no point has the name")));
+  inbox.take(message("Before", points({{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 2, 3)}})), kBegin);
+  const Taken taken = inbox.take(after, kBegin);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  const auto& pairs = std::get<LandmarkPairs>(taken.found[0].body);
+  ASSERT_EQ(pairs.deformed.cols(), 1);
+  EXPECT_EQ(pairs.undeformed.col(0), Vec3(1, 2, 3));
+  EXPECT_EQ(pairs.deformed.col(0), Vec3(2, 2, 3));
+}
+
+TEST(Inbox, ModelsOfAnotherFrameFollowTheNewestTransforms) {
+  const test_support::TemporaryFolder folder;
+  const auto registration = folder.path() / "T.txt";
+  std::ofstream(registration) << "1 0 0 100\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  Inbox inbox =
+      Inbox::open({.tumour_device = "F", .model_frame = "Stylus", .registration = registration})
+          .value();
+  const auto touched = message("F", points({{"F-1", Vec3(1, 2, 3)}}));
+  EXPECT_THAT(inbox.take(touched, kBegin).notes, Contains(HasSubstr("Stylus")));
+  igtl::Matrix34f matrix = igtl::Matrix34f::Identity();
+  matrix(1, 3) = 10.0F;
+  inbox.take(message("StylusToReference", igtl::Transform{matrix}), kBegin);
+  const Taken taken = inbox.take(touched, kBegin);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  EXPECT_EQ(std::get<TumourBoundary>(taken.found[0].body).points.col(0), Vec3(101, 12, 3));
+  auto lost = message("StylusToReference", igtl::Transform{matrix});
+  lost.envelope.metadata.push_back({"TransformStatus", "OUT_OF_VIEW"});
+  inbox.take(lost, kBegin);
+  EXPECT_THAT(inbox.take(touched, kBegin).found, IsEmpty()) << "the pose is not known any more";
+}
+
+TEST(Inbox, KeepsNoMoreThanItUses) {
+  const Inbox none = Inbox::open({}).value();
+  EXPECT_FALSE(none.from_peers().is_wanted("POLYDATA"));
+  EXPECT_FALSE(none.from_upstream().is_wanted("IMAGE"));
+  EXPECT_TRUE(none.from_peers().is_wanted("GET_STATUS"));
+  const Inbox models = Inbox::open({.tumour_device = "F"}).value();
+  EXPECT_TRUE(models.from_peers().is_wanted("POLYDATA"));
+  EXPECT_TRUE(models.from_upstream().is_wanted("POINT"));
+  EXPECT_FALSE(models.from_upstream().is_wanted("IMAGE"));
+  EXPECT_FALSE(models.from_peers().is_wanted("STRING"));
+}
+
+// A sweep over an ellipsoid at a known place, sent as PlusServer sends it.
+class InboxSweep : public testing::Test {
+ protected:
+  void SetUp() override {
+    options.device = folder.path() / "device.xml";
+    std::ofstream(options.device) << sweep.device_text();
+    options.registration = folder.path() / "T.txt";
+    std::ofstream(options.registration)
+        << test_support::matrix_text(sweep.T_ras_reference().matrix());
+  }
+  void write_contours() {
+    options.contours = folder.path() / "contours.csv";
+    std::ofstream stream(options.contours);
+    stream.precision(12);
+    for (int frame = 0; frame < sweep.frames; ++frame) {
+      const auto contour = sweep.section(frame, 90);
+      for (Eigen::Index i = 0; i < contour.points_px.cols(); ++i) {
+        stream << frame << ',' << contour.points_px(0, i) << ',' << contour.points_px(1, i) << '\n';
+      }
+    }
+  }
+  void write_seed() {
+    options.seeds = folder.path() / "seeds.csv";
+    const int middle = sweep.frames / 2;
+    const Eigen::Vector2d centre = sweep.section(middle).points_px.rowwise().mean();
+    std::ofstream(options.seeds) << middle << ',' << centre[0] << ',' << centre[1] << '\n';
+  }
+  static igtl::Matrix34f matrix_of(const std::string& numbers) {
+    Eigen::Matrix4d matrix;
+    std::istringstream stream(numbers);
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column) stream >> matrix(row, column);
+    return igtl::from_matrix(matrix);
+  }
+  // The messages of all frames; the last one's time.
+  Inbox::TimePoint play(Inbox& inbox) {
+    const auto content = sweep.content();
+    const std::size_t bytes = static_cast<std::size_t>(sweep.width * sweep.height);
+    Inbox::TimePoint now = kBegin;
+    for (std::size_t frame = 0; frame < content.frames.size(); ++frame) {
+      now = kBegin + milliseconds(100 * static_cast<int>(frame));
+      const auto time = igtl::to_timestamp(milliseconds(5000 + 100 * static_cast<int>(frame)));
+      const auto send = [&](igtl::Message made) {
+        made.envelope.timestamp = time;
+        const Taken taken = inbox.take(made, now);
+        EXPECT_THAT(taken.found, IsEmpty()) << "a sweep ends with a gap";
+        EXPECT_THAT(taken.notes, IsEmpty());
+      };
+      igtl::Image image;
+      image.geometry.dims = image.part = {sweep.width, sweep.height, 1};
+      const auto* pixels =
+          reinterpret_cast<const std::uint8_t*>(content.pixels.data()) + frame * bytes;
+      image.voxels = std::vector<std::uint8_t>(pixels, pixels + bytes);
+      send(message("Image_Reference", image));
+      for (const auto& [name, value] : content.frames[frame]) {
+        constexpr std::string_view kEnd = "Transform";
+        if (!name.ends_with(kEnd)) continue;
+        auto transform =
+            message(name.substr(0, name.size() - kEnd.size()), igtl::Transform{matrix_of(value)});
+        transform.envelope.metadata.push_back(
+            {"TransformStatus", content.frames[frame].at(name + "Status")});
+        send(transform);
+      }
+    }
+    return now;
+  }
+
+  test_support::TemporaryFolder folder;
+  VirtualSweep sweep;
+  InboxOptions options;
+};
+
+TEST_F(InboxSweep, ContoursOfASweepAreTheBoundaryInRas) {
+  write_contours();
+  Inbox inbox = Inbox::open(options).value();
+  const auto last = play(inbox);
+  EXPECT_THAT(inbox.tick(last + milliseconds(1900)).found, IsEmpty());
+  const Taken taken = inbox.tick(last + milliseconds(2100));
+  ASSERT_THAT(taken.found, SizeIs(1)) << testing::PrintToString(taken.notes);
+  EXPECT_EQ(taken.found[0].source, "ius");
+  EXPECT_EQ(taken.found[0].acquired, last);
+  EXPECT_THAT(taken.found[0].told, HasSubstr("sweep of 21 images"));
+  const Points& boundary = std::get<TumourBoundary>(taken.found[0].body).points;
+  EXPECT_GT(boundary.cols(), 1000);
+  for (Eigen::Index i = 0; i < boundary.cols(); ++i) {
+    EXPECT_LT(std::abs(sweep.distance_mm(boundary.col(i))), 0.02);
+  }
+  EXPECT_THAT(inbox.tick(last + milliseconds(9000)).found, IsEmpty()) << "once";
+}
+
+TEST_F(InboxSweep, TheNextSweepEndsTheOneBeforeAndCountsItsOwnImages) {
+  write_contours();
+  Inbox inbox = Inbox::open(options).value();
+  play(inbox);
+  const Taken taken =
+      inbox.take(message("ProbeToTracker", igtl::Transform{}), kBegin + std::chrono::seconds(60));
+  EXPECT_THAT(taken.found, SizeIs(1));
+}
+
+TEST_F(InboxSweep, ASeedIsTraced) {
+  sweep.speckle = 0.1;
+  write_seed();
+  Inbox inbox = Inbox::open(options).value();
+  const auto last = play(inbox);
+  const Taken taken = inbox.tick(last + milliseconds(2100));
+  ASSERT_THAT(taken.found, SizeIs(1)) << testing::PrintToString(taken.notes);
+  EXPECT_THAT(taken.notes, Contains(HasSubstr("bright lesion traced")));
+  const Points& boundary = std::get<TumourBoundary>(taken.found[0].body).points;
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < boundary.cols(); ++i) {
+    sum += std::abs(sweep.distance_mm(boundary.col(i)));
+  }
+  EXPECT_LT(sum / static_cast<double>(boundary.cols()), 0.5);
+}
+
+TEST_F(InboxSweep, ASweepThatGivesNothingSaysWhy) {
+  write_contours();
+  std::ofstream(options.contours) << "999,1,1\n999,2,1\n999,2,2\n";
+  Inbox inbox = Inbox::open(options).value();
+  const auto last = play(inbox);
+  const Taken taken = inbox.tick(last + milliseconds(2100));
+  EXPECT_THAT(taken.found, IsEmpty());
+  EXPECT_THAT(taken.notes, Contains(HasSubstr("1 contours are of images that the sweep of 21")));
+  std::filesystem::remove(options.contours);
+  play(inbox);
+  EXPECT_THAT(inbox.tick(kBegin + std::chrono::seconds(60)).notes,
+              Contains(HasSubstr("contours.csv")));
+}
+
+}  // namespace
+}  // namespace brainshift::client

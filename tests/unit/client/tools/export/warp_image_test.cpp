@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/export/warp_image.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+namespace brainshift::client {
+namespace {
+
+using testing::HasSubstr;
+
+// v = 3 i + 5 j - 7 k on 1 x 2 x 3 mm voxels.
+VoxelImage ramp() {
+  VoxelImage image;
+  image.dims = {12, 10, 8};
+  image.T_ras_voxel.linear() = Vec3(1, 2, 3).asDiagonal();
+  image.T_ras_voxel.translation() = Vec3(-5, 4, 2);
+  for (int k = 0; k < 8; ++k)
+    for (int j = 0; j < 10; ++j)
+      for (int i = 0; i < 12; ++i)
+        image.values.push_back(static_cast<float>(3 * i + 5 * j - 7 * k));
+  return image;
+}
+double ramp_at(const Vec3& x) { return 3 * (x[0] + 5) + 5 * (x[1] - 4) / 2 - 7 * (x[2] - 2) / 3; }
+
+// One voxel wherever it is wanted.
+io::DisplacementField one_voxel(const Vec3& place, const Vec3& v) {
+  io::DisplacementField field;
+  field.grid.dims = {1, 1, 1};
+  field.grid.T_ras_voxel.translation() = place;
+  field.ras_mm = {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  return field;
+}
+
+TEST(WarpImage, AVoxelAsksTheImageWhereItComesFrom) {
+  const Vec3 x(0.25, 9, 10), v(1.5, -2.25, 3.0);
+  const auto warped = warp_image(ramp(), one_voxel(x, v));
+  ASSERT_TRUE(warped) << warped.error().message;
+  EXPECT_NEAR(warped->values.at(0), ramp_at(x + v), 1e-4);
+}
+
+TEST(WarpImage, ALinearImageIsWarpedExactlyOnAnObliqueGrid) {
+  io::DisplacementField field;
+  field.grid.dims = {6, 5, 4};
+  field.grid.T_ras_voxel.linear() =
+      Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  field.grid.T_ras_voxel.translation() = Vec3(-2, 8, 8);
+  for (std::size_t i = 0; i < 3 * field.grid.num_voxels(); ++i) {
+    field.ras_mm.push_back(0.01F * static_cast<float>(i % 70));
+  }
+  const auto warped = warp_image(ramp(), field);
+  ASSERT_TRUE(warped);
+  for (int k = 0; k < 4; ++k)
+    for (int j = 0; j < 5; ++j)
+      for (int i = 0; i < 6; ++i) {
+        const std::size_t voxel = field.grid.index(i, j, k);
+        const float* v = &field.ras_mm[3 * voxel];
+        EXPECT_NEAR(warped->values[voxel],
+                    ramp_at(field.grid.voxel_mm(i, j, k) + Vec3(v[0], v[1], v[2])), 1e-4);
+      }
+}
+
+TEST(WarpImage, HalfAVoxelBeyondTheBorderHasTheBordersValueAndFartherOutZero) {
+  const VoxelImage image = ramp();
+  io::DisplacementField field = one_voxel({6.4, 4, 2}, Vec3::Zero());  // last voxel at x = 6
+  field.grid.dims = {2, 1, 1};                                         // the second at 7.4
+  field.ras_mm.resize(6, 0.0F);
+  const auto warped = warp_image(image, field);
+  ASSERT_TRUE(warped);
+  EXPECT_EQ(warped->values[0], 33.0F);
+  EXPECT_EQ(warped->values[1], 0.0F);
+}
+
+TEST(WarpImage, AVoxelThatIsNotFiniteCountsAsZero) {
+  VoxelImage image = ramp();
+  image.values[0] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(warp_image(image, one_voxel({-5, 4, 2}, Vec3::Zero()))->values[0], 0.0F);
+  EXPECT_EQ(warp_image(image, one_voxel({-4, 4, 2}, Vec3::Zero()))->values[0], 3.0F);
+}
+
+TEST(WarpImage, TheOtherDirectionAndAnImageElsewhereAreRefused) {
+  io::DisplacementField field = one_voxel({0, 8, 8}, Vec3::Zero());
+  field.direction = io::FieldDirection::kModeling;
+  EXPECT_THAT(warp_image(ramp(), field).error().message, HasSubstr("resampling, not modeling"));
+  const auto elsewhere = warp_image(ramp(), one_voxel({400, 8, 8}, Vec3::Zero()));
+  EXPECT_EQ(elsewhere.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(elsewhere.error().message, HasSubstr("no voxel of the grid lies in the image"));
+}
+
+}  // namespace
+}  // namespace brainshift::client

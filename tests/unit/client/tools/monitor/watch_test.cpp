@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/monitor/watch.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "common/wire/frame.hpp"
+#include "tests/support/toy_patient.hpp"
+#include "tests/unit/client/lib/fake_daemon.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+using wire::MessageType;
+
+UpdateMessage update(std::uint64_t sequence, int nodes) {
+  UpdateMessage message;
+  message.session_id = 1;
+  message.boot_id = 7;
+  message.update.model_id = "toy";
+  message.update.sequence = sequence;
+  message.update.estimate.quality.quality = Quality::kGood;
+  message.update.estimate.displacement = Points::Zero(3, nodes);
+  return message;
+}
+
+TEST(Watch, TumourNodesAreTheOnesInsideIt) {
+  const BrainModel model = test_support::toy_patient(12);
+  const auto nodes = tumour_nodes(model);
+  EXPECT_GT(nodes.size(), 20u);
+  for (const NodeIndex node : nodes) {
+    EXPECT_LE((model.mesh.nodes.col(node) - Vec3(30, 30, 40)).norm(), 10.001);
+  }
+}
+
+TEST(Watch, TheTumoursMotionIsThatOfItsNodesAmongThePart) {
+  UpdateMessage message = update(4, 3);
+  message.update.estimate.displacement << 3, 0, 9, 4, 0, 9, 0, 1, 9;
+  EXPECT_DOUBLE_EQ(*watched(message, {0, 1}, 3).tumour_mm, 3.0);  // 5 and 1 mm
+  message.update.part = FieldPart{100, {7, 20, 30}, 0};
+  EXPECT_DOUBLE_EQ(*watched(message, {20, 50}, 100).tumour_mm, 1.0);
+  EXPECT_EQ(watched(message, {0, 1, 2}, 100).tumour_mm, std::nullopt);
+}
+
+TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
+  UpdateMessage message = update(12, 3);
+  message.update.part = FieldPart{100, {7, 20, 30}, 0};
+  message.received_bytes = 7149;
+  message.received_nodes = 2;
+  WatchedUpdate told = watched(message, {20}, 100);
+  told.status = {Currency::kCurrent, "", 0.08};
+  EXPECT_EQ(
+      watch_line(told, false),
+      "update 12  age 0.08 s  3 of 100 nodes (2 sent, 7.1 kB)  tumour 0.00 mm  good, current");
+  told.status = {Currency::kStale, "no word", std::nan("")};
+  told.tumour_mm.reset();
+  EXPECT_EQ(watch_line(told, false),
+            "update 12  age unknown  3 of 100 nodes (2 sent, 7.1 kB)  no tumour node  good, stale: "
+            "no word");
+  const auto json = nlohmann::json::parse(watch_line(told, true));
+  EXPECT_EQ(json.at("sequence"), 12);
+  EXPECT_EQ(json.at("currency"), "stale");
+  EXPECT_TRUE(json.at("age_s").is_null());
+  EXPECT_TRUE(json.at("tumour_mm").is_null());
+  EXPECT_EQ(json.at("received_nodes"), 2);
+}
+
+TEST(Watch, ALateAnswerIsMarked) {
+  UpdateMessage message = update(12, 3);
+  message.update.answer_time = {250.0, 50.0};
+  WatchedUpdate told = watched(message, {}, 3);
+  EXPECT_THAT(watch_line(told, false),
+              EndsWith("  LATE: answered 250 ms after its observation came, usually 50 ms"));
+  EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), true);
+  message.update.answer_time = {100.0, 50.0};
+  told = watched(message, {}, 3);
+  EXPECT_THAT(watch_line(told, false), Not(HasSubstr("LATE")));
+  EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), false);
+}
+
+TEST(Watch, AFailureSaysWhy) {
+  UpdateMessage message = update(5, 0);
+  message.error = Error{ErrorCode::kEmptySet, "no point is inside the brain"};
+  EXPECT_THAT(watch_line(watched(message, {}, 3), false),
+              HasSubstr("no field: no point is inside the brain"));
+}
+
+// A daemon of the toy patient that sends what was chosen once it is subscribed to.
+TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
+  BrainModel model = test_support::toy_patient(5);
+  model.model_id = "toy";
+  std::mutex mutex;
+  std::vector<Subscription> subscriptions;
+  FakeDaemon daemon([&](const wire::Frame& request) -> FakeDaemon::Answers {
+    const std::lock_guard lock(mutex);
+    const std::uint64_t id = request.request_id;
+    if (request.type == MessageType::kModelRequest) {
+      return {wire::encode_frame(MessageType::kModelReply, id, wire::encode(model))};
+    }
+    if (request.type != MessageType::kSubscribeRequest) return {};
+    subscriptions.push_back(wire::decode_subscription(request.payload).value());
+    SessionState state;
+    state.session = {7, 1, "toy"};
+    state.phase = SessionPhase::kTracking;
+    state.newest_update = state.newest_usable = 1;
+    state.age_ms = 250.0;
+    state.valid_ms = 60000;
+    FakeDaemon::Answers answers = {
+        wire::encode_frame(MessageType::kSessionState, id, wire::encode(state))};
+    if (subscriptions.size() == 1) {
+      UpdateMessage message = update(1, 2);
+      message.update.part = FieldPart{static_cast<int>(model.mesh.nodes.cols()), {3, 8}, 0};
+      answers.push_back(wire::encode_frame(MessageType::kUpdate, 0, wire::encode(message)));
+    }
+    return answers;
+  });
+  std::vector<std::string> lines;
+  const FieldChoice choice{TumourRegion{40.0}, 10.0, 0.1, false};
+  const Status status = watch({.endpoint = daemon.endpoint(), .choice = choice, .count = 1},
+                              [&](const std::string& line) { lines.push_back(line); });
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_THAT(lines, ElementsAre(StartsWith("update 1  age ")));
+  EXPECT_THAT(lines.front(), HasSubstr("2 of 216 nodes (2 sent"));
+  const std::lock_guard lock(mutex);
+  EXPECT_EQ(subscriptions.front().choice, choice);
+  EXPECT_EQ(subscriptions.back().choice, choice) << "a renewal names the choice again";
+}
+
+}  // namespace
+}  // namespace brainshift::client

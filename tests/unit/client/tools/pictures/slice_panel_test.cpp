@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/pictures/slice_panel.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/geometry/surface.hpp"
+#include "tests/unit/client/tools/replay/box.hpp"
+
+namespace brainshift::client {
+namespace {
+
+const SliceWindow kWindow{Plane::kAxial, 5.0, -2.0, 12.0, -2.0, 12.0, 10.0};
+
+TEST(SliceWindow, ShowsThePatientsRightOnTheLeftAndAnteriorUp) {
+  const cv::Point2d middle = kWindow.pixel({5, 5, 5});
+  EXPECT_LT(kWindow.pixel({8, 5, 5}).x, middle.x);  // +R
+  EXPECT_LT(kWindow.pixel({5, 8, 5}).y, middle.y);  // +A
+  EXPECT_TRUE(kWindow.position(kWindow.pixel({3, 7, 5})).isApprox(Vec3(3, 7, 5), 1e-12));
+  EXPECT_EQ(kWindow.size(), cv::Size(140, 140));
+}
+
+TEST(SliceWindow, CoronalShowsSuperiorUp) {
+  SliceWindow window = kWindow;
+  window.plane = Plane::kCoronal;
+  const cv::Point2d middle = window.pixel({5, 5, 5});
+  EXPECT_LT(window.pixel({8, 5, 5}).x, middle.x);
+  EXPECT_LT(window.pixel({5, 5, 8}).y, middle.y);
+  EXPECT_TRUE(window.position(window.pixel({3, 5, 7})).isApprox(Vec3(3, 5, 7), 1e-12));
+}
+
+TEST(SliceWindow, SagittalShowsAnteriorOnTheLeftAndSuperiorUp) {
+  SliceWindow window = kWindow;
+  window.plane = Plane::kSagittal;
+  const cv::Point2d middle = window.pixel({5, 5, 5});
+  EXPECT_LT(window.pixel({5, 8, 5}).x, middle.x);
+  EXPECT_LT(window.pixel({5, 5, 8}).y, middle.y);
+  EXPECT_EQ(window.normal_axis(), 0);
+  EXPECT_TRUE(window.position(window.pixel({5, 3, 7})).isApprox(Vec3(5, 3, 7), 1e-12));
+}
+
+TEST(SliceSamples, CoverTheInsideOfTheMeshAndNothingElse) {
+  const TetMesh mesh = box_mesh();
+  const geometry::TetLocator locator(mesh);
+  const SliceSamples samples = sample_slice(locator, kWindow, 1.0);
+  EXPECT_EQ(samples.positions.size(), 11u * 11u);
+  Points identity = mesh.nodes;
+  for (std::size_t i = 0; i < samples.positions.size(); ++i) {
+    EXPECT_TRUE(
+        geometry::value_at(samples.locations[i], identity).isApprox(samples.positions[i], 1e-9));
+  }
+}
+
+TEST(Section, OfAClosedSurfaceIsOneClosedLineOfTheRightLength) {
+  const TriangleSurface sphere = geometry::ellipsoid_surface(Vec3(1, 2, 3), Vec3(10, 10, 10), 1.0);
+  const auto lines = section_polylines(sphere, Vec3::UnitZ(), 3.2);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NEAR((lines[0].front() - lines[0].back()).norm(), 0.0, 1e-6);
+  double length = 0.0;
+  for (std::size_t i = 1; i < lines[0].size(); ++i)
+    length += (lines[0][i] - lines[0][i - 1]).norm();
+  EXPECT_NEAR(length, 2.0 * 3.14159265 * 10.0, 1.0);
+  EXPECT_TRUE(section_polylines(sphere, Vec3::UnitZ(), 30.0).empty());
+}
+
+TEST(Section, OfTheDeformedSurfaceMovesWithALinearField) {
+  const TetMesh mesh = box_mesh();
+  const geometry::TetLocator locator(mesh);
+  const TriangleSurface sphere = geometry::ellipsoid_surface(Vec3(5, 5, 5), Vec3(2, 2, 2), 0.5);
+  const Points field = 0.1 * mesh.nodes;
+  const TriangleSurface moved = deformed_surface(sphere, locator, field);
+  EXPECT_LT((moved.vertices - 1.1 * sphere.vertices).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(SlicePanel, ArrowPointsWhereTheFieldPoints) {
+  const TetMesh mesh = box_mesh();
+  const geometry::TetLocator locator(mesh);
+  const SliceSamples samples = sample_slice(locator, kWindow, 5.0);
+  SlicePanel panel(kWindow);
+  // Anatomically leftwards: to the right in a radiological view.
+  panel.draw_arrows(samples, Vec3(-1.5, 0, 0).replicate(1, mesh.num_nodes()), 1.0, 1.5, true);
+  const cv::Point2d start = kWindow.pixel({5, 5, 5});
+  const auto lit = [&](double dx) {
+    return panel.image().at<cv::Vec3b>(static_cast<int>(start.y),
+                                       static_cast<int>(start.x + dx))[0] > 60;
+  };
+  EXPECT_TRUE(lit(7));
+  EXPECT_FALSE(lit(-7));
+}
+
+TEST(SlicePanel, GravityPointsDownInACoronalSliceOfAnUprightHead) {
+  SliceWindow window{Plane::kCoronal, 5.0, 0.0, 20.0, 0.0, 20.0, 20.0};
+  SlicePanel panel(window);
+  panel.draw_gravity(Vec3(0, 0, -1));
+  // The barbs widen the arrow near its tip: compare the ink above and below its middle.
+  const cv::Rect above(0, 56, 172, 44);
+  const cv::Rect below(0, 100, 172, 50);
+  const auto ink = [&](const cv::Rect& part) { return cv::sum(panel.image()(part))[0]; };
+  EXPECT_GT(ink(below), 1.2 * ink(above));
+}
+
+TEST(SlicePanel, MriGreyFollowsTheVoxels) {
+  VoxelImage mri;
+  mri.dims = {15, 15, 15};
+  mri.T_ras_voxel = AffineTransform(Eigen::Translation3d(-2, -2, -2));
+  mri.values.assign(15 * 15 * 15, 0.0f);
+  for (std::size_t i = 0; i < mri.values.size(); ++i)
+    mri.values[i] = static_cast<float>(i % 15);  // grows with x
+  SlicePanel panel(kWindow);
+  panel.draw_mri(mri, 1.0);
+  EXPECT_GT(panel.image().at<cv::Vec3b>(70, 20)[0], panel.image().at<cv::Vec3b>(70, 120)[0] + 100);
+}
+
+}  // namespace
+}  // namespace brainshift::client

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/preview/case_view.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/client/tools/preview/box_case.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using test_support::TemporaryFolder;
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+class CaseViewOf : public testing::Test {
+ protected:
+  CaseView view(const BoxCase& box = {}) { return view_case(write_box_case(folder, box)).value(); }
+  TemporaryFolder folder;
+};
+
+TEST_F(CaseViewOf, ASoundCaseHasRolesAndNeitherProblemsNorDoubts) {
+  const CaseView seen = view();
+  EXPECT_THAT(seen.problems, IsEmpty());
+  EXPECT_THAT(doubts(seen), IsEmpty());
+  ASSERT_EQ(seen.roles.size(), static_cast<std::size_t>(seen.brain.num_vertices()));
+  for (const NodeRole role :
+       {NodeRole::kFixed, NodeRole::kSlave, NodeRole::kCraniotomy, NodeRole::kBrainstem})
+    EXPECT_THAT(seen.roles, Contains(role));
+  const auto opening = opening_of(seen);
+  ASSERT_TRUE(opening);
+  EXPECT_NEAR(opening->centre.x(), 75.0, 1e-9);
+  EXPECT_GT(opening->normal.x(), 0.9);
+}
+
+TEST_F(CaseViewOf, FactsGiveSizesSidesAndAngles) {
+  const auto lines = facts(view());
+  EXPECT_THAT(lines, Contains("case box"));
+  EXPECT_THAT(lines, Contains(AllOf(HasSubstr("150 x 150 x 150 mm"), HasSubstr("3375 cc"))));
+  EXPECT_THAT(lines, Contains(AllOf(HasSubstr("tumour: 7."),
+                                    HasSubstr("right 40, posterior 10, superior 20 mm"))));
+  EXPECT_THAT(lines, Contains(AllOf(HasSubstr("gravity: left 1.00; 180 degrees"))));
+}
+
+TEST_F(CaseViewOf, DoubtsNameATumourOnTheOtherSide) {
+  BoxCase box;
+  box.tumour = "[-40, -10, 20]";
+  EXPECT_THAT(doubts(view(box)),
+              Contains(AllOf(HasSubstr("the tumour lies on the left, the craniotomy on the right"),
+                             HasSubstr("tumour.ellipsoid"))));
+}
+
+TEST_F(CaseViewOf, DoubtsNameGravityThatPullsOutOfTheOpening) {
+  BoxCase box;
+  box.gravity = "[1, 0, 0]";
+  box.brainstem = "[0, 0, -75]";
+  EXPECT_THAT(doubts(view(box)),
+              Contains(AllOf(HasSubstr("faces down"), HasSubstr("gravity.direction"))));
+}
+
+TEST_F(CaseViewOf, DoubtsNameABrainOfAnotherUnit) {
+  BoxCase box;
+  box.side_mm = 300.0;
+  box.craniotomy = "[150, -10, 20]";
+  box.brainstem = "[0, 0, -150]";
+  EXPECT_THAT(doubts(view(box)), Contains(HasSubstr("300 mm long")));
+}
+
+TEST_F(CaseViewOf, DoubtsNameABrainstemOnTop) {
+  BoxCase box;
+  box.brainstem = "[0, 0, 75]";
+  EXPECT_THAT(doubts(view(box)), Contains(HasSubstr("brainstem.centre_mm")));
+}
+
+TEST_F(CaseViewOf, DoubtsNameATumourThatIsCutAtTheSurface) {
+  BoxCase box;
+  box.tumour = "[65, -10, 20]";  // sticks out by 2 mm
+  const CaseView seen = view(box);
+  EXPECT_THAT(seen.problems, IsEmpty());
+  EXPECT_THAT(doubts(seen), Contains(HasSubstr("outside the brain, by up to 2.0 mm")));
+}
+
+TEST_F(CaseViewOf, ATumourOutsideTheBrainIsAProblemThatIsStillSeen) {
+  BoxCase box;
+  box.tumour = "[90, -10, 20]";
+  const CaseView seen = view(box);
+  EXPECT_THAT(seen.problems,
+              ElementsAre(AllOf(HasSubstr("tumour.ellipsoid"), HasSubstr("outside the brain"))));
+  EXPECT_GT(seen.tumour.num_vertices(), 0);
+  EXPECT_GT(seen.brain.num_vertices(), 0);
+  EXPECT_THAT(seen.roles, Not(IsEmpty()));
+}
+
+TEST_F(CaseViewOf, AnOpeningInTheAirIsAProblemWithoutRoles) {
+  BoxCase box;
+  box.craniotomy = "[175, -10, 20]";
+  const CaseView seen = view(box);
+  EXPECT_THAT(seen.problems, ElementsAre(HasSubstr("craniotomy.centre_mm")));
+  EXPECT_THAT(seen.roles, IsEmpty());
+  EXPECT_FALSE(opening_of(seen));
+  EXPECT_THAT(doubts(seen), IsEmpty());
+}
+
+TEST_F(CaseViewOf, AMissingFileIsAnError) {
+  const auto missing = view_case(folder / "nowhere.yaml");
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error().message, HasSubstr("nowhere.yaml"));
+}
+
+TEST(PlaceText, NamesTheThreeSides) {
+  EXPECT_EQ(place_text(Vec3(46.2, -47.0, 9.4)), "right 46, posterior 47, superior 9 mm");
+  EXPECT_EQ(place_text(Vec3(-1.0, 2.0, -3.0)), "left 1, anterior 2, inferior 3 mm");
+}
+
+TEST(DirectionText, BeginsWithTheLargestPartAndLeavesOutTheSmallest) {
+  EXPECT_EQ(direction_text(Vec3(-0.2, 0.35, -0.92)), "inferior 0.92, anterior 0.35, left 0.20");
+  EXPECT_EQ(direction_text(Vec3(0.0, -2.0, 0.02)), "posterior 1.00");
+}
+
+}  // namespace
+}  // namespace brainshift::client

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/replay/verify.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/wire/decision.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/client/tools/replay/scripted_daemon.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// A daemon whose field is a function of the observation, and the journal of a session with it.
+class Verify : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto created = io::SurgeryFile::create(folder / "a.surgery", {.case_id = "box"});
+    ASSERT_TRUE(created);
+    file.emplace(std::move(*created));
+    daemon.script = [this](const Observation& o) {
+      sent.push_back(o.source + std::to_string(o.sequence));
+      if (fails == o.sequence) return std::vector{failure(o.sequence)};
+      UpdateMessage iterate = update(o.sequence, false);
+      UpdateMessage last = answer(o.sequence);
+      if (differs == o.sequence) last.update.estimate.displacement(0, 0) += 0.5;
+      return std::vector{std::move(iterate), std::move(last)};
+    };
+  }
+  static UpdateMessage failure(std::uint64_t observation) {
+    UpdateMessage message = update(observation, true);
+    message.error = Error{ErrorCode::kNotConverged, "no luck"};
+    return message;
+  }
+  static UpdateMessage answer(std::uint64_t observation) {
+    UpdateMessage message = update(observation, true);
+    message.update.timings = {};
+    message.update.estimate.history.clear();
+    message.update.estimate.displacement.setConstant(static_cast<double>(observation));
+    return message;
+  }
+  void record_observation(const std::string& source, std::uint64_t sequence) {
+    Observation observation;
+    observation.case_id = "box";
+    observation.source = source;
+    observation.sequence = sequence;
+    observation.body = LandmarkPairs{Points::Ones(3, 4), Points::Ones(3, 4), 0.3};
+    append(io::RecordKind::kObservation, sequence, wire::encode(observation));
+  }
+  void record_decision(const std::string& source, std::uint64_t sequence, Outcome outcome,
+                       std::uint64_t update) {
+    append(io::RecordKind::kDecision, sequence,
+           wire::encode(Decision{1, source, sequence, outcome, update, 0, "why"}));
+  }
+  void record_update(std::uint64_t sequence, std::uint64_t observation) {
+    UpdateMessage message = answer(observation);
+    message.session_id = 99;
+    message.update.sequence = sequence;
+    append(io::RecordKind::kUpdate, sequence, wire::encode(message));
+  }
+  void append(io::RecordKind kind, std::uint64_t sequence, std::string payload) {
+    ASSERT_TRUE(file->append({kind, sequence, 0, std::move(payload)}));
+  }
+  // Accepted: ius 1, 2, 3 and camera 2. ius 2 is superseded, camera 2 fails.
+  void record_session() {
+    record_observation("ius", 1);
+    record_observation("ius", 2);
+    record_observation("camera", 7);
+    record_decision("ius", 1, Outcome::kUsed, 1);
+    record_observation("ius", 3);
+    record_decision("ius", 2, Outcome::kSuperseded, 0);
+    record_update(1, 1);
+    record_decision("ius", 3, Outcome::kUsed, 2);
+    record_update(2, 3);
+    record_decision("camera", 7, Outcome::kFailed, 3);
+  }
+  Result<Verification> verify() {
+    return verify_records(*file, daemon.link(), {kSession, Agreement::kBitForBit, timeout});
+  }
+
+  const test_support::TemporaryFolder folder;
+  std::optional<io::SurgeryFile> file;
+  ScriptedDaemon daemon;
+  std::vector<std::string> sent;
+  std::uint64_t differs = 0, fails = 7;
+  std::chrono::milliseconds timeout{5000};
+};
+
+TEST_F(Verify, SendsWhatWasTriedInItsOrderAndFindsTheSameAnswers) {
+  record_session();
+  const auto verification = verify();
+  ASSERT_TRUE(verification) << verification.error().message;
+  EXPECT_THAT(sent, ElementsAre("ius1", "ius3", "camera7"));
+  EXPECT_EQ(verification->compared, 3u);
+  EXPECT_THAT(verification->differences, IsEmpty());
+  EXPECT_THAT(report_lines(*verification),
+              ElementsAre(HasSubstr("3 of 3 answers agree bit for bit")));
+}
+
+TEST_F(Verify, NamesTheUpdatesThatDiffer) {
+  record_session();
+  differs = 3;
+  fails = 0;
+  const auto verification = verify();
+  ASSERT_TRUE(verification) << verification.error().message;
+  EXPECT_THAT(verification->differences,
+              ElementsAre(HasSubstr("update 2 (observation 3): displacement: 1 numbers"),
+                          HasSubstr("update 3 (observation 7): failed when recorded")));
+  EXPECT_DOUBLE_EQ(verification->max_difference_mm, 0.5);
+  EXPECT_THAT(report_lines(*verification).front(), HasSubstr("1 of 3 answers agree"));
+}
+
+TEST_F(Verify, AnAnswerThatFailsNowDiffers) {
+  record_session();
+  fails = 1;
+  const auto verification = verify();
+  ASSERT_TRUE(verification);
+  EXPECT_THAT(verification->differences.front(), HasSubstr("error: \"none\" recorded"));
+}
+
+TEST_F(Verify, WithoutDecisionsTheUpdatesStandForThem) {
+  record_observation("ius", 1);
+  record_observation("ius", 2);
+  record_observation("ius", 3);
+  record_update(1, 1);
+  record_update(2, 3);
+  const auto verification = verify();
+  ASSERT_TRUE(verification) << verification.error().message;
+  EXPECT_THAT(sent, ElementsAre("ius1", "ius3"));
+  EXPECT_EQ(verification->compared, 2u);
+}
+
+TEST_F(Verify, WithoutDecisionsTwoSourcesOfOneSequenceCannotBeToldApart) {
+  record_observation("ius", 1);
+  record_observation("camera", 1);
+  record_update(1, 1);
+  const auto verification = verify();
+  ASSERT_FALSE(verification);
+  EXPECT_EQ(verification.error().code, ErrorCode::kUnreadable);
+  EXPECT_THAT(verification.error().message, HasSubstr("update 1: 2 observations"));
+}
+
+TEST_F(Verify, AJournalThatLacksSomethingIsRefused) {
+  record_decision("ius", 1, Outcome::kUsed, 1);
+  EXPECT_THAT(verify().error().message, HasSubstr("observation 1 of ius is not recorded"));
+}
+
+TEST_F(Verify, AJournalWithoutAnswersIsRefused) {
+  record_observation("ius", 1);
+  EXPECT_EQ(verify().error().code, ErrorCode::kEmptySet);
+}
+
+TEST_F(Verify, ASilentDaemonIsReported) {
+  record_session();
+  daemon.script = [](const Observation&) { return std::vector<UpdateMessage>(); };
+  timeout = std::chrono::milliseconds(20);
+  EXPECT_EQ(verify().error().code, ErrorCode::kUnavailable);
+}
+
+}  // namespace
+}  // namespace brainshift::client

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/pipeline/scene_plan.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/toy_patient.hpp"
+
+namespace brainshift::pipeline {
+namespace {
+
+using testing::HasSubstr;
+
+void expect_refused(const CaseConfig& config, Method method, Boundary boundary,
+                    const std::string& words) {
+  const auto plan = plan_scene(config, method, boundary);
+  ASSERT_FALSE(plan.has_value()) << words;
+  EXPECT_EQ(plan.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(plan.error().message, HasSubstr(words));
+}
+
+TEST(PlanScene, CarriesEverythingByDefault) {
+  const auto plan = plan_scene({}, Method::kCondensed, Boundary::kContact);
+  ASSERT_TRUE(plan.has_value());
+  EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
+}
+
+TEST(PlanScene, DefaultsAreAllowedWithEveryMethodAndBoundary) {
+  for (const Method method : kAllMethods) {
+    for (const Boundary boundary : {Boundary::kContact, Boundary::kFixed}) {
+      const auto plan = plan_scene({}, method, boundary);
+      ASSERT_TRUE(plan.has_value()) << to_string(method);
+      EXPECT_EQ(plan->contact, boundary == Boundary::kContact);
+      EXPECT_EQ(plan->uncertainty, method == Method::kCondensed);
+    }
+  }
+}
+
+TEST(PlanScene, LeavesOutWhatIsForcedOff) {
+  CaseConfig config;
+  config.scene.contact = Carry::kOff;
+  config.scene.uncertainty = Carry::kOff;
+  config.scene.gravity_modes = Carry::kOff;
+  config.scene.far_field = Carry::kOff;
+  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
+  ASSERT_TRUE(plan.has_value());
+  EXPECT_FALSE(plan->contact || plan->uncertainty || plan->gravity_modes || plan->far_field);
+}
+
+TEST(PlanScene, CarriesWhatIsForcedOn) {
+  CaseConfig config;
+  config.scene.contact = config.scene.uncertainty = config.scene.gravity_modes =
+      config.scene.far_field = config.scene.rotation = Carry::kOn;
+  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
+  ASSERT_TRUE(plan.has_value());
+  EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
+}
+
+TEST(PlanScene, CarriesPressureOnlyWhenAsked) {
+  CaseConfig config;
+  EXPECT_FALSE(plan_scene(config, Method::kCondensed, Boundary::kContact)->pressure);
+  config.scene.pressure = Carry::kOn;
+  for (const Method method : {Method::kCondensed, Method::kPaper}) {
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kContact)->pressure);
+    EXPECT_TRUE(plan_scene(config, method, Boundary::kFixed)->pressure);
+  }
+}
+
+TEST(PlanScene, APriorWithoutGravityModesHasNoneToCarry) {
+  CaseConfig config;
+  config.prior.gravity_mode_sd = 0.0;
+  EXPECT_FALSE(plan_scene(config, Method::kCondensed, Boundary::kContact)->gravity_modes);
+}
+
+TEST(PlanScene, RefusesPartsForcedOnThatAreNotAvailable) {
+  CaseConfig config;
+  config.scene.pressure = Carry::kOn;
+  expect_refused(config, Method::kIterativeSolver, Boundary::kContact,
+                 "scene.pressure = on: method pcg has no solver for pore pressure");
+  config = {};
+  config.scene.contact = Carry::kOn;
+  expect_refused(config, Method::kCondensed, Boundary::kFixed, "scene.contact = on");
+  config = {};
+  config.scene.uncertainty = Carry::kOn;
+  expect_refused(config, Method::kPaper, Boundary::kContact, "method paper");
+  config = {};
+  config.scene.gravity_modes = Carry::kOn;
+  config.prior.gravity_levels_mm.clear();
+  expect_refused(config, Method::kCondensed, Boundary::kContact, "scene.gravity_modes = on");
+}
+
+TEST(PlanScene, RefusesPartsForcedOffThatTheMethodAlwaysCarries) {
+  CaseConfig config;
+  config.scene.contact = Carry::kOff;
+  expect_refused(config, Method::kPaper, Boundary::kContact, "scene.contact = off");
+  EXPECT_TRUE(plan_scene(config, Method::kPaper, Boundary::kFixed).has_value());
+  config = {};
+  config.scene.gravity_modes = Carry::kOff;
+  expect_refused(config, Method::kPaper, Boundary::kContact, "scene.gravity_modes = off");
+}
+
+TEST(RegionOfInterest, IsTheNodesNoFartherFromTheTumourThanAsked) {
+  const BrainModel model = test_support::toy_patient(6);
+  const auto region = region_of_interest(model, 12.0);
+  EXPECT_TRUE(std::is_sorted(region.begin(), region.end()));
+  for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+    const double distance = (model.mesh.nodes.col(i) - Vec3(30, 30, 40)).norm() - 10.0;
+    if (std::abs(distance - 12.0) < 1.0) continue;  // facets of the ball
+    EXPECT_EQ(std::binary_search(region.begin(), region.end(), i), distance < 12.0) << i;
+  }
+}
+
+TEST(RegionOfInterest, IsEmptyWithoutATumourSurface) {
+  BrainModel model = test_support::toy_patient();
+  model.tumour = {};
+  EXPECT_TRUE(region_of_interest(model, 12.0).empty());
+}
+
+}  // namespace
+}  // namespace brainshift::pipeline
