@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels bench verify stability sensing interchange surgeries evidence ablations replays calculix prior faults fuzz documents format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior faults fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -18,17 +18,21 @@ setup: ## install the Debian packages that are missing (root or sudo)
 configure: setup
 	@cmake --preset $(PRESET) --log-level=WARNING
 
-build: configure ## build everything, tests included, into build/release
+build: configure ## build the programs and the tests into build/release
 	cmake --build --preset $(PRESET) -j $(JOBS)
 
 demo: configure ## build the binaries and run the whole job on the default case, into demo/
 	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift bench_error_time bench_summary
 	cmake/scripts/demo.sh $(BUILD)/bin
 
-test: build ## build and run all tests
-	ctest --preset $(PRESET) -j 2
+test: build ## build and run the tests of the product
+	cmake/scripts/run-tests.sh $(PRESET)
 
-test-kernels: build ## all tests again with OpenBLAS kernels of other processors; KERNELS="Haswell SkylakeX Nehalem"
+studies: configure ## build the programs of the studies and run their smoke tests
+	cmake --build --preset $(PRESET) -j $(JOBS) --target studies
+	cmake/scripts/run-tests.sh studies
+
+test-kernels: build ## what computes with BLAS, again with OpenBLAS kernels of other processors; KERNELS="Haswell SkylakeX Nehalem"
 	cmake/scripts/test-kernels.sh $(PRESET) $(KERNELS)
 
 bench: configure ## error against run time, latency, memory, into out/bench; QUICK=1 for a short run

@@ -3,6 +3,15 @@ option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
 option(BRAINSHIFT_CLIENT_ONLY "Build and install the C++ client library alone: no solver, nothing under the GPL" OFF)
 set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
+# Several files of a folder are compiled as one: templates are instantiated and headers read once for all of them.
+# An edit compiles its whole batch, so the preset dev leaves it off. layout.names keeps names of a folder apart.
+option(BRAINSHIFT_UNITY "Compile the files of a folder together (unity builds)" OFF)
+set(CMAKE_UNITY_BUILD ${BRAINSHIFT_UNITY})
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+
+# See brainshift_archives in BrainshiftTargets.cmake.
+option(BRAINSHIFT_TEST_LIBRARY "Tests link the product as one shared library, and are themselves compiled with -O1" OFF)
+
 option(BRAINSHIFT_FUZZ "Build the fuzz targets with libFuzzer (clang)" OFF)
 
 set(CMAKE_CXX_STANDARD 20)
@@ -23,7 +32,7 @@ target_compile_options(brainshift_warnings INTERFACE
 # GCC 12 reports copies inside std::string that no code makes (GCC bugs 105329, 105651), also in precompiled
 # headers, where it does not see that they are the system's. The sanitizer presets look at real ones.
 target_compile_options(brainshift_warnings INTERFACE -Wno-array-bounds -Wno-restrict
-  -Wno-stringop-overflow)
+  -Wno-stringop-overflow -Wno-stringop-overread)
 
 if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
   # GCC is the compiler whose warnings are errors.

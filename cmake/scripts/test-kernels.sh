@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# test-kernels.sh PRESET [KERNEL...]: runs all tests with OpenBLAS kernels that this machine would not choose
+# test-kernels.sh PRESET [KERNEL...]: runs the tests of what links BLAS (label blas) with OpenBLAS kernels that this machine
+# would not choose
 # by itself, so that a result that holds on one processor only is found here.
 # Without a name: one other kernel (Haswell; on a machine that chooses Haswell, SkylakeX or Nehalem).
 # Kernels: Haswell, Zen (AVX2), SkylakeX (AVX-512), Nehalem (any x86-64 with SSE4.2).
@@ -40,7 +41,7 @@ for kernel in "$@"; do
   fi
   used=$(OPENBLAS_CORETYPE=$kernel kernel_in_use)
   [ "$used" = "$kernel" ] || { echo "test-kernels: OpenBLAS takes $used for $kernel" >&2; exit 1; }
-  echo "test-kernels: all tests with OPENBLAS_CORETYPE=$kernel"
-  OPENBLAS_CORETYPE=$kernel ctest --preset "$preset" -j "${JOBS:-2}" || failed+=("$kernel")
+  echo "test-kernels: tests of what links BLAS with OPENBLAS_CORETYPE=$kernel"
+  OPENBLAS_CORETYPE=$kernel cmake/scripts/run-tests.sh "$preset" -L '^blas$' || failed+=("$kernel")
 done
 [ ${#failed[@]} -eq 0 ] || { echo "test-kernels: tests failed with ${failed[*]}" >&2; exit 1; }

@@ -17,10 +17,11 @@ namespace brainshift::geometry {
 namespace {
 
 // Distances need no exact predicates; `contains` takes a vote of three rays instead.
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangle = Kernel::Triangle_3;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle>::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+using TriangleKernel = CGAL::Simple_cartesian<double>;
+using Triangle = TriangleKernel::Triangle_3;
+using Primitive =
+    CGAL::AABB_triangle_primitive<TriangleKernel, std::vector<Triangle>::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<TriangleKernel, Primitive>>;
 
 // Twice the area over the longest edge squared; flatter triangles have no usable normal. Their
 // points lie on the edges of their neighbours, so nothing is lost by leaving them out.
@@ -34,7 +35,7 @@ constexpr double kOnEdge = 1e-9;
 constexpr double kRayDirections[3][3] = {
     {0.3713, 0.5477, 0.7497}, {-0.8271, 0.2179, 0.5182}, {0.4583, -0.7941, -0.3992}};
 
-Kernel::Point_3 to_cgal(const Vec3& x) { return {x[0], x[1], x[2]}; }
+TriangleKernel::Point_3 to_cgal(const Vec3& x) { return {x[0], x[1], x[2]}; }
 
 double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -166,7 +167,7 @@ bool ClosestPointIndex::contains(const Vec3& query) const {
     if (!(query[axis] >= box.min(axis) && query[axis] <= box.max(axis))) return false;
   int votes = 0;
   for (const auto& d : kRayDirections) {
-    const Kernel::Ray_3 ray(to_cgal(query), Kernel::Vector_3(d[0], d[1], d[2]));
+    const TriangleKernel::Ray_3 ray(to_cgal(query), TriangleKernel::Vector_3(d[0], d[1], d[2]));
     votes += impl_->tree.number_of_intersected_primitives(ray) % 2 == 1 ? 1 : 0;
   }
   return votes >= 2;

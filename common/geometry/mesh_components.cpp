@@ -9,22 +9,23 @@
 namespace brainshift::geometry {
 namespace {
 
-struct Face {
+struct ComponentFace {
   std::array<int, 3> nodes;  // increasing
   int tet;
 };
 
-std::vector<Face> sorted_faces(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) {
-  std::vector<Face> faces;
+std::vector<ComponentFace> sorted_faces(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) {
+  std::vector<ComponentFace> faces;
   faces.reserve(4 * static_cast<std::size_t>(tets.cols()));
   for (int t = 0; t < static_cast<int>(tets.cols()); ++t)
     for (int omit = 0; omit < 4; ++omit) {
-      Face face{{tets((omit + 1) % 4, t), tets((omit + 2) % 4, t), tets((omit + 3) % 4, t)}, t};
+      ComponentFace face{
+          {tets((omit + 1) % 4, t), tets((omit + 2) % 4, t), tets((omit + 3) % 4, t)}, t};
       std::sort(face.nodes.begin(), face.nodes.end());
       faces.push_back(face);
     }
   std::sort(faces.begin(), faces.end(),
-            [](const Face& a, const Face& b) { return a.nodes < b.nodes; });
+            [](const ComponentFace& a, const ComponentFace& b) { return a.nodes < b.nodes; });
   return faces;
 }
 
@@ -41,7 +42,7 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) 
     }
     return t;
   };
-  const std::vector<Face> faces = sorted_faces(tets);
+  const std::vector<ComponentFace> faces = sorted_faces(tets);
   for (std::size_t f = 1; f < faces.size(); ++f) {
     if (faces[f].nodes != faces[f - 1].nodes) continue;
     const int a = root(faces[f].tet);

@@ -15,9 +15,9 @@ namespace brainshift::geometry {
 namespace {
 
 // A weight below this lies on the opposite edge.
-constexpr double kOnEdge = 1e-9;
+constexpr double kOnRim = 1e-9;
 // Twice the area over the longest edge squared; a flatter triangle has no plane.
-constexpr double kFlat = 1e-12;
+constexpr double kFlatTriangle = 1e-12;
 
 }  // namespace
 
@@ -71,7 +71,7 @@ SurfacePlace MovedSurface::closest_on(int triangle, const Vec3& query) const {
   place.triangle = triangle;
   place.distance_mm = std::numeric_limits<double>::infinity();
   const double longest = std::max({frame.ab_ab, frame.ac_ac, (frame.ac - frame.ab).squaredNorm()});
-  if (!(std::sqrt(std::max(0.0, frame.determinant)) > kFlat * longest)) return place;
+  if (!(std::sqrt(std::max(0.0, frame.determinant)) > kFlatTriangle * longest)) return place;
   const Vec3 q = closest_on_triangle(frame, query);
   const double along_ab = frame.ab.dot(q - frame.a), along_ac = frame.ac.dot(q - frame.a);
   const double b = (frame.ac_ac * along_ab - frame.ab_ac * along_ac) / frame.determinant;
@@ -120,8 +120,8 @@ bool MovedSurface::on_rim(const SurfacePlace& place) const {
         3 * static_cast<std::size_t>(place.triangle) + static_cast<std::size_t>(k);
     const auto corner = static_cast<std::size_t>(moved_.triangles(k, place.triangle));
     // Edge k lies opposite to corner k + 2.
-    if (surface_.rim_edge_[edge] != 0 && place.weights[(k + 2) % 3] < kOnEdge) return true;
-    if (surface_.rim_vertex_[corner] != 0 && place.weights[k] > 1.0 - kOnEdge) return true;
+    if (surface_.rim_edge_[edge] != 0 && place.weights[(k + 2) % 3] < kOnRim) return true;
+    if (surface_.rim_vertex_[corner] != 0 && place.weights[k] > 1.0 - kOnRim) return true;
   }
   return false;
 }

@@ -20,12 +20,13 @@ constexpr double kReachOverSpacing = 5.0;
 // Neighbours whose second principal spread is below this fraction of the first lie on a line.
 constexpr double kOnALine = 0.01;
 // Closer than this (mm), the direction from one point to another is rounding.
-constexpr double kTouching = 1e-9;
+constexpr double kCoincident = 1e-9;
 // Planes that are blended; with one, alignment stalls where the closest points change.
 constexpr std::size_t kBlended = 8;
 
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
-                                                 PointColumns, 3, std::uint32_t>;
+using CloudTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointColumns>,
+                                        PointColumns, 3, std::uint32_t>;
 
 Status check(const Points& points, const Points& normals, const CloudOptions& options) {
   if (points.cols() < 3)
@@ -61,7 +62,7 @@ struct OrientedCloud::Impl {
   Points points, normals;
   double reach_mm = 0.0;
   PointColumns columns{points};
-  Tree tree{3, columns};
+  CloudTree tree{3, columns};
 
   void nearest(const Vec3& x, std::vector<std::uint32_t>& ids, std::vector<double>& squared) const {
     nanoflann::KNNResultSet<double, std::uint32_t> found(ids.size());
@@ -155,7 +156,7 @@ DistanceSample OrientedCloud::at(const Vec3& x) const {
   const Vec3 away = x - impl_->points.col(ids[0]);
   const Vec3 first = impl_->normals.col(ids[0]);
   const double distance = std::sqrt(squared[0]);
-  if (distance <= kTouching) return {0.0, first};
+  if (distance <= kCoincident) return {0.0, first};
   if (distance > impl_->reach_mm || first.isZero()) return {distance, away / distance};
   const double per_reach = 1.0 / (impl_->reach_mm * impl_->reach_mm);
   double weights = 0.0, sum = 0.0;

@@ -11,7 +11,7 @@
 namespace brainshift::geometry {
 namespace {
 
-Vec3 area_vector(const Points& vertices, const Eigen::Vector3i& t) {
+Vec3 face_area_vector(const Points& vertices, const Eigen::Vector3i& t) {
   const Vec3 a = vertices.col(t[0]);
   return (vertices.col(t[1]) - a).cross(vertices.col(t[2]) - a);
 }
@@ -54,7 +54,7 @@ Status orient(CheckedSurface& checked, const CorticalSite& site,
   TriangleSurface& surface = checked.surface;
   double along = 0.0, area = 0.0;
   for (int t = 0; t < surface.num_triangles(); ++t) {
-    const Vec3 n = area_vector(surface.vertices, surface.triangles.col(t));
+    const Vec3 n = face_area_vector(surface.vertices, surface.triangles.col(t));
     along += n.dot(site.outward);
     area += n.norm();
   }
@@ -114,7 +114,7 @@ Result<CorticalSite> craniotomy_site(const BrainModel& model) {
     const bool inside = std::all_of(corners.begin(), corners.end(), [&](int node) {
       return static_cast<bool>(open[static_cast<std::size_t>(node)]);
     });
-    if (inside) normal += area_vector(model.mesh.nodes, corners);
+    if (inside) normal += face_area_vector(model.mesh.nodes, corners);
   }
   if (!(normal.norm() > 0.0)) {
     return fail(ErrorCode::kEmptySet,

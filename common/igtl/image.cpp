@@ -74,14 +74,14 @@ void append_image_header(const ImageGeometry& geometry, int components, std::uin
   append_sizes(part, out);
 }
 
-tl::unexpected<Error> invalid(std::string message) {
+tl::unexpected<Error> invalid_image(std::string message) {
   return fail(ErrorCode::kInvalidArgument, std::move(message));
 }
 
-Status validate(const ImageGeometry& geometry) {
+Status validate_image(const ImageGeometry& geometry) {
   for (const int dim : geometry.dims) {
     if (dim < 1 || dim > kMaxDim) {
-      return invalid("dims hold " + std::to_string(dim) + ", must be 1 to 65535");
+      return invalid_image("dims hold " + std::to_string(dim) + ", must be 1 to 65535");
     }
   }
   if (!geometry.steps.allFinite() || !geometry.centre.allFinite()) {
@@ -97,27 +97,27 @@ Status validate(const ImageGeometry& geometry) {
   }
   gram += directions.transpose() * directions;
   // sin^2 of the angle between them; single precision does not tell smaller angles from none.
-  if (!(gram.determinant() > 1e-12)) return invalid("two steps are parallel, or one is zero");
+  if (!(gram.determinant() > 1e-12)) return invalid_image("two steps are parallel, or one is zero");
   return {};
 }
 
 Status validate_part(const ImageGeometry& geometry, int components,
                      const std::array<int, 3>& offset, const std::array<int, 3>& part,
                      std::uint64_t numbers) {
-  if (Status status = validate(geometry); !status) return status;
+  if (Status status = validate_image(geometry); !status) return status;
   if (components < 1 || components > kMaxComponents) {
-    return invalid(std::to_string(components) + " components, must be 1 to 255");
+    return invalid_image(std::to_string(components) + " components, must be 1 to 255");
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (offset[axis] < 0 || part[axis] < 1 || part[axis] > geometry.dims[axis] - offset[axis]) {
-      return invalid("part of " + std::to_string(part[axis]) + " voxels from voxel " +
-                     std::to_string(offset[axis]) + " on, the volume has " +
-                     std::to_string(geometry.dims[axis]));
+      return invalid_image("part of " + std::to_string(part[axis]) + " voxels from voxel " +
+                           std::to_string(offset[axis]) + " on, the volume has " +
+                           std::to_string(geometry.dims[axis]));
     }
   }
   const std::uint64_t expected = product(part) * static_cast<std::uint64_t>(components);
   if (numbers != expected) {
-    return invalid(std::to_string(numbers) + " numbers, must be " + std::to_string(expected));
+    return invalid_image(std::to_string(numbers) + " numbers, must be " + std::to_string(expected));
   }
   return {};
 }
@@ -186,13 +186,13 @@ ImageGeometry image_geometry(const std::array<int, 3>& dims, const AffineTransfo
   return geometry;
 }
 
-Status validate(const Image& image) {
+Status validate_image(const Image& image) {
   const std::uint64_t numbers =
       std::visit([](const auto& voxels) { return std::uint64_t{voxels.size()}; }, image.voxels);
   return validate_part(image.geometry, image.components, image.offset, image.part, numbers);
 }
 
-Status validate(const ImageView& image) {
+Status validate_image(const ImageView& image) {
   const std::uint64_t numbers =
       std::visit([](const auto& voxels) { return std::uint64_t{voxels.size()}; }, image.voxels);
   return validate_part(image.geometry, image.components, {0, 0, 0}, image.geometry.dims, numbers);

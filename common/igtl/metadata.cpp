@@ -20,7 +20,8 @@ std::size_t bytes_of(const Metadata& metadata) {
   return bytes;
 }
 
-tl::unexpected<Error> does_not_fit(std::string_view part, std::uint64_t bytes, std::size_t left) {
+tl::unexpected<Error> entry_does_not_fit(std::string_view part, std::uint64_t bytes,
+                                         std::size_t left) {
   return malformed(std::string(part) + " of " + std::to_string(bytes) + " bytes, " +
                    std::to_string(left) + " are left");
 }
@@ -29,11 +30,11 @@ Result<Metadata> decode_metadata(std::string_view header, std::string_view text)
   Metadata metadata;
   if (header.empty()) return metadata;
   ByteReader entries(header);
-  if (entries.left() < kCountBytes) return does_not_fit("metadata count", kCountBytes, 1);
+  if (entries.left() < kCountBytes) return entry_does_not_fit("metadata count", kCountBytes, 1);
   const auto count = entries.number<std::uint16_t>();
   if (std::size_t{count} * kEntryBytes > entries.left()) {
-    return does_not_fit("header of " + std::to_string(count) + " metadata entries",
-                        std::size_t{count} * kEntryBytes, entries.left());
+    return entry_does_not_fit("header of " + std::to_string(count) + " metadata entries",
+                              std::size_t{count} * kEntryBytes, entries.left());
   }
   ByteReader texts(text);
   metadata.reserve(count);  // whose headers are here
@@ -41,10 +42,11 @@ Result<Metadata> decode_metadata(std::string_view header, std::string_view text)
     const auto key_bytes = entries.number<std::uint16_t>();
     const auto encoding = entries.number<std::uint16_t>();
     const auto value_bytes = entries.number<std::uint32_t>();
-    if (key_bytes > texts.left()) return does_not_fit("metadata key", key_bytes, texts.left());
+    if (key_bytes > texts.left())
+      return entry_does_not_fit("metadata key", key_bytes, texts.left());
     std::string key(texts.take(key_bytes));
     if (value_bytes > texts.left()) {
-      return does_not_fit("metadata value", value_bytes, texts.left());
+      return entry_does_not_fit("metadata value", value_bytes, texts.left());
     }
     metadata.push_back({std::move(key), std::string(texts.take(value_bytes)), encoding});
   }
@@ -87,7 +89,7 @@ Result<Body> decode_body(std::uint16_t version, std::string_view body) {
     return parts;
   }
   if (body.size() < kExtendedHeaderBytes) {
-    return does_not_fit("extended header", kExtendedHeaderBytes, body.size());
+    return entry_does_not_fit("extended header", kExtendedHeaderBytes, body.size());
   }
   ByteReader reader(body);
   const std::size_t extended_bytes = reader.number<std::uint16_t>();
@@ -100,7 +102,7 @@ Result<Body> decode_body(std::uint16_t version, std::string_view body) {
   }
   const std::size_t left = body.size() - extended_bytes;
   if (header_bytes + metadata_bytes > left) {
-    return does_not_fit("metadata", header_bytes + metadata_bytes, left);
+    return entry_does_not_fit("metadata", header_bytes + metadata_bytes, left);
   }
   const std::size_t content_bytes = left - header_bytes - metadata_bytes;
   parts.content = body.substr(extended_bytes, content_bytes);

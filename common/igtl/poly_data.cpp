@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kPolyHeaderBytes = 40;
 constexpr std::size_t kAttributeHeaderBytes = 6;
-constexpr std::size_t kPointBytes = 12;
+constexpr std::size_t kPolyPointBytes = 12;
 constexpr std::size_t kMaxNameBytes = 255;
 constexpr int kMaxScalarComponents = 127;  // igtlPolyDataMessage.h
 constexpr std::uint8_t kOfCells = 0x10;
@@ -272,8 +272,8 @@ Result<PolyData> decode_poly_data(std::string_view content) {
   }
   const auto attributes = reader.number<std::uint32_t>();
 
-  if (std::uint64_t{points} * kPointBytes > reader.left()) {
-    return does_not_fit("points", std::uint64_t{points} * kPointBytes, reader.left());
+  if (std::uint64_t{points} * kPolyPointBytes > reader.left()) {
+    return does_not_fit("points", std::uint64_t{points} * kPolyPointBytes, reader.left());
   }
   PolyData data;
   data.points.resize(3, points);

@@ -26,7 +26,7 @@ constexpr int kMostRefined = 2;  // steps of iterative refinement
 // Quasi-definite matrices have an L D L^T in any order. The swaps that MUMPS makes with its usual
 // threshold cost no measurable time and keep extreme steps accurate.
 constexpr double kPivotThreshold = 0.01;
-constexpr std::uint64_t kSeed = 17;
+constexpr std::uint64_t kProbeSeed = 17;
 
 // MUMPS is not reentrant (module variables), not even for different instances.
 std::mutex& mumps_mutex() {
@@ -34,7 +34,7 @@ std::mutex& mumps_mutex() {
   return mutex;
 }
 
-Status check_finite(const SymmetricMatrix& lower) {
+Status check_finite_lower(const SymmetricMatrix& lower) {
   for (long k = 0; k < lower.nonZeros(); ++k) {
     if (!std::isfinite(lower.valuePtr()[k])) {
       return fail(ErrorCode::kNotFinite, "consolidation matrix: entry " + std::to_string(k) +
@@ -270,7 +270,7 @@ Result<SymmetricIndefinite> SymmetricIndefinite::factorise(const SymmetricMatrix
   if (lower.rows() == 0) {
     return fail(ErrorCode::kEmptySet, "consolidation matrix: no unknown is left to solve for");
   }
-  if (auto finite = check_finite(lower); !finite) return tl::unexpected(finite.error());
+  if (auto finite = check_finite_lower(lower); !finite) return tl::unexpected(finite.error());
   use_single_threaded_blas();
   SymmetricIndefinite factor(std::make_unique<Impl>());
   factor.impl_->negative_pivots = negative_pivots;
@@ -282,7 +282,7 @@ Result<SymmetricIndefinite> SymmetricIndefinite::factorise(const SymmetricMatrix
 Status SymmetricIndefinite::refactorise(const SymmetricMatrix& lower) {
   Impl& impl = *impl_;
   assert(lower.rows() == impl.mumps.n && lower.nonZeros() == impl.mumps.nnz);
-  if (auto finite = check_finite(lower); !finite) return finite;
+  if (auto finite = check_finite_lower(lower); !finite) return finite;
   const Stopwatch watch;
   impl.rescale(lower);
   impl.mumps.a = impl.scaled.valuePtr();
@@ -360,7 +360,7 @@ Status SymmetricIndefinite::solve_many(const Eigen::MatrixXd& b, Eigen::MatrixXd
   x = scaled_b;
   impl_->raw_solve(x.data(), static_cast<int>(b.cols()));
   // Columns at the same size, so that a small one is not hidden behind a large one.
-  Random random(kSeed);
+  Random random(kProbeSeed);
   VecX signs(b.cols());
   for (Eigen::Index j = 0; j < b.cols(); ++j) {
     const double size = x.col(j).lpNorm<Eigen::Infinity>();

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kBlock = 96;
+constexpr Index kTeamBlock = 96;
 // Below this size the team's waking costs more than it saves.
 constexpr Index kSmall = 256;
 
@@ -19,14 +19,14 @@ bool cholesky(blas::Out<double> a, ThreadTeam& team) {
   assert(a.rows() == a.cols());
   const Index n = a.rows();
   if (n <= kSmall) return blas::cholesky(a);
-  for (Index first = 0; first < n; first += kBlock) {
-    const Index width = std::min(kBlock, n - first);
+  for (Index first = 0; first < n; first += kTeamBlock) {
+    const Index width = std::min(kTeamBlock, n - first);
     auto corner = a.block(first, first, width, width);
     if (!blas::cholesky(corner)) return false;
     const Index below = first + width, rest = n - below;
-    const Index blocks = (rest + kBlock - 1) / kBlock;
-    const auto begin = [&](Index block) { return below + block * kBlock; };
-    const auto size = [&](Index block) { return std::min(kBlock, n - begin(block)); };
+    const Index blocks = (rest + kTeamBlock - 1) / kTeamBlock;
+    const auto begin = [&](Index block) { return below + block * kTeamBlock; };
+    const auto size = [&](Index block) { return std::min(kTeamBlock, n - begin(block)); };
     team.split(blocks, [&](long from, long to) {
       for (Index i = from; i < to; ++i) {
         blas::solve_lower_transposed_right(corner, a.block(begin(i), first, size(i), width));

@@ -31,7 +31,7 @@ constexpr int kMaxDisparities = 2048;
 // Turned round, a swapped pair matches much better than as it was given.
 constexpr double kSwappedGain = 2.0;
 
-Status check(const RectifiedPair& pair, const MatchOptions& options) {
+Status check_match(const RectifiedPair& pair, const MatchOptions& options) {
   const auto refuse = [](const char* name, double value, const char* must) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be {}", name, value, must));
   };
@@ -176,7 +176,7 @@ Result<MeasuredDisparity> measure(const GrayImage& left, const GrayImage& right,
 double confidence(double sd_px) { return std::erf(1.0 / (std::numbers::sqrt2 * sd_px)); }
 
 Result<DisparityMap> match(const RectifiedPair& pair, const MatchOptions& options) {
-  if (Status ok = check(pair, options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_match(pair, options); !ok) return tl::unexpected(ok.error());
   const cv::Mat left = view_of(pair.left), right = view_of(pair.right);
   const cv::Mat from_left = match_one_way(left, right, options);
   const cv::Mat from_right = match_from_right(left, right, options);

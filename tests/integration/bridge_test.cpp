@@ -30,7 +30,7 @@ using testing::HasSubstr;
 using testing::SizeIs;
 using testing::StartsWith;
 
-constexpr std::string_view kListening = "listening on ";
+constexpr std::string_view kBridgeListening = "listening on ";
 constexpr milliseconds kLong{60000};
 
 std::string after(const std::string& line, std::string_view start) {
@@ -93,7 +93,7 @@ class BridgeBesideADaemon : public testing::Test {
                                  files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n"),
                                  "--model", files.path("model.h5")},
         files.path("daemon.log"));
-    endpoint = after(daemon->first_line(), kListening);
+    endpoint = after(daemon->first_line(), kBridgeListening);
     console.emplace(client::Client::connect(endpoint).value());
     ASSERT_TRUE(console->start_session({.case_id = "colin27-coarse"}));
     model = console->model().value();
@@ -108,7 +108,7 @@ class BridgeBesideADaemon : public testing::Test {
                                         endpoint,     "--listen", "127.0.0.1:0"};
     command.insert(command.end(), more.begin(), more.end());
     bridge = std::make_unique<Background>(command, files.path("bridge.log"));
-    const std::string address = after(bridge->first_line(), kListening);
+    const std::string address = after(bridge->first_line(), kBridgeListening);
     port = static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
   }
   IgtlPeer viewer(int receive_buffer = 0) { return IgtlPeer::connect(port, receive_buffer); }

@@ -14,14 +14,14 @@ namespace {
 
 using testing::StartsWith;
 
-constexpr const char* kListening = "listening on ";
+constexpr const char* kHealthListening = "listening on ";
 
 TEST(Health, IsZeroWhileTheDaemonAnswersAndOneAfterItHasGone) {
   const Workspace files;
   const auto config = files.write("daemon.yaml", "endpoint: tcp://127.0.0.1:*\n");
   Background daemon({brainshiftd(), "serve", "--config", config}, files.path("log"));
-  ASSERT_THAT(daemon.first_line(), StartsWith(kListening));
-  const std::string endpoint = daemon.first_line().substr(std::string(kListening).size());
+  ASSERT_THAT(daemon.first_line(), StartsWith(kHealthListening));
+  const std::string endpoint = daemon.first_line().substr(std::string(kHealthListening).size());
   const auto ask = [&] {
     return run({brainshiftd(), "health", "--config", config, "--endpoint", endpoint});
   };

@@ -96,7 +96,7 @@ std::vector<std::string> observe_command(const Workspace& files, const std::stri
           files.path("out/case.surgery")};
 }
 
-void expect_refused(const Finished& finished, const std::string& says) {
+void expect_stereo_refused(const Finished& finished, const std::string& says) {
   EXPECT_EQ(finished.exit_status, 2);
   const auto told = lines(finished.err);
   ASSERT_THAT(told, SizeIs(1)) << finished.err;
@@ -169,15 +169,15 @@ TEST(Stereo, PicturesBecomeObservationsOfASurgery) {
   // Time goes forward, and a surgery belongs to one model.
   later = observe_command(files, files.path("points.xyz"));
   later.insert(later.end(), {"--time-s", "12.5"});
-  expect_refused(run(later), "case.surgery: --time-s 12.5: must be above 12.5");
+  expect_stereo_refused(run(later), "case.surgery: --time-s 12.5: must be above 12.5");
   write_model(files, "model.h5", 6);
-  expect_refused(run(observe_command(files, files.path("points.xyz"))),
-                 "case.surgery: model_id is \"");
+  expect_stereo_refused(run(observe_command(files, files.path("points.xyz"))),
+                        "case.surgery: model_id is \"");
   EXPECT_THAT(observations_of(files.path("out/case.surgery")), SizeIs(2));
   // Only the sources that a surgery has can be played by themselves.
-  expect_refused(run({brainshift(), "replay", files.path("out/case.surgery"), "--sources", "ius",
-                      "--report", files.path("r.json")}),
-                 "holds no observation of source \"ius\"; it has: scanner, stereopsis");
+  expect_stereo_refused(run({brainshift(), "replay", files.path("out/case.surgery"), "--sources",
+                             "ius", "--report", files.path("r.json")}),
+                        "holds no observation of source \"ius\"; it has: scanner, stereopsis");
 }
 
 TEST(Stereo, BoardsBecomeACalibration) {
@@ -196,15 +196,16 @@ TEST(Stereo, BoardsBecomeACalibration) {
         brainshift(), "stereo", "calibrate",   "--left", left,    "--right",           right,
         "--board",    corners,  "--square-mm", "8",      "--out", files.path("c.yaml")};
   };
-  expect_refused(run(command(files.path("r*.pgm"), files.path("l*.pgm"), "9x6")),
-                 "left and right are swapped");
-  expect_refused(run(command(files.path("l*.pgm"), files.path("r[0-4].pgm"), "9x6")),
-                 "6 left and 5 right pictures: must be as many");
-  expect_refused(run(command(files.path("l[0-3].pgm"), files.path("r[0-3].pgm"), "9x6")),
-                 "found in 4 pairs: at least 5 are needed");
-  expect_refused(run(command(files.path("l*.pgm"), files.path("r*.pgm"), "9by6")), "--board 9by6");
-  expect_refused(run(command(files.path("x*.pgm"), files.path("r*.pgm"), "9x6")),
-                 "x*.pgm: no file of this name or pattern");
+  expect_stereo_refused(run(command(files.path("r*.pgm"), files.path("l*.pgm"), "9x6")),
+                        "left and right are swapped");
+  expect_stereo_refused(run(command(files.path("l*.pgm"), files.path("r[0-4].pgm"), "9x6")),
+                        "6 left and 5 right pictures: must be as many");
+  expect_stereo_refused(run(command(files.path("l[0-3].pgm"), files.path("r[0-3].pgm"), "9x6")),
+                        "found in 4 pairs: at least 5 are needed");
+  expect_stereo_refused(run(command(files.path("l*.pgm"), files.path("r*.pgm"), "9by6")),
+                        "--board 9by6");
+  expect_stereo_refused(run(command(files.path("x*.pgm"), files.path("r*.pgm"), "9x6")),
+                        "x*.pgm: no file of this name or pattern");
   EXPECT_FALSE(std::filesystem::exists(files.path("c.yaml")));
   const Finished made = run(command(files.path("l*.pgm"), files.path("r*.pgm"), "9x6"));
   ASSERT_EQ(made.exit_status, 0) << made.err;
@@ -227,7 +228,7 @@ TEST_P(BadStereoPair, ExitsTwoWithOneLineAndLeavesNothingBehind) {
   std::filesystem::create_directory(files.path("out"));
   write_pair(files);
   GetParam().spoil(files);
-  expect_refused(run(reconstruct_command(files)), GetParam().says);
+  expect_stereo_refused(run(reconstruct_command(files)), GetParam().says);
   EXPECT_TRUE(std::filesystem::is_empty(files.path("out")));
 }
 
@@ -297,7 +298,7 @@ TEST(BadSurface, ExitsTwoWithOneLineAndMakesNoSurgery) {
     return files.write("points.xyz", text);
   };
   const auto expect = [&](const std::string& surface, const std::string& says) {
-    expect_refused(run(observe_command(files, surface)), says);
+    expect_stereo_refused(run(observe_command(files, surface)), says);
     EXPECT_TRUE(std::filesystem::is_empty(files.path("out"))) << says;
   };
   expect(points(0.001, 0.0), "metres?");
@@ -307,10 +308,10 @@ TEST(BadSurface, ExitsTwoWithOneLineAndMakesNoSurgery) {
   expect(files.path("absent.ply"), "absent.ply");
   auto command = observe_command(files, points(1.0, 0.0));
   command[8] = "-1";
-  expect_refused(run(command), "--sd-mm -1: must be finite and > 0");
+  expect_stereo_refused(run(command), "--sd-mm -1: must be finite and > 0");
   command[8] = "0.5";
   command.insert(command.end(), {"--time-s", "-2"});
-  expect_refused(run(command), "--time-s -2: must be between 0 and 1e+06");
+  expect_stereo_refused(run(command), "--time-s -2: must be between 0 and 1e+06");
 }
 
 TEST(StereoUsage, HelpTeachesAndMissingOptionsAreNamed) {
@@ -319,7 +320,7 @@ TEST(StereoUsage, HelpTeachesAndMissingOptionsAreNamed) {
     EXPECT_EQ(help.exit_status, 0);
     EXPECT_THAT(help.out, HasSubstr(std::string("brainshift stereo ") + part));
     EXPECT_THAT(help.out, HasSubstr("Example"));
-    expect_refused(run({brainshift(), "stereo", part}), "is required");
+    expect_stereo_refused(run({brainshift(), "stereo", part}), "is required");
   }
 }
 

@@ -17,8 +17,8 @@ namespace brainshift::inversion {
 namespace {
 
 using test_support::record_check;
-constexpr const char* kStudy = "adjoint";
-constexpr const char* kSource = "Ji et al. 2009 eq. 5-8";
+constexpr const char* kAdjointStudy = "adjoint";
+constexpr const char* kAdjointSource = "Ji et al. 2009 eq. 5-8";
 
 struct Physics {
   const char* name;
@@ -58,8 +58,9 @@ TEST_P(Adjoint, OfThePenalisedSystemIsItself) {
     const double left = kf.cwiseProduct(g).sum(), right = f.cwiseProduct(kg).sum();
     const double error = std::abs(left - right) / std::abs(left);
     EXPECT_TRUE(record_check(
-        kStudy, std::string(names[i]) + " with contact " + GetParam().name + ": relative asymmetry",
-        error, "<= 1e-9", error <= 1e-9, kSource));
+        kAdjointStudy,
+        std::string(names[i]) + " with contact " + GetParam().name + ": relative asymmetry", error,
+        "<= 1e-9", error <= 1e-9, kAdjointSource));
   }
 }
 
@@ -78,8 +79,8 @@ TEST_P(Adjoint, GradientEqualsCentralDifferences) {
   const double difference = (forward->value - backward->value) / (2.0 * kStep);
   const double error = std::abs(difference - slope) / std::abs(slope);
   EXPECT_TRUE(record_check(
-      kStudy, std::string("gradient with contact ") + GetParam().name + ": relative error", error,
-      "<= 1e-6", error <= 1e-6, kSource));
+      kAdjointStudy, std::string("gradient with contact ") + GetParam().name + ": relative error",
+      error, "<= 1e-6", error <= 1e-6, kAdjointSource));
 }
 
 }  // namespace

@@ -18,11 +18,12 @@
 namespace brainshift::fem {
 namespace {
 
-constexpr double kHeight = 60.0, kWidth = 60.0;
+constexpr double kColumnHeight = 60.0, kWidth = 60.0;
 
 // Largest error over the nodes, relative to the sag of the top.
 double column_error(int cells) {
-  const TetMesh mesh = test_support::box_mesh(cells, cells, cells, Vec3(kWidth, kWidth, kHeight));
+  const TetMesh mesh =
+      test_support::box_mesh(cells, cells, cells, Vec3(kWidth, kWidth, kColumnHeight));
   DofMap dofs(mesh.num_nodes());
   for (int n = 0; n < mesh.num_nodes(); ++n) {
     if (mesh.nodes(2, n) == 0.0) dofs.fix_all(n);
@@ -43,12 +44,12 @@ double column_error(int cells) {
   double error = 0.0;
   for (int n = 0; n < mesh.num_nodes(); ++n) {
     const double z = mesh.nodes(2, n);
-    const Vec3 exact(0, 0, -density / youngs * (kHeight * z - z * z / 2.0));
+    const Vec3 exact(0, 0, -density / youngs * (kColumnHeight * z - z * z / 2.0));
     error = std::max(error, (u.col(n) - exact).norm());
   }
-  error /= density * kHeight * kHeight / (2.0 * youngs);
+  error /= density * kColumnHeight * kColumnHeight / (2.0 * youngs);
   test_support::record(
-      {"gravity-column", "P1", "element size mm", "error %", kHeight / cells, 100.0 * error});
+      {"gravity-column", "P1", "element size mm", "error %", kColumnHeight / cells, 100.0 * error});
   return error;
 }
 

@@ -14,15 +14,15 @@ namespace brainshift::fem {
 namespace {
 
 using test_support::record_check;
-constexpr double kPi = std::numbers::pi;
+constexpr double kPiCryer = std::numbers::pi;
 constexpr double kRadius = 10.0, kLoad = 1e-4;
-constexpr const char* kSource = "Cryer 1963; Verruijt 2016 section 4.3";
+constexpr const char* kCryerSource = "Cryer 1963; Verruijt 2016 section 4.3";
 
-double series(double poisson_ratio, double time) {
+double cryer_series(double poisson_ratio, double time) {
   const double e = (1.0 - poisson_ratio) / (1.0 - 2.0 * poisson_ratio);
   double sum = 0.0;
   for (int j = 0; j < 200; ++j) {
-    double low = j * kPi + 1e-3, high = (j + 1) * kPi;
+    double low = j * kPiCryer + 1e-3, high = (j + 1) * kPiCryer;
     const auto f = [&](double x) {
       return (1.0 - e * x * x / 2.0) * std::sin(x) - x * std::cos(x);
     };
@@ -80,7 +80,7 @@ Course centre_course(int cells, double poisson_ratio) {
     advance(*stepper, state, load, (until - time) / 30.0 * scale_s, 30);
     time = until;
     const double centre = state.pressure[0] / kLoad;
-    const double exact = series(poisson_ratio, time);
+    const double exact = cryer_series(poisson_ratio, time);
     test_support::record({"cryer", name, "T", "centre pressure / q", time, centre});
     test_support::record({"cryer", "series", "T", "centre pressure / q", time, exact});
     course.error = std::max(course.error, std::abs(centre - exact));
@@ -92,16 +92,16 @@ Course centre_course(int cells, double poisson_ratio) {
 
 TEST(Cryer, CentrePressureFollowsTheSeriesAndRisesFirst) {
   constexpr double kPoisson = 0.2;
-  EXPECT_NEAR(series(kPoisson, 1e-4), 1.0, 0.02);  // undrained: q
+  EXPECT_NEAR(cryer_series(kPoisson, 1e-4), 1.0, 0.02);  // undrained: q
   const Course coarse = centre_course(7, kPoisson);
   const Course fine = centre_course(14, kPoisson);
   ASSERT_GT(fine.error, 1e-6);
   EXPECT_LT(fine.error, coarse.error);
   EXPECT_TRUE(record_check("cryer", "largest error of the centre pressure over q", fine.error,
-                           "<= 1 %", fine.error <= 0.01, kSource));
+                           "<= 1 %", fine.error <= 0.01, kCryerSource));
   EXPECT_TRUE(record_check("cryer", "peak of the centre pressure over q", fine.peak,
                            "> 1.1; series " + std::to_string(fine.series_peak), fine.peak > 1.1,
-                           kSource));
+                           kCryerSource));
 }
 
 }  // namespace

@@ -19,16 +19,16 @@ namespace brainshift::fem {
 namespace {
 
 using test_support::record_check;
-constexpr double kPi = std::numbers::pi;
+constexpr double kPiMandel = std::numbers::pi;
 constexpr double kHalfWidth = 10.0, kHeight = 1.0, kDepth = 1.0;  // mm
-constexpr double kForce = 1e-3;                                   // N, on the half slab
-constexpr const char* kSource = "Mandel 1953; Cheng and Detournay 1988";
+constexpr double kPlateForce = 1e-3;                              // N, on the half slab
+constexpr const char* kMandelSource = "Mandel 1953; Cheng and Detournay 1988";
 
 std::vector<double> roots(double poisson_ratio) {
   const double slope = (1.0 - poisson_ratio) / (0.5 - poisson_ratio);
   std::vector<double> list;
   for (int i = 0; i < 200; ++i) {
-    double low = i * kPi + 1e-9, high = i * kPi + kPi / 2.0;
+    double low = i * kPiMandel + 1e-9, high = i * kPiMandel + kPiMandel / 2.0;
     for (int k = 0; k < 100; ++k) {
       const double w = 0.5 * (low + high);
       // sin w - slope w cos w is negative left of the root, positive right of it; its sign
@@ -41,7 +41,7 @@ std::vector<double> roots(double poisson_ratio) {
   return list;
 }
 
-double series(const std::vector<double>& w, double x, double time) {  // p a / F
+double mandel_series(const std::vector<double>& w, double x, double time) {  // p a / F
   double sum = 0.0;
   for (const double r : w) {
     sum += std::sin(r) / (r - std::sin(r) * std::cos(r)) *
@@ -57,7 +57,7 @@ class Slab {
     // Finer towards the drained side.
     for (int n = 0; n < mesh_.num_nodes(); ++n) {
       const double s = mesh_.nodes(0, n) / kHalfWidth;
-      mesh_.nodes(0, n) = kHalfWidth * std::sin(0.5 * kPi * s);
+      mesh_.nodes(0, n) = kHalfWidth * std::sin(0.5 * kPiMandel * s);
     }
     DofMap dofs(mesh_.num_nodes());
     std::vector<NodeIndex> drained;
@@ -83,7 +83,7 @@ class Slab {
       const auto low = with_plate_at(-0.0, dt_s), high = with_plate_at(-1e-2, dt_s);
       ASSERT_TRUE(low.has_value() && high.has_value());
       const double f0 = plate_force(*low), f1 = plate_force(*high);
-      const double share = (kForce - f0) / (f1 - f0);
+      const double share = (kPlateForce - f0) / (f1 - f0);
       state_.displacement = low->displacement + share * (high->displacement - low->displacement);
       state_.pressure = low->pressure + share * (high->pressure - low->pressure);
     }
@@ -117,33 +117,34 @@ TEST(Mandel, PressureFollowsTheSeriesAndRisesFirst) {
   const PoroMaterial material = tissue(kPoisson);
   const double scale_s = kHalfWidth * kHalfWidth / consolidation_coefficient(material);
   const auto w = roots(kPoisson);
-  EXPECT_NEAR(series(w, 0.0, 1e-5), 0.5, 1e-3);  // undrained: F / (2 a)
+  EXPECT_NEAR(mandel_series(w, 0.0, 1e-5), 0.5, 1e-3);  // undrained: F / (2 a)
 
   Slab slab(40, material);
   double time = 0.0, error = 0.0, peak = 0.0, series_peak = 0.0;
   for (const double until : {0.001, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2}) {
     slab.advance((until - time) / 60.0 * scale_s, 60);
     time = until;
-    EXPECT_NEAR(slab.plate_force(slab.state()), kForce, 1e-9 * kForce);
-    const double centre = slab.state().pressure[slab.axis()[0]] * kHalfWidth * kDepth / kForce;
+    EXPECT_NEAR(slab.plate_force(slab.state()), kPlateForce, 1e-9 * kPlateForce);
+    const double centre = slab.state().pressure[slab.axis()[0]] * kHalfWidth * kDepth / kPlateForce;
     peak = std::max(peak, centre);
-    series_peak = std::max(series_peak, series(w, 0.0, time));
+    series_peak = std::max(series_peak, mandel_series(w, 0.0, time));
     test_support::record({"mandel", "centre", "T", "p a / F", time, centre});
-    test_support::record({"mandel", "centre series", "T", "p a / F", time, series(w, 0.0, time)});
+    test_support::record(
+        {"mandel", "centre series", "T", "p a / F", time, mandel_series(w, 0.0, time)});
     if (time < 0.02) continue;  // a boundary layer of a few elements
     for (const NodeIndex n : slab.axis()) {
-      const double exact = series(w, slab.mesh().nodes(0, n), time);
-      const double found = slab.state().pressure[n] * kHalfWidth * kDepth / kForce;
+      const double exact = mandel_series(w, slab.mesh().nodes(0, n), time);
+      const double found = slab.state().pressure[n] * kHalfWidth * kDepth / kPlateForce;
       error = std::max(error, std::abs(found - exact) / 0.5);
     }
   }
   ASSERT_GT(error, 1e-6);
   EXPECT_TRUE(record_check("mandel", "largest error of pressure over its initial value", error,
-                           "<= 1 %", error <= 0.01, kSource));
+                           "<= 1 %", error <= 0.01, kMandelSource));
   EXPECT_TRUE(record_check("mandel", "peak at the centre over the initial pressure", peak / 0.5,
                            "> 1.05; series " + std::to_string(series_peak / 0.5),
                            peak / 0.5 > 1.05 && std::abs(peak / series_peak - 1.0) < 0.01,
-                           kSource));
+                           kMandelSource));
 }
 
 }  // namespace

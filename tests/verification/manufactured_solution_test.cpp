@@ -24,7 +24,7 @@ const Vec3 kAmplitude(1.0, -0.5, 0.7);
 Vec3 sines(const Vec3& x) { return (kWave * x).array().sin(); }
 Vec3 cosines(const Vec3& x) { return (kWave * x).array().cos(); }
 
-Vec3 exact(const Vec3& x) { return kAmplitude * sines(x).prod(); }
+Vec3 exact_solution(const Vec3& x) { return kAmplitude * sines(x).prod(); }
 
 // Gradient of s(x) s(y) s(z).
 Vec3 bubble_gradient(const Vec3& x) {
@@ -61,7 +61,8 @@ Errors errors_of(const DisplacementSpace& space, const Points& u) {
       Vec3 x = Vec3::Zero();
       for (int k = 0; k < 4; ++k) x += q.l[k] * space.mesh.nodes.col(space.mesh.tets(k, e));
       const Mat3 exact_gradient = kAmplitude * bubble_gradient(x).transpose();
-      errors.l2 += q.weight * volume * (displacement_at(space, u, e, q.l) - exact(x)).squaredNorm();
+      errors.l2 +=
+          q.weight * volume * (displacement_at(space, u, e, q.l) - exact_solution(x)).squaredNorm();
       errors.gradient += q.weight * volume *
                          (displacement_gradient(space, u, e, q.l) - exact_gradient).squaredNorm();
     }

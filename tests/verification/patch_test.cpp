@@ -11,12 +11,12 @@
 namespace brainshift::verification {
 namespace {
 
-constexpr double kSize = 10.0;
-constexpr char kSource[] = "Irons and Razzaque 1972";
+constexpr double kPatchSize = 10.0;
+constexpr char kPatchSource[] = "Irons and Razzaque 1972";
 
 TetMesh distorted_box(int cells) {
-  TetMesh mesh = test_support::box_mesh(cells, cells, cells, Vec3::Constant(kSize));
-  test_support::perturb_interior(mesh, 0.15 * kSize / cells, 7);
+  TetMesh mesh = test_support::box_mesh(cells, cells, cells, Vec3::Constant(kPatchSize));
+  test_support::perturb_interior(mesh, 0.15 * kPatchSize / cells, 7);
   return mesh;
 }
 
@@ -68,16 +68,16 @@ TEST(Patch, LinearFieldIsReproduced) {
     const Patch errors = patch(element, linear);
     const std::string name = name_of(element);
     EXPECT_TRUE(test_support::record_check("patch", name + " displacement", errors.displacement,
-                                           "<= 1e-12", errors.displacement <= 1e-12, kSource));
+                                           "<= 1e-12", errors.displacement <= 1e-12, kPatchSource));
     EXPECT_TRUE(test_support::record_check("patch", name + " stress", errors.stress, "<= 1e-9",
-                                           errors.stress <= 1e-9, kSource));
+                                           errors.stress <= 1e-9, kPatchSource));
   }
 }
 
 TEST(Patch, QuadraticFieldIsReproducedByQuadraticElementsOnly) {
   const Patch p2 = patch(fem::Element::kP2, quadratic);
   EXPECT_TRUE(test_support::record_check("patch", "P2 quadratic displacement", p2.displacement,
-                                         "<= 1e-12", p2.displacement <= 1e-12, kSource));
+                                         "<= 1e-12", p2.displacement <= 1e-12, kPatchSource));
   EXPECT_LE(p2.stress, 1e-8);
   EXPECT_GT(patch(fem::Element::kP1, quadratic).displacement, 1e-4);
 }
@@ -98,7 +98,7 @@ TEST(RigidMotion, CostsNoForce) {
     const double force = fem::internal_force(space, materials, rigid).norm() / scale;
     EXPECT_TRUE(test_support::record_check("patch",
                                            std::string(name_of(element)) + " rigid motion force",
-                                           force, "<= 1e-12", force <= 1e-12, kSource));
+                                           force, "<= 1e-12", force <= 1e-12, kPatchSource));
   }
 }
 

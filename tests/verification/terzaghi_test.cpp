@@ -15,16 +15,16 @@ namespace brainshift::fem {
 namespace {
 
 using test_support::record_check;
-constexpr double kPi = std::numbers::pi;
+constexpr double kPiTerzaghi = std::numbers::pi;
 constexpr double kLoad = 1e-4;  // N/mm^2
-constexpr const char* kSource = "Terzaghi 1923; Verruijt 2016 section 2.2";
+constexpr const char* kTerzaghiSource = "Terzaghi 1923; Verruijt 2016 section 2.2";
 
 double series_pressure(double depth, double time) {
   double sum = 0.0;
   for (int m = 0; m < 400; ++m) {
     const double k = 2 * m + 1;
-    sum += 4.0 / (k * kPi) * std::sin(k * kPi * depth / (2.0 * Column::kHeight)) *
-           std::exp(-k * k * kPi * kPi * time / 4.0);
+    sum += 4.0 / (k * kPiTerzaghi) * std::sin(k * kPiTerzaghi * depth / (2.0 * Column::kHeight)) *
+           std::exp(-k * k * kPiTerzaghi * kPiTerzaghi * time / 4.0);
   }
   return sum;
 }
@@ -33,7 +33,8 @@ double series_settlement(double time) {
   double sum = 0.0;
   for (int m = 0; m < 400; ++m) {
     const double k = 2 * m + 1;
-    sum += 8.0 / (k * k * kPi * kPi) * std::exp(-k * k * kPi * kPi * time / 4.0);
+    sum += 8.0 / (k * k * kPiTerzaghi * kPiTerzaghi) *
+           std::exp(-k * k * kPiTerzaghi * kPiTerzaghi * time / 4.0);
   }
   return 1.0 - sum;
 }
@@ -75,9 +76,9 @@ TEST(Terzaghi, PressureAndSettlementFollowTheSeries) {
   }
   ASSERT_GT(pressure_error, 1e-6);  // not exact by accident
   EXPECT_TRUE(record_check("terzaghi", "largest error of pressure over q", pressure_error, "<= 1 %",
-                           pressure_error <= 0.01, kSource));
+                           pressure_error <= 0.01, kTerzaghiSource));
   EXPECT_TRUE(record_check("terzaghi", "largest relative error of settlement", settlement_error,
-                           "<= 1 %", settlement_error <= 0.01, kSource));
+                           "<= 1 %", settlement_error <= 0.01, kTerzaghiSource));
 }
 
 // A load that ramps up smoothly, so that the order of the time steps shows from the start.
@@ -89,7 +90,7 @@ double ramped_settlement_mm(int steps) {
   const double dt = 0.2 * time_scale_s(material) / steps;
   for (int i = 1; i <= steps; ++i) {
     BiotLoad load;
-    load.force = column.load.force * std::pow(std::sin(0.5 * kPi * i / steps), 2);
+    load.force = column.load.force * std::pow(std::sin(0.5 * kPiTerzaghi * i / steps), 2);
     advance(stepper, state, load, dt, 1);
   }
   return -state.displacement(2, column.top[0]);

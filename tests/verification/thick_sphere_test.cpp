@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kInner = 10.0, kOuter = 20.0, kYoungs = 0.003, kPressure = 1e-4;
 constexpr char kStudy[] = "thick-sphere";
-constexpr char kSource[] = "Lame: Timoshenko and Goodier art. 142";
+constexpr char kThickSphereSource[] = "Lame: Timoshenko and Goodier art. 142";
 
 double exact(double r, double nu) {
   const double a3 = std::pow(kInner, 3), b3 = std::pow(kOuter, 3);
@@ -128,7 +128,7 @@ Outcome nodal_average(double nu, int cells) {
           dofs.num_unknowns(), elapsed_s};
 }
 
-std::string series(const std::string& element, double nu) {
+std::string lame_series(const std::string& element, double nu) {
   std::string number = std::to_string(nu);
   number.resize(6);
   return element + " nu " + number;
@@ -137,7 +137,7 @@ std::string series(const std::string& element, double nu) {
 // The charts show the ends, ordinary and nearly incompressible.
 void record_outcome(const std::string& element, double nu, const Outcome& outcome) {
   if (nu != 0.3 && nu != 0.4999) return;
-  const std::string name = series(element, nu);
+  const std::string name = lame_series(element, nu);
   test_support::record({kStudy, name, "unknowns", "displacement error %",
                         static_cast<double>(outcome.unknowns), outcome.error_pct});
   test_support::record({"thick-sphere-stress", name, "unknowns", "von Mises stress error %",
@@ -174,18 +174,19 @@ TEST(ThickSphere, LinearElementsLockAndQuadraticOnesDoNot) {
   const Outcome& p2 = finest[{fem::Element::kP2, 0.4999}];
   ASSERT_EQ(p1.unknowns, p2.unknowns);
   EXPECT_TRUE(test_support::record_check(kStudy, "P2 nu 0.4999 displacement error %", p2.error_pct,
-                                         "<= 3", p2.error_pct <= 3.0, kSource));
+                                         "<= 3", p2.error_pct <= 3.0, kThickSphereSource));
   // Locking: with the same unknowns P1 is several times worse, and worse than itself where it
   // does not lock.
   const double ratio = p1.error_pct / p2.error_pct;
   EXPECT_TRUE(test_support::record_check(kStudy, "P1 error over P2 error at nu 0.4999", ratio,
-                                         ">= 4", ratio >= 4.0, kSource));
+                                         ">= 4", ratio >= 4.0, kThickSphereSource));
   const double p1_growth = p1.error_pct / finest[{fem::Element::kP1, 0.3}].error_pct;
   EXPECT_TRUE(test_support::record_check(kStudy, "P1 error at nu 0.4999 over error at 0.3",
-                                         p1_growth, ">= 5", p1_growth >= 5.0, kSource));
+                                         p1_growth, ">= 5", p1_growth >= 5.0, kThickSphereSource));
   const double p2_growth = p2.error_pct / finest[{fem::Element::kP2, 0.3}].error_pct;
   EXPECT_TRUE(test_support::record_check(kStudy, "P2 error at nu 0.4999 over error at 0.3",
-                                         p2_growth, "<= 1.2", p2_growth <= 1.2, kSource));
+                                         p2_growth, "<= 1.2", p2_growth <= 1.2,
+                                         kThickSphereSource));
 }
 
 }  // namespace

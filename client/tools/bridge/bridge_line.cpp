@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-std::string dump(const ordered_json& object) {
+std::string line_text(const ordered_json& object) {
   return object.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
@@ -26,7 +26,7 @@ std::string shown_line(const ShownLine& line, bool json) {
     object["made_ms"] = line.made_ms;
     object["clients"] = line.clients;
     object["replaced"] = line.replaced;
-    return dump(object);
+    return line_text(object);
   }
   std::string text = fmt::format("update {}", state.sequence);
   if (std::isfinite(state.age_ms)) {
@@ -44,7 +44,7 @@ std::string shown_line(const ShownLine& line, bool json) {
 
 std::string note_line(const std::string& sentence, bool json) {
   if (!json) return sentence;
-  return dump({{"event", "note"}, {"text", sentence}});
+  return line_text({{"event", "note"}, {"text", sentence}});
 }
 
 }  // namespace brainshift::client

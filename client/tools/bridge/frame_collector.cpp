@@ -14,7 +14,7 @@ constexpr const char* kTracker = "ToTracker";
 
 // The pixels of a flat image and their type; empty when it is none that a recording can hold.
 template <typename T>
-std::string bytes_of(const std::vector<T>& values) {
+std::string pixel_bytes(const std::vector<T>& values) {
   std::string bytes(values.size() * sizeof(T), '\0');
   std::memcpy(bytes.data(), values.data(), bytes.size());
   return bytes;
@@ -23,13 +23,13 @@ std::optional<std::pair<tracking::PixelType, std::string>> flat_pixels(const igt
   using tracking::PixelType;
   if (image.components != 1 || image.part[2] != 1 || !image.is_whole()) return std::nullopt;
   if (const auto* u8 = std::get_if<std::vector<std::uint8_t>>(&image.voxels)) {
-    return std::pair{PixelType::kUint8, bytes_of(*u8)};
+    return std::pair{PixelType::kUint8, pixel_bytes(*u8)};
   }
   if (const auto* i16 = std::get_if<std::vector<std::int16_t>>(&image.voxels)) {
-    return std::pair{PixelType::kInt16, bytes_of(*i16)};
+    return std::pair{PixelType::kInt16, pixel_bytes(*i16)};
   }
   if (const auto* u16 = std::get_if<std::vector<std::uint16_t>>(&image.voxels)) {
-    return std::pair{PixelType::kUint16, bytes_of(*u16)};
+    return std::pair{PixelType::kUint16, pixel_bytes(*u16)};
   }
   return std::nullopt;
 }

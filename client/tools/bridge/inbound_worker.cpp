@@ -16,7 +16,7 @@ constexpr std::chrono::milliseconds kLook{100};
 constexpr std::chrono::milliseconds kForASession{2000};
 constexpr std::size_t kSmallMessage = 1024;
 
-std::size_t bytes_of(const igtl::Message& message) {
+std::size_t message_bytes(const igtl::Message& message) {
   if (const auto* image = std::get_if<igtl::Image>(&message.content)) {
     return std::visit([](const auto& voxels) { return voxels.size() * sizeof voxels[0]; },
                       image->voxels);
@@ -71,7 +71,7 @@ InboundWorker::InboundWorker(Inbox inbox, std::string endpoint, std::optional<Cl
       tell_(std::move(tell)) {}
 
 void InboundWorker::post(igtl::Message&& message) {
-  const std::size_t bytes = bytes_of(message);
+  const std::size_t bytes = message_bytes(message);
   const std::lock_guard lock(mutex_);
   while (!queue_.empty() && queued_bytes_ + bytes > kMaxQueuedBytes) {
     queued_bytes_ -= queue_.front().bytes;

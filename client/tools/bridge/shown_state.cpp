@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-std::string dump(const ordered_json& value) {
+std::string state_text(const ordered_json& value) {
   return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
@@ -54,7 +54,7 @@ std::string flag_names(const Update& update) {
   return names;
 }
 
-std::string to_json(const ShownState& state) { return dump(to_object(state)); }
+std::string to_json(const ShownState& state) { return state_text(to_object(state)); }
 
 igtl::Metadata to_metadata(const ShownState& state) {
   igtl::Metadata metadata;
@@ -63,9 +63,9 @@ igtl::Metadata to_metadata(const ShownState& state) {
     std::string text = "unknown";
     if (value.is_string()) {
       // By way of JSON, which replaces bytes that are no UTF-8.
-      text = nlohmann::json::parse(dump(value)).get<std::string>();
+      text = nlohmann::json::parse(state_text(value)).get<std::string>();
     } else if (!value.is_null()) {
-      text = dump(value);
+      text = state_text(value);
     }
     const std::uint16_t encoding = is_ascii(text) ? igtl::kUsAscii : igtl::kUtf8;
     metadata.push_back({key, std::move(text), encoding});

@@ -11,7 +11,7 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct BridgeArguments {
   BridgeOptions options;
   std::string listen = "127.0.0.1:18945";
   std::string from;
@@ -36,7 +36,7 @@ void catch_signals(Bridge* bridge) {
   for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
 }
 
-Result<BridgeOptions> read_options(const Arguments& arguments) {
+Result<BridgeOptions> read_options(const BridgeArguments& arguments) {
   BridgeOptions options = arguments.options;
   auto listen = parse_address("--listen", arguments.listen);
   if (!listen) return tl::unexpected(listen.error());
@@ -61,7 +61,7 @@ Result<BridgeOptions> read_options(const Arguments& arguments) {
   return options;
 }
 
-Status run(const Arguments& arguments) {
+Status run_bridge(const BridgeArguments& arguments) {
   const auto options = read_options(arguments);
   if (!options) return tl::unexpected(options.error());
   const auto tell = [](const std::string& line) {
@@ -84,7 +84,7 @@ Status run(const Arguments& arguments) {
   return status;
 }
 
-void add_stream_options(CLI::App& command, Arguments& arguments) {
+void add_stream_options(CLI::App& command, BridgeArguments& arguments) {
   command.add_option("--endpoint", arguments.options.endpoint, "where the daemon listens")
       ->capture_default_str();
   add_key_options(command, arguments.keys);
@@ -109,7 +109,7 @@ void add_stream_options(CLI::App& command, Arguments& arguments) {
   command.add_flag("--json", arguments.options.json, "a line is a JSON object");
 }
 
-void add_inbound_options(CLI::App& command, Arguments& arguments) {
+void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
   InboxOptions& inbox = arguments.options.inbox;
   const char* group = "What comes in";
   const auto file = [&](const char* name, auto& target, const char* help) {
@@ -160,7 +160,7 @@ void add_inbound_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_bridge(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<BridgeArguments>();
   CLI::App* command = app.add_subcommand(
       "bridge",
       "Show a running daemon's field in 3D Slicer and other OpenIGTLink programs, and take images, "
@@ -183,7 +183,7 @@ void add_bridge(CLI::App& app, Status& status) {
       "  brainshift bridge --from 127.0.0.1:18944 --seeds seeds.csv --device device.xml \\\n"
       "    --registration T_ras_reference.txt\n"
       "      sweeps of PlusServer; each becomes an observation two seconds after its last image");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_bridge(*arguments); });
 }
 
 }  // namespace brainshift::client

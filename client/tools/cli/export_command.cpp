@@ -14,7 +14,7 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct ExportArguments {
   ExportOptions options;
   std::string direction, sequence = "last";
   std::vector<std::string> formats;
@@ -41,7 +41,7 @@ Status read_direction(const std::string& text, ExportOptions& options) {
               "--direction: \"" + text + "\": must be resampling or modeling");
 }
 
-void print(const Manifest& manifest, const ExportOptions& options) {
+void print_export(const Manifest& manifest, const ExportOptions& options) {
   const Update& update = manifest.message.update;
   const auto& [nx, ny, nz] = manifest.grid.dims;
   const Vec3 spacing = manifest.grid.spacing_mm();
@@ -61,7 +61,7 @@ void print(const Manifest& manifest, const ExportOptions& options) {
   }
 }
 
-Status run(Arguments& arguments, bool spacing_given) {
+Status run_export(ExportArguments& arguments, bool spacing_given) {
   ExportOptions& options = arguments.options;
   if (Status ok = read_direction(arguments.direction, options); !ok) return ok;
   if (Status ok = read_sequence(arguments.sequence, options.choice); !ok) return ok;
@@ -72,7 +72,7 @@ Status run(Arguments& arguments, bool spacing_given) {
   options.software = "brainshift " BRAINSHIFT_VERSION;
   const auto manifest = export_surgery(options, terminal_progress());
   if (!manifest) return tl::unexpected(manifest.error());
-  print(*manifest, options);
+  print_export(*manifest, options);
   return {};
 }
 
@@ -100,7 +100,7 @@ constexpr const char* kFooter =
 }  // namespace
 
 void add_export(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = app.add_subcommand(
       "export", "Write a field of a journal for 3D Slicer, ITK, ANTs, elastix, ParaView.");
   ExportOptions& options = arguments->options;
@@ -128,7 +128,7 @@ void add_export(CLI::App& app, Status& status) {
                     "with --sequence N: also an update that is unusable; every file says so");
   command->footer(kFooter);
   command->callback(
-      [arguments, spacing, &status] { status = run(*arguments, spacing->count() > 0); });
+      [arguments, spacing, &status] { status = run_export(*arguments, spacing->count() > 0); });
 }
 
 }  // namespace brainshift::client

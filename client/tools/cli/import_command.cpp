@@ -12,13 +12,13 @@ namespace brainshift::client {
 namespace {
 
 // What the arguments say: a recording, or landmarks.
-struct Arguments {
+struct ImportArguments {
   ImportOptions options;
   std::filesystem::path landmarks, landmarks_moved;
 };
 
 // Options that landmarks have no use for, by the paths given.
-Status check_landmarks_alone(const Arguments& arguments) {
+Status check_landmarks_alone(const ImportArguments& arguments) {
   const ImportOptions& options = arguments.options;
   for (const auto& [name, path] :
        {std::pair{"--recording", options.recording}, std::pair{"--device", options.device},
@@ -32,7 +32,7 @@ Status check_landmarks_alone(const Arguments& arguments) {
   return {};
 }
 
-Status run_landmarks(const Arguments& arguments) {
+Status run_landmarks(const ImportArguments& arguments) {
   if (Status ok = check_landmarks_alone(arguments); !ok) return ok;
   LandmarkOptions options;
   options.landmarks = arguments.landmarks;
@@ -47,7 +47,7 @@ Status run_landmarks(const Arguments& arguments) {
   return {};
 }
 
-Status run(const Arguments& arguments) {
+Status run_import(const ImportArguments& arguments) {
   const ImportOptions& options = arguments.options;
   if (!options.out.empty()) {  // import_recording names what is missing
     if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
@@ -65,7 +65,7 @@ Status run(const Arguments& arguments) {
 }  // namespace
 
 void add_import(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ImportArguments>();
   ImportOptions* options = &arguments->options;
   CLI::App* command = app.add_subcommand(
       "import",
@@ -129,7 +129,7 @@ void add_import(CLI::App& app, Status& status) {
       "  brainshift import --landmarks before.mrk.json --landmarks-moved during.mrk.json \\\n"
       "    --model colin27.h5 --out landmarks.surgery\n"
       "Frames are left out where the tracker lost sight; the report counts them by reason.");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_import(*arguments); });
 }
 
 }  // namespace brainshift::client

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct JournalArguments {
   std::vector<fs::path> files;
   fs::path file;
   fs::path out;
@@ -31,7 +31,7 @@ struct Arguments {
 };
 
 // Every file is reported; the first that is not good decides how the command ends.
-Status check(const std::vector<fs::path>& files) {
+Status run_check(const std::vector<fs::path>& files) {
   Status status;
   const auto keep_first = [&](const Error& error) {
     if (status) status = tl::unexpected(error);
@@ -49,7 +49,7 @@ Status check(const std::vector<fs::path>& files) {
   return status;
 }
 
-Status export_tables(const Arguments& arguments) {
+Status export_tables(const JournalArguments& arguments) {
   const bool fields_wanted = !arguments.fields.folder.empty() || !arguments.fields_file.empty();
   if (arguments.csv.empty() && !fields_wanted) {
     return fail(ErrorCode::kInvalidArgument,
@@ -90,15 +90,16 @@ Status finish(const Result<CopiedJournal>& copied, const fs::path& out) {
   return {};
 }
 
-CLI::App* add_action(CLI::App& journal, const std::string& name, const std::string& text,
-                     const std::string& examples) {
+CLI::App* add_journal_action(CLI::App& journal, const std::string& name, const std::string& text,
+                             const std::string& examples) {
   CLI::App* action = journal.add_subcommand(name, text);
   action->footer(examples);
   return action;
 }
 
-void add_check(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, Status& status) {
-  CLI::App* action = add_action(
+void add_check(CLI::App& journal, const std::shared_ptr<JournalArguments>& arguments,
+               Status& status) {
+  CLI::App* action = add_journal_action(
       journal, "check", "Say what files hold, and whether every record is what was written.",
       "Examples:\n"
       "  brainshift journal check journal/*.surgery\n"
@@ -108,11 +109,12 @@ void add_check(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, S
       "file\n"
       "when it was copied. Exit status: 0 all records are good; 2 a file is broken or is none.");
   action->add_option("files", arguments->files, "surgery files (.surgery)")->required();
-  action->callback([arguments, &status] { status = check(arguments->files); });
+  action->callback([arguments, &status] { status = run_check(arguments->files); });
 }
 
-void add_export(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, Status& status) {
-  CLI::App* action = add_action(
+void add_export(CLI::App& journal, const std::shared_ptr<JournalArguments>& arguments,
+                Status& status) {
+  CLI::App* action = add_journal_action(
       journal, "export",
       "Write a table of the records, and the fields for ParaView or as one HDF5 file.",
       "Examples:\n"
@@ -137,8 +139,9 @@ void add_export(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, 
   action->callback([arguments, &status] { status = export_tables(*arguments); });
 }
 
-void add_repair(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, Status& status) {
-  CLI::App* action = add_action(
+void add_repair(CLI::App& journal, const std::shared_ptr<JournalArguments>& arguments,
+                Status& status) {
+  CLI::App* action = add_journal_action(
       journal, "repair", "Write the valid prefix of a file to a new one.",
       "Example:\n"
       "  brainshift journal repair damaged.surgery --out mended.surgery\n"
@@ -151,8 +154,9 @@ void add_repair(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, 
   });
 }
 
-void add_trim(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, Status& status) {
-  CLI::App* action = add_action(
+void add_trim(CLI::App& journal, const std::shared_ptr<JournalArguments>& arguments,
+              Status& status) {
+  CLI::App* action = add_journal_action(
       journal, "trim", "Write a range of observations, with their updates, to a new file.",
       "Example, observations 100 to 250 of every source:\n"
       "  brainshift journal trim long.surgery --from 100 --to 250 --out part.surgery\n"
@@ -171,7 +175,7 @@ void add_trim(CLI::App& journal, const std::shared_ptr<Arguments>& arguments, St
 }  // namespace
 
 void add_journal(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<JournalArguments>();
   CLI::App* journal = app.add_subcommand(
       "journal", "Check, export, repair and trim recorded surgeries (docs/journal.md).");
   journal->require_subcommand(1);

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct KeysArguments {
   std::string name;
   fs::path folder = ".";
   fs::path allow_list;
@@ -23,7 +23,7 @@ struct Arguments {
   std::vector<fs::path> files;
 };
 
-Status make(const Arguments& arguments) {
+Status make(const KeysArguments& arguments) {
   const auto files = make_keys(arguments.folder, arguments.name);
   if (!files) return tl::unexpected(files.error());
   std::printf("%s   public: hand it out\n%s   secret: stays on this machine\n",
@@ -31,7 +31,7 @@ Status make(const Arguments& arguments) {
   return {};
 }
 
-Status add(const Arguments& arguments) {
+Status add(const KeysArguments& arguments) {
   const auto key = named_key(arguments.key);
   if (!key) return tl::unexpected(key.error());
   const io::AllowedKey allowed{*role_from(arguments.role),
@@ -47,7 +47,7 @@ Status add(const Arguments& arguments) {
   return {};
 }
 
-Status list(const Arguments& arguments) {
+Status list(const KeysArguments& arguments) {
   const auto keys = io::read_allow_list(arguments.allow_list);
   if (!keys) return tl::unexpected(keys.error());
   for (const io::AllowedKey& key : *keys) {
@@ -58,7 +58,7 @@ Status list(const Arguments& arguments) {
 }
 
 // Every file is reported; the first bad one decides how the command ends.
-Status check(const Arguments& arguments) {
+Status check_keys(const KeysArguments& arguments) {
   const CheckedKeys checked = check_key_files(arguments.files);
   for (const std::string& line : checked.good) std::puts(line.c_str());
   for (std::size_t i = 1; i < checked.bad.size(); ++i) print_error(checked.bad[i].message);
@@ -72,10 +72,11 @@ std::vector<std::string> role_words() {
   return words;
 }
 
-using Action = Status (*)(const Arguments&);
+using Action = Status (*)(const KeysArguments&);
 
-CLI::App* add_action(CLI::App& keys, const std::string& name, const std::string& text,
-                     const std::shared_ptr<Arguments>& arguments, Action run, Status& status) {
+CLI::App* add_keys_action(CLI::App& keys, const std::string& name, const std::string& text,
+                          const std::shared_ptr<KeysArguments>& arguments, Action run,
+                          Status& status) {
   CLI::App* action = keys.add_subcommand(name, text);
   action->callback([arguments, run, &status] { status = run(*arguments); });
   return action;
@@ -84,7 +85,7 @@ CLI::App* add_action(CLI::App& keys, const std::string& name, const std::string&
 }  // namespace
 
 void add_keys(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<KeysArguments>();
   CLI::App* keys = app.add_subcommand(
       "keys", "Make and check the keys of daemons and clients (docs/security.md).");
   keys->require_subcommand(1);
@@ -101,16 +102,16 @@ void add_keys(CLI::App& app, Status& status) {
       "also takes over.\n"
       "Each has a --help of its own.");
 
-  CLI::App* action = add_action(*keys, "make", "Make a key pair: NAME.public and NAME.secret.",
-                                arguments, make, status);
+  CLI::App* action = add_keys_action(*keys, "make", "Make a key pair: NAME.public and NAME.secret.",
+                                     arguments, make, status);
   action->add_option("name", arguments->name, "of the machine or program")->required();
   action->add_option("--dir", arguments->folder, "folder for the files")->capture_default_str();
   action->footer(
       "Nothing is overwritten. The secret file is for its owner alone (mode 0600).\n"
       "Example:\n  brainshift keys make console --dir ~/.config/brainshift");
 
-  action = add_action(*keys, "add", "Add a public key to a daemon's allow-list.", arguments, add,
-                      status);
+  action = add_keys_action(*keys, "add", "Add a public key to a daemon's allow-list.", arguments,
+                           add, status);
   action->add_option("key", arguments->key, "a .public file, or its 40 characters")->required();
   action->add_option("--allow", arguments->allow_list, "allow-list; made if it does not exist")
       ->required();
@@ -123,12 +124,12 @@ void add_keys(CLI::App& app, Status& status) {
       "The daemon reads its list when it starts. To take a key away, delete its line.\n"
       "Example:\n  brainshift keys add --allow allow-list --role source ultrasound.public");
 
-  action = add_action(*keys, "list", "Print an allow-list.", arguments, list, status);
+  action = add_keys_action(*keys, "list", "Print an allow-list.", arguments, list, status);
   action->add_option("--allow", arguments->allow_list, "allow-list")->required();
   action->footer("Example:\n  brainshift keys list --allow allow-list");
 
-  action = add_action(*keys, "check", "Check permissions, format and duplicates of files.",
-                      arguments, check, status);
+  action = add_keys_action(*keys, "check", "Check permissions, format and duplicates of files.",
+                           arguments, check_keys, status);
   action->add_option("files", arguments->files, "key files and allow-lists")->required();
   action->footer("Example:\n  brainshift keys check daemon.secret allow-list");
 }

@@ -11,12 +11,12 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct PreviewArguments {
   std::filesystem::path case_file;
   std::filesystem::path out;
 };
 
-Status run(const Arguments& arguments) {
+Status run_preview(const PreviewArguments& arguments) {
   if (Status ok = io::check_output_folder("--out", arguments.out); !ok) return ok;
   const auto summary = write_preview(arguments.case_file, arguments.out, terminal_progress());
   if (!summary) return tl::unexpected(summary.error());
@@ -31,7 +31,7 @@ Status run(const Arguments& arguments) {
 }  // namespace
 
 void add_preview(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<PreviewArguments>();
   CLI::App* command = app.add_subcommand(
       "preview", "Draw a case before it is prepared: brain, tumour, opening, gravity, contact.");
   command->add_option("--case", arguments->case_file, "case file (YAML)")->required();
@@ -44,7 +44,7 @@ void add_preview(CLI::App& app, Status& status) {
       "or gravity along the wrong axis is seen at once. Lines that begin with \"look again\" name\n"
       "what is unusual, and the key to look at. Exit status 2: the case cannot be prepared; what\n"
       "there is of it is drawn all the same.");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_preview(*arguments); });
 }
 
 }  // namespace brainshift::client

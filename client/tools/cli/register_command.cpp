@@ -13,12 +13,12 @@ namespace brainshift::client {
 namespace {
 
 // What the arguments say, before they are options of register_patient.
-struct Arguments {
+struct RegisterArguments {
   RegisterOptions options;
   std::vector<double> target;
 };
 
-Status run(const Arguments& arguments) {
+Status run_register(const RegisterArguments& arguments) {
   RegisterOptions options = arguments.options;
   if (!arguments.target.empty()) {
     options.target = Vec3(arguments.target[0], arguments.target[1], arguments.target[2]);
@@ -32,7 +32,7 @@ Status run(const Arguments& arguments) {
   return {};
 }
 
-void add_inputs(CLI::App& command, Arguments& arguments) {
+void add_inputs(CLI::App& command, RegisterArguments& arguments) {
   RegisterOptions& options = arguments.options;
   command.add_option("--recording", options.recording,
                      "tracked stylus held still on each fiducial, as PLUS records it (.mha, .nrrd; "
@@ -60,7 +60,7 @@ void add_inputs(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_register(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RegisterArguments>();
   RegisterOptions& options = arguments->options;
   CLI::App* command = app.add_subcommand(
       "register",
@@ -103,7 +103,7 @@ void add_register(CLI::App& app, Status& status) {
       "Read the expected error at the tumour, not the registration error: a small one of few "
       "fiducials proves nothing.\n"
       "Hold the tip in each fiducial for two seconds, and move on quickly.");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_register(*arguments); });
 }
 
 }  // namespace brainshift::client

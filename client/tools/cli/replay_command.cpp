@@ -14,7 +14,7 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct ReplayArguments {
   ReplayOptions options;
   KeyOptions keys;
   std::string speed = "max";
@@ -43,7 +43,7 @@ Status verify(const ReplayOptions& options) {
                   " answers differ; the first: " + verification->differences.front());
 }
 
-Status run(Arguments arguments) {
+Status run_replay(ReplayArguments arguments) {
   ReplayOptions& options = arguments.options;
   options.speed = arguments.speed == "max" ? Speed::kMax : Speed::kRecorded;
   if (arguments.boundary == "contact") options.boundaries = {Boundary::kContact};
@@ -74,7 +74,7 @@ Status run(Arguments arguments) {
 }  // namespace
 
 void add_replay(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* command = app.add_subcommand(
       "replay", "Play a recorded surgery to a running daemon and score its answers.");
   ReplayOptions& options = arguments->options;
@@ -146,7 +146,7 @@ void add_replay(CLI::App& app, Status& status) {
       "an "
       "update differs:\n"
       "  brainshift replay journal/colin27-20250131T120000Z-1.surgery --verify");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_replay(*arguments); });
 }
 
 }  // namespace brainshift::client

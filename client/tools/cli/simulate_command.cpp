@@ -10,7 +10,7 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
   SimulateOptions options;
   bool list = false;
 };
@@ -25,7 +25,7 @@ void print_scenarios() {
   }
 }
 
-Status run(const Arguments& arguments) {
+Status run_simulate(const SimulateArguments& arguments) {
   if (arguments.list) {
     print_scenarios();
     return {};
@@ -44,7 +44,7 @@ Status run(const Arguments& arguments) {
 }  // namespace
 
 void add_simulate(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command =
       app.add_subcommand("simulate", "Record a simulated surgery with its known truth.");
   SimulateOptions& options = arguments->options;
@@ -64,7 +64,7 @@ void add_simulate(CLI::App& app, Status& status) {
       "noise):\n"
       "  brainshift simulate --case config/cases/colin27.yaml --scenario paper --seed 1 --out "
       "paper.surgery");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_simulate(*arguments); });
 }
 
 }  // namespace brainshift::client

@@ -19,7 +19,7 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct SolveArguments {
   std::filesystem::path problem, out, probes;
   bool json = false;
 };
@@ -192,8 +192,8 @@ nlohmann::json summary(const ProblemSpec& spec, const forward::ForwardSolution& 
   return json;
 }
 
-void print(const ProblemSpec& spec, const forward::ForwardSolution& solution,
-           const Probed& values) {
+void print_solution(const ProblemSpec& spec, const forward::ForwardSolution& solution,
+                    const Probed& values) {
   std::printf("%d nodes, %d tetrahedra (%s), %d unknowns, %d linear solve%s\n",
               solution.space.num_nodes(), solution.space.num_elements(),
               name_of(solution.space.element), solution.unknowns, solution.iterations,
@@ -218,7 +218,7 @@ void print(const ProblemSpec& spec, const forward::ForwardSolution& solution,
   }
 }
 
-Status run(const Arguments& arguments) {
+Status run_solve(const SolveArguments& arguments) {
   if (Status ok = io::check_output_file("--out", arguments.out); !ok) return ok;
   if (!arguments.probes.empty()) {
     if (Status ok = io::check_output_file("--probes", arguments.probes); !ok) return ok;
@@ -240,7 +240,7 @@ Status run(const Arguments& arguments) {
   if (arguments.json) {
     std::printf("%s\n", summary(*spec, *solution, *values).dump(2).c_str());
   } else {
-    print(*spec, *solution, *values);
+    print_solution(*spec, *solution, *values);
   }
   for (const std::string& warning : solution->warnings) {
     std::fprintf(stderr, "brainshift: warning: %s\n", warning.c_str());
@@ -251,7 +251,7 @@ Status run(const Arguments& arguments) {
 }  // namespace
 
 void add_solve(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SolveArguments>();
   CLI::App* command = app.add_subcommand(
       "solve", "Solve one forward problem on any mesh, to compare with other codes.");
   command->add_option("--problem", arguments->problem, "problem file (YAML)")->required();
@@ -275,7 +275,7 @@ void add_solve(CLI::App& app, Status& status) {
       "  brainshift solve --problem docs/examples/solve/thick_sphere.yaml --out sphere.vtu\n"
       "  brainshift solve --problem docs/examples/solve/signorini_block.yaml --out block.vtu "
       "--probes block.csv --json");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_solve(*arguments); });
 }
 
 }  // namespace brainshift::client

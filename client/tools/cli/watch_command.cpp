@@ -10,13 +10,13 @@
 namespace brainshift::client {
 namespace {
 
-struct Arguments {
+struct WatchArguments {
   WatchOptions options;
   ChoiceText choice;
   KeyOptions keys;
 };
 
-Status run(const Arguments& arguments) {
+Status run_watch(const WatchArguments& arguments) {
   const auto choice = parse_choice(arguments.choice);
   if (!choice) return tl::unexpected(choice.error());
   WatchOptions options = arguments.options;
@@ -31,7 +31,7 @@ Status run(const Arguments& arguments) {
 }  // namespace
 
 void add_watch(CLI::App& app, Status& status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WatchArguments>();
   WatchOptions& options = arguments->options;
   ChoiceText& choice = arguments->choice;
   CLI::App* command = app.add_subcommand(
@@ -72,7 +72,7 @@ void add_watch(CLI::App& app, Status& status) {
       "nodes among them, the verdict on the field, and whether it may be shown as current. "
       "Between\n"
       "updates a line tells when that changes, e.g. to stale when the daemon is silent.");
-  command->callback([arguments, &status] { status = run(*arguments); });
+  command->callback([arguments, &status] { status = run_watch(*arguments); });
 }
 
 }  // namespace brainshift::client

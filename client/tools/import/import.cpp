@@ -29,7 +29,7 @@ constexpr double kFarthest_mm = 100.0;
 constexpr double kNearTracker_mm = 10.0;
 constexpr double kMostSd_mm = 20.0;
 
-Status check_options(const ImportOptions& options) {
+Status check_import(const ImportOptions& options) {
   const auto one_of = [](bool first, bool second, const char* names) -> Status {
     if (first != second) return {};
     return fail(ErrorCode::kInvalidArgument, fmt::format("exactly one of {} is required, {} given",
@@ -154,7 +154,7 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
 }  // namespace
 
 Result<ImportReport> import_recording(const ImportOptions& options, const Progress& progress) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_import(options); !ok) return tl::unexpected(ok.error());
   std::optional<io::FiducialFile> fiducials;
   const auto constants = constant_links(options, fiducials);
   if (!constants) return tl::unexpected(constants.error());

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLeastPairs = 3;  // as the daemon needs
 constexpr double kLeastSd_mm = 0.01, kMostSd_mm = 20.0;
 
-Status check_options(const LandmarkOptions& options) {
+Status check_landmark_import(const LandmarkOptions& options) {
   if (options.landmarks.empty()) {
     return fail(ErrorCode::kInvalidArgument, "--landmarks is required");
   }
@@ -123,7 +123,7 @@ std::string files_of(const LandmarkOptions& options) {
 }  // namespace
 
 Result<LandmarkReport> import_landmarks(const LandmarkOptions& options, const Progress& progress) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_landmark_import(options); !ok) return tl::unexpected(ok.error());
   const auto pairs = options.landmarks_moved.empty()
                          ? io::read_pairs(options.landmarks)
                          : io::read_pairs(options.landmarks, options.landmarks_moved);

@@ -25,7 +25,7 @@ tl::unexpected<Error> refuse(std::string text) {
   return fail(ErrorCode::kInvalidArgument, std::move(text));
 }
 
-Status check_options(const RegisterOptions& options) {
+Status check_register(const RegisterOptions& options) {
   if (options.recording.empty() == options.fiducials.empty()) {
     return refuse(fmt::format("exactly one of --recording and --fiducials is required, {} given",
                               options.recording.empty() ? "none" : "both"));
@@ -218,7 +218,7 @@ Result<Vec3> target_of(const RegisterOptions& options, const Progress& progress,
 }  // namespace
 
 Result<RegisterReport> register_patient(const RegisterOptions& options, const Progress& progress) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_register(options); !ok) return tl::unexpected(ok.error());
   RegisterReport report;
   const auto fit = fit_fiducials(options, report);
   if (!fit) return tl::unexpected(fit.error());

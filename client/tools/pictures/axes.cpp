@@ -16,7 +16,7 @@ constexpr int kRightAxisMargin = 160;
 constexpr int kBottomMargin = 130;
 constexpr int kTextLeft = 60;
 constexpr int kFirstLegendY = 160;
-constexpr int kLegendRow = 46;
+constexpr int kAxesLegendRow = 46;
 constexpr int kBelowLegend = 40;
 constexpr int kSample = 60;  // width of a legend's line or bar
 constexpr int kSampleGap = 14;
@@ -91,7 +91,7 @@ cv::Rect draw_legend(cv::Mat& image, const std::vector<LegendSample>& samples, b
     const int width = kSample + kSampleGap + text_width(sample.name, {}) + kEntryGap;
     if (x > kTextLeft && x + width > image.cols - 20) {
       x = kTextLeft;
-      y += kLegendRow;
+      y += kAxesLegendRow;
     }
     if (sample.bar) {
       cv::rectangle(image, cv::Rect(x, y - 12, kSample, 24), sample.stroke.colour, cv::FILLED);

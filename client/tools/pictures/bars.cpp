@@ -59,7 +59,7 @@ void draw_group_name(cv::Mat& image, const cv::Rect& area, double middle, const 
   }
 }
 
-std::vector<LegendSample> legend_of(const BarSpec& spec) {
+std::vector<LegendSample> bar_legend(const BarSpec& spec) {
   std::vector<LegendSample> samples;
   for (const BarSeries& series : spec.series)
     samples.push_back({series.legend, {series.colour, 1, 0.0}, Marker::kNone, true});
@@ -76,7 +76,7 @@ cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area) {
   const auto bars = static_cast<double>(std::max<std::size_t>(1, spec.series.size()));
   draw_titles(image, spec.title, spec.subtitle);
   Frame frame;
-  frame.area = draw_legend(image, legend_of(spec));
+  frame.area = draw_legend(image, bar_legend(spec));
   frame.x = {{}, {0.0, groups}};
   frame.y = {{spec.y_label}, {spec.y_min, spec.y_max}};
   draw_y_axis(image, frame);

@@ -101,7 +101,7 @@ Ranges ranges_of(const ChartSpec& spec) {
   return ranges;
 }
 
-std::vector<LegendSample> legend_of(const std::vector<Series>& all) {
+std::vector<LegendSample> series_legend(const std::vector<Series>& all) {
   std::vector<LegendSample> samples;
   for (const Series& series : all) {
     if (series.legend.empty()) continue;
@@ -122,7 +122,7 @@ cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area) {
   const Ranges ranges = ranges_of(spec);
   draw_titles(image, spec.title, spec.subtitle);
   Frame left;
-  left.area = draw_legend(image, legend_of(spec.series), has_right);
+  left.area = draw_legend(image, series_legend(spec.series), has_right);
   left.x = {spec.x, padded(ranges.x, spec.x)};
   left.y = {spec.y, padded(ranges.left, spec.y)};
   Frame right = left;

@@ -19,9 +19,9 @@ constexpr double kArrowSpacing_mm = 9.0;
 constexpr double kMapSpacing_mm = 1.0;
 constexpr double kDifferenceFactor = 5.0;  // "magnified five times for visualization", paper Fig. 4
 
-const Stroke kBefore{palette::kWhite, 3, 12.0};
-const Stroke kTrue{palette::kSkyBlue, 8, 0.0};
-const Stroke kEstimated{palette::kOrange, 3, 0.0};
+const Stroke kSliceBefore{palette::kWhite, 3, 12.0};
+const Stroke kSliceTrue{palette::kSkyBlue, 8, 0.0};
+const Stroke kSliceEstimated{palette::kOrange, 3, 0.0};
 
 struct Estimated {
   std::string boundary;
@@ -96,16 +96,17 @@ TriangleSurface moved_brain(const Scene& scene, const Points& displacement) {
 void draw_tumour(SlicePanel& panel, const Scene& scene, const Points& estimate) {
   if (scene.head.tumour.num_triangles() == 0) return;
   if (scene.truth != nullptr) {
-    panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, *scene.truth), kTrue);
+    panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, *scene.truth),
+                       kSliceTrue);
   }
-  panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, estimate), kEstimated);
-  panel.draw_section(scene.head.tumour, kBefore);
+  panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, estimate), kSliceEstimated);
+  panel.draw_section(scene.head.tumour, kSliceBefore);
 }
 
 std::vector<LegendEntry> outline_legend(const Scene& scene, const std::string& what) {
-  std::vector<LegendEntry> legend = {{what + " before", kBefore},
-                                     {what + " estimated", kEstimated}};
-  if (scene.truth != nullptr) legend.push_back({what + " true", kTrue});
+  std::vector<LegendEntry> legend = {{what + " before", kSliceBefore},
+                                     {what + " estimated", kSliceEstimated}};
+  if (scene.truth != nullptr) legend.push_back({what + " true", kSliceTrue});
   return legend;
 }
 
@@ -160,9 +161,9 @@ cv::Mat close_up_sheet(const Scene& scene, Plane plane) {
   sheet.legend = outline_legend(scene, "outline");
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.8);
-    if (scene.truth != nullptr) panel.draw_section(moved_brain(scene, *scene.truth), kTrue);
-    panel.draw_section(moved_brain(scene, *e.displacement), kEstimated);
-    panel.draw_section(scene.brain, kBefore);
+    if (scene.truth != nullptr) panel.draw_section(moved_brain(scene, *scene.truth), kSliceTrue);
+    panel.draw_section(moved_brain(scene, *e.displacement), kSliceEstimated);
+    panel.draw_section(scene.brain, kSliceBefore);
     draw_tumour(panel, scene, *e.displacement);
     panel.draw_orientation(10.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
@@ -221,11 +222,11 @@ cv::Mat error_sheet(const Scene& scene) {
       slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "|estimated - true| (mm)";
-  sheet.legend = {{"tumour before", kBefore}};
+  sheet.legend = {{"tumour before", kSliceBefore}};
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.9);
     panel.draw_magnitude_map(samples, *e.displacement - *scene.truth, sheet.colour_max, 0.7);
-    panel.draw_section(scene.head.tumour, kBefore);
+    panel.draw_section(scene.head.tumour, kSliceBefore);
     panel.draw_orientation(20.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
   }

@@ -13,7 +13,7 @@ namespace brainshift::client {
 namespace {
 
 constexpr std::uint64_t kSeeds = std::uint64_t{1} << 53;
-constexpr double kPerDegree = std::numbers::pi / 180.0;
+constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 
 // Points every `spacing` along the polyline that the segments make up, in the order they come in.
 void walk_segments(const Points& segments, double spacing, std::vector<Vec3>& points) {
@@ -47,7 +47,7 @@ ProbeError::ProbeError(const ProbeErrors& errors) : errors_(errors), tracker_(er
   Random sides(errors.sweep_seed);
   for (bool& each : from_above_) each = sides.uniform() < 0.5;
   Random random(errors.calibration_seed);
-  turn_ = normal_vector(errors.calibration_sd_deg * kPerDegree, random);
+  turn_ = normal_vector(errors.calibration_sd_deg * kRadiansPerDegree, random);
   shift_ = normal_vector(errors.calibration_sd_mm, random);
   scale_ = errors.scale_sd * random.normal();
 }
@@ -58,7 +58,7 @@ bool ProbeError::sweeps(int sweep, double share) const {
 
 void ProbeError::disturb(Points& section, const Vec3& centre, const Vec3& probe) {
   if (errors_.tracker_sd_mm > 0.0 || errors_.tracker_sd_deg > 0.0) {
-    const Vec3 turn = normal_vector(errors_.tracker_sd_deg * kPerDegree, tracker_);
+    const Vec3 turn = normal_vector(errors_.tracker_sd_deg * kRadiansPerDegree, tracker_);
     move(section, turn, centre, normal_vector(errors_.tracker_sd_mm, tracker_));
   }
   if (scale_ != 0.0) section += scale_ * (section.colwise() - probe);
@@ -89,7 +89,7 @@ CorticalSurface measure_cortex(const TriangleSurface& deformed, const CortexView
   for (Eigen::Index i = 0; i < points.size(); ++i) {
     points.data()[i] += view.noise_sd_mm * random.normal();
   }
-  const Vec3 turn = normal_vector(view.pose_sd_deg * kPerDegree, random);
+  const Vec3 turn = normal_vector(view.pose_sd_deg * kRadiansPerDegree, random);
   const Vec3 shift = normal_vector(view.pose_sd_mm, random);
   move(points, turn, deformed.vertices.rowwise().mean(), shift);
   CorticalSurface surface;

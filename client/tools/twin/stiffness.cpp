@@ -21,7 +21,7 @@ int class_of(double z) {
   const double inside = std::clamp(z, -kWidestClass, kWidestClass);
   return 1 + static_cast<int>(std::lround((inside + kWidestClass) / kClassStep));
 }
-double middle_of(int label) { return kClassStep * (label - 1) - kWidestClass; }
+double class_middle(int label) { return kClassStep * (label - 1) - kWidestClass; }
 
 Vec3 centroid_of(const TetMesh& mesh, int tet) {
   Vec3 centroid = Vec3::Zero();
@@ -74,7 +74,7 @@ VariedBrain vary_stiffness(const BrainModel& model, const CaseConfig& config, do
     const int label = class_of(field.at(centroid_of(mesh, t)));
     mesh.labels[static_cast<std::size_t>(t)] = label;
     TissueStiffness tissue{config.material.shear_modulus_pa, config.material.poisson_ratio};
-    tissue.shear_modulus_pa *= std::exp(sd * middle_of(label));
+    tissue.shear_modulus_pa *= std::exp(sd * class_middle(label));
     varied.config.material.regions[label] = tissue;
   }
   return varied;
@@ -104,7 +104,7 @@ Result<VariedBrain> vary_tissues(const BrainModel& model, const CaseConfig& conf
     const int label = tissue * kStiffnessClasses + level;
     mesh.labels[static_cast<std::size_t>(t)] = label;
     TissueStiffness stiffness{config.material.shear_modulus_pa, config.material.poisson_ratio};
-    stiffness.shear_modulus_pa *= factor[tissue] * std::exp(kTissueSd * middle_of(level));
+    stiffness.shear_modulus_pa *= factor[tissue] * std::exp(kTissueSd * class_middle(level));
     varied.config.material.regions[label] = stiffness;
   }
   return varied;

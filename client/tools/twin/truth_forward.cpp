@@ -18,7 +18,7 @@ struct BoundaryNodes {
   Points normals;  // 3 x nodes; zero inside
 };
 
-Hold middle_of(Hold a, Hold b) {
+Hold edge_hold(Hold a, Hold b) {
   if (a == Hold::kFixed || b == Hold::kFixed) return Hold::kFixed;
   return a == Hold::kFree && b == Hold::kFree ? Hold::kFree : Hold::kSlave;
 }
@@ -43,7 +43,7 @@ BoundaryNodes boundary_nodes(const BrainModel& model, const fem::DisplacementSpa
       const auto node = static_cast<std::size_t>(nodes[static_cast<std::size_t>(k)]);
       boundary.normals.col(static_cast<Eigen::Index>(node)) += area;
       if (k < 3) continue;
-      boundary.hold[node] = middle_of(boundary.hold[static_cast<std::size_t>(face[k - 3])],
+      boundary.hold[node] = edge_hold(boundary.hold[static_cast<std::size_t>(face[k - 3])],
                                       boundary.hold[static_cast<std::size_t>(face[(k - 2) % 3])]);
     }
   }

@@ -12,10 +12,10 @@
 namespace brainshift::client {
 namespace {
 
-constexpr double kPerDegree = std::numbers::pi / 180.0;
+constexpr double kLoadRadiansPerDegree = std::numbers::pi / 180.0;
 
 Vec3 turned(const Vec3& direction, const Vec3& turn_deg) {
-  const Vec3 turn = kPerDegree * turn_deg;
+  const Vec3 turn = kLoadRadiansPerDegree * turn_deg;
   return Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * direction;
 }
 
@@ -30,7 +30,7 @@ Vec3 value_at(const io::ScorePoint& point, const Points& u) {
 Vec3 tilted_gravity(const BrainModel& model, double tilt_deg) {
   const Vec3 axis =
       (craniotomy_centre(model) - Vec3(model.tumour.vertices.rowwise().mean())).normalized();
-  return Eigen::AngleAxisd(tilt_deg * kPerDegree, axis) * model.gravity_direction;
+  return Eigen::AngleAxisd(tilt_deg * kLoadRadiansPerDegree, axis) * model.gravity_direction;
 }
 
 Gravity gravity_of(const BrainModel& model, const Scenario& scenario) {

@@ -13,7 +13,7 @@
 namespace brainshift::client {
 namespace {
 
-constexpr double kPerDegree = std::numbers::pi / 180.0;
+constexpr double kBeamRadiansPerDegree = std::numbers::pi / 180.0;
 constexpr double kWindowReach =
     30.0;  // mm, as far as the brain's surface may be from the given centre
 constexpr double kBoundaryEcho = 0.6;  // q, mm: of a unit of impedance per mm
@@ -69,7 +69,7 @@ class Insonation {
   }
   double beam_angle(Eigen::Index beam) const {
     const double step = 2.0 * probe_.half_angle_deg / std::max(1, probe_.beams - 1);
-    return (-probe_.half_angle_deg + step * static_cast<double>(beam)) * kPerDegree;
+    return (-probe_.half_angle_deg + step * static_cast<double>(beam)) * kBeamRadiansPerDegree;
   }
 
   // Envelope, samples x beams.
@@ -153,8 +153,8 @@ struct PixelGrid {
 PixelGrid pixel_grid(const UltrasoundProbe& probe) {
   const double reach = probe.array_radius_mm + probe.depth_mm;
   PixelGrid grid;
-  grid.top_mm = probe.array_radius_mm * std::cos(probe.half_angle_deg * kPerDegree);
-  grid.left_mm = -reach * std::sin(probe.half_angle_deg * kPerDegree);
+  grid.top_mm = probe.array_radius_mm * std::cos(probe.half_angle_deg * kBeamRadiansPerDegree);
+  grid.left_mm = -reach * std::sin(probe.half_angle_deg * kBeamRadiansPerDegree);
   grid.width = static_cast<int>(std::ceil(-2.0 * grid.left_mm / probe.pixel_mm)) + 1;
   grid.height = static_cast<int>(std::ceil((reach - grid.top_mm) / probe.pixel_mm)) + 1;
   return grid;
@@ -165,14 +165,15 @@ std::string scan_converted(const Eigen::MatrixXf& envelope, const UltrasoundProb
                            const PixelGrid& grid) {
   std::string pixels(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height),
                      '\0');
-  const double beams_per_rad = (probe.beams - 1) / (2.0 * probe.half_angle_deg * kPerDegree);
+  const double beams_per_rad =
+      (probe.beams - 1) / (2.0 * probe.half_angle_deg * kBeamRadiansPerDegree);
   for (int v = 0; v < grid.height; ++v)
     for (int u = 0; u < grid.width; ++u) {
       const double across = grid.left_mm + u * probe.pixel_mm;
       const double down = grid.top_mm + v * probe.pixel_mm;
       const double k = (std::hypot(across, down) - probe.array_radius_mm) / probe.sample_mm;
       const double b =
-          (std::atan2(across, down) + probe.half_angle_deg * kPerDegree) * beams_per_rad;
+          (std::atan2(across, down) + probe.half_angle_deg * kBeamRadiansPerDegree) * beams_per_rad;
       if (!(k >= 0.0 && k < static_cast<double>(envelope.rows() - 1) && b >= 0.0 &&
             b < static_cast<double>(envelope.cols() - 1)))
         continue;
@@ -208,7 +209,7 @@ std::vector<Plane> fan(const ProbeWindow& window, const UltrasoundProbe& probe,
   for (int i = 0; i < sweep.frames_per_sweep; ++i) {
     const double at = sweep.frames_per_sweep > 1 ? 2.0 * i / (sweep.frames_per_sweep - 1) - 1.0 : 0;
     const Mat3 tilt =
-        Eigen::AngleAxisd(at * sweep.tilt_deg * kPerDegree, across).toRotationMatrix();
+        Eigen::AngleAxisd(at * sweep.tilt_deg * kBeamRadiansPerDegree, across).toRotationMatrix();
     Plane plane;
     plane.axis = tilt * axis;
     plane.across = across;

@@ -18,10 +18,10 @@ namespace brainshift::client {
 namespace {
 
 constexpr int kDraws = 1000;
-constexpr double kPerDegree = std::numbers::pi / 180.0;
+constexpr double kPoseRadiansPerDegree = std::numbers::pi / 180.0;
 // Of points that are tested for the margin; the sagitta between two of them is below 0.1 mm.
 constexpr double kTestEdge_mm = 3.0;
-constexpr std::uint64_t kSeeds = std::uint64_t{1} << 53;
+constexpr std::uint64_t kPlaceSeeds = std::uint64_t{1} << 53;
 
 double between(double least, double most, Random& random) {
   return least + (most - least) * random.uniform();
@@ -30,7 +30,7 @@ double between(double least, double most, Random& random) {
 // A unit vector at up to `most_deg` from `axis`, the angle uniform.
 Vec3 beside(const Vec3& axis, double most_deg, Random& random) {
   const Vec3 across = axis.cross(random.direction()).normalized();
-  return Eigen::AngleAxisd(most_deg * kPerDegree * random.uniform(), across) * axis;
+  return Eigen::AngleAxisd(most_deg * kPoseRadiansPerDegree * random.uniform(), across) * axis;
 }
 
 class Head {
@@ -50,7 +50,7 @@ class Head {
   };
   std::optional<Place> draw_opening(Random& random) const {
     Place place;
-    place.centre = geometry::sample_surface(brain_.surface, 1, random.index(kSeeds)).col(0);
+    place.centre = geometry::sample_surface(brain_.surface, 1, random.index(kPlaceSeeds)).col(0);
     place.normal = index_.triangle_normal(index_.closest(place.centre).triangle);
     const bool high = place.centre[2] >= low_[2] + kSkullBase * (high_[2] - low_[2]);
     const bool lateral = std::abs(place.centre[0] - 0.5 * (low_[0] + high_[0])) >= kFromMidline_mm;
@@ -101,7 +101,8 @@ std::optional<CaseConfig> draw(const CaseConfig& config, const Head& head, Rando
   opening.long_axis_direction = place->normal.cross(random.direction()).normalized();
 
   patient.gravity_direction = beside(-place->normal, kUppermost_deg, random);
-  if (patient.gravity_direction[2] > std::sin(kHeadDown_deg * kPerDegree)) return std::nullopt;
+  if (patient.gravity_direction[2] > std::sin(kHeadDown_deg * kPoseRadiansPerDegree))
+    return std::nullopt;
   if (!head.holds(
           geometry::ellipsoid_surface(tumour.centre_mm, tumour.semi_axes_mm, kTestEdge_mm))) {
     return std::nullopt;

@@ -30,7 +30,7 @@ void read_camera(YamlSection section, CameraIntrinsics& camera) {
   section.done();
 }
 
-void read_transform(YamlSection section, Eigen::Matrix4d& matrix) {
+void read_camera_transform(YamlSection section, Eigen::Matrix4d& matrix) {
   std::vector<double> rotation(9, 0.0);
   Vec3 translation = Vec3::Zero();
   section.numbers("rotation", rotation, kRequired);
@@ -89,7 +89,7 @@ Result<StereoCalibration> read_calibration(const std::filesystem::path& path) {
   read_camera(root.section("left", kRequired), calibration.left);
   read_camera(root.section("right", kRequired), calibration.right);
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  read_transform(root.section("T_right_left", kRequired), matrix);
+  read_camera_transform(root.section("T_right_left", kRequired), matrix);
   root.number("rms_px", calibration.rms_px);
   root.number("epipolar_rms_px", calibration.epipolar_rms_px);
   YamlSection pairs = root.section("pairs");

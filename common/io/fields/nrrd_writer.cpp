@@ -20,7 +20,7 @@ std::string lps(const Vec3& ras) {
   return fmt::format("({},{},{})", 0.0 - ras.x(), 0.0 - ras.y(), ras.z() + 0.0);
 }
 
-std::string header_of(const DisplacementField& field) {
+std::string nrrd_header_of(const DisplacementField& field) {
   const VoxelGrid& grid = field.grid;
   const Mat3 axes = grid.T_ras_voxel.linear();
   return fmt::format(
@@ -53,7 +53,7 @@ Status write_nrrd(const std::filesystem::path& path, const DisplacementField& fi
   if (path.extension() != ".nrrd") {
     return file_error(ErrorCode::kUnreadable, path, "must end in .nrrd");
   }
-  auto file = GzipOutput::create(path, header_of(field), true);
+  auto file = GzipOutput::create(path, nrrd_header_of(field), true);
   if (!file) return tl::unexpected(file.error());
   const std::size_t slice = 3 * grid_size({field.grid.dims[0], field.grid.dims[1], 1});
   std::vector<float> values(slice);

@@ -31,7 +31,7 @@ tl::unexpected<Error> refuse(ErrorCode code, std::string_view option, const fs::
   return fail(code, fmt::format("{}: {}: {}", option, path.string(), reason));
 }
 
-fs::path folder_of(const fs::path& path) {
+fs::path output_folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
@@ -39,8 +39,9 @@ fs::path folder_of(const fs::path& path) {
 Status check_writable(std::string_view option, const fs::path& path, const fs::path& trial) {
   const auto file = PendingFile::create(trial);  // removed again at once
   if (file) return {};
-  return refuse(ErrorCode::kInvalidArgument, option, path,
-                fmt::format("no file can be made in the folder {}", folder_of(trial).string()));
+  return refuse(
+      ErrorCode::kInvalidArgument, option, path,
+      fmt::format("no file can be made in the folder {}", output_folder_of(trial).string()));
 }
 
 }  // namespace
@@ -59,7 +60,7 @@ Status check_output_file(std::string_view option, const fs::path& path) {
     return refuse(ErrorCode::kInvalidArgument, option, path,
                   fmt::format("is {}, must be a regular file or not exist yet", what));
   }
-  const fs::path folder = folder_of(path);
+  const fs::path folder = output_folder_of(path);
   if (!fs::is_directory(folder, error)) {
     return refuse(ErrorCode::kNotFound, option, path,
                   fmt::format("the folder {} does not exist", folder.string()));

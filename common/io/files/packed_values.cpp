@@ -19,7 +19,7 @@ constexpr std::size_t kLargestData = std::size_t{8} << 30;
 // No deflate stream expands further than this (zlib's technical notes: 1032 to 1).
 constexpr std::size_t kLargestRatio = 1040;
 
-tl::unexpected<Error> unreadable(const std::string& message) {
+tl::unexpected<Error> unreadable_values(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
 }
 
@@ -28,7 +28,7 @@ Result<std::size_t> expected_bytes(const PackedValues& packed, int bytes_per_val
   for (const std::int64_t size : packed.sizes) {
     if (size == 0) return std::size_t{0};
     if (bytes > kLargestData / static_cast<std::size_t>(size)) {
-      return unreadable("its sizes promise more than 8 GiB of pixels");
+      return unreadable_values("its sizes promise more than 8 GiB of pixels");
     }
     bytes *= static_cast<std::size_t>(size);
   }
@@ -38,7 +38,7 @@ Result<std::size_t> expected_bytes(const PackedValues& packed, int bytes_per_val
 // zlib or gzip stream, whichever it is, in pieces: zlib counts its buffers with 32 bits.
 Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
   if (size / kLargestRatio > compressed.size()) {
-    return unreadable(
+    return unreadable_values(
         fmt::format("its sizes promise {} bytes of pixels: {} compressed ones are too few", size,
                     compressed.size()));
   }
@@ -65,10 +65,11 @@ Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
     if (out > 0) written += out - stream.avail_out;
   }
   inflateEnd(&stream);
-  if (written > size) return unreadable("its pixels are more than its sizes say");
+  if (written > size) return unreadable_values("its pixels are more than its sizes say");
   if (state != Z_STREAM_END || written != size) {
-    return unreadable(fmt::format("its compressed pixels are {}: {} of {} bytes",
-                                  state == Z_DATA_ERROR ? "damaged" : "truncated", written, size));
+    return unreadable_values(fmt::format("its compressed pixels are {}: {} of {} bytes",
+                                         state == Z_DATA_ERROR ? "damaged" : "truncated", written,
+                                         size));
   }
   return expanded;
 }
@@ -125,7 +126,7 @@ Result<std::vector<std::int64_t>> parse_sizes(const std::string& field, std::str
     std::int64_t size = 0;
     const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), size);
     if (error != std::errc() || size < least || size > kLargestSize) {
-      return unreadable(
+      return unreadable_values(
           fmt::format("{} = {}: every size must be {} to {}", field, text, least, kLargestSize));
     }
     sizes.push_back(size);
@@ -144,7 +145,7 @@ Result<std::string> unpack(const PackedValues& packed, int bytes_per_value) {
     values = std::move(*expanded);
   } else {
     if (packed.data.size() != *size) {
-      return unreadable(
+      return unreadable_values(
           fmt::format("holds {} bytes of pixels, its sizes say {}", packed.data.size(), *size));
     }
     values = std::string(packed.data);

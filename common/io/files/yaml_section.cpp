@@ -88,7 +88,7 @@ std::optional<TextProblem> problem_of(const std::string& text) {
 int line_of(const YAML::Node& node) { return node.Mark().is_null() ? 0 : node.Mark().line + 1; }
 
 // The value as one short line for a message.
-std::string shown(const YAML::Node& node, int depth = 0) {
+std::string shown_value(const YAML::Node& node, int depth = 0) {
   if (node.IsNull()) return "(empty)";
   if (node.IsMap()) return "(a section)";
   if (node.IsScalar()) {
@@ -101,7 +101,7 @@ std::string shown(const YAML::Node& node, int depth = 0) {
   if (depth > 1) return "[...]";
   std::string list = "[";
   for (std::size_t i = 0; i < node.size() && i < 6; ++i) {
-    list.append(i > 0 ? ", " : "").append(shown(node[i], depth + 1));
+    list.append(i > 0 ? ", " : "").append(shown_value(node[i], depth + 1));
   }
   return list + (node.size() > 6 ? ", ...]" : "]");
 }
@@ -232,7 +232,7 @@ YamlSection YamlSection::section(const std::string& key, Presence presence) {
   // A heading whose keys are all commented out.
   if (value && value->yaml.IsNull()) value = nullptr;
   if (value && !value->yaml.IsMap()) {
-    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(value->yaml) +
+    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(value->yaml) +
                                           ": must be a section of keys and values");
     value = nullptr;
   }
@@ -256,21 +256,22 @@ void YamlSection::number(const std::string& key, double& value, Presence presenc
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node || parse_finite(node->yaml, value)) return;
   state_->fail_at(line_of_key(key),
-                  full_key(key) + " = " + shown(node->yaml) + ": must be a finite number");
+                  full_key(key) + " = " + shown_value(node->yaml) + ": must be a finite number");
 }
 
 void YamlSection::integer(const std::string& key, int& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node || parse_scalar(node->yaml, value)) return;
   state_->fail_at(line_of_key(key),
-                  full_key(key) + " = " + shown(node->yaml) + ": must be an integer");
+                  full_key(key) + " = " + shown_value(node->yaml) + ": must be an integer");
 }
 
 void YamlSection::text(const std::string& key, std::string& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node) return;
   if (!node->yaml.IsScalar()) {
-    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(node->yaml) + ": must be text");
+    state_->fail_at(line_of_key(key),
+                    full_key(key) + " = " + shown_value(node->yaml) + ": must be text");
     return;
   }
   value = node->yaml.Scalar();
@@ -319,7 +320,7 @@ void YamlSection::vector3(const std::string& key, Vec3& value, Presence presence
     value = parsed;
     return;
   }
-  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown(node->yaml) +
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node->yaml) +
                                         ": must be a list of three finite numbers");
 }
 
@@ -333,8 +334,8 @@ void YamlSection::numbers(const std::string& key, std::vector<double>& value, Pr
     value = std::move(parsed);
     return;
   }
-  state_->fail_at(line_of_key(key),
-                  full_key(key) + " = " + shown(node->yaml) + ": must be a list of finite numbers");
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node->yaml) +
+                                        ": must be a list of finite numbers");
 }
 
 std::vector<std::string> YamlSection::names() {

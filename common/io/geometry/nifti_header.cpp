@@ -41,7 +41,7 @@ constexpr Layout kNifti1 = {40, 70, 108};
 constexpr Layout kNifti2 = {16, 12, 168};
 
 // What is looked at, in this machine's byte order.
-struct Header {
+struct PackedHeader {
   bool single_file = false;  // voxels lie behind the header, else in a second file
   std::size_t bytes = 0;     // of the header
   std::array<std::int64_t, 8> dim{};
@@ -60,7 +60,7 @@ T field(std::string_view bytes, std::size_t offset, bool swapped) {
 }
 
 template <typename Dim, typename Offset>
-void fill(Header& header, std::string_view bytes, const Layout& layout, bool swapped) {
+void fill(PackedHeader& header, std::string_view bytes, const Layout& layout, bool swapped) {
   for (std::size_t i = 0; i < header.dim.size(); ++i) {
     header.dim[i] = field<Dim>(bytes, layout.dim + i * sizeof(Dim), swapped);
   }
@@ -79,12 +79,12 @@ std::string first_bytes(const fs::path& path) {
 }
 
 // None: no NIfTI header. An ANALYZE 7.5 header has no magic, and no affine.
-std::optional<Header> parse(std::string_view bytes) {
+std::optional<PackedHeader> parse(std::string_view bytes) {
   const auto has_magic = [&](std::size_t offset, std::string_view magic) {
     return bytes.substr(offset, magic.size()) == magic;
   };
   if (bytes.size() < kNifti1Bytes) return std::nullopt;
-  Header header;
+  PackedHeader header;
   for (const bool swapped : {false, true}) {
     const auto size = static_cast<std::size_t>(field<std::uint32_t>(bytes, 0, swapped));
     header.bytes = size;
@@ -106,7 +106,7 @@ std::optional<Header> parse(std::string_view bytes) {
 
 // Each of the following: what is wrong, or nothing.
 
-std::string check_dimensions(const Header& header) {
+std::string check_dimensions(const PackedHeader& header) {
   const std::int64_t dimensions = header.dim[0];
   for (std::size_t axis = 1; axis <= 3; ++axis) {
     if (dimensions < 3 || dimensions > 7 || header.dim[axis] < 1) {
@@ -126,7 +126,7 @@ std::string check_dimensions(const Header& header) {
   return {};
 }
 
-std::string check_datatype(const Header& header) {
+std::string check_datatype(const PackedHeader& header) {
   switch (header.datatype) {
     case DT_UINT8:
     case DT_INT8:
@@ -145,7 +145,7 @@ std::string check_datatype(const Header& header) {
   }
 }
 
-std::string check_offset(const Header& header) {
+std::string check_offset(const PackedHeader& header) {
   // libnifti keeps it as an int.
   constexpr double kMost = std::numeric_limits<int>::max();
   const double least = header.single_file ? static_cast<double>(header.bytes) : 0.0;

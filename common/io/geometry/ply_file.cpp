@@ -19,7 +19,7 @@ struct FormatProblem {
   std::string message;
 };
 
-[[noreturn]] void refuse(const std::string& message) { throw FormatProblem{message}; }
+[[noreturn]] void refuse_ply(const std::string& message) { throw FormatProblem{message}; }
 
 struct Property {
   std::string name;
@@ -42,7 +42,7 @@ struct Header {
 Header read_header(std::string_view& rest) {
   constexpr std::string_view kEnd = "end_header";
   const std::size_t end = rest.find(kEnd);
-  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos) refuse("is not a PLY file");
+  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos) refuse_ply("is not a PLY file");
   std::istringstream lines{std::string(rest.substr(0, end))};
   rest.remove_prefix(std::min(rest.size(), rest.find('\n', end) + 1));
 
@@ -55,26 +55,26 @@ Header read_header(std::string_view& rest) {
     if (first == "format") words >> header.format;
     if (first == "comment" && header.space == PointSpace::kUnsaid) {
       const Result<PointSpace> said = point_space_in(line);
-      if (!said) refuse(said.error().message);
+      if (!said) refuse_ply(said.error().message);
       header.space = *said;
     }
     if (first == "element") {
       Element element;
-      if (!(words >> element.name >> element.count)) refuse("element without a count: " + line);
+      if (!(words >> element.name >> element.count)) refuse_ply("element without a count: " + line);
       header.elements.push_back(element);
     }
     if (first == "property") {
-      if (header.elements.empty()) refuse("property before the first element");
+      if (header.elements.empty()) refuse_ply("property before the first element");
       Property property;
       words >> property.type;
       if (property.type == "list") words >> property.count_type >> property.type;
-      if (!(words >> property.name)) refuse("property without a name");
+      if (!(words >> property.name)) refuse_ply("property without a name");
       header.elements.back().properties.push_back(property);
     }
   }
   if (header.format != "ascii" && header.format != "binary_little_endian") {
-    refuse("PLY format '" + header.format +
-           "' is not supported: must be ascii or binary_little_endian");
+    refuse_ply("PLY format '" + header.format +
+               "' is not supported: must be ascii or binary_little_endian");
   }
   return header;
 }
@@ -93,14 +93,14 @@ class Cursor {
     if (type == "uint" || type == "uint32") return binary<std::uint32_t>();
     if (type == "float" || type == "float32") return binary<float>();
     if (type == "double" || type == "float64") return binary<double>();
-    refuse("property type '" + type + "' is unknown");
+    refuse_ply("property type '" + type + "' is unknown");
   }
   std::size_t remaining() const { return rest_.size(); }
 
  private:
   template <typename T>
   double binary() {
-    if (rest_.size() < sizeof(T)) refuse("ends too early");
+    if (rest_.size() < sizeof(T)) refuse_ply("ends too early");
     const T number = load_number<T>(rest_.data(), false);
     rest_.remove_prefix(sizeof(T));
     return static_cast<double>(number);
@@ -109,7 +109,7 @@ class Cursor {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
     double number = 0.0;
     const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), number);
-    if (error != std::errc()) refuse("ends too early or holds something that is not a number");
+    if (error != std::errc()) refuse_ply("ends too early or holds something that is not a number");
     rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
     return number;
   }
@@ -117,7 +117,7 @@ class Cursor {
   bool ascii_;
 };
 
-int to_index(double value) {
+int ply_index(double value) {
   const bool fits = value >= 0.0 && value <= std::numeric_limits<int>::max();
   return fits ? static_cast<int>(value) : -1;  // the caller's index check names it
 }
@@ -133,12 +133,12 @@ void read_entry(Cursor& cursor, const Element& element, std::map<std::string, do
     }
     const double count = cursor.value(property.count_type);
     if (!(count >= 0.0) || count > static_cast<double>(cursor.remaining())) {
-      refuse("a list promises an impossible number of entries");
+      refuse_ply("a list promises an impossible number of entries");
     }
     const bool is_face = property.name == "vertex_indices" || property.name == "vertex_index";
     for (int k = 0; k < static_cast<int>(count); ++k) {
       const double value = cursor.value(property.type);
-      if (is_face) indices.push_back(to_index(value));
+      if (is_face) indices.push_back(ply_index(value));
     }
   }
 }
@@ -150,7 +150,8 @@ TriangleSurface read_ply(std::string_view rest) {
   for (const Element& element : header.elements) {
     if (element.properties.empty()) continue;
     // Every entry takes at least a byte.
-    if (element.count > cursor.remaining()) refuse("element '" + element.name + "' ends too early");
+    if (element.count > cursor.remaining())
+      refuse_ply("element '" + element.name + "' ends too early");
     const auto count = static_cast<Eigen::Index>(element.count);
     if (element.name == "vertex") surface.vertices.resize(3, count);
     if (element.name == "face") surface.triangles.resize(3, count);
@@ -160,14 +161,14 @@ TriangleSurface read_ply(std::string_view rest) {
       read_entry(cursor, element, scalars, indices);
       if (element.name == "vertex") {
         if (scalars.count("x") + scalars.count("y") + scalars.count("z") != 3) {
-          refuse("element 'vertex' lacks x, y or z");
+          refuse_ply("element 'vertex' lacks x, y or z");
         }
         surface.vertices.col(i) << scalars["x"], scalars["y"], scalars["z"];
       }
       if (element.name == "face") {
         if (indices.size() != 3) {
-          refuse("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
-                 " vertices: must have 3");
+          refuse_ply("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
+                     " vertices: must have 3");
         }
         surface.triangles.col(i) << indices[0], indices[1], indices[2];
       }

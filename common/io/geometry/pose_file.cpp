@@ -33,7 +33,7 @@ void skip_separators(std::string_view& rest) {
 }
 
 // The numbers of a text without comments; kUnreadable for anything else in it.
-Result<std::vector<double>> parse_numbers(std::string_view rest, const std::string& name) {
+Result<std::vector<double>> pose_numbers(std::string_view rest, const std::string& name) {
   skip_separators(rest);
   if (rest.rfind(name, 0) == 0) rest.remove_prefix(name.size());
   std::vector<double> numbers;
@@ -71,7 +71,7 @@ Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::s
                                  double tolerance) {
   const auto content = read_file(path);
   if (!content) return tl::unexpected(content.error());
-  const auto numbers = parse_numbers(without_comments(*content), name);
+  const auto numbers = pose_numbers(without_comments(*content), name);
   if (!numbers) return file_error(numbers.error().code, path, numbers.error().message);
   if (numbers->size() != 16) {
     return file_error(ErrorCode::kUnreadable, path,

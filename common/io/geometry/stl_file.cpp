@@ -14,8 +14,8 @@
 namespace brainshift::io {
 namespace {
 
-constexpr std::size_t kHeader = 84;    // 80 bytes of text, 4 of count
-constexpr std::size_t kTriangle = 50;  // normal, three corners (floats), 2 bytes of attributes
+constexpr std::size_t kHeader = 84;     // 80 bytes of text, 4 of count
+constexpr std::size_t kFacetText = 50;  // normal, three corners (floats), 2 bytes of attributes
 
 // Merges corners whose coordinates are equal bit for bit (after making -0 into 0): programs write
 // a shared vertex with the same digits each time.
@@ -46,7 +46,7 @@ class SurfaceBuilder {
 Result<TriangleSurface> parse_binary(const std::string& content, std::size_t triangles) {
   SurfaceBuilder builder;
   for (std::size_t t = 0; t < triangles; ++t) {
-    const char* at = content.data() + kHeader + t * kTriangle + 12;
+    const char* at = content.data() + kHeader + t * kFacetText + 12;
     for (int corner = 0; corner < 3; ++corner, at += 12) {
       const float x = load_number<float>(at, false);
       const float y = load_number<float>(at + 4, false);
@@ -124,7 +124,7 @@ Result<TriangleSurface> parse_stl(const std::string& content) {
   // A binary file may begin with "solid" too, so the size decides.
   if (content.size() >= kHeader) {
     const std::size_t triangles = load_number<std::uint32_t>(content.data() + 80, false);
-    if (content.size() == kHeader + triangles * kTriangle) {
+    if (content.size() == kHeader + triangles * kFacetText) {
       return as_ras(parse_binary(content, triangles), text.substr(0, 80));
     }
   }

@@ -13,7 +13,7 @@ namespace brainshift::io {
 namespace {
 
 // deflate cannot do better than about 1032:1; a header that promises more lies.
-constexpr std::size_t kLargestExpansion = 1040;
+constexpr std::size_t kLargestBlockExpansion = 1040;
 
 tl::unexpected<Error> unreadable(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
@@ -97,7 +97,7 @@ Result<std::string> read_compressed(ByteSource& source, const Encoding& encoding
   std::string out;
   for (std::size_t i = 0; i < blocks; ++i) {
     const std::size_t expanded = i + 1 == blocks && last_size != 0 ? last_size : block_size;
-    if (sizes[i] > source.remaining() || expanded / kLargestExpansion > sizes[i]) {
+    if (sizes[i] > source.remaining() || expanded / kLargestBlockExpansion > sizes[i]) {
       return unreadable("a block's size is impossible");
     }
     const Result<std::string> compressed = source.read(sizes[i]);

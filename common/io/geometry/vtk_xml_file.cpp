@@ -12,11 +12,11 @@ namespace {
 constexpr std::int64_t kVtkTetra = 10;
 constexpr std::int64_t kVtkTriangle = 5;
 
-tl::unexpected<Error> unreadable(const std::string& message) {
+tl::unexpected<Error> unreadable_file(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
 }
 
-Result<PointSpace> read_space(const VtkXmlFile& file) {
+Result<PointSpace> file_space(const VtkXmlFile& file) {
   const Result<std::optional<std::string>> text = file.field_text("SPACE");
   if (!text) return tl::unexpected(text.error());
   return *text ? parse_point_space(**text) : PointSpace::kUnsaid;
@@ -28,9 +28,9 @@ Result<Points> read_points(const VtkXmlFile& file) {
   const Result<VtkArray> array = file.array("Points", 0, *count);
   if (!array) return tl::unexpected(array.error());
   if (array->components != 3 || !array->is_real()) {
-    return unreadable("Points must have three real components");
+    return unreadable_file("Points must have three real components");
   }
-  const Result<PointSpace> space = read_space(file);
+  const Result<PointSpace> space = file_space(file);
   if (!space) return tl::unexpected(space.error());
   Points points = Eigen::Map<const Points>(array->reals.data(), 3, *count);
   turn_to_ras(*space, points);
@@ -56,13 +56,13 @@ Result<CellList> read_cells(const VtkXmlFile& file, const std::string& section,
   for (std::size_t i = 0; i < cells.offsets.size(); ++i) {
     const auto end = static_cast<std::int64_t>(cells.connectivity.size());
     if (cells.size(i) < 0 || cells.offsets[i] < 0 || cells.offsets[i] > end) {
-      return unreadable(section + " offset " + std::to_string(i) + " is " +
-                        std::to_string(cells.offsets[i]) + ": must grow and not exceed " +
-                        std::to_string(end));
+      return unreadable_file(section + " offset " + std::to_string(i) + " is " +
+                             std::to_string(cells.offsets[i]) + ": must grow and not exceed " +
+                             std::to_string(end));
     }
   }
   if (static_cast<std::int64_t>(cells.offsets.size()) != count) {
-    return unreadable(section + " offsets must be integers");
+    return unreadable_file(section + " offsets must be integers");
   }
   return cells;
 }
@@ -78,11 +78,11 @@ Result<std::vector<std::int64_t>> read_labels(const VtkXmlFile& file, std::int64
     Result<VtkArray> array = file.array("CellData", name, cells);
     if (!array) return tl::unexpected(array.error());
     if (array->components != 1 || array->is_real()) {
-      return unreadable("CellData array 'label' must be one integer per cell");
+      return unreadable_file("CellData array 'label' must be one integer per cell");
     }
     for (const std::int64_t label : array->integers) {
       if (label < std::numeric_limits<int>::min() || label > std::numeric_limits<int>::max()) {
-        return unreadable("label " + std::to_string(label) + " is out of range");
+        return unreadable_file("label " + std::to_string(label) + " is out of range");
       }
     }
     return array->integers;
@@ -100,7 +100,7 @@ Result<GroupedMesh> read_grouped(const VtkXmlFile& file) {
   if (!cells) return tl::unexpected(cells.error());
   const Result<VtkArray> types = file.array("Cells", "types", *count);
   if (!types) return tl::unexpected(types.error());
-  if (types->is_real()) return unreadable("Cells array 'types' must be integers");
+  if (types->is_real()) return unreadable_file("Cells array 'types' must be integers");
   const Result<std::vector<std::int64_t>> labels = read_labels(file, *count);
   if (!labels) return tl::unexpected(labels.error());
 
@@ -113,10 +113,10 @@ Result<GroupedMesh> read_grouped(const VtkXmlFile& file) {
     if (!tetra && (types->integers[cell] != kVtkTriangle || labels->empty())) continue;
     const int vertices = tetra ? 4 : 3;
     if (cells->size(cell) != vertices) {
-      return unreadable("cell " + std::to_string(cell) + " is a " +
-                        (tetra ? "tetrahedron" : "triangle") + " with " +
-                        std::to_string(cells->size(cell)) + " vertices: must have " +
-                        std::to_string(vertices));
+      return unreadable_file("cell " + std::to_string(cell) + " is a " +
+                             (tetra ? "tetrahedron" : "triangle") + " with " +
+                             std::to_string(cells->size(cell)) + " vertices: must have " +
+                             std::to_string(vertices));
     }
     for (int k = 0; k < vertices; ++k) {
       (tetra ? tets : triangles)
@@ -126,7 +126,7 @@ Result<GroupedMesh> read_grouped(const VtkXmlFile& file) {
     if (labels->empty()) continue;
     (tetra ? mesh.labels : result.triangle_labels).push_back(static_cast<int>((*labels)[cell]));
   }
-  if (tets.empty()) return unreadable("has no tetrahedron");
+  if (tets.empty()) return unreadable_file("has no tetrahedron");
   mesh.tets = Eigen::Map<const Eigen::Matrix<int, 4, Eigen::Dynamic>>(
       tets.data(), 4, static_cast<Eigen::Index>(tets.size() / 4));
   result.triangles = Eigen::Map<const Eigen::Matrix<int, 3, Eigen::Dynamic>>(
@@ -143,7 +143,7 @@ Result<MeshWithFields> parse_vtu(std::string content, bool with_fields) {
   if (!grouped) return tl::unexpected(grouped.error());
   MeshWithFields result{std::move(grouped->mesh), {}};
   if (!with_fields) return result;
-  const Result<PointSpace> space = read_space(*file);
+  const Result<PointSpace> space = file_space(*file);
   if (!space) return tl::unexpected(space.error());
   const std::size_t arrays = file->array_names("PointData").size();
   for (std::size_t i = 0; i < arrays; ++i) {
@@ -173,7 +173,7 @@ Result<TriangleSurface> parse_vtp(std::string content) {
   const Result<std::int64_t> count = file->count("NumberOfPolys");
   if (!strips) return tl::unexpected(strips.error());
   if (!count) return tl::unexpected(count.error());
-  if (*strips > 0) return unreadable("has triangle strips: must have triangles");
+  if (*strips > 0) return unreadable_file("has triangle strips: must have triangles");
   const Result<CellList> cells = read_cells(*file, "Polys", *count);
   if (!cells) return tl::unexpected(cells.error());
 
@@ -182,8 +182,8 @@ Result<TriangleSurface> parse_vtp(std::string content) {
   surface.triangles.resize(3, *count);
   for (std::size_t cell = 0; cell < cells->offsets.size(); ++cell) {
     if (cells->size(cell) != 3) {
-      return unreadable("polygon " + std::to_string(cell) + " has " +
-                        std::to_string(cells->size(cell)) + " vertices: must have 3");
+      return unreadable_file("polygon " + std::to_string(cell) + " has " +
+                             std::to_string(cells->size(cell)) + " vertices: must have 3");
     }
     for (int k = 0; k < 3; ++k) {
       surface.triangles(k, static_cast<Eigen::Index>(cell)) =

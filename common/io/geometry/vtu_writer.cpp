@@ -10,7 +10,7 @@
 namespace brainshift::io {
 namespace {
 
-constexpr std::uint8_t kVtkTetra = 10;
+constexpr std::uint8_t kWrittenTetra = 10;
 constexpr std::uint8_t kVtkQuadraticTetra = 24;
 
 std::string cells_xml(const Eigen::MatrixXi& elements) {
@@ -21,7 +21,7 @@ std::string cells_xml(const Eigen::MatrixXi& elements) {
   }
   const std::vector<std::int64_t> connectivity(elements.data(), elements.data() + elements.size());
   const std::vector<std::uint8_t> types(cells,
-                                        elements.rows() == 4 ? kVtkTetra : kVtkQuadraticTetra);
+                                        elements.rows() == 4 ? kWrittenTetra : kVtkQuadraticTetra);
   return "<Cells>\n" +
          vtk_array("connectivity", "Int64", 1, connectivity.data(), connectivity.size()) +
          vtk_array("offsets", "Int64", 1, offsets.data(), cells) +

@@ -19,7 +19,7 @@ using nlohmann::json;
 constexpr std::string_view kSlicersColumns =
     "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
 
-tl::unexpected<Error> unreadable(const std::string& message) {
+tl::unexpected<Error> unreadable_markups(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
 }
 
@@ -27,9 +27,9 @@ Result<Vec3> signs_to_ras(const std::string& system) {
   if (system == "RAS" || system == "0") return Vec3(1, 1, 1);
   if (system == "LPS" || system == "1") return Vec3(-1, -1, 1);
   if (system.empty()) {
-    return unreadable("coordinateSystem is missing: its points could be mirrored");
+    return unreadable_markups("coordinateSystem is missing: its points could be mirrored");
   }
-  return unreadable("coordinateSystem = " + system.substr(0, 30) + ": must be LPS or RAS");
+  return unreadable_markups("coordinateSystem = " + system.substr(0, 30) + ": must be LPS or RAS");
 }
 
 // A text, or the text of a number; empty for anything else.
@@ -47,11 +47,12 @@ Status check_units(const json& markup) {
   const bool good =
       units->is_array() ? std::all_of(units->begin(), units->end(), is_mm) : is_mm(*units);
   if (good) return {};
-  return unreadable("coordinateUnits = " + units->dump().substr(0, 30) + ": must be mm");
+  return unreadable_markups("coordinateUnits = " + units->dump().substr(0, 30) + ": must be mm");
 }
 
 Status take_point(const json& point, std::size_t number, const Vec3& signs, NamedPoints& list) {
-  if (!point.is_object()) return unreadable(fmt::format("control point {} is no object", number));
+  if (!point.is_object())
+    return unreadable_markups(fmt::format("control point {} is no object", number));
   const std::string status = text_of(point, "positionStatus");
   if (!status.empty() && status != "defined") return {};
   const auto position = point.find("position");
@@ -63,7 +64,7 @@ Status take_point(const json& point, std::size_t number, const Vec3& signs, Name
         number_at.is_number() ? number_at.get<double>() : std::nan("");
   }
   if (!three || !value.allFinite()) {
-    return unreadable(
+    return unreadable_markups(
         fmt::format("control point {}: position must be three finite numbers", number));
   }
   list.add(text_of(point, "label"), signs.cwiseProduct(value));
@@ -91,21 +92,22 @@ Result<NamedPoints> parse_markups_json(const std::string& content) {
   const json document = json::parse(content, nullptr, false);
   const auto list = document.is_object() ? document.find("markups") : document.end();
   if (!document.is_object() || list == document.end() || !list->is_array()) {
-    return unreadable("must be JSON with a list \"markups\"");
+    return unreadable_markups("must be JSON with a list \"markups\"");
   }
   if (list->size() != 1 || !(*list)[0].is_object()) {
-    return unreadable(fmt::format("holds {} markups: must hold one point list", list->size()));
+    return unreadable_markups(
+        fmt::format("holds {} markups: must hold one point list", list->size()));
   }
   const json& markup = (*list)[0];
   if (const std::string type = text_of(markup, "type"); type != "Fiducial") {
-    return unreadable("type = " + type.substr(0, 30) + ": must be Fiducial, a point list");
+    return unreadable_markups("type = " + type.substr(0, 30) + ": must be Fiducial, a point list");
   }
   const auto signs = signs_to_ras(text_of(markup, "coordinateSystem"));
   if (!signs) return tl::unexpected(signs.error());
   if (Status ok = check_units(markup); !ok) return tl::unexpected(ok.error());
   const auto points = markup.find("controlPoints");
   if (points == markup.end() || !points->is_array()) {
-    return unreadable("has no list \"controlPoints\"");
+    return unreadable_markups("has no list \"controlPoints\"");
   }
   NamedPoints named;
   std::size_t number = 0;
@@ -141,8 +143,8 @@ Result<NamedPoints> parse_fcsv(const std::string& content) {
     Vec3 point;
     if (!parse_number(cell("x"), point[0]) || !parse_number(cell("y"), point[1]) ||
         !parse_number(cell("z"), point[2])) {
-      return unreadable(fmt::format("line {}: \"{}\" must have finite numbers as x, y and z",
-                                    number, text.substr(0, 60)));
+      return unreadable_markups(fmt::format(
+          "line {}: \"{}\" must have finite numbers as x, y and z", number, text.substr(0, 60)));
     }
     named.add(cell("label"), signs->cwiseProduct(point));
   }

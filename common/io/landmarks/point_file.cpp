@@ -16,14 +16,14 @@ namespace brainshift::io {
 namespace {
 
 // Where in a row the name and the coordinates are.
-struct Columns {
+struct PointColumnsOf {
   std::optional<std::size_t> name;
   std::array<std::size_t, 3> at{};
   Vec3 signs = Vec3(1, 1, 1);  // to RAS
 };
 
 // None: the heading has no such columns.
-std::optional<Columns> columns_named(const std::vector<std::string>& heading) {
+std::optional<PointColumnsOf> point_columns_named(const std::vector<std::string>& heading) {
   struct Spelling {
     std::array<const char*, 3> names;
     Vec3 signs;
@@ -35,7 +35,7 @@ std::optional<Columns> columns_named(const std::vector<std::string>& heading) {
     return static_cast<std::size_t>(std::find(heading.begin(), heading.end(), name) -
                                     heading.begin());
   };
-  Columns columns;
+  PointColumnsOf columns;
   for (const char* name : {"label", "name"}) {
     if (find(name) < heading.size()) columns.name = find(name);
   }
@@ -48,18 +48,18 @@ std::optional<Columns> columns_named(const std::vector<std::string>& heading) {
 }
 
 // Of rows without a heading.
-Columns columns_of_size(std::size_t cells) {
-  Columns columns;
+PointColumnsOf point_columns_of_size(std::size_t cells) {
+  PointColumnsOf columns;
   const std::size_t first = cells == 4 ? 1 : 0;
   if (cells == 4) columns.name = 0;
   columns.at = {first, first + 1, first + 2};
   return columns;
 }
 
-Result<NamedPoints> parse_csv(const std::string& content) {
+Result<NamedPoints> parse_points(const std::string& content) {
   std::istringstream lines(content);
   std::string line;
-  std::optional<Columns> columns;
+  std::optional<PointColumnsOf> columns;
   std::size_t expected = 0;  // cells of a row; 0: a heading decides
   NamedPoints named;
   bool first = true;
@@ -69,9 +69,9 @@ Result<NamedPoints> parse_csv(const std::string& content) {
     const auto cells = quoted_cells_of(text);
     const bool heading = first && !has_number(cells);
     if (first && !heading && (cells.size() == 3 || cells.size() == 4)) {
-      columns = columns_of_size(expected = cells.size());
+      columns = point_columns_of_size(expected = cells.size());
     } else if (heading) {
-      columns = columns_named(cells);
+      columns = point_columns_named(cells);
     }
     first = false;
     if (!columns) {
@@ -111,7 +111,7 @@ Result<NamedPoints> read_points(const std::filesystem::path& path) {
   if (!content) return tl::unexpected(content.error());
   auto named = extension == ".json"   ? parse_markups_json(*content)
                : extension == ".fcsv" ? parse_fcsv(*content)
-                                      : parse_csv(*content);
+                                      : parse_points(*content);
   if (!named) return file_error(named.error().code, path, named.error().message);
   return named;
 }

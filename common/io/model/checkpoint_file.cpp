@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kMagic[8] = {'b', 's', 'h', 'i', 'f', 't', 'c', 'p'};
+constexpr char kCheckpointMagic[8] = {'b', 's', 'h', 'i', 'f', 't', 'c', 'p'};
 // 2: blocks hold the columns as rows, neighbouring slaves together.
 constexpr std::uint32_t kVersion = 2;
 
@@ -145,13 +145,13 @@ Status CheckpointFile::Impl::start(std::uint64_t key) {
   const off_t size = ::lseek(file.get(), 0, SEEK_END);
   if (size < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be read");
   FileHeader found{};
-  const std::size_t known = std::min(static_cast<std::size_t>(size), sizeof kMagic);
+  const std::size_t known = std::min(static_cast<std::size_t>(size), sizeof kCheckpointMagic);
   if (!read_at(file.get(), &found, std::min(static_cast<std::size_t>(size), sizeof found), 0) ||
-      std::memcmp(found.magic, kMagic, known) != 0) {
+      std::memcmp(found.magic, kCheckpointMagic, known) != 0) {
     return file_error(ErrorCode::kUnreadable, path, "is there but is no checkpoint file");
   }
   FileHeader header{};
-  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  std::memcpy(header.magic, kCheckpointMagic, sizeof kCheckpointMagic);
   header.key = key;
   header.version = kVersion;
   header.crc = header_crc(header);

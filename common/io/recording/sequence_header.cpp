@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kFramePrefix = "Seq_Frame";
 
-tl::unexpected<Error> unreadable(const std::string& message) {
+tl::unexpected<Error> unreadable_header(const std::string& message) {
   return fail(ErrorCode::kUnreadable, message);
 }
 
@@ -22,7 +22,7 @@ Status store(SequenceHeader& header, std::string_view key, std::string_view valu
   std::string_view rest = key;
   if (!rest.starts_with(kFramePrefix)) {
     const bool is_new = header.fields.emplace(key, value).second;
-    if (!is_new) return unreadable(fmt::format("field {} is given twice", key));
+    if (!is_new) return unreadable_header(fmt::format("field {} is given twice", key));
     return {};
   }
   rest.remove_prefix(kFramePrefix.size());
@@ -31,10 +31,10 @@ Status store(SequenceHeader& header, std::string_view key, std::string_view valu
   rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
   if (error != std::errc() || frame < 0 || frame >= kLargestSize || rest.size() < 2 ||
       rest[0] != '_') {
-    return unreadable(fmt::format("field {} does not name a frame and a value", key));
+    return unreadable_header(fmt::format("field {} does not name a frame and a value", key));
   }
   const bool is_new = header.frames[frame].emplace(rest.substr(1), value).second;
-  if (!is_new) return unreadable(fmt::format("field {} is given twice", key));
+  if (!is_new) return unreadable_header(fmt::format("field {} is given twice", key));
   return {};
 }
 
@@ -46,8 +46,8 @@ std::string take_field(SequenceHeader& header, const std::string& key) {
 Status check_dimensions(const SequenceHeader& header, const std::string& dimensions,
                         const std::string& sizes) {
   if (sizes.empty() || std::to_string(header.sizes.size()) != dimensions) {
-    return unreadable(fmt::format("NDims = \"{}\" does not agree with the {} sizes \"{}\"",
-                                  dimensions, header.sizes.size(), sizes));
+    return unreadable_header(fmt::format("NDims = \"{}\" does not agree with the {} sizes \"{}\"",
+                                         dimensions, header.sizes.size(), sizes));
   }
   return {};
 }
@@ -64,7 +64,7 @@ Status understand_meta(SequenceHeader& header) {
   const auto flag = [&](const std::string& key, bool& value) -> Status {
     const std::string text = take_field(header, key);
     if (!text.empty() && text != "True" && text != "False") {
-      return unreadable(fmt::format("{} = {}: must be True or False", key, text));
+      return unreadable_header(fmt::format("{} = {}: must be True or False", key, text));
     }
     value = text == "True";
     return {};
@@ -72,11 +72,11 @@ Status understand_meta(SequenceHeader& header) {
   if (Status ok = flag("BinaryDataByteOrderMSB", header.big_endian); !ok) return ok;
   if (Status ok = flag("CompressedData", header.compressed); !ok) return ok;
   if (take_field(header, "BinaryData") == "False") {
-    return unreadable("BinaryData = False: pixels as text are not supported");
+    return unreadable_header("BinaryData = False: pixels as text are not supported");
   }
   const std::string channels = take_field(header, "ElementNumberOfChannels");
   if (!channels.empty() && channels != "1") {
-    return unreadable("ElementNumberOfChannels = " + channels + ": must be 1 (grey images)");
+    return unreadable_header("ElementNumberOfChannels = " + channels + ": must be 1 (grey images)");
   }
   return {};
 }
@@ -92,19 +92,19 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
   std::string_view rest = content;
   while (true) {
     if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
-      return unreadable("is no MetaImage: its header has no ElementDataFile");
+      return unreadable_header("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view line = take_line(rest);
     const std::size_t equals = line.find('=');
     if (equals == std::string_view::npos) {
       if (trimmed(line).empty()) continue;
-      return unreadable("is no MetaImage: its header has no ElementDataFile");
+      return unreadable_header("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view key = trimmed(line.substr(0, equals));
     const std::string_view value = trimmed(line.substr(equals + 1));
     if (key == "ElementDataFile") {
       if (value != "LOCAL") {
-        return unreadable(
+        return unreadable_header(
             fmt::format("ElementDataFile = {}: must be LOCAL (pixels in the same file)", value));
       }
       break;
@@ -121,7 +121,7 @@ Result<SequenceHeader> parse_nrrd_sequence(std::string_view content) {
   if (!nrrd) return tl::unexpected(nrrd.error());
   const std::string kinds = nrrd->field("kinds");
   if (!kinds.starts_with("domain") && !kinds.empty()) {
-    return unreadable("kinds = " + kinds + ": the first axis must be the image's");
+    return unreadable_header("kinds = " + kinds + ": the first axis must be the image's");
   }
   SequenceHeader header;
   static_cast<PackedValues&>(header) = std::move(*nrrd);

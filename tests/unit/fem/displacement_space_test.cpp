@@ -10,7 +10,7 @@
 namespace brainshift::fem {
 namespace {
 
-constexpr Elasticity kTissue{0.003, 0.0021};
+constexpr Elasticity kSpaceTissue{0.003, 0.0021};
 
 TetMesh distorted() {
   TetMesh mesh = test_support::box_mesh(2, 3, 2, Vec3(4.0, 5.0, 6.0));
@@ -80,9 +80,9 @@ TEST(SpaceStiffness, OfLinearElementsIsTheUniformOne) {
   dofs.fix_normal(0, Vec3(0.6, 0.0, 0.8));
   dofs.fix_all(5);
   dofs.finalise();
-  const auto materials = MaterialMap::uniform({kTissue}, space.num_elements());
+  const auto materials = MaterialMap::uniform({kSpaceTissue}, space.num_elements());
   const linalg::SymmetricMatrix general = assemble_stiffness(space, materials, dofs);
-  const linalg::SymmetricMatrix uniform = assemble_stiffness(space.mesh, kTissue, dofs);
+  const linalg::SymmetricMatrix uniform = assemble_stiffness(space.mesh, kSpaceTissue, dofs);
   ASSERT_GT(uniform.norm(), 0.0);
   EXPECT_LT((general - uniform).norm(), 1e-14 * uniform.norm());
 }
@@ -90,7 +90,7 @@ TEST(SpaceStiffness, OfLinearElementsIsTheUniformOne) {
 TEST(SpaceStiffness, AgreesWithTheInternalForce) {
   for (const Element element : {Element::kP1, Element::kP2}) {
     const DisplacementSpace space = make_space(distorted(), element);
-    MaterialMap materials = MaterialMap::uniform({kTissue}, space.num_elements());
+    MaterialMap materials = MaterialMap::uniform({kSpaceTissue}, space.num_elements());
     materials.materials.push_back({Elasticity{0.1, 0.07}});
     materials.of_tet[4] = 1;
     DofMap dofs(space.num_nodes());

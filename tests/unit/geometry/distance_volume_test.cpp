@@ -17,7 +17,7 @@ namespace {
 
 const Vec3 kCentre(35, -45, 20);
 
-ClosestPointIndex index_of(const TriangleSurface& surface) {
+ClosestPointIndex voxel_index_of(const TriangleSurface& surface) {
   auto index = ClosestPointIndex::build(surface);
   EXPECT_TRUE(index.has_value());
   return std::move(*index);
@@ -56,7 +56,7 @@ TEST(SignedDistanceGrid, NodesAreExactNearTheSurfaceAndHardlyTooFarElsewhere) {
         box(kCentre - Vec3(4, 6, 9), kCentre + Vec3(5, 7, 8))}) {
     ASSERT_TRUE(is_closed(surface));
     ASSERT_GT(enclosed_volume(surface), 0.0);
-    const ClosestPointIndex index = index_of(surface);
+    const ClosestPointIndex index = voxel_index_of(surface);
     DistanceGridOptions options;
     options.spacing_mm = 0.73;
     options.margin_mm = 9.0;
@@ -90,7 +90,7 @@ TEST(SignedDistanceGrid, NodesAreExactNearTheSurfaceAndHardlyTooFarElsewhere) {
 }
 
 TEST(SignedDistanceGrid, SameBitsWhateverTheNumberOfThreads) {
-  const ClosestPointIndex index = index_of(peanut(2.0));
+  const ClosestPointIndex index = voxel_index_of(peanut(2.0));
   DistanceGridOptions options;
   options.threads = 1;
   const auto one = signed_distance_grid(index, options);
@@ -101,7 +101,7 @@ TEST(SignedDistanceGrid, SameBitsWhateverTheNumberOfThreads) {
 }
 
 TEST(SignedDistanceGrid, SpacingGrowsUntilTheNodesFit) {
-  const ClosestPointIndex index = index_of(peanut(3.0));
+  const ClosestPointIndex index = voxel_index_of(peanut(3.0));
   DistanceGridOptions options;
   options.max_nodes = 20000;
   const auto grid = signed_distance_grid(index, options);
@@ -123,8 +123,8 @@ TEST(SignedDistanceGrid, RejectsOpenSurfacesAndOptionsOutOfRange) {
     EXPECT_EQ(grid.error().code, ErrorCode::kInvalidArgument);
     EXPECT_NE(grid.error().message.find(naming), std::string::npos) << grid.error().message;
   };
-  refused(index_of(open), {}, "is not closed");
-  const ClosestPointIndex index = index_of(peanut(3.0));
+  refused(voxel_index_of(open), {}, "is not closed");
+  const ClosestPointIndex index = voxel_index_of(peanut(3.0));
   DistanceGridOptions options;
   options.spacing_mm = 0.0;
   refused(index, options, "spacing_mm = 0");
@@ -141,7 +141,7 @@ TEST(SignedDistanceGrid, RejectsOpenSurfacesAndOptionsOutOfRange) {
 TEST(DistanceVolume, InterpolationErrorFallsWithTheSquareOfTheSpacing) {
   const double radius = 12.0, edge = 0.5;
   const ClosestPointIndex index =
-      index_of(ellipsoid_surface(kCentre, Vec3::Constant(radius), edge));
+      voxel_index_of(ellipsoid_surface(kCentre, Vec3::Constant(radius), edge));
   double previous = 0.0;
   for (const double spacing : {2.0, 1.0}) {
     DistanceGridOptions options;
@@ -168,7 +168,7 @@ TEST(DistanceVolume, InterpolationErrorFallsWithTheSquareOfTheSpacing) {
 
 TEST(DistanceVolume, DefaultSpacingErrsByHundredthsOfAMillimetre) {
   const TriangleSurface surface = ellipsoid_surface(kCentre, Vec3(18, 13, 9), 0.75);
-  const ClosestPointIndex index = index_of(surface);
+  const ClosestPointIndex index = voxel_index_of(surface);
   const auto volume = DistanceVolume::create(*signed_distance_grid(index));
   ASSERT_TRUE(volume);
   Random random(5);
@@ -185,7 +185,7 @@ TEST(DistanceVolume, DefaultSpacingErrsByHundredthsOfAMillimetre) {
 }
 
 TEST(DistanceVolume, GradientIsThatOfTheInterpolant) {
-  const auto volume = DistanceVolume::create(*signed_distance_grid(index_of(peanut(1.5))));
+  const auto volume = DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(1.5))));
   ASSERT_TRUE(volume);
   Random random(6);
   const double step = 1e-5, h = volume->grid().spacing_mm;
@@ -209,7 +209,7 @@ TEST(DistanceVolume, GradientIsThatOfTheInterpolant) {
 
 TEST(DistanceVolume, GoesOnOutsideTheGrid) {
   const TriangleSurface surface = ellipsoid_surface(kCentre, Vec3(18, 13, 9), 1.2);
-  const ClosestPointIndex index = index_of(surface);
+  const ClosestPointIndex index = voxel_index_of(surface);
   DistanceGridOptions options;
   options.margin_mm = 5.0;
   const auto volume = DistanceVolume::create(*signed_distance_grid(index, options));
@@ -231,7 +231,7 @@ TEST(DistanceVolume, GoesOnOutsideTheGrid) {
 }
 
 TEST(DistanceVolume, ManyPointsAreTheSameAsOneByOne) {
-  const auto volume = DistanceVolume::create(*signed_distance_grid(index_of(peanut(3.0))));
+  const auto volume = DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(3.0))));
   ASSERT_TRUE(volume);
   Random random(8);
   PointRows points(50, 3), gradients(50, 3);

@@ -12,12 +12,12 @@
 namespace brainshift::geometry {
 namespace {
 
-const Vec3 kCentre(35, -45, 20);
+const Vec3 kCloudCentre(35, -45, 20);
 
 Points sphere(int count, double radius) {
   Random random(2);
   Points points(3, count);
-  for (int i = 0; i < count; ++i) points.col(i) = kCentre + radius * random.direction();
+  for (int i = 0; i < count; ++i) points.col(i) = kCloudCentre + radius * random.direction();
   return points;
 }
 
@@ -27,7 +27,7 @@ TEST(OrientedCloud, FindsTheClosestPoint) {
   ASSERT_TRUE(cloud);
   Random random(3);
   for (int repetition = 0; repetition < 200; ++repetition) {
-    const Vec3 x = kCentre + 30.0 * random.uniform() * random.direction();
+    const Vec3 x = kCloudCentre + 30.0 * random.uniform() * random.direction();
     Eigen::Index expected = 0;
     const double least = (points.colwise() - x).colwise().norm().minCoeff(&expected);
     double distance = 0.0;
@@ -38,13 +38,13 @@ TEST(OrientedCloud, FindsTheClosestPoint) {
 
 TEST(OrientedCloud, EstimatedNormalsOfASphereAreRadial) {
   CloudOptions options;
-  options.seen_from_mm = kCentre;
+  options.seen_from_mm = kCloudCentre;
   const Points points = sphere(4000, 20);
   const auto cloud = OrientedCloud::build(points, Points(3, 0), options);
   ASSERT_TRUE(cloud);
   double sum = 0.0;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const Vec3 inwards = (kCentre - points.col(i)).normalized();
+    const Vec3 inwards = (kCloudCentre - points.col(i)).normalized();
     EXPECT_NEAR(cloud->normals().col(i).norm(), 1.0, 1e-9);
     EXPECT_GT(cloud->normals().col(i).dot(inwards), 0.95);
     sum += cloud->normals().col(i).dot(inwards);
@@ -91,14 +91,15 @@ TEST(OrientedCloud, NormalsOfEitherSignMakeTheSamePlane) {
 TEST(OrientedCloud, DistanceHardlyJumpsWhereTheClosestPointChanges) {
   Points points = sphere(2000, 20);
   Random noise(8);
-  for (auto x : points.colwise()) x += 0.1 * noise.normal() * (x - kCentre).normalized();
-  const auto cloud = OrientedCloud::build(points, points.colwise() - kCentre);
+  for (auto x : points.colwise()) x += 0.1 * noise.normal() * (x - kCloudCentre).normalized();
+  const auto cloud = OrientedCloud::build(points, points.colwise() - kCloudCentre);
   ASSERT_TRUE(cloud);
   Random random(9);
   double blended = 0.0, single = 0.0;
   for (int repetition = 0; repetition < 2000; ++repetition) {
-    const Vec3 x = kCentre + 21.0 * random.direction();
-    const Vec3 beside = kCentre + 21.0 * (x - kCentre + 0.05 * random.direction()).normalized();
+    const Vec3 x = kCloudCentre + 21.0 * random.direction();
+    const Vec3 beside =
+        kCloudCentre + 21.0 * (x - kCloudCentre + 0.05 * random.direction()).normalized();
     double distance = 0.0;
     const int a = cloud->closest(x, distance), b = cloud->closest(beside, distance);
     if (a == b) continue;
@@ -122,9 +123,9 @@ TEST(OrientedCloud, DefaultReachIsFiveSpacings) {
 
 TEST(OrientedCloud, GivenNormalsAreScaledToUnitLength) {
   const Points points = sphere(50, 20);
-  const auto cloud = OrientedCloud::build(points, 3.0 * (points.colwise() - kCentre));
+  const auto cloud = OrientedCloud::build(points, 3.0 * (points.colwise() - kCloudCentre));
   ASSERT_TRUE(cloud);
-  EXPECT_LT((cloud->normals() - (points.colwise() - kCentre) / 20.0).norm(), 1e-9);
+  EXPECT_LT((cloud->normals() - (points.colwise() - kCloudCentre) / 20.0).norm(), 1e-9);
 }
 
 // Lines 5 mm apart with a point every 0.1 mm: all neighbours are on the same line.

@@ -29,7 +29,7 @@ Eigen::Vector4d barycentric(const TetMesh& mesh, int tet, const Vec3& x) {
   return system.fullPivLu().solve(x.homogeneous());
 }
 
-class RandomPoints {
+class LocatedPoints {
  public:
   Vec3 in_box(const Vec3& low, const Vec3& high) {
     return low + Vec3(uniform(), uniform(), uniform()).cwiseProduct(high - low);
@@ -45,7 +45,7 @@ const Vec3 kLow(-10, 20, 5), kHigh(2, 28, 15);
 TEST(TetLocator, FindsTheHoldingTetrahedronAsBruteForceDoes) {
   const TetMesh mesh = box_mesh(kLow, kHigh, 5, 0.15);
   const TetLocator locator(mesh);
-  RandomPoints random;
+  LocatedPoints random;
   for (int i = 0; i < 300; ++i) {
     const Vec3 x = random.in_box(kLow, kHigh);
     const TetLocation found = locator.locate(x);
@@ -64,7 +64,7 @@ TEST(TetLocator, WeightsReproduceLinearFields) {
   const TetMesh mesh = box_mesh(kLow, kHigh, 5, 0.15);
   const TetLocator locator(mesh);
   const Vec3 gradient(0.3, -1.2, 0.7);
-  RandomPoints random;
+  LocatedPoints random;
   for (int i = 0; i < 300; ++i) {
     const Vec3 x = random.in_box(kLow, kHigh);
     const TetLocation found = locator.locate(x);
@@ -93,7 +93,7 @@ TEST(TetLocator, NodesEdgesAndFacesAreInside) {
 TEST(TetLocator, OutsideDescribesTheClosestPointOfTheMesh) {
   const TetMesh mesh = box_mesh(kLow, kHigh, 4, 0.15);
   const TetLocator locator(mesh);
-  RandomPoints random;
+  LocatedPoints random;
   int outside = 0;
   for (int i = 0; i < 500; ++i) {
     const Vec3 x = random.in_box(kLow - Vec3::Constant(6), kHigh + Vec3::Constant(6));
@@ -132,7 +132,7 @@ TEST(TetLocator, WorksForVeryDifferentSizesOfTetrahedra) {
   TetMesh mesh = box_mesh(Vec3::Zero(), Vec3::Ones(), 8);
   mesh.nodes = mesh.nodes.array().cube();
   const TetLocator locator(mesh);
-  RandomPoints random;
+  LocatedPoints random;
   for (int i = 0; i < 300; ++i) {
     const Vec3 x = random.in_box(Vec3::Zero(), Vec3::Ones()).array().cube();
     const TetLocation found = locator.locate(x);

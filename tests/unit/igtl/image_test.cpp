@@ -21,7 +21,7 @@ std::string message_of(const Image& image) {
   return status ? "" : status.error().message;
 }
 
-void expect_refused(const std::string& content, const char* part) {
+void expect_image_refused(const std::string& content, const char* part) {
   test_example::expect_refused(decode_image(content), part);
 }
 
@@ -134,28 +134,28 @@ TEST(Image, GeometryOfATransformGivesTheTransformBack) {
 }
 
 TEST(Image, WhatFitsNoImageIsRefused) {
-  expect_refused("", "0 bytes");
-  expect_refused(with(0, "\0\2"s), "version 2");
-  expect_refused(with(2, "\0"s), "bytes of voxels");
-  expect_refused(with(3, "\1"), "scalar type 1");
-  expect_refused(with(3, "\x0c"), "scalar type 12");
-  expect_refused(with(4, "\0"s), "endian 0");
-  expect_refused(with(4, "\3"), "endian 3");
-  expect_refused(with(5, "\0"s), "coordinates 0");
-  expect_refused(with(5, "\3"), "coordinates 3");
-  expect_refused(with(6, "\0\0"s), "dims hold 0");
-  expect_refused(with(6, "\0\3"s), "the volume has 3");
-  expect_refused(with(12, "\x7f\x80\0\0"s), "not finite");
-  expect_refused(with(48, "\x7f\xc0\0\0"s), "not finite");
-  expect_refused(with(60, "\0\1"s), "part of 4 voxels from voxel 1 on");
-  expect_refused(with(60, "\xff\xff"), "from voxel 65535 on");
-  expect_refused(content_of(image<float>(3)) + '\0', "289 bytes of voxels, must be 288");
+  expect_image_refused("", "0 bytes");
+  expect_image_refused(with(0, "\0\2"s), "version 2");
+  expect_image_refused(with(2, "\0"s), "bytes of voxels");
+  expect_image_refused(with(3, "\1"), "scalar type 1");
+  expect_image_refused(with(3, "\x0c"), "scalar type 12");
+  expect_image_refused(with(4, "\0"s), "endian 0");
+  expect_image_refused(with(4, "\3"), "endian 3");
+  expect_image_refused(with(5, "\0"s), "coordinates 0");
+  expect_image_refused(with(5, "\3"), "coordinates 3");
+  expect_image_refused(with(6, "\0\0"s), "dims hold 0");
+  expect_image_refused(with(6, "\0\3"s), "the volume has 3");
+  expect_image_refused(with(12, "\x7f\x80\0\0"s), "not finite");
+  expect_image_refused(with(48, "\x7f\xc0\0\0"s), "not finite");
+  expect_image_refused(with(60, "\0\1"s), "part of 4 voxels from voxel 1 on");
+  expect_image_refused(with(60, "\xff\xff"), "from voxel 65535 on");
+  expect_image_refused(content_of(image<float>(3)) + '\0', "289 bytes of voxels, must be 288");
 }
 
 TEST(Image, ASizeThatNoMachineHoldsIsRefusedByTheContentsSize) {
   const std::string huge(6, '\xff');
-  expect_refused(with(2, "\xff").replace(6, 6, huge).replace(66, 6, huge),
-                 "288 bytes of voxels, must be");
+  expect_image_refused(with(2, "\xff").replace(6, 6, huge).replace(66, 6, huge),
+                       "288 bytes of voxels, must be");
 }
 
 TEST(Image, EveryTruncationIsRefused) {

@@ -129,9 +129,9 @@ constexpr int kLibraryType<float> = lib::ImageMessage::TYPE_FLOAT32;
 template <>
 constexpr int kLibraryType<double> = lib::ImageMessage::TYPE_FLOAT64;
 
-using ScalarTypes = ::testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t,
-                                     std::int32_t, std::uint32_t, float, double>;
-TYPED_TEST_SUITE(LibraryImage, ScalarTypes);
+using LibraryScalarTypes = ::testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t,
+                                            std::int32_t, std::uint32_t, float, double>;
+TYPED_TEST_SUITE(LibraryImage, LibraryScalarTypes);
 
 TYPED_TEST(LibraryImage, ScalarAndVectorVolumesAreTheSameBytes) {
   for (const int components : {1, 3}) {

@@ -98,20 +98,20 @@ TEST(Message, WhatCannotBeSentIsNotEncodedAndTheTypeIsNamed) {
   EXPECT_EQ(message(envelope(), image), "IMAGE: 72 numbers, must be 48");
 }
 
-void expect_refused(const std::string& bytes, const char* part) {
+void expect_message_refused(const std::string& bytes, const char* part) {
   test_example::expect_refused(decode(bytes), part);
 }
 
 TEST(Message, ErrorsNameTheType) {
   const std::string good = encoded(envelope(2), test_example::text());
-  expect_refused(good.substr(0, 57), "header of 57 bytes");
-  expect_refused(good.substr(0, good.size() - 1), "STRING: body of");
-  expect_refused(good + '\0', "STRING: body of");
+  expect_message_refused(good.substr(0, 57), "header of 57 bytes");
+  expect_message_refused(good.substr(0, good.size() - 1), "STRING: body of");
+  expect_message_refused(good + '\0', "STRING: body of");
   std::string damaged = good;
   damaged.back() = static_cast<char>(damaged.back() ^ 1);
-  expect_refused(damaged, "STRING of \"brainshift_u\": the CRC-64");
-  expect_refused(encode_header({1, "VIDEO", "camera", 0, 0, 0}),
-                 "VIDEO: a message type that is not read");
+  expect_message_refused(damaged, "STRING of \"brainshift_u\": the CRC-64");
+  expect_message_refused(encode_header({1, "VIDEO", "camera", 0, 0, 0}),
+                         "VIDEO: a message type that is not read");
   Header header{1, "TRANSFORM", "", 0, 47, 0};
   const auto wrong_size = decode(header, std::string(47, '\0'));
   ASSERT_FALSE(wrong_size);

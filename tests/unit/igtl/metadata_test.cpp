@@ -12,7 +12,7 @@ namespace {
 using ::testing::HasSubstr;
 using namespace std::string_literals;
 
-Metadata example() {
+Metadata example_metadata() {
   return {{"sequence", "42"}, {"case", "M\xc3\xbcller", kUtf8}, {"reason", ""}};
 }
 
@@ -21,7 +21,7 @@ std::string body_of(const Metadata& metadata, const std::string& content) {
   return frame.before + content + frame.after;
 }
 
-void expect_refused(const std::string& body, const char* part) {
+void expect_metadata_refused(const std::string& body, const char* part) {
   test_example::expect_refused(decode_body(2, body), part);
 }
 
@@ -34,7 +34,7 @@ TEST(Metadata, LayoutIsTheDocumentedOne) {
 }
 
 TEST(Metadata, DecodeReturnsWhatWasEncoded) {
-  for (const Metadata& metadata : {Metadata{}, example()}) {
+  for (const Metadata& metadata : {Metadata{}, example_metadata()}) {
     for (const std::string& content : {""s, "content"s}) {
       const std::string body = body_of(metadata, content);
       const auto parts = decode_body(2, body);
@@ -47,7 +47,7 @@ TEST(Metadata, DecodeReturnsWhatWasEncoded) {
 }
 
 TEST(Metadata, Version1IsTheContentAlone) {
-  const BodyFrame frame = encode_body_frame(1, 7, example());
+  const BodyFrame frame = encode_body_frame(1, 7, example_metadata());
   EXPECT_EQ(frame.before + frame.after, "");
   const auto parts = decode_body(1, "content");
   ASSERT_TRUE(parts);
@@ -80,25 +80,26 @@ TEST(Metadata, WhatALongerExtendedHeaderAddsIsSkipped) {
 }
 
 TEST(Metadata, SizesBeyondTheBodyAreRefused) {
-  const std::string body = body_of(example(), "content");
+  const std::string body = body_of(example_metadata(), "content");
   const auto with = [&body](std::size_t at, const std::string& bytes) {
     return std::string(body).replace(at, bytes.size(), bytes);
   };
-  expect_refused("\0\14\0\0"s, "extended header");
-  expect_refused(with(0, "\0\13"s), "extended header of 11 bytes");
-  expect_refused(with(0, "\xff\xff"), "extended header of 65535 bytes");
-  expect_refused(with(2, "\xff\xff"), "metadata of 65");
-  expect_refused(with(4, "\xff\xff\xff\xff"), "metadata of 4294967");
-  expect_refused(with(2, "\0\1"s), "metadata count");
+  expect_metadata_refused("\0\14\0\0"s, "extended header");
+  expect_metadata_refused(with(0, "\0\13"s), "extended header of 11 bytes");
+  expect_metadata_refused(with(0, "\xff\xff"), "extended header of 65535 bytes");
+  expect_metadata_refused(with(2, "\xff\xff"), "metadata of 65");
+  expect_metadata_refused(with(4, "\xff\xff\xff\xff"), "metadata of 4294967");
+  expect_metadata_refused(with(2, "\0\1"s), "metadata count");
   const std::size_t entries = 12 + 7;
-  expect_refused(with(entries, "\xff\xff"), "header of 65535 metadata entries");
-  expect_refused(with(entries, "\0\4"s), "header of 4 metadata entries");
-  expect_refused(with(entries + 2, "\xff\xff"), "metadata key of 65535 bytes");
-  expect_refused(with(entries + 6, "\xff\xff\xff\xff"), "metadata value of 4294967295 bytes");
+  expect_metadata_refused(with(entries, "\xff\xff"), "header of 65535 metadata entries");
+  expect_metadata_refused(with(entries, "\0\4"s), "header of 4 metadata entries");
+  expect_metadata_refused(with(entries + 2, "\xff\xff"), "metadata key of 65535 bytes");
+  expect_metadata_refused(with(entries + 6, "\xff\xff\xff\xff"),
+                          "metadata value of 4294967295 bytes");
 }
 
 TEST(Metadata, FindGivesTheValueOfTheKey) {
-  const Metadata metadata = example();
+  const Metadata metadata = example_metadata();
   ASSERT_NE(find(metadata, "sequence"), nullptr);
   EXPECT_EQ(*find(metadata, "sequence"), "42");
   EXPECT_EQ(find(metadata, "Sequence"), nullptr);
@@ -110,7 +111,7 @@ TEST(Metadata, ValidateNamesWhatIsWrong) {
     const Status status = validate(metadata);
     return status ? "" : status.error().message;
   };
-  EXPECT_EQ(message(example()), "");
+  EXPECT_EQ(message(example_metadata()), "");
   EXPECT_EQ(message({{"", "value"}}), "metadata key is empty");
   EXPECT_EQ(message({{"a", "1"}, {"a", "2"}}), "metadata key \"a\" occurs twice");
   EXPECT_EQ(message({{"a", std::string(kMaxMetadataBytes - 1, 'v')}}), "");

@@ -15,17 +15,17 @@ namespace {
 using test_support::box_mesh;
 using test_support::nodes_where;
 
-constexpr fem::Elasticity kTissue{0.0242, 0.0021};
+constexpr fem::Elasticity kSolvedTissue{0.0242, 0.0021};
 
-struct Block {
+struct SolvedBlock {
   TetMesh mesh = box_mesh(3, 3, 3, Vec3(30, 30, 30));
   fem::DofMap dofs{mesh.num_nodes()};
   SymmetricMatrix stiffness;
-  Block() {
+  SolvedBlock() {
     for (NodeIndex n : nodes_where(mesh, [](const Vec3& x) { return x[2] == 0.0; }))
       dofs.fix_all(n);
     dofs.finalise();
-    stiffness = fem::assemble_stiffness(mesh, kTissue, dofs);
+    stiffness = fem::assemble_stiffness(mesh, kSolvedTissue, dofs);
   }
   VecX load() const {
     std::srand(17);
@@ -41,14 +41,14 @@ struct Block {
 };
 
 TEST(CheckedSolve, NormIsTheGreatestRowSum) {
-  const Block block;
+  const SolvedBlock block;
   const SymmetricMatrix whole = block.stiffness.selfadjointView<Eigen::Lower>();
   const Eigen::MatrixXd full(whole);
   EXPECT_NEAR(max_norm(block.stiffness), full.cwiseAbs().rowwise().sum().maxCoeff(), 1e-12);
 }
 
 TEST(CheckedSolve, AFittingFactorNeedsNoRefinement) {
-  const Block block;
+  const SolvedBlock block;
   const auto factor = SparseCholesky::factorise(block.stiffness);
   const VecX b = block.load();
   VecX x;
@@ -60,7 +60,7 @@ TEST(CheckedSolve, AFittingFactorNeedsNoRefinement) {
 }
 
 TEST(CheckedSolve, RefinesWhatASlightlyWrongFactorDid) {
-  const Block block;
+  const SolvedBlock block;
   const SparseCholesky factor = block.factor_of_another(1e-7);
   const auto right = SparseCholesky::factorise(block.stiffness);
   const VecX b = block.load();
@@ -74,7 +74,7 @@ TEST(CheckedSolve, RefinesWhatASlightlyWrongFactorDid) {
 }
 
 TEST(CheckedSolve, RejectsTheFactorOfAnotherMatrix) {
-  const Block block;
+  const SolvedBlock block;
   const SparseCholesky factor = block.factor_of_another(10.0);
   VecX x;
   const auto quality =
@@ -85,7 +85,7 @@ TEST(CheckedSolve, RejectsTheFactorOfAnotherMatrix) {
 }
 
 TEST(CheckedSolve, RejectsARightHandSideThatIsNotFinite) {
-  const Block block;
+  const SolvedBlock block;
   const auto factor = SparseCholesky::factorise(block.stiffness);
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -102,7 +102,7 @@ TEST(CheckedSolve, RejectsARightHandSideThatIsNotFinite) {
 }
 
 TEST(CheckedSolve, OneWrongSolutionAmongManyIsFoundAndRefined) {
-  const Block block;
+  const SolvedBlock block;
   const auto factor = SparseCholesky::factorise(block.stiffness);
   const double norm = max_norm(block.stiffness);
   std::srand(3);
@@ -122,7 +122,7 @@ TEST(CheckedSolve, OneWrongSolutionAmongManyIsFoundAndRefined) {
 }
 
 TEST(CheckedSolve, BlocksOfAnotherMatrixAreRejected) {
-  const Block block;
+  const SolvedBlock block;
   const fem::StiffnessFactor factor(block.factor_of_another(10.0));
   fem::BlockSolver solver(block.stiffness, factor, block.dofs);
   Eigen::MatrixXd u;

@@ -15,11 +15,11 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Block {
+struct IndefiniteBlock {
   TetMesh mesh = test_support::box_mesh(3, 2, 2, Vec3(30, 20, 20));
   fem::DofMap dofs{mesh.num_nodes()};
   fem::PressureMap pressure;
-  explicit Block(bool held = true) {
+  explicit IndefiniteBlock(bool held = true) {
     std::vector<NodeIndex> drained;
     for (int n = 0; n < mesh.num_nodes(); ++n) {
       if (held && mesh.nodes(2, n) == 0.0) dofs.fix_all(n);
@@ -46,7 +46,7 @@ Result<SymmetricIndefinite> factor_of(const fem::BiotMatrix& matrix) {
 }
 
 TEST(SymmetricIndefinite, EqualsDenseEliminationForStepsOfAllSizes) {
-  const Block block;
+  const IndefiniteBlock block;
   for (const double dt : {1e-6, 1e-3, 1.0, 1e6}) {
     const fem::BiotMatrix matrix = block.matrix(dt);
     const auto factor = factor_of(matrix);
@@ -62,7 +62,7 @@ TEST(SymmetricIndefinite, EqualsDenseEliminationForStepsOfAllSizes) {
 }
 
 TEST(SymmetricIndefinite, ManyRightHandSidesEqualSingleSolves) {
-  const fem::BiotMatrix matrix = Block().matrix(0.1);
+  const fem::BiotMatrix matrix = IndefiniteBlock().matrix(0.1);
   const auto factor = factor_of(matrix);
   ASSERT_TRUE(factor.has_value());
   Eigen::MatrixXd b(matrix.lower.rows(), 70), x;  // more than one block
@@ -81,7 +81,7 @@ TEST(SymmetricIndefinite, ManyRightHandSidesEqualSingleSolves) {
 }
 
 TEST(SymmetricIndefinite, ReciprocalConditionIsThatOfTheDenseScaledMatrix) {
-  const fem::BiotMatrix matrix = Block().matrix(0.1);
+  const fem::BiotMatrix matrix = IndefiniteBlock().matrix(0.1);
   const auto factor = factor_of(matrix);
   ASSERT_TRUE(factor.has_value());
   Eigen::MatrixXd a = dense(matrix.lower);
@@ -94,7 +94,7 @@ TEST(SymmetricIndefinite, ReciprocalConditionIsThatOfTheDenseScaledMatrix) {
 }
 
 TEST(SymmetricIndefinite, RefactorisedCloneEqualsAFreshFactorAndLeavesTheOriginalAlone) {
-  const Block block;
+  const IndefiniteBlock block;
   const fem::BiotMatrix soft = block.matrix(0.1), stiff = block.matrix(0.1, 0.01);
   const auto original = factor_of(soft);
   ASSERT_TRUE(original.has_value());
@@ -112,7 +112,7 @@ TEST(SymmetricIndefinite, RefactorisedCloneEqualsAFreshFactorAndLeavesTheOrigina
 }
 
 TEST(SymmetricIndefinite, RejectsABodyThatFloats) {
-  const auto factor = factor_of(Block(false).matrix(0.1));
+  const auto factor = factor_of(IndefiniteBlock(false).matrix(0.1));
   ASSERT_FALSE(factor.has_value());
   EXPECT_EQ(factor.error().code, ErrorCode::kFloatingBody);
   EXPECT_THAT(factor.error().message, HasSubstr("not held"));
@@ -131,7 +131,7 @@ TEST(SymmetricIndefinite, RejectsAMatrixOfTheRightInertiaThatIsAsGoodAsSingular)
 
 // Nothing moves at the boundary and nothing drains: a constant pressure is left open.
 TEST(SymmetricIndefinite, RejectsFluidEnclosedInABodyThatCannotChangeItsVolume) {
-  Block block;
+  IndefiniteBlock block;
   block.dofs = fem::DofMap(block.mesh.num_nodes());
   const Vec3 size(30, 20, 20);
   for (int n = 0; n < block.mesh.num_nodes(); ++n) {
@@ -148,7 +148,7 @@ TEST(SymmetricIndefinite, RejectsFluidEnclosedInABodyThatCannotChangeItsVolume) 
 }
 
 TEST(SymmetricIndefinite, RejectsTheWrongInertia) {
-  fem::BiotMatrix matrix = Block().matrix(0.1);
+  fem::BiotMatrix matrix = IndefiniteBlock().matrix(0.1);
   // A tissue that pushes back with negative stiffness at one unknown.
   matrix.lower.coeffRef(5, 5) *= -1.0;
   const auto factor = factor_of(matrix);
@@ -158,7 +158,7 @@ TEST(SymmetricIndefinite, RejectsTheWrongInertia) {
 }
 
 TEST(SymmetricIndefinite, RejectsNumbersThatAreNotFinite) {
-  const fem::BiotMatrix good = Block().matrix(0.1);
+  const fem::BiotMatrix good = IndefiniteBlock().matrix(0.1);
   auto factor = factor_of(good);
   ASSERT_TRUE(factor.has_value());
   for (const double bad :
@@ -178,7 +178,7 @@ TEST(SymmetricIndefinite, RejectsNumbersThatAreNotFinite) {
 }
 
 TEST(SymmetricIndefinite, RejectsASolutionThatOverflows) {
-  const fem::BiotMatrix matrix = Block().matrix(0.1);
+  const fem::BiotMatrix matrix = IndefiniteBlock().matrix(0.1);
   const auto factor = factor_of(matrix);
   ASSERT_TRUE(factor.has_value());
   VecX x;

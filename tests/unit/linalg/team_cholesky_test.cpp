@@ -18,7 +18,7 @@ MatrixXd positive_definite(Index size) {
   return a * a.transpose() + static_cast<double>(size) * MatrixXd::Identity(size, size);
 }
 
-MatrixXd lower(const MatrixXd& a) { return a.triangularView<Eigen::Lower>(); }
+MatrixXd team_lower(const MatrixXd& a) { return a.triangularView<Eigen::Lower>(); }
 
 TEST(TeamCholesky, IsTheFactorOfAnotherLibrary) {
   ThreadTeam team(2);
@@ -27,7 +27,7 @@ TEST(TeamCholesky, IsTheFactorOfAnotherLibrary) {
     MatrixXd l = a;
     ASSERT_TRUE(cholesky(l, team));
     const MatrixXd expected = a.llt().matrixL();
-    EXPECT_LE((lower(l) - expected).norm(), 1e-13 * (1.0 + expected.norm())) << size;
+    EXPECT_LE((team_lower(l) - expected).norm(), 1e-13 * (1.0 + expected.norm())) << size;
   }
 }
 
@@ -37,7 +37,7 @@ TEST(TeamCholesky, DoesNotDependOnTheNumberOfMembers) {
   MatrixXd by_one = a, by_three = a;
   ASSERT_TRUE(cholesky(by_one, one));
   ASSERT_TRUE(cholesky(by_three, three));
-  EXPECT_EQ(lower(by_one), lower(by_three));
+  EXPECT_EQ(team_lower(by_one), team_lower(by_three));
 }
 
 TEST(TeamCholesky, WorksOnABlockOfALargerMatrix) {
@@ -46,7 +46,7 @@ TEST(TeamCholesky, WorksOnABlockOfALargerMatrix) {
   MatrixXd larger = MatrixXd::Constant(310, 305, 7.0);
   larger.block(4, 2, 300, 300) = a;
   ASSERT_TRUE(cholesky(larger.block(4, 2, 300, 300), team));
-  EXPECT_LE((lower(larger.block(4, 2, 300, 300)) - MatrixXd(a.llt().matrixL())).norm(), 1e-10);
+  EXPECT_LE((team_lower(larger.block(4, 2, 300, 300)) - MatrixXd(a.llt().matrixL())).norm(), 1e-10);
   larger.block(4, 2, 300, 300).setConstant(7.0);
   EXPECT_EQ(larger, MatrixXd::Constant(310, 305, 7.0));
 }

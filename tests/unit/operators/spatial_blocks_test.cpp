@@ -11,7 +11,7 @@
 namespace brainshift {
 namespace {
 
-Points scattered(int n) {
+Points scattered_points(int n) {
   Random random(5);
   Points points(3, n);
   for (double& x : points.reshaped()) x = 100.0 * random.uniform();
@@ -29,7 +29,7 @@ double extent_mm(const Points& points, std::span<const int> block) {
 
 TEST(SpatialBlocks, HoldEveryPointOnceInBlocksOfAboutTheSameSize) {
   for (const int n : {0, 1, 2, 63, 64, 65, 129, 1000}) {
-    const SpatialBlocks blocks = spatial_blocks(scattered(n), 64);
+    const SpatialBlocks blocks = spatial_blocks(scattered_points(n), 64);
     EXPECT_EQ(blocks.size(), (n + 63) / 64);
     std::vector<int> all;
     for (int b = 0; b < blocks.size(); ++b) {
@@ -46,7 +46,7 @@ TEST(SpatialBlocks, HoldEveryPointOnceInBlocksOfAboutTheSameSize) {
 }
 
 TEST(SpatialBlocks, AreOfNeighbours) {
-  const Points points = scattered(4096);  // 64 blocks: a cube of 100 in parts of 25 at best
+  const Points points = scattered_points(4096);  // 64 blocks: a cube of 100 in parts of 25 at best
   const SpatialBlocks blocks = spatial_blocks(points, 64);
   for (int b = 0; b < blocks.size(); ++b) EXPECT_LT(extent_mm(points, blocks.block(b)), 35.0);
 }

@@ -77,7 +77,7 @@ std::shared_ptr<const BrainModel> model() {
 }
 
 // An inversion that remembers what it was given.
-struct FakeInversion {
+struct FakeEstimator {
   std::shared_ptr<std::optional<SparseData>> seen = std::make_shared<std::optional<SparseData>>();
   std::unique_ptr<FakeInverter> make() const {
     return std::make_unique<FakeInverter>(
@@ -91,14 +91,14 @@ struct FakeInversion {
 };
 
 Pipeline pipeline_on(std::shared_ptr<const BrainModel> brain, const CaseConfig& config = {},
-                     std::unique_ptr<inversion::Inverter> inverter = FakeInversion{}.make(),
+                     std::unique_ptr<inversion::Inverter> inverter = FakeEstimator{}.make(),
                      Method method = Method::kPaper, Boundary boundary = Boundary::kContact) {
   auto built = Pipeline::build(std::move(brain), config, method, boundary, std::move(inverter));
   EXPECT_TRUE(built.has_value());
   return std::move(*built);
 }
 
-Pipeline pipeline(const FakeInversion& inversion, Boundary boundary = Boundary::kContact,
+Pipeline pipeline(const FakeEstimator& inversion, Boundary boundary = Boundary::kContact,
                   const CaseConfig& config = {}, Method method = Method::kPaper) {
   return pipeline_on(model(), config, inversion.make(), method, boundary);
 }
@@ -120,7 +120,7 @@ bool leaves_out(const Update& update, const std::string& part) {
 }
 
 TEST(Pipeline, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   CaseConfig config;
   config.inversion.sigma_mm = 0.25;
   const auto update = pipeline(inversion, Boundary::kContact, config).run(landmarks(3), {});
@@ -137,7 +137,7 @@ TEST(Pipeline, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
 }
 
 TEST(Pipeline, AShiftedTumourBoundaryGivesBackItsShift) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   const Vec3 shift(1.5, -2.0, 1.0);
   const auto update = pipeline(inversion).run(boundary_moved_by(shift), {});
   ASSERT_TRUE(update.has_value());
@@ -148,7 +148,7 @@ TEST(Pipeline, AShiftedTumourBoundaryGivesBackItsShift) {
 }
 
 TEST(Pipeline, GuidingPointsAreDistinctAndTheSameInEveryRun) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   Pipeline once = pipeline(inversion);
   ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0}), {}).has_value());
   const SparseData first = inversion.seen->value();
@@ -163,7 +163,7 @@ TEST(Pipeline, GuidingPointsAreDistinctAndTheSameInEveryRun) {
 }
 
 TEST(Pipeline, FewerBoundaryPointsThanWantedAreAllUsed) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   CaseConfig config;
   config.inversion.sparse_points = 1'000'000;
   const Observation observation = boundary_moved_by({1, 0, 0});
@@ -173,7 +173,7 @@ TEST(Pipeline, FewerBoundaryPointsThanWantedAreAllUsed) {
 }
 
 TEST(Pipeline, RefusesWhatIsNotAssimilated) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   Observation observation = landmarks(1);
   observation.body = CorticalSurface{};
   const auto surface = pipeline(inversion).run(observation, {});
@@ -194,7 +194,7 @@ TEST(Pipeline, RefusesWhatIsNotAssimilated) {
 }
 
 TEST(Pipeline, RefusesLandmarksThatDoNotPairUpOrAreTooFew) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   Observation observation = landmarks(1);
   auto& pairs = std::get<LandmarkPairs>(observation.body);
   pairs.deformed.conservativeResize(3, 3);
@@ -265,7 +265,7 @@ TEST(Pipeline, TheInverterWritesIntoTheUpdateItself) {
 }
 
 TEST(Pipeline, ResetForgetsEvidenceAndTheInvertersState) {
-  const FakeInversion inversion;
+  const FakeEstimator inversion;
   auto inverter = inversion.make();
   const FakeInverter& watched = *inverter;
   Pipeline two = pipeline_on(model(), {}, std::move(inverter));
@@ -279,12 +279,12 @@ TEST(Pipeline, ResetForgetsEvidenceAndTheInvertersState) {
 }
 
 TEST(Pipeline, SaysWhatItLeavesOut) {
-  const auto contact = pipeline(FakeInversion{}, Boundary::kContact).run(landmarks(1), {});
+  const auto contact = pipeline(FakeEstimator{}, Boundary::kContact).run(landmarks(1), {});
   ASSERT_TRUE(contact.has_value());
   EXPECT_TRUE(leaves_out(*contact, "pressure"));
   EXPECT_TRUE(leaves_out(*contact, "uncertainty"));
   EXPECT_FALSE(leaves_out(*contact, "contact"));
-  const auto fixed = pipeline(FakeInversion{}, Boundary::kFixed).run(landmarks(1), {});
+  const auto fixed = pipeline(FakeEstimator{}, Boundary::kFixed).run(landmarks(1), {});
   ASSERT_TRUE(fixed.has_value());
   EXPECT_TRUE(leaves_out(*fixed, "contact"));
   for (const Omission& omission : fixed->left_out) {
@@ -353,7 +353,7 @@ TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
 
 TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
   for (const Method method : kAllMethods) {
-    const auto update = pipeline(FakeInversion{}, Boundary::kContact, {}, method).run(landmarks(1));
+    const auto update = pipeline(FakeEstimator{}, Boundary::kContact, {}, method).run(landmarks(1));
     ASSERT_TRUE(update.has_value());
     EXPECT_EQ(leaves_out(*update, "uncertainty"), method != Method::kCondensed)
         << to_string(method);
@@ -361,7 +361,7 @@ TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
   CaseConfig off;
   off.scene.uncertainty = Carry::kOff;
   const auto update =
-      pipeline(FakeInversion{}, Boundary::kContact, off, Method::kCondensed).run(landmarks(1));
+      pipeline(FakeEstimator{}, Boundary::kContact, off, Method::kCondensed).run(landmarks(1));
   ASSERT_TRUE(update.has_value());
   EXPECT_TRUE(leaves_out(*update, "uncertainty"));
 }
@@ -369,7 +369,7 @@ TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
 TEST(Pipeline, ListsWhatTheInversionLeftOut) {
   CaseConfig config;
   config.scene.far_field = Carry::kOff;
-  auto inverter = FakeInversion{}.make();
+  auto inverter = FakeEstimator{}.make();
   FakeInverter& leaving_out = *inverter;
   Pipeline built =
       pipeline_on(model(), config, std::move(inverter), Method::kCondensed, Boundary::kContact);
@@ -420,7 +420,7 @@ TEST(Pipeline, NeedsATumourSurface) {
   auto without = std::make_shared<BrainModel>(*model());
   without->tumour = {};
   const auto built =
-      Pipeline::build(without, {}, Method::kPaper, Boundary::kContact, FakeInversion{}.make());
+      Pipeline::build(without, {}, Method::kPaper, Boundary::kContact, FakeEstimator{}.make());
   ASSERT_FALSE(built.has_value());
   EXPECT_EQ(built.error().code, ErrorCode::kEmptySet);
 }

@@ -11,7 +11,7 @@
 namespace brainshift::registration {
 namespace {
 
-geometry::ClosestPointIndex index_of(const TriangleSurface& surface) {
+geometry::ClosestPointIndex cloud_index_of(const TriangleSurface& surface) {
   auto index = geometry::ClosestPointIndex::build(surface);
   EXPECT_TRUE(index.has_value());
   return std::move(*index);
@@ -32,7 +32,7 @@ TEST(Cppd, IsNegativeOutsideAndPositiveInsideAPlate) {
   nodes << 4, 4, 5, 5,  //
       3, 3, 5, 5,       // the last two project onto the diagonal edge
       3.5, 1.25, 2.5, 2.0;
-  const VecX d = signed_projection_distance(nodes, index_of(plate()));
+  const VecX d = signed_projection_distance(nodes, cloud_index_of(plate()));
   ASSERT_EQ(d.size(), 4);
   EXPECT_NEAR(d[0], -1.5, 1e-14);
   EXPECT_NEAR(d[1], 0.75, 1e-14);
@@ -44,12 +44,13 @@ TEST(Cppd, ChangesSignWithTheOrientationOfTheSurface) {
   TriangleSurface turned = plate();
   turned.triangles.row(0).swap(turned.triangles.row(1));
   const Points above = Vec3(4, 3, 3.5);
-  EXPECT_NEAR(signed_projection_distance(above, index_of(turned))[0], 1.5, 1e-14);
+  EXPECT_NEAR(signed_projection_distance(above, cloud_index_of(turned))[0], 1.5, 1e-14);
 }
 
 TEST(Cppd, OfASphereIsRadiusMinusDistance) {
   const Vec3 centre(10, -20, 30);
-  const auto sphere = index_of(geometry::ellipsoid_surface(centre, Vec3::Constant(20.0), 1.0));
+  const auto sphere =
+      cloud_index_of(geometry::ellipsoid_surface(centre, Vec3::Constant(20.0), 1.0));
   Random random(3);
   Points nodes(3, 200);
   for (int i = 0; i < 200; ++i)
@@ -69,7 +70,7 @@ TEST(Cppd, SignHoldsAboveVertices) {
   // Straight above a vertex any of its triangles may be named.
   const TriangleSurface surface = geometry::ellipsoid_surface(Vec3::Zero(), Vec3(9, 4, 2), 2.0);
   const Points normals = geometry::vertex_normals(surface);
-  const auto index = index_of(surface);
+  const auto index = cloud_index_of(surface);
   const VecX above = signed_projection_distance(surface.vertices + 0.3 * normals, index);
   const VecX below = signed_projection_distance(surface.vertices - 0.3 * normals, index);
   EXPECT_LT(above.maxCoeff(), -0.2);
@@ -83,7 +84,7 @@ TEST(Cppd, MismatchIsTheMeanMagnitude) {
 }
 
 TEST(Cppd, OfNoNodesIsEmpty) {
-  const VecX d = signed_projection_distance(Points(3, 0), index_of(plate()));
+  const VecX d = signed_projection_distance(Points(3, 0), cloud_index_of(plate()));
   EXPECT_EQ(d.size(), 0);
   EXPECT_EQ(mismatch(d).mean, 0.0);
 }

@@ -182,8 +182,8 @@ TEST(Fiducials, AmbiguousOrNoCorrespondenceIsRefused) {
   EXPECT_THAT(none.error().message, HasSubstr("no correspondence of 6 measured to 6"));
 }
 
-void expect_refused(const Points& measured, const Points& image, ErrorCode code,
-                    const std::string& naming) {
+void expect_fiducials_refused(const Points& measured, const Points& image, ErrorCode code,
+                              const std::string& naming) {
   const auto result = register_fiducials(measured, image);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, code);
@@ -194,30 +194,31 @@ void expect_refused(const Points& measured, const Points& image, ErrorCode code,
 TEST(Fiducials, RefuseWhatFixesNoPose) {
   const Points image = markers();
   const auto code = ErrorCode::kInvalidArgument;
-  expect_refused(image.leftCols(5), image, code, "5 measured but 6 in the image");
-  expect_refused(image.leftCols(2), image.leftCols(2), code, "2 measured: at least 3");
+  expect_fiducials_refused(image.leftCols(5), image, code, "5 measured but 6 in the image");
+  expect_fiducials_refused(image.leftCols(2), image.leftCols(2), code, "2 measured: at least 3");
   Points line(3, 4);
   for (int i = 0; i < 4; ++i) line.col(i) = Vec3(1, 2, 3) + 30.0 * i * Vec3(0.3, 0.5, -0.2);
-  expect_refused(line, image.leftCols(4), code, "all 4 measured ones lie on one line");
-  expect_refused(image.leftCols(4), line, code, "all 4 image ones lie on one line");
+  expect_fiducials_refused(line, image.leftCols(4), code, "all 4 measured ones lie on one line");
+  expect_fiducials_refused(image.leftCols(4), line, code, "all 4 image ones lie on one line");
   Points twice = image;
   twice.col(4) = twice.col(1);
-  expect_refused(twice, image, code, "measured ones 1 and 4 are at the same place");
+  expect_fiducials_refused(twice, image, code, "measured ones 1 and 4 are at the same place");
   Points bad = image;
   bad(2, 3) = std::nan("");
-  expect_refused(bad, image, ErrorCode::kNotFinite, "measured one 3 is not finite");
-  expect_refused(image, bad, ErrorCode::kNotFinite, "image one 3 is not finite");
+  expect_fiducials_refused(bad, image, ErrorCode::kNotFinite, "measured one 3 is not finite");
+  expect_fiducials_refused(image, bad, ErrorCode::kNotFinite, "image one 3 is not finite");
 }
 
 TEST(Fiducials, MixedUpUnitsAreNamed) {
   const Points image = markers();
   const auto code = ErrorCode::kInvalidArgument;
-  expect_refused(0.001 * image, image, code,
-                 "the measured ones span 0.19 and the image's 190 mm: metres?");
-  expect_refused(0.1 * image, image, code, "span 19 and the image's 190 mm: centimetres?");
-  expect_refused(image, 0.001 * image, code, ": image in metres?");
-  expect_refused(image, 0.1 * image, code, ": image in centimetres?");
-  expect_refused(image, 2.0 * image, code, ": not the same arrangement");
+  expect_fiducials_refused(0.001 * image, image, code,
+                           "the measured ones span 0.19 and the image's 190 mm: metres?");
+  expect_fiducials_refused(0.1 * image, image, code,
+                           "span 19 and the image's 190 mm: centimetres?");
+  expect_fiducials_refused(image, 0.001 * image, code, ": image in metres?");
+  expect_fiducials_refused(image, 0.1 * image, code, ": image in centimetres?");
+  expect_fiducials_refused(image, 2.0 * image, code, ": not the same arrangement");
   const auto matched = match_fiducials(0.001 * image, image);
   ASSERT_FALSE(matched);
   EXPECT_THAT(matched.error().message, HasSubstr("metres?"));

@@ -11,13 +11,13 @@
 namespace brainshift::registration {
 namespace {
 
-TriangleSurface ellipsoid() {
+TriangleSurface input_ellipsoid() {
   return geometry::ellipsoid_surface(Vec3(35, -45, 20), Vec3(18, 13, 9), 3.0);
 }
 
 void expect_refused(const Points& points, const RigidTransform& T, const IcpOptions& options,
                     ErrorCode code, const std::string& naming) {
-  const auto surface = geometry::ClosestPointIndex::build(ellipsoid());
+  const auto surface = geometry::ClosestPointIndex::build(input_ellipsoid());
   ASSERT_TRUE(surface);
   const auto result = align(points, *surface, T, options);
   ASSERT_FALSE(result);
@@ -28,7 +28,7 @@ void expect_refused(const Points& points, const RigidTransform& T, const IcpOpti
 
 TEST(Icp, RefusesPointsThatFixNoPose) {
   const RigidTransform T = RigidTransform::Identity();
-  Points points = geometry::sample_surface(ellipsoid(), 20, 1);
+  Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
   expect_refused(points.leftCols(2), T, {}, ErrorCode::kInvalidArgument, "2 given");
   expect_refused(Points(3, 0), T, {}, ErrorCode::kInvalidArgument, "0 given");
   Points line(3, 10);
@@ -40,7 +40,7 @@ TEST(Icp, RefusesPointsThatFixNoPose) {
 }
 
 TEST(Icp, RefusesAnInitialPoseThatIsNotRigid) {
-  const Points points = geometry::sample_surface(ellipsoid(), 20, 1);
+  const Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
   RigidTransform T = RigidTransform::Identity();
   T.linear() *= 1.01;
   expect_refused(points, T, {}, ErrorCode::kInvalidArgument, "not a rotation");
@@ -52,7 +52,7 @@ TEST(Icp, RefusesAnInitialPoseThatIsNotRigid) {
 }
 
 TEST(Icp, RefusesOptionsOutOfRangeByName) {
-  const Points points = geometry::sample_surface(ellipsoid(), 20, 1);
+  const Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
   const auto refused = [&](auto member, auto value, const std::string& name) {
     IcpOptions options;
     options.*member = value;

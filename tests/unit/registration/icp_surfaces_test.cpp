@@ -20,7 +20,7 @@ using test::kDegree;
 using test::motion;
 using test::placement_error;
 
-TriangleSurface bumpy() {
+TriangleSurface bumpy_surface() {
   TriangleSurface surface = geometry::ellipsoid_surface(Vec3::Zero(), Vec3(17, 13, 10), 1.2);
   for (auto x : surface.vertices.colwise()) {
     const double bump = std::exp(-(x.normalized() - Vec3(0.6, 0.64, 0.48)).squaredNorm() / 0.3);
@@ -35,13 +35,14 @@ geometry::DistanceVolume volume_of(const TriangleSurface& surface) {
   return geometry::DistanceVolume::create(geometry::signed_distance_grid(index).value()).value();
 }
 
-Points traced(const Points& on_surface, const RigidTransform& T, double noise_mm, Random& random) {
+Points traced_surface(const Points& on_surface, const RigidTransform& T, double noise_mm,
+                      Random& random) {
   Points points = (T.linear() * on_surface).colwise() + Vec3(T.translation());
   for (double& value : points.reshaped()) value += noise_mm * random.normal();
   return points;
 }
 
-IcpOptions without_prior(double sd_mm) {
+IcpOptions surface_without_prior(double sd_mm) {
   IcpOptions options;
   options.sd_mm = sd_mm;
   options.rotation_sd_deg = 0.0;
@@ -49,15 +50,15 @@ IcpOptions without_prior(double sd_mm) {
 }
 
 TEST(IcpOnDistances, EndsWhereSearchedTrianglesEnd) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   const auto index = geometry::ClosestPointIndex::build(surface).value();
   const auto volume = volume_of(surface);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Random random(seed);
-    const Points points =
-        traced(geometry::sample_surface(surface, 500, seed), motion(random, 5.0, 8.0), 0.3, random);
-    const auto exact = align(points, index, RigidTransform::Identity(), without_prior(0.3));
-    const auto fast = align(points, volume, RigidTransform::Identity(), without_prior(0.3));
+    const Points points = traced_surface(geometry::sample_surface(surface, 500, seed),
+                                         motion(random, 5.0, 8.0), 0.3, random);
+    const auto exact = align(points, index, RigidTransform::Identity(), surface_without_prior(0.3));
+    const auto fast = align(points, volume, RigidTransform::Identity(), surface_without_prior(0.3));
     ASSERT_TRUE(exact && fast);
     EXPECT_TRUE(fast->converged);
     // Below the error of a pose from 500 points with 0.3 mm: 0.3 sqrt(6 / 500) = 0.033 mm rms,
@@ -70,10 +71,10 @@ TEST(IcpOnDistances, EndsWhereSearchedTrianglesEnd) {
 }
 
 TEST(IcpOnDistances, RepeatsBitForBit) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   Random random(12);
-  const Points points =
-      traced(geometry::sample_surface(surface, 203, 12), motion(random, 4.0, 6.0), 0.3, random);
+  const Points points = traced_surface(geometry::sample_surface(surface, 203, 12),
+                                       motion(random, 4.0, 6.0), 0.3, random);
   const auto first = align(points, volume_of(surface), RigidTransform::Identity());
   const auto second = align(points, volume_of(surface), RigidTransform::Identity());
   ASSERT_TRUE(first && second);
@@ -86,7 +87,7 @@ TEST(IcpOnDistances, SphereShowsNoRotationAndKeepsTheOrientation) {
   Random random(3);
   Points points(3, 400);
   for (auto x : points.colwise()) x = kCentre + Vec3(3, -1, 2) + 14.0 * random.direction();
-  const auto result = align(points, volume, RigidTransform::Identity(), without_prior(0.3));
+  const auto result = align(points, volume, RigidTransform::Identity(), surface_without_prior(0.3));
   ASSERT_TRUE(result);
   EXPECT_FALSE(result->rotation_observable);
   EXPECT_EQ(result->observable_axes, 3);
@@ -100,10 +101,10 @@ TEST(IcpOnDistances, SphereShowsNoRotationAndKeepsTheOrientation) {
 TEST(IcpOnDistances, NamesTheAxisOfASpheroid) {
   const auto surface = geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 18), 1.2);
   Random random(4);
-  const Points points =
-      traced(geometry::sample_surface(surface, 600, 4), motion(random, 1.0, 0.0), 0.0, random);
+  const Points points = traced_surface(geometry::sample_surface(surface, 600, 4),
+                                       motion(random, 1.0, 0.0), 0.0, random);
   const auto result =
-      align(points, volume_of(surface), RigidTransform::Identity(), without_prior(0.3));
+      align(points, volume_of(surface), RigidTransform::Identity(), surface_without_prior(0.3));
   ASSERT_TRUE(result);
   const auto sentences = not_shown(result->observability);
   ASSERT_EQ(sentences.size(), 1u);
@@ -112,13 +113,13 @@ TEST(IcpOnDistances, NamesTheAxisOfASpheroid) {
 }
 
 TEST(IcpOnDistances, OutliersEndWithoutWeight) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   Random random(5);
   const RigidTransform T = motion(random, 8.0, 12.0);
-  Points points = traced(geometry::sample_surface(surface, 500, 5), T, 0.2, random);
+  Points points = traced_surface(geometry::sample_surface(surface, 500, 5), T, 0.2, random);
   for (int i = 0; i < 500; i += 10)
     points.col(i) += 15.0 * (points.col(i) - T * kCentre).normalized();
-  IcpOptions options = without_prior(0.2);
+  IcpOptions options = surface_without_prior(0.2);
   options.welsch_scale_mm = 1.0;
   const auto result = align(points, volume_of(surface), RigidTransform::Identity(), options);
   ASSERT_TRUE(result);
@@ -135,7 +136,7 @@ TEST(IcpOnDistances, OutliersEndWithoutWeight) {
 
 // Errors of many repetitions, each by its stated covariance: the mean of xi^T C^-1 xi is 6.
 TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   const auto volume = volume_of(surface);
   const double noise = 0.4;
   const int runs = 300;
@@ -145,8 +146,8 @@ TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
   const Points on_surface = geometry::sample_surface(surface, 250, 6);
   const RigidTransform T = motion(random, 1.0, 2.0);
   for (int run = 0; run < runs; ++run) {
-    const Points points = traced(on_surface, T, noise, random);
-    IcpOptions options = without_prior(noise);
+    const Points points = traced_surface(on_surface, T, noise, random);
+    IcpOptions options = surface_without_prior(noise);
     options.welsch_scale_mm = 10.0;  // as good as least squares, of which the covariance is that
     const auto result = align(points, volume, RigidTransform::Identity(), options);
     ASSERT_TRUE(result);
@@ -162,7 +163,7 @@ TEST(IcpOnDistances, CovarianceIsThatOfTheErrors) {
 }
 
 TEST(IcpOnDistances, StaysFiniteFarFromTheGrid) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   const Points points = geometry::sample_surface(surface, 50, 1).colwise() + Vec3(0, 0, 5000);
   const auto result = align(points, volume_of(surface), RigidTransform::Identity());
   ASSERT_TRUE(result);
@@ -172,14 +173,16 @@ TEST(IcpOnDistances, StaysFiniteFarFromTheGrid) {
 }
 
 TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   const auto cloud = geometry::OrientedCloud::build(geometry::sample_surface(surface, 4000, 7));
   ASSERT_TRUE(cloud);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Random random(seed);
     const RigidTransform T = motion(random, 4.0, 6.0);
-    const Points points = traced(geometry::sample_surface(surface, 600, 70 + seed), T, 0.2, random);
-    const auto result = align(points, *cloud, RigidTransform::Identity(), without_prior(0.2));
+    const Points points =
+        traced_surface(geometry::sample_surface(surface, 600, 70 + seed), T, 0.2, random);
+    const auto result =
+        align(points, *cloud, RigidTransform::Identity(), surface_without_prior(0.2));
     ASSERT_TRUE(result);
     EXPECT_TRUE(result->converged);
     // Planes over neighbourhoods of 1 mm miss a surface of 10 mm radius by some hundredths; noise
@@ -189,7 +192,7 @@ TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
 }
 
 TEST(IcpOnDistances, RefusesTheSameInputs) {
-  const TriangleSurface surface = bumpy();
+  const TriangleSurface surface = bumpy_surface();
   const auto volume = volume_of(surface);
   const auto few = align(surface.vertices.leftCols(2), volume, RigidTransform::Identity());
   ASSERT_FALSE(few);

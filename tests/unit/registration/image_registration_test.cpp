@@ -144,8 +144,8 @@ TEST(ImageRegistration, LowAgreementTellsUnrelatedImages) {
   }
 }
 
-void expect_refused(const Result<ImageRegistration>& result, ErrorCode code,
-                    const std::string& text) {
+void expect_image_refused(const Result<ImageRegistration>& result, ErrorCode code,
+                          const std::string& text) {
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, code);
   EXPECT_THAT(result.error().message, HasSubstr(text));
@@ -153,28 +153,30 @@ void expect_refused(const Result<ImageRegistration>& result, ErrorCode code,
 
 TEST(ImageRegistration, RefusesBadSamples) {
   const ImageRegistrar mri_registrar = registrar();
-  expect_refused(mri_registrar.align({}), ErrorCode::kInvalidArgument, "0 samples: at least 500");
-  expect_refused(mri_registrar.align(test::samples_of(blobs(), 499, 1)),
-                 ErrorCode::kInvalidArgument, "499 samples");
+  expect_image_refused(mri_registrar.align({}), ErrorCode::kInvalidArgument,
+                       "0 samples: at least 500");
+  expect_image_refused(mri_registrar.align(test::samples_of(blobs(), 499, 1)),
+                       ErrorCode::kInvalidArgument, "499 samples");
   IntensitySamples bad = samples();
   bad.intensities.conservativeResize(7);
-  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument,
-                 "12000 positions and 7 intensities");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument,
+                       "12000 positions and 7 intensities");
   bad = samples();
   bad.intensities[41] = std::numeric_limits<double>::quiet_NaN();
-  expect_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 41 is not finite");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 41 is not finite");
   bad = samples();
   bad.positions(1, 17) = std::numeric_limits<double>::infinity();
-  expect_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 17 is not finite");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kNotFinite, "sample 17 is not finite");
   bad = samples();
   bad.intensities.setConstant(3.0);
-  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument, "intensities are all 3");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument,
+                       "intensities are all 3");
   bad = samples();
   bad.positions.setConstant(3.0);
-  expect_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument, "at one place");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kInvalidArgument, "at one place");
   bad = samples();
   bad.positions.row(0).array() += 500.0;
-  expect_refused(mri_registrar.align(bad), ErrorCode::kEmptySet, "0 % of the samples");
+  expect_image_refused(mri_registrar.align(bad), ErrorCode::kEmptySet, "0 % of the samples");
 }
 
 TEST(ImageRegistration, RefusesAConstantMri) {
@@ -182,7 +184,7 @@ TEST(ImageRegistration, RefusesAConstantMri) {
   for (float& value : constant.values) value = 42.0f;
   const auto made = ImageRegistrar::create(constant, nullptr);
   ASSERT_TRUE(made);
-  expect_refused(made->align(samples()), ErrorCode::kInvalidArgument, "the MRI is 42");
+  expect_image_refused(made->align(samples()), ErrorCode::kInvalidArgument, "the MRI is 42");
 }
 
 TEST(ImageRegistration, RefusesAnOptimumAtTheEdge) {
@@ -191,8 +193,8 @@ TEST(ImageRegistration, RefusesAnOptimumAtTheEdge) {
   options.start_offset_mm = 1.0;
   IntensitySamples displaced = samples();
   displaced.positions.row(0).array() += 5.0;
-  expect_refused(registrar(options).align(displaced), ErrorCode::kNotConverged,
-                 "at the edge of the search (3 mm, 15 deg)");
+  expect_image_refused(registrar(options).align(displaced), ErrorCode::kNotConverged,
+                       "at the edge of the search (3 mm, 15 deg)");
 }
 
 void expect_refused_mri(const VoxelImage& image, ErrorCode code, const std::string& text,

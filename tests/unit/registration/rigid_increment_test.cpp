@@ -12,7 +12,7 @@
 namespace brainshift::registration {
 namespace {
 
-Vec3 normal_vector(Random& random) {
+Vec3 normal_increment(Random& random) {
   const double x = random.normal(), y = random.normal(), z = random.normal();
   return {x, y, z};
 }
@@ -21,8 +21,8 @@ TEST(RigidIncrement, IsRigidAndMovesTheCentreByTheTranslation) {
   Random random(1);
   for (int i = 0; i < 20; ++i) {
     Vec6 xi;
-    xi << normal_vector(random), 10.0 * normal_vector(random);
-    const Vec3 centre = 50.0 * normal_vector(random);
+    xi << normal_increment(random), 10.0 * normal_increment(random);
+    const Vec3 centre = 50.0 * normal_increment(random);
     const RigidTransform T = rigid_increment(xi, centre);
     EXPECT_LT((T.linear().transpose() * T.linear() - Mat3::Identity()).norm(), 1e-14);
     EXPECT_NEAR(T.linear().determinant(), 1.0, 1e-14);
@@ -55,7 +55,7 @@ TEST(RotationVector, InvertsTheExponential) {
 TEST(DirectionGradient, IsTheDerivativeOfTheMovedPoint) {
   Random random(3);
   for (int i = 0; i < 20; ++i) {
-    const Vec3 x = 20.0 * normal_vector(random), centre = 20.0 * normal_vector(random);
+    const Vec3 x = 20.0 * normal_increment(random), centre = 20.0 * normal_increment(random);
     const Vec3 n = random.direction();
     const Vec6 gradient = direction_gradient(x, n, centre);
     EXPECT_GT(gradient.head<3>().norm(), 0.1);  // else the comparison shows nothing
@@ -80,7 +80,7 @@ TEST(DirectionGradient, IsTheDerivativeOfTheDistanceToASurface) {
   int inside = 0;
   for (int i = 0; i < 50; ++i) {
     const Vec3 x = Vec3(1, 2, 3) + (i % 2 ? 20.0 : 5.0) * random.direction();
-    const Vec3 centre = 5.0 * normal_vector(random);
+    const Vec3 centre = 5.0 * normal_increment(random);
     const geometry::ClosestPoint closest = surface->closest(x);
     const Vec3 away = (x - closest.point) / closest.distance_mm;
     const Vec6 gradient = direction_gradient(x, away, centre);

@@ -20,7 +20,7 @@ const TriangleSurface& sphere() {
       geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 12), 0.6);
   return surface;
 }
-constexpr double kRadius_mm = 12.0;
+constexpr double kTargetRadius_mm = 12.0;
 // Facets with edges of 0.6 mm lie 0.6^2 / (8 R) = 0.004 mm inside the sphere; the volume and the
 // cloud add hundredths of a millimetre.
 constexpr double kTolerance_mm = 0.05;
@@ -29,7 +29,7 @@ PointRows points_around() {
   Random random(3);
   PointRows points(200, 3);
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const double radius = kRadius_mm + 4.0 * random.uniform() - 2.0;
+    const double radius = kTargetRadius_mm + 4.0 * random.uniform() - 2.0;
     points.row(i) = kCentre + radius * random.direction();
   }
   return points;
@@ -53,7 +53,7 @@ void expect_sphere(const TargetSurface& surface) {
   const Measured measured = measure(surface, points);
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const Vec3 arm = points.row(i).transpose() - kCentre;
-    const double outside_mm = arm.norm() - kRadius_mm;
+    const double outside_mm = arm.norm() - kTargetRadius_mm;
     EXPECT_NEAR(std::abs(measured.distances_mm[i]), std::abs(outside_mm), kTolerance_mm);
     if (std::abs(outside_mm) < 2.0 * kTolerance_mm) continue;  // the sign is rounding there
     const Vec3 away = measured.distances_mm[i] * Vec3(measured.gradients.row(i));

@@ -120,29 +120,30 @@ TEST(Match, ConfidenceIsAProbability) {
 
 TEST(Match, BadOptionsAndPicturesAreNamed) {
   const RectifiedPair good{GrayImage(40, 40), GrayImage(40, 40), {}, {}};
-  const auto refusal = [](const RectifiedPair& pair, const MatchOptions& options) {
+  const auto match_refusal = [](const RectifiedPair& pair, const MatchOptions& options) {
     const auto map = match(pair, options);
     return map ? "no refusal" : map.error().message;
   };
   MatchOptions options;
   options.disparities = 0;
-  EXPECT_EQ(refusal(good, options), "disparities = 0: must be between 1 and 2048");
+  EXPECT_EQ(match_refusal(good, options), "disparities = 0: must be between 1 and 2048");
   options = {};
   options.block_px = 4;
-  EXPECT_EQ(refusal(good, options), "block_px = 4: must be odd and between 1 and 21");
+  EXPECT_EQ(match_refusal(good, options), "block_px = 4: must be odd and between 1 and 21");
   options = {};
   options.noise_grey = 0.0;
-  EXPECT_EQ(refusal(good, options), "noise_grey = 0: must be > 0");
+  EXPECT_EQ(match_refusal(good, options), "noise_grey = 0: must be > 0");
   options = {};
   options.max_left_right_px = NAN;
-  EXPECT_EQ(refusal(good, options), "max_left_right_px = nan: must be > 0");
-  EXPECT_EQ(refusal({GrayImage(40, 40), GrayImage(41, 40), {}, {}}, {}),
+  EXPECT_EQ(match_refusal(good, options), "max_left_right_px = nan: must be > 0");
+  EXPECT_EQ(match_refusal({GrayImage(40, 40), GrayImage(41, 40), {}, {}}, {}),
             "the left picture has 40 x 40 px, the right one 41 x 40 px: must be equal and not "
             "empty");
-  EXPECT_THAT(refusal({}, {}), HasSubstr("0 x 0 px"));
+  EXPECT_THAT(match_refusal({}, {}), HasSubstr("0 x 0 px"));
 }
 
-std::string refusal(const GrayImage& left, const GrayImage& right, const DepthRange& range = {}) {
+std::string match_refusal(const GrayImage& left, const GrayImage& right,
+                          const DepthRange& range = {}) {
   const auto measured = measure_disparity(left, right, operating_rig(), range);
   return measured ? "no refusal" : measured.error().message;
 }
@@ -151,26 +152,26 @@ TEST(MeasureDisparity, SwappedPicturesAreToldFromBadOnes) {
   const StereoCalibration rig = operating_rig();
   const GrayImage left = render(rig, Eye::kLeft, Patch{}, 1);
   const GrayImage right = render(rig, Eye::kRight, Patch{}, 2);
-  EXPECT_EQ(refusal(left, right), "no refusal");
-  EXPECT_THAT(refusal(right, left), HasSubstr("left and right pictures are swapped"));
+  EXPECT_EQ(match_refusal(left, right), "no refusal");
+  EXPECT_THAT(match_refusal(right, left), HasSubstr("left and right pictures are swapped"));
 }
 
 TEST(MeasureDisparity, WithoutTextureNothingMatches) {
   const StereoCalibration rig = operating_rig();
   Patch wall;
   wall.contrast = 0.0;
-  EXPECT_THAT(refusal(render(rig, Eye::kLeft, wall, 1), render(rig, Eye::kRight, wall, 2)),
+  EXPECT_THAT(match_refusal(render(rig, Eye::kLeft, wall, 1), render(rig, Eye::kRight, wall, 2)),
               HasSubstr("have a consistent match between 100 and 600 mm: must be at least 10 %"));
 }
 
 TEST(MeasureDisparity, AnotherDepthThanTheSurfacesIsRefused) {
   const StereoCalibration rig = operating_rig();
-  EXPECT_THAT(refusal(render(rig, Eye::kLeft, Patch{}, 1), render(rig, Eye::kRight, Patch{}, 2),
-                      {400.0, 500.0}),
+  EXPECT_THAT(match_refusal(render(rig, Eye::kLeft, Patch{}, 1),
+                            render(rig, Eye::kRight, Patch{}, 2), {400.0, 500.0}),
               HasSubstr("have a consistent match between 400 and 500 mm"));
-  EXPECT_THAT(refusal(GrayImage(640, 480), GrayImage(640, 480), {400.0, 300.0}),
+  EXPECT_THAT(match_refusal(GrayImage(640, 480), GrayImage(640, 480), {400.0, 300.0}),
               HasSubstr("depth range = 400 to 300 mm: must be 0 < near < far"));
-  EXPECT_THAT(refusal(GrayImage(640, 480), GrayImage(640, 480), {1.0, 2.0}),
+  EXPECT_THAT(match_refusal(GrayImage(640, 480), GrayImage(640, 480), {1.0, 2.0}),
               HasSubstr("no point so near lies in both pictures"));
 }
 

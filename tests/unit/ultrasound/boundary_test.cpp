@@ -69,21 +69,21 @@ TEST(BoundaryPoints, OfAnOpenContourKeepBothEnds) {
   EXPECT_LT((points->col(5) - pixels(0.1, 0.1) * Vec3(10, 0, 0)).norm(), 1e-12);
 }
 
-void expect_refused(const Contour& contour, double spacing_mm, const std::string& says) {
+void expect_boundary_refused(const Contour& contour, double spacing_mm, const std::string& says) {
   const auto points = boundary_points(contour, pixels(0.2, 0.2), spacing_mm);
   ASSERT_FALSE(points);
   EXPECT_THAT(points.error().message, HasSubstr(says));
 }
 
 TEST(BoundaryPoints, RefuseWhatIsNoContourNamingTheFrame) {
-  expect_refused(circle(2, 50), 0.2, "frame 4 has 2 points: must have at least 3");
+  expect_boundary_refused(circle(2, 50), 0.2, "frame 4 has 2 points: must have at least 3");
   Contour dot = circle(5, 0.0);
-  expect_refused(dot, 0.2, "frame 4 is 0 mm long");
+  expect_boundary_refused(dot, 0.2, "frame 4 is 0 mm long");
   Contour infinite = circle(5, 10.0);
   infinite.points_px(1, 2) = std::numeric_limits<double>::quiet_NaN();
-  expect_refused(infinite, 0.2, "frame 4 holds a value that is not a finite number");
-  expect_refused(circle(50, 50), 0.0, "spacing = 0 mm");
-  expect_refused(circle(50, 1e9), 0.2, "frame 4");
+  expect_boundary_refused(infinite, 0.2, "frame 4 holds a value that is not a finite number");
+  expect_boundary_refused(circle(50, 50), 0.0, "spacing = 0 mm");
+  expect_boundary_refused(circle(50, 1e9), 0.2, "frame 4");
 }
 
 }  // namespace

@@ -38,11 +38,11 @@ Sweep sweep(double offset_mm) {
   return result;
 }
 
-constexpr PixelWindow kAll{0, 0, 4, 3};
+constexpr PixelWindow kAllFrames{0, 0, 4, 3};
 
 TEST(EnclosingGrid, BeginsAtTheCornerAndCoversTheFrames) {
   const Sweep s = sweep(0.25);
-  const auto grid = enclosing_grid(s.recording, s.poses, kAll, Vec3(0.5, 0.5, 0.5));
+  const auto grid = enclosing_grid(s.recording, s.poses, kAllFrames, Vec3(0.5, 0.5, 0.5));
   ASSERT_TRUE(grid);
   EXPECT_LT((grid->origin_mm - Vec3(0.25, 0.25, 0.25)).norm(), 1e-12);
   EXPECT_THAT(grid->dims, testing::ElementsAre(6, 4, 8));
@@ -52,7 +52,7 @@ TEST(Compound, OnTheGridPutsEveryPixelIntoItsVoxel) {
   const Sweep s = sweep(0.0);
   const VolumeGrid grid{{4, 3, 5}, Vec3::Zero(), Vec3::Ones()};
   for (const Paste paste : {Paste::kNearest, Paste::kLinear}) {
-    const auto volume = compound(s.recording, s.poses, kAll, grid, paste);
+    const auto volume = compound(s.recording, s.poses, kAllFrames, grid, paste);
     ASSERT_TRUE(volume);
     for (int k = 0; k < 5; ++k) {
       for (int j = 0; j < 3; ++j) {
@@ -70,7 +70,7 @@ TEST(Compound, OffTheGridLinearSplatKeepsALinearFieldInside) {
   // mean is the field there.
   const Sweep s = sweep(0.5);
   const VolumeGrid grid{{5, 4, 6}, Vec3::Zero(), Vec3::Ones()};
-  const auto volume = compound(s.recording, s.poses, kAll, grid, Paste::kLinear);
+  const auto volume = compound(s.recording, s.poses, kAllFrames, grid, Paste::kLinear);
   ASSERT_TRUE(volume);
   for (int k = 1; k < 5; ++k) {
     for (int j = 1; j < 3; ++j) {
@@ -87,7 +87,7 @@ TEST(Compound, TakesTheMeanOfFramesThatOverlap) {
   Sweep s = sweep(0.0);
   for (auto& T : s.poses) T->translation().setZero();
   const VolumeGrid grid{{4, 3, 1}, Vec3::Zero(), Vec3::Ones()};
-  const auto volume = compound(s.recording, s.poses, kAll, grid);
+  const auto volume = compound(s.recording, s.poses, kAllFrames, grid);
   ASSERT_TRUE(volume);
   EXPECT_FLOAT_EQ(volume->image.at(1, 2, 0), static_cast<float>(field(Vec3(1, 2, 2))));
   EXPECT_FLOAT_EQ(volume->weight[9], 5.0F);
@@ -112,18 +112,18 @@ TEST(Compound, LeavesOutFramesWithoutAPoseAndPixelsOutsideTheWindow) {
 TEST(Compound, RefusesWhatCannotBeDone) {
   const Sweep s = sweep(0.0);
   const VolumeGrid grid{{4, 3, 5}, Vec3::Zero(), Vec3::Ones()};
-  auto volume = compound(s.recording, {}, kAll, grid);
+  auto volume = compound(s.recording, {}, kAllFrames, grid);
   ASSERT_FALSE(volume);
   EXPECT_THAT(volume.error().message, HasSubstr("0 poses for 5 frames"));
   volume = compound(s.recording, s.poses, {10, 0, 5, 5}, grid);
   ASSERT_FALSE(volume);
   EXPECT_THAT(volume.error().message, HasSubstr("clip rectangle at 10 0"));
-  volume = compound(s.recording, s.poses, kAll, {{0, 3, 5}, Vec3::Zero(), Vec3::Ones()});
+  volume = compound(s.recording, s.poses, kAllFrames, {{0, 3, 5}, Vec3::Zero(), Vec3::Ones()});
   ASSERT_FALSE(volume);
   EXPECT_THAT(volume.error().message, HasSubstr("volume of 0 x 3 x 5 voxels"));
-  EXPECT_FALSE(enclosing_grid(s.recording, s.poses, kAll, Vec3(1e-6, 1e-6, 1e-6)));
-  EXPECT_FALSE(enclosing_grid(s.recording, s.poses, kAll, Vec3(1, 0, 1)));
-  const auto none = enclosing_grid(s.recording, ImagePoses(5), kAll, Vec3::Ones());
+  EXPECT_FALSE(enclosing_grid(s.recording, s.poses, kAllFrames, Vec3(1e-6, 1e-6, 1e-6)));
+  EXPECT_FALSE(enclosing_grid(s.recording, s.poses, kAllFrames, Vec3(1, 0, 1)));
+  const auto none = enclosing_grid(s.recording, ImagePoses(5), kAllFrames, Vec3::Ones());
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::kEmptySet);
 }

@@ -25,7 +25,7 @@ UpdateMessage sample_part(std::uint64_t base = 0) {
   return message;
 }
 
-Result<UpdateMessage> decode_changed(const std::function<void(pb::Update&)>& change) {
+Result<UpdateMessage> decode_changed_choice(const std::function<void(pb::Update&)>& change) {
   return decode_update(changed<pb::Update>(encode(sample_part(7)), change));
 }
 
@@ -93,7 +93,7 @@ TEST(FieldPartOnTheWire, ChangesMayHoldNoNode) {
 
 TEST(FieldPartOnTheWire, NodesThatAreNotOnesOfTheMeshInOrderAreRefused) {
   const auto expect = [](const char* sentence, const std::function<void(pb::FieldPart&)>& change) {
-    expect_refused(decode_changed([&](auto& m) { change(*m.mutable_part()); }),
+    expect_refused(decode_changed_choice([&](auto& m) { change(*m.mutable_part()); }),
                    ErrorCode::kProtocol, sentence);
   };
   expect("update.part.node_steps: node 2 twice", [](auto& m) { m.set_node_steps(2, 0); });
@@ -113,23 +113,25 @@ TEST(FieldPartOnTheWire, NodesThatAreNotOnesOfTheMeshInOrderAreRefused) {
 }
 
 TEST(FieldPartOnTheWire, SlavesAreNodesOfTheMeshAndNotOfThePart) {
-  EXPECT_TRUE(decode_changed([](auto& m) { m.mutable_contact()->set_active_slaves(0, 99); }));
-  expect_refused(decode_changed([](auto& m) { m.mutable_contact()->set_active_slaves(0, 100); }),
-                 ErrorCode::kProtocol, "update.contact.active_slaves: index 100");
+  EXPECT_TRUE(
+      decode_changed_choice([](auto& m) { m.mutable_contact()->set_active_slaves(0, 99); }));
+  expect_refused(
+      decode_changed_choice([](auto& m) { m.mutable_contact()->set_active_slaves(0, 100); }),
+      ErrorCode::kProtocol, "update.contact.active_slaves: index 100");
 }
 
 TEST(FieldPartOnTheWire, ABaseIsAnEarlierUpdateOfAUsableOne) {
-  expect_refused(decode_changed([](auto& m) { m.mutable_part()->set_base_sequence(8); }),
+  expect_refused(decode_changed_choice([](auto& m) { m.mutable_part()->set_base_sequence(8); }),
                  ErrorCode::kProtocol, "update.part.base_sequence: is not below");
-  expect_refused(decode_changed([](auto& m) { m.set_final(false); }), ErrorCode::kProtocol,
+  expect_refused(decode_changed_choice([](auto& m) { m.set_final(false); }), ErrorCode::kProtocol,
                  "update.part.base_sequence: is present although the update is not final");
-  expect_refused(decode_changed([](auto& m) {
+  expect_refused(decode_changed_choice([](auto& m) {
                    m.set_quality(pb::QUALITY_UNUSABLE);
                    m.add_quality_flags(pb::QUALITY_FLAG_INVERTED_ELEMENTS);
                  }),
                  ErrorCode::kProtocol,
                  "update.part.base_sequence: is present although the update is not usable");
-  expect_refused(decode_changed([](auto& m) {
+  expect_refused(decode_changed_choice([](auto& m) {
                    m.mutable_part()->clear_base_sequence();
                    m.mutable_part()->clear_node_steps();
                    m.clear_displacement();
@@ -139,14 +141,14 @@ TEST(FieldPartOnTheWire, ABaseIsAnEarlierUpdateOfAUsableOne) {
 }
 
 TEST(FieldPartOnTheWire, AFailureAndAMissingDeviationAreRefused) {
-  expect_refused(decode_changed([](auto& m) {
+  expect_refused(decode_changed_choice([](auto& m) {
                    m.set_status("failed");
                    m.set_error_code("internal");
                    m.clear_displacement();
                    m.clear_quality();
                  }),
                  ErrorCode::kProtocol, "update.part: is present although");
-  expect_refused(decode_changed([](auto& m) { m.mutable_sd_mm()->RemoveLast(); }),
+  expect_refused(decode_changed_choice([](auto& m) { m.mutable_sd_mm()->RemoveLast(); }),
                  ErrorCode::kProtocol, "update.sd_mm: 3 values");
 }
 

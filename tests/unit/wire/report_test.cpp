@@ -29,7 +29,7 @@ DaemonReport sample_report() {
   return report;
 }
 
-void expect_refused(const DaemonReport& report, ErrorCode code, const char* field) {
+void expect_report_refused(const DaemonReport& report, ErrorCode code, const char* field) {
   const auto decoded = decode_report(encode(report));
   ASSERT_FALSE(decoded) << field;
   EXPECT_EQ(decoded.error().code, code);
@@ -51,16 +51,16 @@ TEST(Report, NumbersThatCannotBeAreRefusedNamingTheField) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   DaemonReport report = sample_report();
   report.sources[0].age_ms = nan;
-  expect_refused(report, ErrorCode::kNotFinite, "report.sources.age_ms");
+  expect_report_refused(report, ErrorCode::kNotFinite, "report.sources.age_ms");
   report = sample_report();
   report.stages[0].all.p99_ms = -1.0;
-  expect_refused(report, ErrorCode::kProtocol, "report.stages.p99_ms");
+  expect_report_refused(report, ErrorCode::kProtocol, "report.stages.p99_ms");
   report = sample_report();
   report.bounds_ms = {1.0, 1.0};
-  expect_refused(report, ErrorCode::kProtocol, "report.bounds_ms");
+  expect_report_refused(report, ErrorCode::kProtocol, "report.bounds_ms");
   report = sample_report();
   report.stages[0].bucket_counts.pop_back();
-  expect_refused(report, ErrorCode::kProtocol, "report.stages.bucket_counts");
+  expect_report_refused(report, ErrorCode::kProtocol, "report.stages.bucket_counts");
 }
 
 // A report is printed on terminals.

@@ -21,19 +21,19 @@ using testing::HasSubstr;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;
-using Answers = FakeDaemon::Answers;
+using CurrencyAnswers = FakeDaemon::Answers;
 
-constexpr milliseconds kPatient(20000);
+constexpr milliseconds kCurrencyPatient(20000);
 
-Client connect(const std::string& endpoint) {
-  auto client = Client::connect(endpoint, {.request_timeout = kPatient,
-                                           .session_timeout = kPatient,
+Client connect_to(const std::string& endpoint) {
+  auto client = Client::connect(endpoint, {.request_timeout = kCurrencyPatient,
+                                           .session_timeout = kCurrencyPatient,
                                            .renewal_interval = milliseconds(20)});
   EXPECT_TRUE(client) << client.error().message;
   return std::move(*client);
 }
 
-std::string update_frame(const SessionKey& key, std::uint64_t sequence) {
+std::string current_frame(const SessionKey& key, std::uint64_t sequence) {
   UpdateMessage message;
   message.session_id = key.session_id;
   message.boot_id = key.boot_id;
@@ -50,7 +50,7 @@ class Simulated {
  public:
   explicit Simulated(SessionKey key) : key_(std::move(key)) {}
 
-  Answers operator()(const Frame& request) {
+  CurrencyAnswers operator()(const Frame& request) {
     const std::lock_guard lock(mutex_);
     const std::uint64_t id = request.request_id;
     switch (request.type) {
@@ -59,13 +59,14 @@ class Simulated {
         subscriptions_.push_back(wanted);
         if (wanted.id != subscription_) sent_ = told_ = 0;
         subscription_ = wanted.id;
-        Answers answers = {encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
+        CurrencyAnswers answers = {
+            encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
         push(wanted.received, answers);
         return answers;
       }
       case MessageType::kStatusRequest: {
         ++newest_;
-        Answers answers;
+        CurrencyAnswers answers;
         push(sent_, answers, /*credit=*/subscription_ != 0 && sent_ == acknowledged_);
         answers.push_back(encode_frame(MessageType::kStatusReply, id, encode(DaemonStatus{})));
         return answers;
@@ -88,10 +89,10 @@ class Simulated {
     state.valid_ms = 1000;
     return state;
   }
-  void push(std::uint64_t received, Answers& answers, bool credit = true) {
+  void push(std::uint64_t received, CurrencyAnswers& answers, bool credit = true) {
     acknowledged_ = received;
     if (!credit || sent_ != received || newest_ == told_) return;
-    answers.push_back(update_frame(key_, newest_));
+    answers.push_back(current_frame(key_, newest_));
     told_ = newest_;
     ++sent_;
   }
@@ -107,10 +108,10 @@ const SessionKey kKey{11, 1, "model"};
 TEST(Currency, AViewerThatHasNotReadGetsTheNewestUpdateFirst) {
   auto daemon = std::make_shared<Simulated>(kKey);
   FakeDaemon server([daemon](const Frame& request) { return (*daemon)(request); });
-  Client viewer = connect(server.endpoint());
+  Client viewer = connect_to(server.endpoint());
   ASSERT_TRUE(viewer.subscribe());
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(viewer.status());  // 30 updates, none read
-  const auto first = viewer.next_update(kPatient);
+  const auto first = viewer.next_update(kCurrencyPatient);
   ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(first->update.sequence, 30u);
   EXPECT_EQ(viewer.field_status().currency, Currency::kCurrent);
@@ -120,16 +121,17 @@ TEST(Currency, AViewerThatHasNotReadGetsTheNewestUpdateFirst) {
 TEST(Currency, RenewsWhileItWaitsAndSoStaysCurrent) {
   auto daemon = std::make_shared<Simulated>(kKey);
   FakeDaemon server([daemon](const Frame& request) { return (*daemon)(request); });
-  Client viewer = connect(server.endpoint());
+  Client viewer = connect_to(server.endpoint());
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kPatient));
+  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
   EXPECT_FALSE(viewer.next_update(milliseconds(300)));
   EXPECT_GT(daemon->subscriptions().size(), 3u);
   EXPECT_EQ(daemon->subscriptions().back().received, 1u);
   EXPECT_EQ(viewer.field_status().currency, Currency::kCurrent);
   server.stop();
-  EXPECT_THAT(viewer.next_update(kPatient).error().message, HasSubstr("lost the connection"));
+  EXPECT_THAT(viewer.next_update(kCurrencyPatient).error().message,
+              HasSubstr("lost the connection"));
   EXPECT_FALSE(viewer.next_update(milliseconds(1200)));  // longer than an answer holds
   const FieldStatus status = viewer.field_status();
   EXPECT_EQ(status.currency, Currency::kStale);
@@ -143,10 +145,10 @@ TEST(Currency, SubscribesAgainAfterARestartThatAnotherCallNoticed) {
   auto first = std::make_shared<Simulated>(kKey);
   auto server = std::make_unique<FakeDaemon>(
       [first](const Frame& request) { return (*first)(request); }, endpoint);
-  Client viewer = connect(endpoint);
+  Client viewer = connect_to(endpoint);
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kPatient));
+  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
   ASSERT_TRUE(viewer.latest_usable());
   server.reset();
   auto second = std::make_shared<Simulated>(SessionKey{12, 1, "model"});
@@ -155,8 +157,8 @@ TEST(Currency, SubscribesAgainAfterARestartThatAnotherCallNoticed) {
   auto status = viewer.status();
   if (!status) status = viewer.status();
   ASSERT_TRUE(status) << status.error().message;
-  auto update = viewer.next_update(kPatient);
-  if (!update) update = viewer.next_update(kPatient);
+  auto update = viewer.next_update(kCurrencyPatient);
+  if (!update) update = viewer.next_update(kCurrencyPatient);
   ASSERT_TRUE(update) << update.error().message;
   EXPECT_EQ(update->boot_id, 12u);
   EXPECT_EQ(viewer.latest_usable()->boot_id, 12u);
@@ -168,7 +170,7 @@ TEST(Currency, AnotherPatientsModelIsShownByNoViewerAndEachSaysWhy) {
   const std::string endpoint = "ipc://" + (folder / "daemon").string();
   auto first = std::make_shared<Simulated>(kKey);
   const auto with_model = [](const std::shared_ptr<Simulated>& daemon) {
-    return [daemon](const Frame& request) -> Answers {
+    return [daemon](const Frame& request) -> CurrencyAnswers {
       if (request.type != MessageType::kModelRequest) return (*daemon)(request);
       BrainModel model;
       model.model_id = "model";
@@ -177,11 +179,11 @@ TEST(Currency, AnotherPatientsModelIsShownByNoViewerAndEachSaysWhy) {
     };
   };
   auto server = std::make_unique<FakeDaemon>(with_model(first), endpoint);
-  Client viewer = connect(endpoint);
+  Client viewer = connect_to(endpoint);
   ASSERT_TRUE(viewer.model());
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kPatient));
+  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
   server.reset();
   auto second = std::make_shared<Simulated>(SessionKey{12, 1, "another"});
   server = std::make_unique<FakeDaemon>(with_model(second), endpoint);
@@ -202,7 +204,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
     const std::lock_guard lock(mutex);
     return last;
   };
-  FakeDaemon server([&](const Frame& request) -> Answers {
+  FakeDaemon server([&](const Frame& request) -> CurrencyAnswers {
     if (request.type != MessageType::kObservation) return (*daemon)(request);
     const auto observation = wire::decode_observation(request.payload).value();
     {
@@ -212,7 +214,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
     return {encode_frame(MessageType::kObservationReply, request.request_id,
                          encode(ObservationReceipt{observation.sequence, false}))};
   });
-  Client source = connect(server.endpoint());
+  Client source = connect_to(server.endpoint());
   Observation observation;
   observation.sequence = 1;
   observation.body = TumourBoundary{Points::Random(3, 4), 0.5};
@@ -225,7 +227,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
 }
 
 TEST(Currency, AWindowOutsideItsRangeIsRefused) {
-  Client viewer = connect("tcp://127.0.0.1:1");
+  Client viewer = connect_to("tcp://127.0.0.1:1");
   for (const std::uint32_t window : {0u, Subscription::kMaxWindow + 1}) {
     const auto refused = viewer.subscribe(window);
     ASSERT_FALSE(refused);

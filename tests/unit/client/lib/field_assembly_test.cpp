@@ -15,8 +15,8 @@ using Outcome = FieldAssembly::Outcome;
 const SessionKey kSession{7, 1, "model"};
 
 // Every column of the displacement holds the value, every deviation a tenth of it.
-UpdateMessage update(std::uint64_t sequence, double value, int columns,
-                     std::optional<FieldPart> part = std::nullopt) {
+UpdateMessage assembled_update(std::uint64_t sequence, double value, int columns,
+                               std::optional<FieldPart> part = std::nullopt) {
   UpdateMessage message;
   message.session_id = kSession.session_id;
   message.boot_id = kSession.boot_id;
@@ -32,7 +32,7 @@ UpdateMessage update(std::uint64_t sequence, double value, int columns,
 UpdateMessage changes(std::uint64_t sequence, double value, std::vector<NodeIndex> nodes,
                       std::uint64_t base) {
   const int columns = static_cast<int>(nodes.size());
-  return update(sequence, value, columns, FieldPart{10, std::move(nodes), base});
+  return assembled_update(sequence, value, columns, FieldPart{10, std::move(nodes), base});
 }
 
 FieldAssembly assembly() {
@@ -44,7 +44,7 @@ FieldAssembly assembly() {
 // Holding update 4 of nodes 2, 3, 5 and 8, all of them 1.
 FieldAssembly holding_a_part() {
   FieldAssembly held = assembly();
-  auto first = update(4, 1.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
+  auto first = assembled_update(4, 1.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
   EXPECT_EQ(held.complete(first), Outcome::kWhole);
   return held;
 }
@@ -65,7 +65,7 @@ TEST(FieldAssembly, ChangesComeOutAsTheWholeChoice) {
 
 TEST(FieldAssembly, ChangesOfTheWholeBrainNameNoPart) {
   FieldAssembly held = assembly();
-  auto first = update(1, 1.0, 10);
+  auto first = assembled_update(1, 1.0, 10);
   ASSERT_EQ(held.complete(first), Outcome::kWhole);
   auto message = changes(2, 2.0, {9}, 1);
   ASSERT_EQ(held.complete(message), Outcome::kWhole);
@@ -108,7 +108,7 @@ TEST(FieldAssembly, ChangesAreDroppedUntilTheWholeChoiceComes) {
   held.forget();
   auto under_way = changes(5, 2.0, {3}, 4);
   EXPECT_EQ(held.complete(under_way), Outcome::kDropped) << "asking anew was due before";
-  auto whole = update(6, 3.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
+  auto whole = assembled_update(6, 3.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
   EXPECT_EQ(held.complete(whole), Outcome::kWhole);
   auto next = changes(7, 4.0, {2}, 6);
   ASSERT_EQ(held.complete(next), Outcome::kWhole);
@@ -117,11 +117,11 @@ TEST(FieldAssembly, ChangesAreDroppedUntilTheWholeChoiceComes) {
 
 TEST(FieldAssembly, NothingIsBuiltOnFailuresIteratesAndUnusableFields) {
   FieldAssembly held = holding_a_part();
-  auto failure = update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
+  auto failure = assembled_update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
   failure.error = Error{ErrorCode::kEmptySet, "no point"};
-  auto iterate = update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
+  auto iterate = assembled_update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
   iterate.update.final = false;
-  auto unusable = update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
+  auto unusable = assembled_update(5, 9.0, 4, FieldPart{10, {2, 3, 5, 8}, 0});
   unusable.update.estimate.quality.quality = Quality::kUnusable;
   for (auto* message : {&failure, &iterate, &unusable}) {
     EXPECT_EQ(held.complete(*message), Outcome::kWhole) << "it is handed out as it is";
@@ -138,7 +138,7 @@ TEST(FieldAssembly, AnotherChoiceForgetsAndWithoutAToleranceNothingIsHeld) {
   auto message = changes(6, 2.0, {3}, 4);
   EXPECT_EQ(held.complete(message), Outcome::kLost);
   held.begin({});
-  auto whole = update(1, 1.0, 10);
+  auto whole = assembled_update(1, 1.0, 10);
   EXPECT_EQ(held.complete(whole), Outcome::kWhole);
   auto unasked = changes(2, 2.0, {3}, 1);
   EXPECT_EQ(held.complete(unasked), Outcome::kLost);

@@ -12,11 +12,11 @@ namespace {
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 
-const SessionKey kKey{7, 1, "model"};
+const SessionKey kWatchedKey{7, 1, "model"};
 
 SessionState tracking(std::uint64_t newest) {
   SessionState state;
-  state.session = kKey;
+  state.session = kWatchedKey;
   state.phase = SessionPhase::kTracking;
   state.newest_update = state.newest_usable = newest;
   state.age_ms = 100.0;
@@ -26,7 +26,8 @@ SessionState tracking(std::uint64_t newest) {
 
 class SessionWatchTest : public testing::Test {
  protected:
-  FieldStatus judge(milliseconds at, std::uint64_t shown = 5, const SessionKey& key = kKey) const {
+  FieldStatus judge(milliseconds at, std::uint64_t shown = 5,
+                    const SessionKey& key = kWatchedKey) const {
     return watch_.judge(std::pair{key, shown}, "tcp://or:1", zero_ + at);
   }
   void hear(milliseconds asked, const SessionState& state) {

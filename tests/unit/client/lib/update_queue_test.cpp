@@ -6,7 +6,7 @@
 namespace brainshift::client {
 namespace {
 
-UpdateMessage update(std::uint64_t sequence, bool final) {
+UpdateMessage queued_update(std::uint64_t sequence, bool final) {
   UpdateMessage message;
   message.update.sequence = sequence;
   message.update.final = final;
@@ -21,41 +21,41 @@ std::vector<std::uint64_t> drain(UpdateQueue& queue) {
 
 TEST(UpdateQueue, KeepsTheOrderOfArrival) {
   UpdateQueue queue(10);
-  for (std::uint64_t i = 1; i <= 5; ++i) queue.push(update(i, i % 2 == 0));
+  for (std::uint64_t i = 1; i <= 5; ++i) queue.push(queued_update(i, i % 2 == 0));
   EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 2, 3, 4, 5}));
 }
 
 TEST(UpdateQueue, WhenFullTheOldestIterateGivesWay) {
   UpdateQueue queue(3);
-  queue.push(update(1, true));
-  queue.push(update(2, false));
-  queue.push(update(3, false));
-  queue.push(update(4, false));
+  queue.push(queued_update(1, true));
+  queue.push(queued_update(2, false));
+  queue.push(queued_update(3, false));
+  queue.push(queued_update(4, false));
   EXPECT_EQ(queue.size(), 3u);
   EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 3, 4}));
 }
 
 TEST(UpdateQueue, FinalUpdatesAndErrorsAreNeverDropped) {
   UpdateQueue queue(2);
-  queue.push(update(1, true));
+  queue.push(queued_update(1, true));
   queue.push(fail(ErrorCode::kProtocol, "bad"));
-  auto failed = update(3, false);
+  auto failed = queued_update(3, false);
   failed.error = Error{ErrorCode::kEmptySet, "no point"};
   queue.push(failed);
-  queue.push(update(4, true));
-  queue.push(update(5, false));  // the only one that may go
+  queue.push(queued_update(4, true));
+  queue.push(queued_update(5, false));  // the only one that may go
   EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 0, 3, 4}));
 }
 
 TEST(UpdateQueue, WhatTheDaemonHasNewerIsDropped) {
   UpdateQueue queue(10);
   const auto usable = [](std::uint64_t sequence, std::uint64_t session) {
-    UpdateMessage message = update(sequence, true);
+    UpdateMessage message = queued_update(sequence, true);
     message.session_id = session;
     message.update.estimate.quality.quality = Quality::kGood;
     return message;
   };
-  UpdateMessage failure = update(4, true);
+  UpdateMessage failure = queued_update(4, true);
   failure.session_id = 2;
   failure.error = Error{ErrorCode::kEmptySet, "no point"};
   UpdateMessage last = failure;
@@ -75,7 +75,7 @@ TEST(UpdateQueue, WhatTheDaemonHasNewerIsDropped) {
 TEST(UpdateQueue, IteratesAloneNeverExceedTheCapacity) {
   UpdateQueue queue(4);
   for (std::uint64_t i = 1; i <= 1000; ++i) {
-    queue.push(update(i, false));
+    queue.push(queued_update(i, false));
     EXPECT_LE(queue.size(), 4u);
   }
   EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{997, 998, 999, 1000}));

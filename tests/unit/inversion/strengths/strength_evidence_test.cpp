@@ -16,7 +16,7 @@ using Eigen::MatrixXd;
 
 constexpr int kCommon = 2, kModes = 30, kData = 120;
 constexpr PerPart<int> kCounts = {3, 0, 7, 0, 0, 0, 20, 0, 0};
-constexpr std::size_t kPresent[] = {0, 2, 6};
+constexpr std::size_t kPresentPart[] = {0, 2, 6};
 // The evidence leaves out what changes ln p by less than about this.
 constexpr double kLeftOut = 0.03;
 
@@ -89,7 +89,7 @@ TEST_F(StrengthEvidenceTest, AProfileIsTheEvidenceOfEveryStrengthOfAPart) {
   PerPart<StrengthProfile> found{};
   ASSERT_TRUE(evidence.project(variances, projection, work));
   ASSERT_TRUE(evidence.profiles(projection, variances, floors, found, work));
-  for (const std::size_t part : kPresent) {
+  for (const std::size_t part : kPresentPart) {
     for (std::size_t i = 1; i < kStrengths.size(); ++i) {
       auto with = variances, without = variances;
       with[part] = kStrengths[i] * kStrengths[i] + floors[part];
@@ -107,7 +107,7 @@ TEST_F(StrengthEvidenceTest, ProfilesOfAChangedPartAreThoseOfTheChangedHypothesi
   StrengthEvidence::Projection changed_projection;
   PerPart<StrengthProfile> found{}, expected{};
   ASSERT_TRUE(evidence.project(variances, projection, work));
-  for (const std::size_t part : kPresent) {
+  for (const std::size_t part : kPresentPart) {
     for (const double variance : {0.0, 0.25, 64.0}) {
       auto changed = variances;
       changed[part] = variance;
@@ -115,7 +115,7 @@ TEST_F(StrengthEvidenceTest, ProfilesOfAChangedPartAreThoseOfTheChangedHypothesi
           evidence.changed_profiles(projection, variances, part, variance, floors, found, work));
       ASSERT_TRUE(evidence.project(changed, changed_projection, work));
       ASSERT_TRUE(evidence.profiles(changed_projection, changed, floors, expected, work));
-      for (const std::size_t each : kPresent) {
+      for (const std::size_t each : kPresentPart) {
         for (std::size_t i = 0; i < kStrengths.size(); ++i) {
           EXPECT_NEAR(found[each][i], expected[each][i], 1e-6) << part << ", " << each << ", " << i;
         }
@@ -165,7 +165,7 @@ TEST_F(StrengthEvidenceTest, DataThatSayNothingLeaveEveryStrengthAsProbable) {
   PerPart<StrengthProfile> found{};
   ASSERT_TRUE(evidence.project(of(1, 1, 1), projection, work));
   ASSERT_TRUE(evidence.profiles(projection, of(1, 1, 1), {}, found, work));
-  for (const std::size_t part : kPresent) {
+  for (const std::size_t part : kPresentPart) {
     for (const double log_p : found[part]) EXPECT_EQ(log_p, 0.0);
   }
 }

@@ -25,7 +25,7 @@ const char* const kGood = R"(<PlusConfiguration version="2.1">
   <VolumeReconstruction ClipRectangleOrigin="167 62" ClipRectangleSize="495 488" OutputSpacing="0.5 0.5 0.4"/>
 </PlusConfiguration>)";
 
-std::string refusal(const std::string& what, const std::string& with) {
+std::string plus_refusal(const std::string& what, const std::string& with) {
   std::string text = kGood;
   const std::size_t at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
@@ -56,20 +56,24 @@ TEST(PlusConfig, ReadsTransformsAndReconstruction) {
 }
 
 TEST(PlusConfig, NamesTransformAndAttributeThatAreWrong) {
-  EXPECT_THAT(refusal("3e0", ""), HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(refusal("3e0", "3 9"), HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(refusal("3e0", "far"), HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(refusal("0.1  0    0   1", "0 0 0 1"),
+  EXPECT_THAT(plus_refusal("3e0", ""),
+              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
+  EXPECT_THAT(plus_refusal("3e0", "3 9"),
+              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
+  EXPECT_THAT(plus_refusal("3e0", "far"),
+              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
+  EXPECT_THAT(plus_refusal("0.1  0    0   1", "0 0 0 1"),
               HasSubstr("ImageToProbe: Matrix cannot be inverted"));
-  EXPECT_THAT(refusal("0 -1 0 5", "0 -1.1 0 5"),
+  EXPECT_THAT(plus_refusal("0 -1 0 5", "0 -1.1 0 5"),
               HasSubstr("Transform PhantomToReference: Matrix is no rigid"));
-  EXPECT_THAT(refusal("0 -1 0 5", "0 1 0 5"), HasSubstr("reflection"));
-  EXPECT_THAT(refusal("From=\"Phantom\"", ""), HasSubstr("without From or To"));
-  EXPECT_THAT(refusal("\"495 488\"", "\"495\""), HasSubstr("ClipRectangleSize = \"495\""));
-  EXPECT_THAT(refusal("\"167 62\"", "\"-1 62\""), HasSubstr("ClipRectangleOrigin = \"-1 62\""));
-  EXPECT_THAT(refusal("0.5 0.5 0.4", "0.5 0 0.4"), HasSubstr("OutputSpacing = \"0.5 0 0.4\""));
-  EXPECT_THAT(refusal("</PlusConfiguration>", ""), HasSubstr("is no XML"));
-  EXPECT_THAT(refusal("<PlusConfiguration", "<Other"), HasSubstr("XML"));
+  EXPECT_THAT(plus_refusal("0 -1 0 5", "0 1 0 5"), HasSubstr("reflection"));
+  EXPECT_THAT(plus_refusal("From=\"Phantom\"", ""), HasSubstr("without From or To"));
+  EXPECT_THAT(plus_refusal("\"495 488\"", "\"495\""), HasSubstr("ClipRectangleSize = \"495\""));
+  EXPECT_THAT(plus_refusal("\"167 62\"", "\"-1 62\""),
+              HasSubstr("ClipRectangleOrigin = \"-1 62\""));
+  EXPECT_THAT(plus_refusal("0.5 0.5 0.4", "0.5 0 0.4"), HasSubstr("OutputSpacing = \"0.5 0 0.4\""));
+  EXPECT_THAT(plus_refusal("</PlusConfiguration>", ""), HasSubstr("is no XML"));
+  EXPECT_THAT(plus_refusal("<PlusConfiguration", "<Other"), HasSubstr("XML"));
 }
 
 TEST(PlusConfig, AMissingFileIsNotFound) {

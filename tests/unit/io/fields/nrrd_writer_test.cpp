@@ -28,7 +28,7 @@ struct Nrrd {
 };
 
 // gzread takes what follows the header for a gzip stream of its own.
-Nrrd read(const std::filesystem::path& path) {
+Nrrd read_nrrd_field(const std::filesystem::path& path) {
   const std::string content = test_support::content_of(path);
   const std::size_t end = content.find("\n\n");
   Nrrd nrrd;
@@ -65,7 +65,7 @@ TEST(NrrdWriter, SaysWhatTheFieldIs) {
   const TemporaryFolder folder;
   DisplacementField field = small_field();
   ASSERT_TRUE(write_nrrd(folder / "f.nrrd", field));
-  auto nrrd = read(folder / "f.nrrd");
+  auto nrrd = read_nrrd_field(folder / "f.nrrd");
   EXPECT_EQ(nrrd.magic, "NRRD0005");
   EXPECT_EQ(nrrd.keys["type"], "float");
   EXPECT_EQ(nrrd.keys["space"], "left-posterior-superior");
@@ -77,7 +77,7 @@ TEST(NrrdWriter, SaysWhatTheFieldIs) {
   EXPECT_EQ(nrrd.keys["brainshift note"], "update 7, good");
   field.direction = FieldDirection::kModeling;
   ASSERT_TRUE(write_nrrd(folder / "f.nrrd", field));
-  EXPECT_EQ(read(folder / "f.nrrd").keys["displacement field type"], "modeling");
+  EXPECT_EQ(read_nrrd_field(folder / "f.nrrd").keys["displacement field type"], "modeling");
   EXPECT_EQ(folder.entries(), 1u);
 }
 
@@ -85,7 +85,7 @@ TEST(NrrdWriter, PlacesAndVectorsAreLps) {
   const TemporaryFolder folder;
   const DisplacementField field = small_field();
   ASSERT_TRUE(write_nrrd(folder / "f.nrrd", field));
-  auto nrrd = read(folder / "f.nrrd");
+  auto nrrd = read_nrrd_field(folder / "f.nrrd");
   const Mat3 lps_ras = Vec3(-1, -1, 1).asDiagonal();
   EXPECT_EQ(vector_of(nrrd.keys["space origin"]),
             Vec3(lps_ras * field.grid.T_ras_voxel.translation()));

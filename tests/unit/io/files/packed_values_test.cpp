@@ -28,7 +28,7 @@ PackedValues of(std::vector<std::int64_t> sizes, std::string_view data, bool com
   return packed;
 }
 
-std::string refusal(const PackedValues& packed, int bytes_per_value) {
+std::string values_refusal(const PackedValues& packed, int bytes_per_value) {
   const auto values = unpack(packed, bytes_per_value);
   if (values) return {};
   EXPECT_EQ(values.error().code, ErrorCode::kUnreadable);
@@ -50,14 +50,16 @@ TEST(PackedValues, TheOtherByteOrderIsTurned) {
 
 TEST(PackedValues, RefusesDataThatDisagreeWithTheSizes) {
   const std::string bytes = "abcdefgh", packed = deflated(bytes);
-  EXPECT_THAT(refusal(of({9}, bytes, false), 1), HasSubstr("holds 8 bytes of pixels"));
-  EXPECT_THAT(refusal(of({7}, bytes, false), 1), HasSubstr("holds 8 bytes of pixels"));
-  EXPECT_THAT(refusal(of({9}, packed, true), 1), HasSubstr("truncated: 8 of 9"));
-  EXPECT_THAT(refusal(of({7}, packed, true), 1), HasSubstr("more than its sizes say"));
-  EXPECT_THAT(refusal(of({8}, packed.substr(0, 6), true), 1), HasSubstr("compressed pixels are"));
-  EXPECT_THAT(refusal(of({8}, "abcdefgh", true), 1), HasSubstr("damaged"));
-  EXPECT_THAT(refusal(of({1000000, 1000000}, bytes, false), 1), HasSubstr("more than 8 GiB"));
-  EXPECT_THAT(refusal(of({1000000, 1000}, packed, true), 1), HasSubstr("are too few"));
+  EXPECT_THAT(values_refusal(of({9}, bytes, false), 1), HasSubstr("holds 8 bytes of pixels"));
+  EXPECT_THAT(values_refusal(of({7}, bytes, false), 1), HasSubstr("holds 8 bytes of pixels"));
+  EXPECT_THAT(values_refusal(of({9}, packed, true), 1), HasSubstr("truncated: 8 of 9"));
+  EXPECT_THAT(values_refusal(of({7}, packed, true), 1), HasSubstr("more than its sizes say"));
+  EXPECT_THAT(values_refusal(of({8}, packed.substr(0, 6), true), 1),
+              HasSubstr("compressed pixels are"));
+  EXPECT_THAT(values_refusal(of({8}, "abcdefgh", true), 1), HasSubstr("damaged"));
+  EXPECT_THAT(values_refusal(of({1000000, 1000000}, bytes, false), 1),
+              HasSubstr("more than 8 GiB"));
+  EXPECT_THAT(values_refusal(of({1000000, 1000}, packed, true), 1), HasSubstr("are too few"));
 }
 
 TEST(PackedValues, SizesAreWholeNumbersInRange) {

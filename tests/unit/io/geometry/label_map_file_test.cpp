@@ -35,7 +35,7 @@ std::string counted(bool big_endian = false) {
   return bytes;
 }
 
-std::string gzipped(const std::string& bytes) {
+std::string gzipped_labels(const std::string& bytes) {
   std::string packed(bytes.size() + 100, '\0');
   z_stream stream{};
   EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
@@ -107,7 +107,7 @@ TEST(LabelMapFile, ReadsEveryTypeEncodingAndByteOrder) {
     expect_counted(nrrd("longlong", counted<std::int64_t>(big), kSpace, endian));
     expect_counted(nrrd("uint64_t", counted<std::uint64_t>(big), kSpace, endian));
     expect_counted(nrrd("float", counted<float>(big), kSpace, endian));
-    expect_counted(nrrd("double", gzipped(counted<double>(big)), kSpace, endian, "gzip"));
+    expect_counted(nrrd("double", gzipped_labels(counted<double>(big)), kSpace, endian, "gzip"));
   }
 }
 
@@ -227,7 +227,7 @@ TEST(LabelMapFile, RefusesWhatIsNoVolume) {
   EXPECT_THAT(bad("dimension: 3\nsizes: 2 3 2", "dimension: 2\nsizes: 2 6"),
               HasSubstr("has 2 axes"));
   EXPECT_THAT(refusal(good.substr(0, good.size() - 1)), HasSubstr("holds 11 bytes"));
-  const std::string packed = gzipped(counted<std::uint8_t>());
+  const std::string packed = gzipped_labels(counted<std::uint8_t>());
   EXPECT_THAT(refusal(nrrd("uchar", packed.substr(0, 12), kSpace, "", "gzip")),
               HasSubstr("compressed pixels are"));
   const auto none = read_label_map("nowhere/map.nrrd");

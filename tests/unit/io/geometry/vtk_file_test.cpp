@@ -47,7 +47,7 @@ std::string deflated(const std::string& bytes) {
   return out;
 }
 
-struct Encoding {
+struct VtkEncoding {
   const char* name;
   bool ascii = false;
   bool appended = false;
@@ -61,7 +61,7 @@ struct Encoding {
 // Collects a file's arrays in one encoding.
 class Writer {
  public:
-  explicit Writer(const Encoding& encoding) : encoding_(encoding) {}
+  explicit Writer(const VtkEncoding& encoding) : encoding_(encoding) {}
 
   template <typename T>
   std::string array(const std::string& name, const std::string& type, const std::vector<T>& values,
@@ -130,7 +130,7 @@ class Writer {
     if (encoding_.raw) return header + data;
     return encoding_.joined ? base64(header + data) : base64(header) + base64(data);
   }
-  Encoding encoding_;
+  VtkEncoding encoding_;
   std::string appended_;
 };
 
@@ -142,7 +142,7 @@ const std::vector<std::int64_t> kConnectivity = {0, 1, 2, 3, 0, 1, 4, 5, 1, 2, 0
 const std::vector<std::int64_t> kOffsets = {4, 7, 11};
 const std::vector<std::uint8_t> kTypes = {10, 5, 10};
 
-std::string vtu(const Encoding& encoding) {
+std::string vtu(const VtkEncoding& encoding) {
   Writer out(encoding);
   std::string piece = "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
   piece += out.array("id", "Int32", std::vector<std::int32_t>{0, 1, 2, 3, 4, 5});
@@ -157,7 +157,7 @@ std::string vtu(const Encoding& encoding) {
   return out.file("UnstructuredGrid", piece);
 }
 
-class VtuEncoding : public testing::TestWithParam<Encoding> {
+class VtuEncoding : public testing::TestWithParam<VtkEncoding> {
  protected:
   TemporaryFolder folder_;
 };
@@ -216,28 +216,29 @@ TEST_P(VtuEncoding, FlippedBytesNeverCrash) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, VtuEncoding,
-    testing::Values(Encoding{.name = "Ascii", .ascii = true}, Encoding{.name = "Base64"},
-                    Encoding{.name = "Base64Wide", .wide = true},
-                    Encoding{.name = "Base64Joined", .joined = true},
-                    Encoding{.name = "Zlib", .compressed = true},
-                    Encoding{.name = "ZlibWide", .compressed = true, .wide = true},
-                    Encoding{.name = "ZlibOneBlock", .compressed = true, .block = 4096},
-                    Encoding{.name = "ZlibFullBlocks", .compressed = true, .block = 1},
-                    Encoding{.name = "AppendedRaw", .appended = true, .raw = true},
-                    Encoding{.name = "AppendedRawZlib",
-                             .appended = true,
-                             .raw = true,
-                             .compressed = true,
-                             .wide = true},
-                    Encoding{.name = "AppendedBase64", .appended = true},
-                    Encoding{.name = "AppendedBase64Zlib", .appended = true, .compressed = true}),
+    testing::Values(VtkEncoding{.name = "Ascii", .ascii = true}, VtkEncoding{.name = "Base64"},
+                    VtkEncoding{.name = "Base64Wide", .wide = true},
+                    VtkEncoding{.name = "Base64Joined", .joined = true},
+                    VtkEncoding{.name = "Zlib", .compressed = true},
+                    VtkEncoding{.name = "ZlibWide", .compressed = true, .wide = true},
+                    VtkEncoding{.name = "ZlibOneBlock", .compressed = true, .block = 4096},
+                    VtkEncoding{.name = "ZlibFullBlocks", .compressed = true, .block = 1},
+                    VtkEncoding{.name = "AppendedRaw", .appended = true, .raw = true},
+                    VtkEncoding{.name = "AppendedRawZlib",
+                                .appended = true,
+                                .raw = true,
+                                .compressed = true,
+                                .wide = true},
+                    VtkEncoding{.name = "AppendedBase64", .appended = true},
+                    VtkEncoding{
+                        .name = "AppendedBase64Zlib", .appended = true, .compressed = true}),
     [](const auto& param) { return param.param.name; });
 
 class VtuFile : public testing::Test {
  protected:
   // The ascii file with one piece of text replaced.
   std::string refusal(const std::string& from, const std::string& to) {
-    std::string text = vtu(Encoding{.name = "", .ascii = true});
+    std::string text = vtu(VtkEncoding{.name = "", .ascii = true});
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     const auto mesh = read_tet_mesh(folder_.write("m.vtu", text.replace(at, from.size(), to)));
@@ -373,7 +374,7 @@ TEST(VtpFile, SaysThatItsPointsAreRasAndIsReadBack) {
 // and KnownMeshIsReadWithItsFields read such.
 
 // SPACE as VTK's own writer puts it into a file of this encoding: a text is its characters and 0.
-std::string with_space(const Encoding& encoding, const std::string& text) {
+std::string with_space(const VtkEncoding& encoding, const std::string& text) {
   Writer out(encoding);
   std::string array =
       out.array("SPACE", "Int8", std::vector<std::int8_t>(text.begin(), text.end()));
@@ -420,7 +421,7 @@ TEST_P(VtuEncoding, AnotherSpaceIsRefusedByFileAndValue) {
 }
 
 TEST_F(VtuFile, MalformedSpaceIsNamed) {
-  const Encoding ascii{.name = "", .ascii = true};
+  const VtkEncoding ascii{.name = "", .ascii = true};
   const std::string whole = with_space(ascii, ended("RAS"));
   const std::string codes = "82\n 65\n 83\n 0\n";
   const auto refused = [&](const std::string& from, const std::string& to) {
@@ -474,7 +475,7 @@ TEST(VtpFile, LpsTwinOfAWrittenSurfaceLoadsEqual) {
   EXPECT_EQ(lps->triangles, ras->triangles);
 }
 
-std::string vtp(const Encoding& encoding, const std::vector<std::int32_t>& offsets,
+std::string vtp(const VtkEncoding& encoding, const std::vector<std::int32_t>& offsets,
                 const std::string& attributes) {
   Writer out(encoding);
   std::string piece = "<Piece NumberOfPoints=\"4\" " + attributes + ">\n<Points>\n";
@@ -488,9 +489,9 @@ std::string vtp(const Encoding& encoding, const std::vector<std::int32_t>& offse
 
 TEST(VtpFile, TrianglesAreReadInEveryEncoding) {
   const TemporaryFolder folder;
-  for (const Encoding& encoding :
-       {Encoding{.name = "", .ascii = true}, Encoding{.name = "", .compressed = true},
-        Encoding{.name = "", .appended = true, .raw = true}}) {
+  for (const VtkEncoding& encoding :
+       {VtkEncoding{.name = "", .ascii = true}, VtkEncoding{.name = "", .compressed = true},
+        VtkEncoding{.name = "", .appended = true, .raw = true}}) {
     const auto surface =
         read_surface(folder.write("s.vtp", vtp(encoding, {3, 6}, "NumberOfPolys=\"2\"")));
     ASSERT_TRUE(surface) << surface.error().message;
@@ -503,7 +504,7 @@ TEST(VtpFile, TrianglesAreReadInEveryEncoding) {
 
 TEST(VtpFile, PolygonsAndStripsAreRefused) {
   const TemporaryFolder folder;
-  const Encoding ascii{.name = "", .ascii = true};
+  const VtkEncoding ascii{.name = "", .ascii = true};
   const auto quad = read_surface(folder.write("s.vtp", vtp(ascii, {4, 6}, "NumberOfPolys=\"2\"")));
   ASSERT_FALSE(quad);
   EXPECT_THAT(quad.error().message, HasSubstr("s.vtp: polygon 0 has 4 vertices: must have 3"));

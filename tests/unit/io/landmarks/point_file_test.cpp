@@ -31,7 +31,7 @@ constexpr const char* kFcsv =
     "1,-1.5,-2,3,0,0,0,1,1,1,0,nasion,,\r\n"
     "2,4,-5,6.25,0,0,0,1,1,1,0,\"left, ear\",a note,\n";
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
+std::string point_replaced(std::string text, const std::string& what, const std::string& with) {
   const std::size_t at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
   return text.replace(at, what.size(), with);
@@ -42,7 +42,7 @@ Result<NamedPoints> read(const std::string& name, const std::string& content) {
   return read_points(folder.write(name, content));
 }
 
-void expect_two(const std::string& name, const std::string& content, const Vec3& signs) {
+void expect_two_points(const std::string& name, const std::string& content, const Vec3& signs) {
   SCOPED_TRACE(name + ": " + content);
   const auto list = read(name, content);
   ASSERT_TRUE(list) << list.error().message;
@@ -51,8 +51,8 @@ void expect_two(const std::string& name, const std::string& content, const Vec3&
                                         signs.cwiseProduct(Vec3(4, -5, 6.25))));
 }
 
-std::string refusal(const std::string& name, const std::string& content,
-                    ErrorCode code = ErrorCode::kUnreadable) {
+std::string point_refusal(const std::string& name, const std::string& content,
+                          ErrorCode code = ErrorCode::kUnreadable) {
   const TemporaryFolder folder;
   const auto path = folder.write(name, content);
   const auto list = read_points(path);
@@ -67,34 +67,38 @@ TEST(PointFile, EverySpellingOfSlicersFramesBecomesRas) {
   for (const auto& [spelling, signs] :
        {std::pair{"LPS", Vec3(-1, -1, 1)}, std::pair{"1", Vec3(-1, -1, 1)},
         std::pair{"RAS", Vec3(1, 1, 1)}, std::pair{"0", Vec3(1, 1, 1)}}) {
-    expect_two("a.fcsv", replaced(kFcsv, "= LPS", "= " + std::string(spelling)), signs);
-    expect_two("a.mrk.json", replaced(kJson, "LPS", spelling), signs);
+    expect_two_points("a.fcsv", point_replaced(kFcsv, "= LPS", "= " + std::string(spelling)),
+                      signs);
+    expect_two_points("a.mrk.json", point_replaced(kJson, "LPS", spelling), signs);
   }
-  expect_two("a.mrk.json", replaced(kJson, "\"LPS\"", "1"), Vec3(-1, -1, 1));
+  expect_two_points("a.mrk.json", point_replaced(kJson, "\"LPS\"", "1"), Vec3(-1, -1, 1));
 }
 
 TEST(PointFile, FcsvColumnsAreSlicersUnlessTheFileOrdersThem) {
-  expect_two(
+  expect_two_points(
       "a.fcsv",
-      replaced(kFcsv, "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n",
-               ""),
+      point_replaced(
+          kFcsv, "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n", ""),
       Vec3(-1, -1, 1));
-  expect_two("a.fcsv",
-             "# CoordinateSystem = 0\n# columns = label,x,y,z,sel,vis\nnasion,-1.5,-2,3,1,1\n"
-             "\"left, ear\",4,-5,6.25,1,1\n",
-             Vec3(1, 1, 1));
+  expect_two_points(
+      "a.fcsv",
+      "# CoordinateSystem = 0\n# columns = label,x,y,z,sel,vis\nnasion,-1.5,-2,3,1,1\n"
+      "\"left, ear\",4,-5,6.25,1,1\n",
+      Vec3(1, 1, 1));
 }
 
 TEST(PointFile, TablesHaveANameOrAHeadingOrNeither) {
-  expect_two("a.csv", "nasion,-1.5,-2,3\n# a comment\n\n\"left, ear\", 4, -5, 6.25\n",
-             Vec3(1, 1, 1));
-  expect_two("a.csv", "label,x,y,z\nnasion,-1.5,-2,3\n\"left, ear\",4,-5,6.25\n", Vec3(1, 1, 1));
-  expect_two("a.csv", "r,a,s,name\n-1.5,-2,3,nasion\n4,-5,6.25,\"left, ear\"\n", Vec3(1, 1, 1));
+  expect_two_points("a.csv", "nasion,-1.5,-2,3\n# a comment\n\n\"left, ear\", 4, -5, 6.25\n",
+                    Vec3(1, 1, 1));
+  expect_two_points("a.csv", "label,x,y,z\nnasion,-1.5,-2,3\n\"left, ear\",4,-5,6.25\n",
+                    Vec3(1, 1, 1));
+  expect_two_points("a.csv", "r,a,s,name\n-1.5,-2,3,nasion\n4,-5,6.25,\"left, ear\"\n",
+                    Vec3(1, 1, 1));
   // As Slicer exports a list as a table.
-  expect_two("a.csv",
-             "label,l,p,s,defined,selected,visible,locked,description\n"
-             "nasion,-1.5,-2,3,1,1,1,0,\n\"left, ear\",4,-5,6.25,1,1,1,0,note\n",
-             Vec3(-1, -1, 1));
+  expect_two_points("a.csv",
+                    "label,l,p,s,defined,selected,visible,locked,description\n"
+                    "nasion,-1.5,-2,3,1,1,1,0,\n\"left, ear\",4,-5,6.25,1,1,1,0,note\n",
+                    Vec3(-1, -1, 1));
   const auto bare = read("a.csv", "1,2,3\n4,5,6\n");
   ASSERT_TRUE(bare) << bare.error().message;
   EXPECT_THAT(bare->names, ElementsAre("", ""));
@@ -103,12 +107,13 @@ TEST(PointFile, TablesHaveANameOrAHeadingOrNeither) {
 
 TEST(PointFile, RefusesMarkupsThatAreNoPointList) {
   const auto bad = [](const char* what, const char* with) {
-    return refusal("a.mrk.json", replaced(kJson, what, with));
+    return point_refusal("a.mrk.json", point_replaced(kJson, what, with));
   };
-  EXPECT_THAT(refusal("a.mrk.json", ""), HasSubstr("must be JSON with a list \"markups\""));
-  EXPECT_THAT(refusal("a.mrk.json", "[]"), HasSubstr("a list \"markups\""));
-  EXPECT_THAT(refusal("a.mrk.json", R"({"markups": []})"), HasSubstr("holds 0 markups"));
-  EXPECT_THAT(refusal("a.mrk.json", R"({"markups": [7]})"), HasSubstr("must hold one point list"));
+  EXPECT_THAT(point_refusal("a.mrk.json", ""), HasSubstr("must be JSON with a list \"markups\""));
+  EXPECT_THAT(point_refusal("a.mrk.json", "[]"), HasSubstr("a list \"markups\""));
+  EXPECT_THAT(point_refusal("a.mrk.json", R"({"markups": []})"), HasSubstr("holds 0 markups"));
+  EXPECT_THAT(point_refusal("a.mrk.json", R"({"markups": [7]})"),
+              HasSubstr("must hold one point list"));
   EXPECT_THAT(bad("Fiducial", "Plane"), HasSubstr("type = Plane"));
   EXPECT_THAT(bad("\"LPS\"", "\"IJK\""), HasSubstr("coordinateSystem = IJK"));
   EXPECT_THAT(bad("\"LPS\"", "2"), HasSubstr("coordinateSystem = 2"));
@@ -118,33 +123,37 @@ TEST(PointFile, RefusesMarkupsThatAreNoPointList) {
   EXPECT_THAT(bad("[-1.5, -2, 3]", "[-1.5, -2]"), HasSubstr("control point 1: position"));
   EXPECT_THAT(bad("6.25", "\"six\""), HasSubstr("control point 3: position"));
   EXPECT_THAT(bad("6.25", "1e999"), HasSubstr("JSON"));
-  EXPECT_THAT(refusal("a.mrk.json",
-                      R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
+  EXPECT_THAT(point_refusal("a.mrk.json",
+                            R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
                           "controlPoints": []}]})",
-                      ErrorCode::kEmptySet),
+                            ErrorCode::kEmptySet),
               HasSubstr("no point that was placed"));
 }
 
 TEST(PointFile, RefusesFcsvThatDoesNotSayWhere) {
-  EXPECT_THAT(refusal("a.fcsv", replaced(kFcsv, "# CoordinateSystem = LPS\n", "")),
+  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "# CoordinateSystem = LPS\n", "")),
               HasSubstr("coordinateSystem is missing"));
-  EXPECT_THAT(refusal("a.fcsv", replaced(kFcsv, "LPS", "2")), HasSubstr("coordinateSystem = 2"));
-  EXPECT_THAT(refusal("a.fcsv", replaced(kFcsv, "-1.5,", "nan,")), HasSubstr("line 4: \"1,nan"));
-  EXPECT_THAT(refusal("a.fcsv", replaced(kFcsv, "x,y,z", "i,j,k")), HasSubstr("line 4"));
-  EXPECT_THAT(refusal("a.fcsv", std::string(kFcsv) + "3,1\n"), HasSubstr("line 6: \"3,1\""));
-  EXPECT_THAT(refusal("a.fcsv", "# CoordinateSystem = LPS\n", ErrorCode::kEmptySet),
+  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "LPS", "2")),
+              HasSubstr("coordinateSystem = 2"));
+  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "-1.5,", "nan,")),
+              HasSubstr("line 4: \"1,nan"));
+  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "x,y,z", "i,j,k")),
+              HasSubstr("line 4"));
+  EXPECT_THAT(point_refusal("a.fcsv", std::string(kFcsv) + "3,1\n"), HasSubstr("line 6: \"3,1\""));
+  EXPECT_THAT(point_refusal("a.fcsv", "# CoordinateSystem = LPS\n", ErrorCode::kEmptySet),
               HasSubstr("no point"));
 }
 
 TEST(PointFile, RefusesTablesOfAnotherShape) {
-  EXPECT_THAT(refusal("a.csv", "1,2\n"), HasSubstr("line 1: \"1,2\" must be x,y,z"));
-  EXPECT_THAT(refusal("a.csv", "u,v,w\n1,2,3\n"), HasSubstr("a heading with the columns"));
-  EXPECT_THAT(refusal("a.csv", "1,2,3\n4,5\n"), HasSubstr("line 2: \"4,5\""));
-  EXPECT_THAT(refusal("a.csv", "a,1,2,3\n1,2,3\n"), HasSubstr("behind a name"));
-  EXPECT_THAT(refusal("a.csv", "x,y,z\n1,2,inf\n"), HasSubstr("line 2"));
-  EXPECT_THAT(refusal("a.csv", "x,y,z\n", ErrorCode::kEmptySet), HasSubstr("no point"));
-  EXPECT_THAT(refusal("a.csv", "", ErrorCode::kEmptySet), HasSubstr("no point"));
-  EXPECT_THAT(refusal("a.vtk", "1,2,3\n"), HasSubstr("must be a .mrk.json, .fcsv or .csv file"));
+  EXPECT_THAT(point_refusal("a.csv", "1,2\n"), HasSubstr("line 1: \"1,2\" must be x,y,z"));
+  EXPECT_THAT(point_refusal("a.csv", "u,v,w\n1,2,3\n"), HasSubstr("a heading with the columns"));
+  EXPECT_THAT(point_refusal("a.csv", "1,2,3\n4,5\n"), HasSubstr("line 2: \"4,5\""));
+  EXPECT_THAT(point_refusal("a.csv", "a,1,2,3\n1,2,3\n"), HasSubstr("behind a name"));
+  EXPECT_THAT(point_refusal("a.csv", "x,y,z\n1,2,inf\n"), HasSubstr("line 2"));
+  EXPECT_THAT(point_refusal("a.csv", "x,y,z\n", ErrorCode::kEmptySet), HasSubstr("no point"));
+  EXPECT_THAT(point_refusal("a.csv", "", ErrorCode::kEmptySet), HasSubstr("no point"));
+  EXPECT_THAT(point_refusal("a.vtk", "1,2,3\n"),
+              HasSubstr("must be a .mrk.json, .fcsv or .csv file"));
   const auto none = read_points("nowhere/a.csv");
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::kNotFound);

@@ -98,7 +98,7 @@ std::string repeated(const std::string& frame, int times) {
   return bytes;
 }
 
-std::string long_head(std::uint64_t size) {
+std::string flood_head(std::uint64_t size) {
   std::string bytes("\2", 1);
   for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(static_cast<char>(size >> shift));
   return bytes;
@@ -141,7 +141,7 @@ TEST_F(Flood, UnfinishedMessagesOfManyPeersHoldABoundedAmount) {
   serve(with_model());
   RawPeer viewer(endpoint_);
   EXPECT_EQ(viewer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
-  const std::string most = long_head(16u << 20) + std::string(15u << 20, 'x');
+  const std::string most = flood_head(16u << 20) + std::string(15u << 20, 'x');
   const double idle = resident_mib();
   std::vector<std::unique_ptr<Socket>> peers;
   for (int i = 0; i < 32; ++i) {
@@ -163,7 +163,7 @@ TEST_F(Flood, AMessageThatNeverEndsEndsWithPatience) {
   serve(with_model(), options);
   Socket peer(endpoint_);
   peer.greet();
-  peer.send_now(long_head(1000) + "begun");
+  peer.send_now(flood_head(1000) + "begun");
   EXPECT_TRUE(peer.sees_the_end());
   EXPECT_EQ(router_->guard_counts().closed_for_silence, 1u);
   RawPeer idle(endpoint_);

@@ -14,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr std::int64_t kHour = 3'600'000'000'000;
+constexpr std::int64_t kSourceHour = 3'600'000'000'000;
 
 Observation with_stamp(Observation observation, std::int64_t acquired_ns) {
   observation.acquired_ns = acquired_ns;
@@ -42,7 +42,7 @@ TEST(Sources, WhatIsRefusedTakesNoPlaceAndNoNumber) {
 TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
   Sources sources(120.0, false);
   ASSERT_TRUE(sources.admit(landmarks(4), 0, true));
-  const auto again = sources.admit(landmarks(4), kHour, false);
+  const auto again = sources.admit(landmarks(4), kSourceHour, false);
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->repeated);
   EXPECT_EQ(again->receipt.observation_sequence, 4u);
@@ -53,15 +53,17 @@ TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
 
 TEST(Sources, EachHasAClockOfItsOwnAndFollowsOneThatWasSet) {
   Sources sources(120.0, false);
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, 7);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kSourceHour), 7, false)->daemon_ns, 7);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "camera"), 0), 9, false)->daemon_ns, 9);
-  EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kHour), 10, false));
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
+  EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kSourceHour), 10, false));
+  EXPECT_EQ(
+      sources.admit(with_stamp(landmarks(2, "camera"), kSourceHour + 1), 11, false)->daemon_ns, 11);
 }
 
 TEST(Sources, OfARecordingShareItsClock) {
   Sources sources(120.0, true);
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, kHour);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kSourceHour), 7, false)->daemon_ns,
+            kSourceHour);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "ius"), 3), 8, false)->daemon_ns, 3)
       << "a replay that begins again";
 }

@@ -19,7 +19,7 @@ constexpr double kFloat = 1e-5;
 
 Vec3 linear_field(const Vec3& x) { return Vec3(0.02 * x[2], 1.0, -0.03 * x[0]); }
 
-UpdateMessage update_of(const BrainModel& model) {
+UpdateMessage streamed_update(const BrainModel& model) {
   UpdateMessage message;
   message.session_id = 4;
   message.update.sequence = 9;
@@ -38,7 +38,7 @@ UpdateMessage update_of(const BrainModel& model) {
 
 // As the daemon would cut it.
 UpdateMessage part_of(const BrainModel& model, const std::vector<NodeIndex>& nodes) {
-  const UpdateMessage whole = update_of(model);
+  const UpdateMessage whole = streamed_update(model);
   UpdateMessage part = whole;
   part.update.part = FieldPart{model.mesh.num_nodes(), nodes, 0};
   Estimate& estimate = part.update.estimate;
@@ -55,7 +55,7 @@ UpdateMessage part_of(const BrainModel& model, const std::vector<NodeIndex>& nod
 TEST(FieldStream, APictureHasFieldSurfacesAndState) {
   const BrainModel model = test_support::toy_patient(6);
   FieldStream stream = FieldStream::build(model, {.region = TumourRegion{5.0}}).value();
-  const auto picture = stream.picture(update_of(model)).value();
+  const auto picture = stream.picture(streamed_update(model)).value();
   const FieldGrid& grid = stream.grid();
   ASSERT_EQ(picture->u.size(), 3 * grid.num_voxels());
   const std::size_t centre = grid.index(grid.dims[0] / 2, grid.dims[1] / 2, grid.dims[2] / 2);
@@ -100,7 +100,7 @@ TEST(FieldStream, TheRegionLiesInsideOfTheFade) {
         geometry::nodes_in_region(model, options.region, geometry::distances_from_tumour(model))
             .value();
     FieldStream stream = FieldStream::build(model, options).value();
-    auto far = update_of(model);
+    auto far = streamed_update(model);
     // Only the region's nodes move: another weight than 1 on them would show.
     for (Eigen::Index i = 0; i < model.mesh.nodes.cols(); ++i) {
       far.update.estimate.displacement.col(i) = Vec3::Constant(3.0);
@@ -132,7 +132,7 @@ TEST(FieldStream, AsksForTheBallThatHoldsWhatItNeedsAndForAllWithSurfaces) {
   EXPECT_LT(nodes.size(), static_cast<std::size_t>(model.mesh.num_nodes()));
   const auto part = without.picture(part_of(model, nodes));
   ASSERT_TRUE(part) << part.error().message;
-  const auto whole = without.picture(update_of(model)).value();
+  const auto whole = without.picture(streamed_update(model)).value();
   EXPECT_EQ((*part)->u, whole->u);
   EXPECT_EQ((*part)->sd, whole->sd);
   EXPECT_EQ((*part)->state.grid_error_mm, whole->state.grid_error_mm);
@@ -141,10 +141,10 @@ TEST(FieldStream, AsksForTheBallThatHoldsWhatItNeedsAndForAllWithSurfaces) {
 TEST(FieldStream, RefusesUpdatesThatAreNotOfItsModel) {
   const BrainModel model = test_support::toy_patient(5);
   FieldStream stream = FieldStream::build(model, {}).value();
-  auto other = update_of(model);
+  auto other = streamed_update(model);
   other.update.model_id = "other";
   EXPECT_THAT(stream.picture(other).error().message, HasSubstr("of model other"));
-  auto fewer = update_of(model);
+  auto fewer = streamed_update(model);
   fewer.update.estimate.displacement = Points::Zero(3, 7);
   EXPECT_THAT(stream.picture(fewer).error().message, HasSubstr("7 nodes"));
   EXPECT_THAT(stream.picture(part_of(model, {0, 1, 2})).error().message, HasSubstr("leaves out"));
@@ -153,7 +153,7 @@ TEST(FieldStream, RefusesUpdatesThatAreNotOfItsModel) {
 TEST(FieldStream, AFieldWithoutStandardDeviationsSaysSo) {
   const BrainModel model = test_support::toy_patient(5);
   FieldStream stream = FieldStream::build(model, {}).value();
-  auto message = update_of(model);
+  auto message = streamed_update(model);
   message.update.estimate.sd_mm.resize(0);
   const auto picture = stream.picture(message).value();
   EXPECT_FALSE(picture->state.has_sd);

@@ -22,9 +22,9 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-const Inbox::TimePoint kBegin{std::chrono::hours(1)};
+const Inbox::TimePoint kInboxBegin{std::chrono::hours(1)};
 
-igtl::Message message(const std::string& device, igtl::Content content) {
+igtl::Message inbox_message(const std::string& device, igtl::Content content) {
   igtl::Message made;
   made.envelope.device = device;
   made.content = std::move(content);
@@ -46,44 +46,48 @@ igtl::PointList points(const std::vector<std::pair<std::string, Vec3>>& named) {
 
 TEST(Inbox, ANamedModelIsTheTumoursBoundary) {
   Inbox inbox = Inbox::open({.tumour_device = "TumourNow", .sd_mm = 0.7}).value();
-  EXPECT_THAT(inbox.take(message("Other", igtl::from_surface(ball())), kBegin).found, IsEmpty());
-  const Taken taken = inbox.take(message("TumourNow", igtl::from_surface(ball())), kBegin);
+  EXPECT_THAT(inbox.take(inbox_message("Other", igtl::from_surface(ball())), kInboxBegin).found,
+              IsEmpty());
+  const Taken taken =
+      inbox.take(inbox_message("TumourNow", igtl::from_surface(ball())), kInboxBegin);
   ASSERT_THAT(taken.found, SizeIs(1));
   EXPECT_THAT(taken.notes, IsEmpty());
   const auto& boundary = std::get<TumourBoundary>(taken.found[0].body);
   EXPECT_EQ(taken.found[0].source, "TumourNow");
   EXPECT_EQ(boundary.sd_mm, 0.7);
   EXPECT_TRUE(boundary.points.isApprox(ball().vertices, 1e-6));
-  EXPECT_EQ(taken.found[0].acquired, kBegin);
+  EXPECT_EQ(taken.found[0].acquired, kInboxBegin);
 }
 
 TEST(Inbox, ANamedModelIsTheCortexWithItsTriangles) {
   Inbox inbox = Inbox::open({.surface_device = "Cortex"}).value();
-  const Taken taken = inbox.take(message("Cortex", igtl::from_surface(ball())), kBegin);
+  const Taken taken = inbox.take(inbox_message("Cortex", igtl::from_surface(ball())), kInboxBegin);
   ASSERT_THAT(taken.found, SizeIs(1));
   const auto& cortex = std::get<CorticalSurface>(taken.found[0].body);
   EXPECT_EQ(cortex.surface.num_triangles(), ball().num_triangles());
-  const Taken bare = inbox.take(message("Cortex", points({{"a", Vec3(1, 2, 3)}})), kBegin);
+  const Taken bare =
+      inbox.take(inbox_message("Cortex", points({{"a", Vec3(1, 2, 3)}})), kInboxBegin);
   ASSERT_THAT(bare.found, SizeIs(1));
   EXPECT_EQ(std::get<CorticalSurface>(bare.found[0].body).surface.num_triangles(), 0);
 }
 
 TEST(Inbox, PointsAreTheTumoursBoundaryToo) {
   Inbox inbox = Inbox::open({.tumour_device = "F"}).value();
-  const Taken taken =
-      inbox.take(message("F", points({{"F-1", Vec3(1, 2, 3)}, {"F-2", Vec3(4, 5, 6)}})), kBegin);
+  const Taken taken = inbox.take(
+      inbox_message("F", points({{"F-1", Vec3(1, 2, 3)}, {"F-2", Vec3(4, 5, 6)}})), kInboxBegin);
   ASSERT_THAT(taken.found, SizeIs(1));
   EXPECT_EQ(std::get<TumourBoundary>(taken.found[0].body).points.col(1), Vec3(4, 5, 6));
-  EXPECT_THAT(inbox.take(message("F", igtl::PointList{}), kBegin).notes,
+  EXPECT_THAT(inbox.take(inbox_message("F", igtl::PointList{}), kInboxBegin).notes,
               ElementsAre("F: it has no point"));
 }
 
 TEST(Inbox, LandmarksArePairedByName) {
   Inbox inbox = Inbox::open({.landmarks_before = "Before", .landmarks_after = "After"}).value();
-  const auto after = message("After", points({{"b", Vec3(2, 2, 3)}, {"c", Vec3(9, 9, 9)}}));
-  EXPECT_THAT(inbox.take(after, kBegin).notes, Contains(HasSubstr("no point has the name")));
-  inbox.take(message("Before", points({{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 2, 3)}})), kBegin);
-  const Taken taken = inbox.take(after, kBegin);
+  const auto after = inbox_message("After", points({{"b", Vec3(2, 2, 3)}, {"c", Vec3(9, 9, 9)}}));
+  EXPECT_THAT(inbox.take(after, kInboxBegin).notes, Contains(HasSubstr("no point has the name")));
+  inbox.take(inbox_message("Before", points({{"a", Vec3(0, 0, 0)}, {"b", Vec3(1, 2, 3)}})),
+             kInboxBegin);
+  const Taken taken = inbox.take(after, kInboxBegin);
   ASSERT_THAT(taken.found, SizeIs(1));
   const auto& pairs = std::get<LandmarkPairs>(taken.found[0].body);
   ASSERT_EQ(pairs.deformed.cols(), 1);
@@ -98,18 +102,19 @@ TEST(Inbox, ModelsOfAnotherFrameFollowTheNewestTransforms) {
   Inbox inbox =
       Inbox::open({.tumour_device = "F", .model_frame = "Stylus", .registration = registration})
           .value();
-  const auto touched = message("F", points({{"F-1", Vec3(1, 2, 3)}}));
-  EXPECT_THAT(inbox.take(touched, kBegin).notes, Contains(HasSubstr("Stylus")));
+  const auto touched = inbox_message("F", points({{"F-1", Vec3(1, 2, 3)}}));
+  EXPECT_THAT(inbox.take(touched, kInboxBegin).notes, Contains(HasSubstr("Stylus")));
   igtl::Matrix34f matrix = igtl::Matrix34f::Identity();
   matrix(1, 3) = 10.0F;
-  inbox.take(message("StylusToReference", igtl::Transform{matrix}), kBegin);
-  const Taken taken = inbox.take(touched, kBegin);
+  inbox.take(inbox_message("StylusToReference", igtl::Transform{matrix}), kInboxBegin);
+  const Taken taken = inbox.take(touched, kInboxBegin);
   ASSERT_THAT(taken.found, SizeIs(1));
   EXPECT_EQ(std::get<TumourBoundary>(taken.found[0].body).points.col(0), Vec3(101, 12, 3));
-  auto lost = message("StylusToReference", igtl::Transform{matrix});
+  auto lost = inbox_message("StylusToReference", igtl::Transform{matrix});
   lost.envelope.metadata.push_back({"TransformStatus", "OUT_OF_VIEW"});
-  inbox.take(lost, kBegin);
-  EXPECT_THAT(inbox.take(touched, kBegin).found, IsEmpty()) << "the pose is not known any more";
+  inbox.take(lost, kInboxBegin);
+  EXPECT_THAT(inbox.take(touched, kInboxBegin).found, IsEmpty())
+      << "the pose is not known any more";
 }
 
 TEST(Inbox, KeepsNoMoreThanItUses) {
@@ -162,9 +167,9 @@ class InboxSweep : public testing::Test {
   Inbox::TimePoint play(Inbox& inbox) {
     const auto content = sweep.content();
     const std::size_t bytes = static_cast<std::size_t>(sweep.width * sweep.height);
-    Inbox::TimePoint now = kBegin;
+    Inbox::TimePoint now = kInboxBegin;
     for (std::size_t frame = 0; frame < content.frames.size(); ++frame) {
-      now = kBegin + milliseconds(100 * static_cast<int>(frame));
+      now = kInboxBegin + milliseconds(100 * static_cast<int>(frame));
       const auto time = igtl::to_timestamp(milliseconds(5000 + 100 * static_cast<int>(frame)));
       const auto send = [&](igtl::Message made) {
         made.envelope.timestamp = time;
@@ -177,12 +182,12 @@ class InboxSweep : public testing::Test {
       const auto* pixels =
           reinterpret_cast<const std::uint8_t*>(content.pixels.data()) + frame * bytes;
       image.voxels = std::vector<std::uint8_t>(pixels, pixels + bytes);
-      send(message("Image_Reference", image));
+      send(inbox_message("Image_Reference", image));
       for (const auto& [name, value] : content.frames[frame]) {
         constexpr std::string_view kEnd = "Transform";
         if (!name.ends_with(kEnd)) continue;
-        auto transform =
-            message(name.substr(0, name.size() - kEnd.size()), igtl::Transform{matrix_of(value)});
+        auto transform = inbox_message(name.substr(0, name.size() - kEnd.size()),
+                                       igtl::Transform{matrix_of(value)});
         transform.envelope.metadata.push_back(
             {"TransformStatus", content.frames[frame].at(name + "Status")});
         send(transform);
@@ -218,8 +223,8 @@ TEST_F(InboxSweep, TheNextSweepEndsTheOneBeforeAndCountsItsOwnImages) {
   write_contours();
   Inbox inbox = Inbox::open(options).value();
   play(inbox);
-  const Taken taken =
-      inbox.take(message("ProbeToTracker", igtl::Transform{}), kBegin + std::chrono::seconds(60));
+  const Taken taken = inbox.take(inbox_message("ProbeToTracker", igtl::Transform{}),
+                                 kInboxBegin + std::chrono::seconds(60));
   EXPECT_THAT(taken.found, SizeIs(1));
 }
 
@@ -249,7 +254,7 @@ TEST_F(InboxSweep, ASweepThatGivesNothingSaysWhy) {
   EXPECT_THAT(taken.notes, Contains(HasSubstr("1 contours are of images that the sweep of 21")));
   std::filesystem::remove(options.contours);
   play(inbox);
-  EXPECT_THAT(inbox.tick(kBegin + std::chrono::seconds(60)).notes,
+  EXPECT_THAT(inbox.tick(kInboxBegin + std::chrono::seconds(60)).notes,
               Contains(HasSubstr("contours.csv")));
 }
 

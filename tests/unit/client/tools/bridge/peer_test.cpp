@@ -22,7 +22,7 @@ std::shared_ptr<const Rest> rest() {
   made->with_sd = false;
   return made;
 }
-BroadcastPtr picture(std::uint64_t sequence, bool blank = false) {
+BroadcastPtr peer_picture(std::uint64_t sequence, bool blank = false) {
   auto made = std::make_shared<Picture>();
   made->rest = rest();
   made->state.sequence = sequence;
@@ -62,17 +62,17 @@ std::optional<test_support::Received> next_of(Pair& pair, std::string_view devic
   }
   return std::nullopt;
 }
-float first_voxel(const test_support::Received& received) {
+float peer_first_voxel(const test_support::Received& received) {
   return std::get<std::vector<float>>(std::get<igtl::Image>(received.message.content).voxels)[0];
 }
 
 TEST(Peer, SendsAPictureAndThenHasNothingToSend) {
   Pair pair = connected();
   EXPECT_FALSE(pair.ours.wants_to_write());
-  pair.ours.offer(picture(1));
+  pair.ours.offer(peer_picture(1));
   const auto image = next_of(pair, "brainshift_u");
   ASSERT_TRUE(image);
-  EXPECT_EQ(first_voxel(*image), 1.0F);
+  EXPECT_EQ(peer_first_voxel(*image), 1.0F);
   EXPECT_TRUE(pair.ours.write());
   EXPECT_FALSE(pair.ours.wants_to_write());
   EXPECT_EQ(pair.ours.replaced(), 0u);
@@ -80,7 +80,7 @@ TEST(Peer, SendsAPictureAndThenHasNothingToSend) {
 
 TEST(Peer, GetsVersionOneUntilItShowsVersionTwoAndThenThePictureAnew) {
   Pair pair = connected();
-  pair.ours.offer(picture(1));
+  pair.ours.offer(peer_picture(1));
   EXPECT_EQ(next_of(pair, "brainshift_u")->header.version, 1);
   igtl::Envelope envelope;
   pair.theirs.send(envelope, igtl::StatusRequest{});
@@ -102,7 +102,7 @@ TEST(Peer, AReaderThatStallsKeepsTwoPicturesAndThenGetsTheNewest) {
   Pair pair = connected();
   std::vector<std::weak_ptr<Broadcast>> offered;
   for (std::uint64_t sequence = 1; sequence <= 50; ++sequence) {
-    const auto broadcast = picture(sequence);
+    const auto broadcast = peer_picture(sequence);
     offered.push_back(broadcast);
     pair.ours.offer(broadcast);
     EXPECT_TRUE(pair.ours.write());
@@ -111,41 +111,41 @@ TEST(Peer, AReaderThatStallsKeepsTwoPicturesAndThenGetsTheNewest) {
                                    [](const auto& each) { return !each.expired(); });
   EXPECT_EQ(alive, 2) << "the one that is being written, and the newest";
   EXPECT_EQ(pair.ours.replaced(), 48u);
-  EXPECT_EQ(first_voxel(*next_of(pair, "brainshift_u")), 1.0F) << "was under way";
-  EXPECT_EQ(first_voxel(*next_of(pair, "brainshift_u")), 50.0F);
+  EXPECT_EQ(peer_first_voxel(*next_of(pair, "brainshift_u")), 1.0F) << "was under way";
+  EXPECT_EQ(peer_first_voxel(*next_of(pair, "brainshift_u")), 50.0F);
   EXPECT_FALSE(next_of(pair, "brainshift_u")) << "and nothing in between";
 }
 
 TEST(Peer, ABlankPictureWaitsForTheEndOfAMessageOnly) {
   Pair pair = connected();
-  auto many = std::make_shared<Picture>(picture(1)->picture());
+  auto many = std::make_shared<Picture>(peer_picture(1)->picture());
   auto with_sd = std::make_shared<Rest>(*rest());
   with_sd->with_sd = true;
   many->rest = with_sd;
   pair.ours.offer(std::make_shared<Broadcast>(many, Broadcast::Part::kWhole, 1));
   EXPECT_TRUE(pair.ours.write());  // stops within brainshift_u
-  pair.ours.offer(picture(0, true));
-  EXPECT_EQ(first_voxel(*next_of(pair, "brainshift_u")), 1.0F);
+  pair.ours.offer(peer_picture(0, true));
+  EXPECT_EQ(peer_first_voxel(*next_of(pair, "brainshift_u")), 1.0F);
   const auto next = next_of(pair, "brainshift_u");
   ASSERT_TRUE(next);
-  EXPECT_EQ(first_voxel(*next), 0.0F) << "without brainshift_sd of the picture before";
+  EXPECT_EQ(peer_first_voxel(*next), 0.0F) << "without brainshift_sd of the picture before";
 }
 
 TEST(Peer, TheStateAloneTakesNoPicturesPlace) {
   Pair pair = connected();
-  pair.ours.offer(picture(1));
+  pair.ours.offer(peer_picture(1));
   EXPECT_TRUE(pair.ours.write());
-  pair.ours.offer(picture(2));
+  pair.ours.offer(peer_picture(2));
   pair.ours.offer(state_of(3));
-  EXPECT_EQ(first_voxel(*next_of(pair, "brainshift_u")), 1.0F);
-  EXPECT_EQ(first_voxel(*next_of(pair, "brainshift_u")), 2.0F);
+  EXPECT_EQ(peer_first_voxel(*next_of(pair, "brainshift_u")), 1.0F);
+  EXPECT_EQ(peer_first_voxel(*next_of(pair, "brainshift_u")), 2.0F);
   EXPECT_TRUE(next_of(pair, "brainshift_state"));
   EXPECT_EQ(pair.ours.replaced(), 0u);
 }
 
 TEST(Peer, RepliesComeBeforeTheNextMessageAndAreLimited) {
   Pair pair = connected();
-  pair.ours.offer(picture(1));
+  pair.ours.offer(peer_picture(1));
   igtl::Envelope envelope;
   envelope.device = "reply";
   EXPECT_TRUE(pair.ours.reply(envelope, igtl::StatusReport{}));

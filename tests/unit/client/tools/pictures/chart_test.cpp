@@ -10,7 +10,7 @@
 namespace brainshift::client {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Series line_of(const std::vector<double>& y, const cv::Scalar& colour = palette::kVermillion) {
@@ -68,7 +68,7 @@ TEST(Chart, LeavesAMarginFreeOnEverySide) {
 TEST(Chart, MissingValueInterruptsTheLine) {
   cv::Rect area;
   const cv::Mat unbroken = draw_chart(one_line({1, 1, 1, 1, 1}), &area);
-  const cv::Mat broken = draw_chart(one_line({1, 1, kNan, 1, 1}));
+  const cv::Mat broken = draw_chart(one_line({1, 1, kGap, 1, 1}));
   const cv::Rect middle(area.x + area.width / 2 - 100, area.y, 200, area.height);
   EXPECT_GT(count_colour(unbroken, palette::kVermillion, middle), 0);
   EXPECT_EQ(count_colour(broken, palette::kVermillion, middle), 0);
@@ -120,7 +120,7 @@ TEST(Chart, AnAxisThatCountsHasWholeTicks) {
 
 TEST(Chart, SurvivesEmptyAndNotFiniteData) {
   for (const std::vector<double>& y :
-       {std::vector<double>{}, {kInfinity}, {kNan, kInfinity}, {0.0, 0.0}}) {
+       {std::vector<double>{}, {kInfinity}, {kGap, kInfinity}, {0.0, 0.0}}) {
     cv::Rect area;
     const cv::Mat chart = draw_chart(one_line(y), &area);
     ASSERT_EQ(chart.size(), ChartSpec{}.size);
@@ -156,7 +156,7 @@ TEST(Chart, LeavesOutWhatALogarithmCannotShow) {
     const cv::Mat image = draw_chart(log_points(std::move(points)), &area);
     return box_of_colour(image, palette::kVermillion, area).area();
   };
-  EXPECT_EQ(ink({{0.0, 1.0, "a"}, {1.0, -1.0, "b"}, {kNan, 1.0, "c"}}), 0);
+  EXPECT_EQ(ink({{0.0, 1.0, "a"}, {1.0, -1.0, "b"}, {kGap, 1.0, "c"}}), 0);
   EXPECT_GT(ink({{0.0, 1.0, "a"}, {1.0, 1.0, "b"}}), 0);
 }
 

@@ -23,7 +23,7 @@ Observation observed(const std::string& source, std::uint64_t sequence) {
   return observation;
 }
 
-io::SurgeryRecord record(const std::string& source, std::uint64_t sequence) {
+io::SurgeryRecord resumed_record(const std::string& source, std::uint64_t sequence) {
   return {io::RecordKind::kObservation, sequence, 0, wire::encode(observed(source, sequence))};
 }
 
@@ -36,9 +36,9 @@ class Resume : public testing::Test {
 TEST_F(Resume, AJournalThatWasNotClosedSaysWhatEachSourceRecordedLast) {
   auto file = io::SurgeryFile::create(path, {.model_id = "m"});
   ASSERT_TRUE(file);
-  ASSERT_TRUE(file->append(record("ius", 4)));
-  ASSERT_TRUE(file->append(record("camera", 50)));
-  ASSERT_TRUE(file->append(record("ius", 6)));
+  ASSERT_TRUE(file->append(resumed_record("ius", 4)));
+  ASSERT_TRUE(file->append(resumed_record("camera", 50)));
+  ASSERT_TRUE(file->append(resumed_record("ius", 6)));
   ASSERT_TRUE(file->append({io::RecordKind::kUpdate, 3, 0, "opaque"}));
   const auto point = read_resume_point(path);
   ASSERT_TRUE(point) << point.error().message;
@@ -53,7 +53,7 @@ TEST_F(Resume, ABrokenJournalCountsUpToTheBreak) {
     auto file = io::SurgeryFile::create(path, {});
     ASSERT_TRUE(file);
     std::vector<io::SurgeryRecord> records;
-    for (std::uint64_t i = 1; i <= 200; ++i) records.push_back(record("ius", i));
+    for (std::uint64_t i = 1; i <= 200; ++i) records.push_back(resumed_record("ius", i));
     ASSERT_TRUE(file->append(records));
     ASSERT_TRUE(file->close());
   }

@@ -20,7 +20,7 @@ namespace {
 using testing::HasSubstr;
 
 // The toy patient with its head a little to the side, so that gravity can turn and tilt.
-const BrainModel& patient() {
+const BrainModel& adverse_patient() {
   static const BrainModel model = [] {
     BrainModel toy = test_support::toy_patient(6);
     toy.gravity_direction = Vec3(0.6, 0, -1).normalized();
@@ -44,9 +44,10 @@ Scenario pressed() {
 
 Result<SimulatedSurgery> play(const Ingredients& ingredients, std::uint64_t seed = 1,
                               const Scenario& scenario = pressed()) {
-  const auto adverse = with_ingredients(scenario, ingredients, patient().gravity_direction, seed);
+  const auto adverse =
+      with_ingredients(scenario, ingredients, adverse_patient().gravity_direction, seed);
   if (!adverse) return tl::unexpected(adverse.error());
-  return play_scenario(patient(), test_support::toy_config(), *adverse, 1);
+  return play_scenario(adverse_patient(), test_support::toy_config(), *adverse, 1);
 }
 
 const Points& boundary_of(const SimulatedSurgery& surgery) {
@@ -104,7 +105,7 @@ TEST(Ingredients, EachChangesWhatItIsNamedAfter) {
     const auto adverse = play({ingredient});
     ASSERT_TRUE(adverse) << name_of({ingredient}) << ": " << adverse.error().message;
     const Points& truth = adverse->truths[0].displacement;
-    ASSERT_EQ(truth.cols(), patient().mesh.num_nodes());
+    ASSERT_EQ(truth.cols(), adverse_patient().mesh.num_nodes());
     const double change = (truth - plain->truths[0].displacement).colwise().norm().maxCoeff();
     if (of_the_brain.count(ingredient) > 0) {
       EXPECT_GT(change, 0.02) << name_of({ingredient});
@@ -119,7 +120,7 @@ TEST(Ingredients, EachChangesWhatItIsNamedAfter) {
 // What an ingredient draws does not depend on the others.
 TEST(Ingredients, AreTheSameAloneAndTogether) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const Vec3 gravity = patient().gravity_direction;
+    const Vec3 gravity = adverse_patient().gravity_direction;
     const Adversity all = with_ingredients(pressed(), all_but_mesh(), gravity, seed)->adverse;
     const auto alone = [&](Ingredient ingredient) {
       return with_ingredients(pressed(), {ingredient}, gravity, seed)->adverse;
@@ -140,11 +141,11 @@ TEST(Ingredients, OfALevelAndOfGravityHaveTheirSize) {
   std::set<double> levels;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto adverse = with_ingredients(pressed(), {Ingredient::kLevel, Ingredient::kGravity},
-                                          patient().gravity_direction, seed);
+                                          adverse_patient().gravity_direction, seed);
     ASSERT_TRUE(adverse);
     levels.insert(adverse->adverse.level_error_mm);
-    const Gravity gravity = gravity_of(patient(), *adverse);
-    const double cosine = gravity.direction.dot(patient().gravity_direction);
+    const Gravity gravity = gravity_of(adverse_patient(), *adverse);
+    const double cosine = gravity.direction.dot(adverse_patient().gravity_direction);
     EXPECT_NEAR(std::acos(cosine) * 180.0 / std::numbers::pi, 10.0, 1e-6);
   }
   EXPECT_EQ(levels, (std::set<double>{-10.0, 10.0}));
@@ -152,12 +153,12 @@ TEST(Ingredients, OfALevelAndOfGravityHaveTheirSize) {
 
 TEST(Gap, LiesBetweenItsBoundsAndVaries) {
   const auto scenario =
-      with_ingredients(pressed(), {Ingredient::kGap}, patient().gravity_direction, 3);
-  const auto brain = truth_brain(patient(), test_support::toy_config(), *scenario, 1);
+      with_ingredients(pressed(), {Ingredient::kGap}, adverse_patient().gravity_direction, 3);
+  const auto brain = truth_brain(adverse_patient(), test_support::toy_config(), *scenario, 1);
   ASSERT_TRUE(brain);
   const auto forward = truth_forward(*brain);
   ASSERT_TRUE(forward) << forward.error().message;
-  ASSERT_EQ(forward->contact().pairs().size(), patient().slaves.size());
+  ASSERT_EQ(forward->contact().pairs().size(), adverse_patient().slaves.size());
   double least = 100.0, most = 0.0;
   for (const contact::ContactPair& pair : forward->contact().pairs()) {
     least = std::min(least, -pair.initial_penetration_mm);
@@ -170,7 +171,7 @@ TEST(Gap, LiesBetweenItsBoundsAndVaries) {
 
 // Errors of a calibration move all sections alike; those of a tracker each in its own way.
 TEST(Probe, TrackerAndCalibrationMoveSectionsAsTheirNamesSay) {
-  const Points section = patient().tumour.vertices;
+  const Points section = adverse_patient().tumour.vertices;
   const Vec3 centre = section.rowwise().mean(), probe(30, 30, 60);
   ProbeErrors errors;
   errors.calibration_sd_mm = 0.5;

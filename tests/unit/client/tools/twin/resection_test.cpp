@@ -24,33 +24,37 @@ using testing::HasSubstr;
 const Vec3 kTumour(30, 30, 40);
 constexpr double kRadius_mm = 10.0;
 
-const BrainModel& patient() {
+const BrainModel& resected_patient() {
   static const BrainModel model = test_support::toy_patient(12);
   return model;
 }
 
 ResectedBrain resected(double fraction, const CaseConfig& config = test_support::toy_config()) {
-  auto brain = resect(patient(), config, {fraction});
+  auto brain = resect(resected_patient(), config, {fraction});
   EXPECT_TRUE(brain) << brain.error().message;
   return std::move(*brain);
 }
 
 Vec3 centre_of(int tet) {
-  return patient().mesh.nodes(Eigen::all, patient().mesh.tets.col(tet)).rowwise().mean();
+  return resected_patient()
+      .mesh.nodes(Eigen::all, resected_patient().mesh.tets.col(tet))
+      .rowwise()
+      .mean();
 }
 
 double volume_of(int tet) {
-  const auto x = patient().mesh.nodes(Eigen::all, patient().mesh.tets.col(tet)).eval();
+  const auto x =
+      resected_patient().mesh.nodes(Eigen::all, resected_patient().mesh.tets.col(tet)).eval();
   return std::abs((x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).dot(x.col(3) - x.col(0))) / 6.0;
 }
 
 // Tetrahedra whose shear modulus differs from that before.
 std::set<int> softened(const ResectedBrain& brain, const CaseConfig& before) {
-  const auto was = contact::tissue_map(patient(), before.material);
+  const auto was = contact::tissue_map(resected_patient(), before.material);
   const auto is = contact::tissue_map(brain.model, brain.config.material);
   EXPECT_TRUE(was && is);
   std::set<int> tets;
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     const double ratio = is->at(t).elastic.shear / was->at(t).elastic.shear;
     if (ratio == 1.0) continue;
     EXPECT_NEAR(ratio, kCavityStiffness, 1e-12) << t;
@@ -65,7 +69,7 @@ TEST(Resection, SoftensTheSuperficialPartOfTheTumourAndNothingElse) {
   const std::set<int> soft = softened(resected(0.7, config), config);
   const std::set<int> whole = softened(resected(1.0, config), config);
   double removed = 0.0, all = 0.0, largest = 0.0, deepest_removed = 60.0, highest_left = 0.0;
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     const Vec3 x = centre_of(t);
     // The surface of the ball is made of triangles of 4 mm: 0.2 mm inside it at most.
     const double radius = (x - kTumour).norm();
@@ -88,7 +92,7 @@ TEST(Resection, OfTheWholeTumourLeavesNothingOfIt) {
   const CaseConfig config = test_support::toy_config();
   const ResectedBrain brain = resected(1.0, config);
   const std::set<int> soft = softened(brain, config);
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     const double radius = (centre_of(t) - kTumour).norm();
     if (radius < kRadius_mm - 0.3) {
       EXPECT_EQ(soft.count(t), 1u) << t;
@@ -96,7 +100,8 @@ TEST(Resection, OfTheWholeTumourLeavesNothingOfIt) {
       EXPECT_EQ(soft.count(t), 0u) << t;
     }
   }
-  EXPECT_EQ(brain.tissue.num_tets() + static_cast<int>(soft.size()), patient().mesh.num_tets());
+  EXPECT_EQ(brain.tissue.num_tets() + static_cast<int>(soft.size()),
+            resected_patient().mesh.num_tets());
 }
 
 TEST(Resection, TheRestOfAStiffTumourStaysStiff) {
@@ -106,7 +111,7 @@ TEST(Resection, TheRestOfAStiffTumourStaysStiff) {
   const auto is = contact::tissue_map(brain.model, brain.config.material);
   ASSERT_TRUE(is);
   int stiff = 0, soft = 0;
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     const double pa = is->at(t).elastic.shear / units::stress_from_pa(1.0);
     const bool deep = centre_of(t)[2] < kTumour[2] - 2.0;
     if ((centre_of(t) - kTumour).norm() > kRadius_mm) {
@@ -126,12 +131,12 @@ TEST(Resection, TheRestOfAStiffTumourStaysStiff) {
 TEST(Resection, ComesOnTopOfStiffnessThatVaries) {
   Scenario scenario = *find_scenario("resection");
   scenario.stiffness_length_mm = 8.0;
-  const auto brain = truth_brain(patient(), test_support::toy_config(), scenario, 3);
+  const auto brain = truth_brain(resected_patient(), test_support::toy_config(), scenario, 3);
   ASSERT_TRUE(brain) << brain.error().message;
   const auto map = contact::tissue_map(brain->model, brain->config.material);
   ASSERT_TRUE(map);
   std::set<double> inside, outside;
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     const double g = map->at(t).elastic.shear;
     ((centre_of(t) - kTumour).norm() > kRadius_mm ? outside : inside).insert(g);
   }
@@ -147,7 +152,8 @@ TEST(Resection, WhatIsGoneHasNoWeight) {
   for (const int t : softened(brain, config)) removed += volume_of(t);
   ASSERT_GT(removed, 1000.0);
   const Vec3 down(0, 0, -1);
-  const Points before = fem::buoyancy_load(patient().mesh, config.material, down, 1e6, down);
+  const Points before =
+      fem::buoyancy_load(resected_patient().mesh, config.material, down, 1e6, down);
   const Points after = fem::buoyancy_load(brain.tissue, config.material, down, 1e6, down);
   const double density = units::weight_density_from_kg_m3(999.0);
   EXPECT_NEAR((before - after).rowwise().sum()[2], -removed * density, 1e-9);
@@ -157,10 +163,11 @@ TEST(Resection, ANodeIsAttachedWhereTissueIsLeftAroundIt) {
   const CaseConfig config = test_support::toy_config();
   const ResectedBrain brain = resected(1.0, config);
   const std::set<int> soft = softened(brain, config);
-  std::vector<int> around(static_cast<std::size_t>(patient().mesh.num_nodes()), 0);
-  for (int t = 0; t < patient().mesh.num_tets(); ++t) {
+  std::vector<int> around(static_cast<std::size_t>(resected_patient().mesh.num_nodes()), 0);
+  for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
     if (soft.count(t)) continue;
-    for (int k = 0; k < 4; ++k) ++around[static_cast<std::size_t>(patient().mesh.tets(k, t))];
+    for (int k = 0; k < 4; ++k)
+      ++around[static_cast<std::size_t>(resected_patient().mesh.tets(k, t))];
   }
   int removed = 0;
   for (std::size_t i = 0; i < around.size(); ++i) {
@@ -182,7 +189,7 @@ class ResectedSurgery : public testing::Test {
     return scenario;
   }
   static SimulatedSurgery play(const Scenario& scenario) {
-    auto surgery = play_scenario(patient(), test_support::toy_config(), scenario, 1);
+    auto surgery = play_scenario(resected_patient(), test_support::toy_config(), scenario, 1);
     EXPECT_TRUE(surgery) << surgery.error().message;
     return std::move(*surgery);
   }
@@ -196,13 +203,13 @@ TEST_F(ResectedSurgery, TheBrainSagsIntoTheCavity) {
   // The roof of the cavity, between it and the opening, sinks farther; so does no other place
   // half as much.
   double roof = 0.0;
-  for (int i = 0; i < patient().mesh.num_nodes(); ++i) {
-    const Vec3 x = patient().mesh.nodes.col(i);
+  for (int i = 0; i < resected_patient().mesh.num_nodes(); ++i) {
+    const Vec3 x = resected_patient().mesh.nodes.col(i);
     if ((x - Vec3(30, 30, 50)).norm() < 1e-9) roof = without(2, i) - with(2, i);
   }
   EXPECT_GT(roof, 0.05);
-  for (int i = 0; i < patient().mesh.num_nodes(); ++i) {
-    const Vec3 x = patient().mesh.nodes.col(i);
+  for (int i = 0; i < resected_patient().mesh.num_nodes(); ++i) {
+    const Vec3 x = resected_patient().mesh.nodes.col(i);
     if ((x - kTumour).norm() < 25.0) continue;
     EXPECT_LT(without(2, i) - with(2, i), 0.5 * roof) << i;
   }
@@ -216,13 +223,13 @@ TEST_F(ResectedSurgery, NothingOfTheCavityIsMeasuredOrScored) {
   ASSERT_GT(removed.size(), 2u);
   EXPECT_EQ(truth.scalars.at("removed_nodes"), static_cast<double>(removed.size()));
   EXPECT_DOUBLE_EQ(truth.scalars.at("resected_fraction"), 0.9);
-  TriangleSurface deformed = patient().tumour;
+  TriangleSurface deformed = resected_patient().tumour;
   std::vector<char> scored(static_cast<std::size_t>(deformed.num_vertices()), 0);
   ASSERT_GT(truth.points.at("cross").size(), 20u);
   for (const io::ScorePoint& point : truth.points.at("cross")) {
     Vec3 x = Vec3::Zero();
     for (int k = 0; k < 4; ++k) {
-      x += point.weights[k] * patient().mesh.nodes.col(point.nodes[k]);
+      x += point.weights[k] * resected_patient().mesh.nodes.col(point.nodes[k]);
       if (point.weights[k] > 0.0) {
         EXPECT_EQ(removed.count(point.nodes[k]), 0u);
       }
@@ -256,12 +263,12 @@ TEST(ResectionRefusal, NamesTheFractionAndTheEmptyTumour) {
   const CaseConfig config = test_support::toy_config();
   for (const double fraction : {0.0, -0.1, 1.01, std::numeric_limits<double>::quiet_NaN(),
                                 std::numeric_limits<double>::infinity()}) {
-    const auto brain = resect(patient(), config, {fraction});
+    const auto brain = resect(resected_patient(), config, {fraction});
     ASSERT_FALSE(brain) << fraction;
     EXPECT_EQ(brain.error().code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(brain.error().message, HasSubstr("resection.volume_fraction"));
   }
-  BrainModel elsewhere = patient();
+  BrainModel elsewhere = resected_patient();
   elsewhere.tumour.vertices.colwise() += Vec3(500, 0, 0);
   const auto brain = resect(elsewhere, config, {});
   ASSERT_FALSE(brain);

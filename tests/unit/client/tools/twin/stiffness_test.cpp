@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSd = 0.3, kLength_mm = 8.0;
 
-const BrainModel& patient() {
+const BrainModel& stiffness_patient() {
   static const BrainModel model = test_support::toy_patient(6);
   return model;
 }
@@ -21,7 +21,7 @@ const BrainModel& patient() {
 // ln of the relative shear modulus of every element.
 VecX log_stiffness(std::uint64_t seed) {
   const CaseConfig config = test_support::toy_config();
-  const VariedBrain varied = vary_stiffness(patient(), config, kSd, kLength_mm, seed);
+  const VariedBrain varied = vary_stiffness(stiffness_patient(), config, kSd, kLength_mm, seed);
   VecX ln(varied.model.mesh.num_tets());
   for (int t = 0; t < varied.model.mesh.num_tets(); ++t) {
     const int label = varied.model.mesh.labels.at(static_cast<std::size_t>(t));
@@ -49,7 +49,7 @@ TEST(VariedStiffness, IsTheSameBrainForASeed) {
 // the variance of a standard normal clamped to +-2 is 0.9205, rounding adds 0.5^2 / 12.
 TEST(VariedStiffness, HasTheMeanSpreadAndLengthAskedFor) {
   constexpr int kBrains = 60;
-  const Points x = centroids(patient().mesh);
+  const Points x = centroids(stiffness_patient().mesh);
   const Eigen::Index elements = x.cols();
   double sum = 0.0, squares = 0.0;
   // Of pairs of elements by distance in units of the length: about 1, and beyond 4.
@@ -87,7 +87,7 @@ TEST(VariedStiffness, HasTheMeanSpreadAndLengthAskedFor) {
 // ln of the relative shear modulus of every element, with tissues told apart.
 VecX log_tissues(std::uint64_t seed) {
   const CaseConfig config = test_support::toy_config();
-  const auto varied = vary_tissues(patient(), config, seed);
+  const auto varied = vary_tissues(stiffness_patient(), config, seed);
   EXPECT_TRUE(varied) << varied.error().message;
   VecX ln(varied->model.mesh.num_tets());
   for (int t = 0; t < varied->model.mesh.num_tets(); ++t) {
@@ -117,7 +117,7 @@ TEST(VariedTissues, AreTheSameForASeedAndDifferInTheTumour) {
   EXPECT_EQ(log_tissues(3), log_tissues(3));
   EXPECT_NE(log_tissues(3), log_tissues(4));
   // Centres of tetrahedra well inside the tumour, and well outside it but not at the surface.
-  const Points x = centroids(patient().mesh);
+  const Points x = centroids(stiffness_patient().mesh);
   int differ = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const VecX ln = log_tissues(seed);

@@ -15,13 +15,13 @@ namespace {
 using testing::HasSubstr;
 
 constexpr double kBrain_mm = 45.0;
-const Vec3 kTumour(22, 0, 0), kVentricle(5, 14, 0);
+const Vec3 kSweptTumour(22, 0, 0), kVentricle(5, 14, 0);
 
 // A ball of white matter, x to the right, with a fissure (1.5 mm thick, at z = -12), a ventricle
 // (a ball of 7 mm) and a tumour (a ball of 8 mm).
 struct ToyHead {
   VoxelImage mri, brain;
-  TriangleSurface tumour = geometry::ellipsoid_surface(kTumour, Vec3::Constant(8.0), 2.0);
+  TriangleSurface tumour = geometry::ellipsoid_surface(kSweptTumour, Vec3::Constant(8.0), 2.0);
   Craniotomy craniotomy;
 
   ToyHead() {
@@ -53,7 +53,7 @@ const TissueEcho& tissue() {
 
 UltrasoundSweep short_sweep() {
   UltrasoundSweep sweep;
-  sweep.target = kTumour;
+  sweep.target = kSweptTumour;
   sweep.frames_per_sweep = 3;
   return sweep;
 }
@@ -97,7 +97,7 @@ TEST(TissueEcho, IsNoFunctionOfTheMri) {
   const Vec3 fissure(0, -20, -12);
   EXPECT_NEAR(mri(fissure), mri(kVentricle), 1e-3);
   EXPECT_GT(scatter(fissure), 50.0f * scatter(kVentricle));
-  EXPECT_GT(scatter(kTumour), 2.0f * scatter(Vec3(0, -20, 10)));
+  EXPECT_GT(scatter(kSweptTumour), 2.0f * scatter(Vec3(0, -20, 10)));
   EXPECT_LT(scatter(Vec3(0, -20, 10)), scatter(fissure));
 }
 
@@ -118,8 +118,8 @@ TEST(MriWithTumour, ShowsARimAndACore) {
   const auto image = mri_with_tumour(head().mri, head().brain, head().tumour);
   ASSERT_TRUE(image);
   const geometry::Interpolator at(*image);
-  EXPECT_NEAR(at(kTumour), 60.0, 10.0);
-  EXPECT_NEAR(at(kTumour + Vec3(0, 6, 0)), 140.0, 15.0);
+  EXPECT_NEAR(at(kSweptTumour), 60.0, 10.0);
+  EXPECT_NEAR(at(kSweptTumour + Vec3(0, 6, 0)), 140.0, 15.0);
   EXPECT_NEAR(at(Vec3(0, -20, 10)), 100.0, 10.0);
 }
 
@@ -143,7 +143,8 @@ TEST(SimulatedUltrasound, FramesLieWhereTheirPosesSay) {
   const Vec3 two = recording.links[0].samples[4].T_to_from.linear().col(2).normalized();
   EXPECT_NEAR(one.dot(two), 0.0, 1e-9);
   for (std::size_t frame : {1u, 4u})
-    EXPECT_NEAR((recording.links[0].samples[frame].T_to_from.inverse() * kTumour).z(), 0.0, 1e-9);
+    EXPECT_NEAR((recording.links[0].samples[frame].T_to_from.inverse() * kSweptTumour).z(), 0.0,
+                1e-9);
 }
 
 TEST(SimulatedUltrasound, IsBlackOutsideTheSectorAndNowhereElse) {
@@ -158,7 +159,7 @@ TEST(SimulatedUltrasound, IsBlackOutsideTheSectorAndNowhereElse) {
 
 TEST(SimulatedUltrasound, ShowsTheTumourBrightAndTheVentricleDark) {
   const tracking::Recording recording = frames(3);
-  const double tumour = grey_mean(recording, 1, kTumour, 5);
+  const double tumour = grey_mean(recording, 1, kSweptTumour, 5);
   const double tissue_below = grey_mean(recording, 1, Vec3(0, 0, 0), 5);
   EXPECT_GT(tumour, tissue_below + 20.0);
   // One of the two middle planes holds the y axis.
@@ -180,7 +181,7 @@ TEST(SimulatedUltrasound, IsDarkBehindBone) {
       tissue(), *probe_window(narrow.brain, narrow.craniotomy), {}, short_sweep(), random);
   const tracking::Recording open = frames(4);
   // The middle beam enters through either; one far from it only through the wide opening.
-  EXPECT_NEAR(grey_mean(shadowed, 1, kTumour, 2), grey_mean(open, 1, kTumour, 2), 40.0);
+  EXPECT_NEAR(grey_mean(shadowed, 1, kSweptTumour, 2), grey_mean(open, 1, kSweptTumour, 2), 40.0);
   const auto side = [](const tracking::Recording& recording) {
     return recording.frame_values(1)
         .block(recording.height / 2, recording.width / 2 + 40, 9, 9)
@@ -209,7 +210,7 @@ TEST(SimulatedUltrasound, SpeckleHasRayleighStatistics) {
       for (int u = 0; u < recording.width; ++u) {
         const Vec3 x = T * Vec3(u, v, 0);
         // White matter, far from anything else.
-        if (x.norm() > 38.0 || (x - kTumour).norm() < 12.0 || (x - kVentricle).norm() < 14.0 ||
+        if (x.norm() > 38.0 || (x - kSweptTumour).norm() < 12.0 || (x - kVentricle).norm() < 14.0 ||
             std::abs(x.z() + 12.0) < 7.0 || values(v, u) < 1.5f)
           continue;
         const double envelope =

@@ -12,13 +12,13 @@
 namespace brainshift::client {
 namespace {
 
-constexpr std::uint64_t kSeeds = 400;
+constexpr std::uint64_t kVariationSeeds = 400;
 
 // Smallest and largest of what the variations of a scenario have.
 template <typename Figure>
 std::pair<double, double> extremes(const char* name, Figure figure) {
   double least = 1e300, most = -1e300;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kVariationSeeds; ++seed) {
     const double value = figure(vary(*find_scenario(name), seed));
     least = std::min(least, value);
     most = std::max(most, value);

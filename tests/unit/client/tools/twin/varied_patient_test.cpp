@@ -34,7 +34,7 @@ const TetMesh& ball() {
   return mesh;
 }
 
-CaseConfig patient(std::uint64_t seed) {
+CaseConfig unvaried_patient(std::uint64_t seed) {
   auto config = vary_patient(ball_case().config, ball(), seed);
   EXPECT_TRUE(config) << config.error().message;
   return std::move(*config);
@@ -42,7 +42,7 @@ CaseConfig patient(std::uint64_t seed) {
 
 TEST(VariedPatient, HasTheTumourInsideTheBrainBelowTheOpening) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const CaseConfig config = patient(seed);
+    const CaseConfig config = unvaried_patient(seed);
     const auto& tumour = std::get<TumourEllipsoid>(config.tumour);
     for (const double axis : tumour.semi_axes_mm) {
       EXPECT_GE(axis, 8.0);
@@ -70,16 +70,17 @@ TEST(VariedPatient, HasTheTumourInsideTheBrainBelowTheOpening) {
 
 TEST(VariedPatient, IsOpenedAboveTheSkullBaseAndBesideTheMidline) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const Vec3 opening = patient(seed).craniotomy.centre_mm - kBallCentre;
+    const Vec3 opening = unvaried_patient(seed).craniotomy.centre_mm - kBallCentre;
     EXPECT_GE(opening[2], -50.0 + 0.4 * 100.0 - 1.5) << seed;
     EXPECT_GE(std::abs(opening[0]), 12.0 - 1.0) << seed;
-    EXPECT_GE(patient(seed).craniotomy.long_axis_mm, patient(seed).craniotomy.short_axis_mm);
+    EXPECT_GE(unvaried_patient(seed).craniotomy.long_axis_mm,
+              unvaried_patient(seed).craniotomy.short_axis_mm);
   }
 }
 
 TEST(VariedPatient, LiesSoThatTheOpeningIsAboutUppermostAndTheHeadNotDown) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const CaseConfig config = patient(seed);
+    const CaseConfig config = unvaried_patient(seed);
     const Vec3 up = -config.gravity_direction;
     EXPECT_NEAR(up.norm(), 1.0, 1e-12);
     const Vec3 opening = (config.craniotomy.centre_mm - kBallCentre).normalized();
@@ -92,7 +93,7 @@ TEST(VariedPatient, TheSeedDecidesAndNothingElseOfTheCaseChanges) {
   const CaseConfig before = ball_case().config;
   std::set<double> depths;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const CaseConfig a = patient(seed), b = patient(seed);
+    const CaseConfig a = unvaried_patient(seed), b = unvaried_patient(seed);
     EXPECT_EQ(a.craniotomy.centre_mm, b.craniotomy.centre_mm);
     EXPECT_EQ(a.gravity_direction, b.gravity_direction);
     EXPECT_EQ(a.case_id, before.case_id + "-" + std::to_string(seed));
@@ -107,7 +108,7 @@ TEST(VariedPatient, TheSeedDecidesAndNothingElseOfTheCaseChanges) {
 TEST(VariedPatient, CanBeBuilt) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     CaseInputs inputs = ball_case();
-    inputs.config = patient(seed);
+    inputs.config = unvaried_patient(seed);
     const auto model = anatomy::build_brain_model(inputs);
     ASSERT_TRUE(model) << seed << ": " << model.error().message;
     EXPECT_FALSE(model->craniotomy.empty());
