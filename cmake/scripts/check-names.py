@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""check-names.py [SOURCE_DIR]: no two .cpp files of a folder define the same name for themselves.
+"""check-names.py BUILD_DIR: no two files that are compiled as one define the same name for themselves.
 
-A unity build (BRAINSHIFT_UNITY) compiles the files of a folder as one. A name of an unnamed namespace is then visible in the
-files behind it: two equal names do not compile, or, worse, a call reaches the other file's overload. So names are unique
-within a folder; what two files share stands once, in a header. Exit status 1 with one line for each name.
+In a unity build (BRAINSHIFT_UNITY) a name of an unnamed namespace is visible in the files behind it: two equal names do not
+compile, or, worse, a call reaches the other file's overload. What two files share stands once, in a header. Exit status 1
+with one line for each name.
 """
 import collections
 import pathlib
 import re
-import subprocess
 import sys
 
 DEFINITION = re.compile(
@@ -63,23 +62,28 @@ def names(text):
     return found
 
 
+def units(build):
+    """The lists of files that are compiled as one."""
+    for unit in sorted(pathlib.Path(build).rglob("Unity/unity_*.cxx")):
+        yield [pathlib.Path(path) for path in re.findall(r'^#include "(.*)"', unit.read_text(), re.MULTILINE)]
+
+
 def main():
-    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    listed = subprocess.run(["git", "-C", root, "ls-files", "-co", "--exclude-standard", "*.cpp"], capture_output=True,
-                            text=True, check=False)
-    files = [root / line for line in listed.stdout.splitlines()] if listed.returncode == 0 else root.rglob("*.cpp")
     folders = collections.defaultdict(lambda: collections.defaultdict(list))
-    for file in files:
-        if file.is_file():
+    compared = 0
+    for index, files in enumerate(units(sys.argv[1])):
+        compared += len(files)
+        for file in files:
             for name, line in names(file.read_text()).items():
-                folders[file.parent][name].append((file.name, line))
+                folders[(file.parent, index)][name].append((file.name, line))
     bad = 0
-    for folder, defined in sorted(folders.items()):
+    for (folder, _), defined in sorted(folders.items()):
         for name, places in sorted(defined.items()):
             equal_aliases = len({line for _, line in places}) == 1 and places[0][1]
             if len(places) > 1 and not equal_aliases and name != "PrintTo":
                 print(f"{folder}: {name} in {', '.join(sorted(file for file, _ in places))}")
                 bad += 1
+    print(f"check-names: {compared} files, {bad} names that stand twice in what is compiled as one")
     return 1 if bad else 0
 
 
