@@ -2,13 +2,14 @@
 """One style for all charts: Okabe and Ito's palette (distinguishable under the common colour-vision
 deficiencies), a marker beside every colour, units on the axes, small PNGs with a palette."""
 import io
+import math
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from PIL import Image  # matplotlib needs it too
 
 from .common import write_file
@@ -41,22 +42,27 @@ def _plain(value, _):
     return f"{value:g}" if 1e-3 <= abs(value) < 1e5 else f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
 
 
+def log_ticks(low, high):
+    """Powers of ten; with 2 and 5, or more, where there are few; every second or third where many."""
+    for steps in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 8)):
+        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        ticks = [step * 10.0 ** power for power in powers for step in steps]
+        ticks = [tick for tick in ticks if low <= tick <= high]
+        if len(ticks) >= 3:
+            return ticks[::1 + (len(ticks) - 1) // 9]
+    return ticks
+
+
 def label(ax, x, y, log_x=False, log_y=False):
-    """Names with their units; a logarithmic axis over less than two decades also labels 2 and 5."""
+    """Names with their units. After plotting: a logarithmic axis has its ticks where the data are."""
     ax.set_xlabel(x)
     ax.set_ylabel(y)
-    for axis, log in ((ax.xaxis, log_x), (ax.yaxis, log_y)):
-        if not log:
-            continue
-        (ax.set_xscale if axis is ax.xaxis else ax.set_yscale)("log")
-        axis.set_major_formatter(FuncFormatter(_plain))
-        low, high = axis.get_view_interval()
-        if low > 0 and high / low < 100:
-            axis.set_minor_locator(matplotlib.ticker.LogLocator(subs=(2, 5)))
-            axis.set_minor_formatter(FuncFormatter(_plain))
-            ax.grid(which="minor", axis="x" if axis is ax.xaxis else "y")
-        else:
-            axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+    for axis, scale, log in ((ax.xaxis, ax.set_xscale, log_x), (ax.yaxis, ax.set_yscale, log_y)):
+        if log:
+            scale("log")
+            axis.set_major_locator(FixedLocator(log_ticks(*axis.get_view_interval())))
+            axis.set_major_formatter(FuncFormatter(_plain))
+            axis.set_minor_locator(NullLocator())
 
 
 def style(k):
@@ -94,12 +100,31 @@ def legend(ax, **options):
         ax.legend(**{"loc": "center left", "bbox_to_anchor": (1.0, 0.5), **options})
 
 
-def save(fig, path):
-    """As PNG with a palette of 64 colours."""
+def _house_palette():
+    """Every colour of the style in steps towards white, for smooth edges of lines and letters."""
+    colours = np.array([list(bytes.fromhex(one[1:])) for one in (*COLOURS, YELLOW, INK, GREY, "#000000")])
+    steps = [255 - (255 - colours) * share for share in np.linspace(1, 0, 25, endpoint=False)]
+    return np.vstack([[255, 255, 255], [225, 225, 225], np.round(np.vstack(steps)).astype(int)])
+
+
+def _indexed(pixels):
+    """Height x width x 3 -> an image of the palette's nearest colours."""
+    palette = _house_palette()
+    different, place = np.unique(pixels.reshape(-1, 3), axis=0, return_inverse=True)
+    nearest = np.array([np.argmin(((palette - colour.astype(int)) ** 2).sum(axis=1)) for colour in different])
+    image = Image.fromarray(nearest[place].reshape(pixels.shape[:2]).astype(np.uint8), "P")
+    image.putpalette(palette.astype(np.uint8).ravel().tolist())
+    return image
+
+
+def save(fig, path, own_colours=False):
+    """As PNG with a palette: the style's, or with own_colours (a colour map, a photograph) the
+    picture's own 256."""
     fig.canvas.draw()
-    image = Image.fromarray(np.asarray(fig.canvas.buffer_rgba())).convert("RGB")
+    pixels = np.asarray(fig.canvas.buffer_rgba())[..., :3].copy()
     plt.close(fig)
+    image = Image.fromarray(pixels).quantize(256) if own_colours else _indexed(pixels)
     content = io.BytesIO()
-    image.quantize(64).save(content, "PNG", optimize=True)
+    image.save(content, "PNG", optimize=True)
     write_file(path, content.getvalue())
     print(f"wrote {path}")
