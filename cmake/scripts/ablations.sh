@@ -33,6 +33,6 @@ status=0
 step estimates "$bin/ablations" --out "$out/rows-colin27.csv" "${options[@]}"
 step summary "$bin/ablations_summary" "$out/rows-colin27.csv" || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make ablations" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make ablations" \
   --title Ablations || status=1
 exit "$status"

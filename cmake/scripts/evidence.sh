@@ -82,6 +82,6 @@ else
 fi
 step summary "$bin/evidence_summary" "$out"/rows-*.csv || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make evidence" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make evidence" \
   --title Evidence || status=1
 exit "$status"

@@ -28,5 +28,5 @@ stiffness() {
 }
 step "unknown stiffness" stiffness || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make prior" --title Prior || status=1
+studies summary --dir "$out" --commit "$(commit_name)" --command "make prior" --title Prior || status=1
 exit "$status"

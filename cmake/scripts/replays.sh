@@ -62,6 +62,6 @@ step summary "$bin/replays_summary" --rows "$out/rows-$head.csv" --corpus "$out/
   --committed-rows "${COMMITTED:-docs/replays}/rows-$head.csv" \
   --committed-corpus "tests/replays/corpus-$head.csv" || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make replays" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make replays" \
   --title Replays || status=1
 exit "$status"

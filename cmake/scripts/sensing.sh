@@ -39,6 +39,6 @@ through_the_daemon() {
 }
 step "through the daemon: joint-mixed" through_the_daemon || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make sensing" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make sensing" \
   --title Sensing || status=1
 exit "$status"

@@ -44,6 +44,6 @@ for table in "$before"/rows-*.csv; do
 done
 step summary "$bin/surgeries_summary" "$out"/rows-*.csv "${earlier[@]}" || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make surgeries" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make surgeries" \
   --title Surgeries || status=1
 exit "$status"

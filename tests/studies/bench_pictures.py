@@ -42,7 +42,7 @@ def _errors(methods, path):
                 ax.annotate(str(one.rank), (x, y), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
             named.add(legend)
         chart.label(ax, "time of one estimate (ms)", f"mean error {where} (mm)", True, True)
-    chart.legend(axes[-1])
+    chart.legend(axes[-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
     chart.save(fig, path)
 
 

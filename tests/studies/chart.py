@@ -95,9 +95,13 @@ def strips(ax, names, series):
 
 
 def legend(ax, **options):
-    """Beside the axes, where it hides nothing; none for a single nameless series."""
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(**{"loc": "center left", "bbox_to_anchor": (1.0, 0.5), **options})
+    """Beside the axes, long names below them, where it hides nothing; none for a nameless series."""
+    names = ax.get_legend_handles_labels()[1]
+    if not names:
+        return
+    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    below = {"loc": "upper left", "bbox_to_anchor": (0.0, -0.13)}
+    ax.legend(**{**(beside if max(map(len, names)) < 30 else below), **options})
 
 
 def _house_palette():

@@ -8,13 +8,13 @@ from .common import study_parser
 from .rows import Table
 
 # Errors, sizes, times and the like span powers of ten; positions and pressures do not.
-LOGARITHMIC = ("error", "size", "steps", " s", "unknowns", "elements", "roughness", "over bound")
+LOGARITHMIC = ("error", "size", "steps", "unknowns", "elements", "roughness", "over bound")
 UNITS = ("mm", "s", "%", "kPa", "Pa", "N", "MPa")
 TIME_FACTOR = "T"  # time over consolidation time
 
 
 def logarithmic(axis):
-    return axis == TIME_FACTOR or any(word in axis for word in LOGARITHMIC)
+    return axis == TIME_FACTOR or axis.endswith(" s") or any(word in axis for word in LOGARITHMIC)
 
 
 def with_unit(axis):
@@ -48,7 +48,9 @@ def draw(points, title, folder):
         for name in exact:
             ax.plot(*zip(*series[name]), color=chart.INK, linestyle="--", linewidth=1.2,
                     label="series" if name == exact[0] else None)
-        chart.label(ax, with_unit(x_name), with_unit(y_name), logarithmic(x_name), logarithmic(y_name))
+        log_x, log_y = (logarithmic(name) and all(point[k] > 0.0 for of_series in series.values() for point in of_series)
+                        for k, name in enumerate((x_name, y_name)))
+        chart.label(ax, with_unit(x_name), with_unit(y_name), log_x, log_y)
         chart.legend(ax)
         count = 1
         while (name := study if count == 1 else f"{study}-{count}") in names:

@@ -75,6 +75,7 @@ def test_axes_have_units_and_logarithms_where_values_span_powers_of_ten():
     assert with_unit("element size mm") == "element size (mm)" and with_unit("depth / H") == "depth / H"
     assert with_unit("T") == "T: time over consolidation time" and with_unit("mm") == "mm"
     assert logarithmic("displacement error %") and logarithmic("T") and not logarithmic("depth / H")
+    assert logarithmic("assembly and solve s") and not logarithmic("noise sd over grey value")
 
 
 @pytest.mark.parametrize("study", ["verification", "sensing", "faults"])
