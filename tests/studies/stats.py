@@ -38,7 +38,11 @@ def incomplete_beta(a, b, x):
     if x <= 0.0 or x >= 1.0:
         return 0.0 if x <= 0.0 else 1.0
     if x >= (a + 1.0) / (a + b + 2.0):  # the fraction converges fast below
-        return 1.0 - incomplete_beta(b, a, 1.0 - x)
+        return 1.0 - _by_fraction(b, a, 1.0 - x)
+    return _by_fraction(a, b, x)
+
+
+def _by_fraction(a, b, x):
     tiny = 1e-300
     kept = lambda value: tiny if abs(value) < tiny else value
     c, d = 1.0, 1.0 / kept(1.0 - (a + b) * x / (a + 1.0))
@@ -94,3 +98,8 @@ def pareto_front(points):
         if not front or points[i][1] < points[front[-1]][1]:
             front.append(i)
     return front
+
+
+def over(a, b):
+    """a / b; NaN where there is no quotient."""
+    return a / b if b else math.nan
