@@ -70,6 +70,11 @@ def style(k):
     return {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)]}
 
 
+def colour_map(*colours):
+    """From the first colour to the last; save() keeps the shades between white and a colour of the style."""
+    return matplotlib.colors.LinearSegmentedColormap.from_list("style", colours)
+
+
 def bound_lines(ax, bounds, text):
     """Dashed lines across the axes, explained once."""
     for i, bound in enumerate(bounds):

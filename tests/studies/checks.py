@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks: a value against a bound that is told in words; and the records that studies keep of them.
 
-A folder of records holds, with headings (cmake/scripts/steps.sh makes them; C++ programs append by
-tests/support/study_record.hpp):
+A folder of records holds, with headings (cmake/scripts/steps.sh makes them, and save() where it did not; C++
+programs append by tests/support/study_record.hpp):
 
     points.csv    study,series,x_name,y_name,x,y          points of curves
     checks.csv    study,name,value,bound,pass,source      pass: 1, 0, or empty without a bound
@@ -14,6 +14,10 @@ from dataclasses import dataclass
 
 from .common import WriteError, write_file
 from .rows import Table, cell_or_dash, significant
+
+POINTS = ("study", "series", "x_name", "y_name", "x", "y")
+CHECKS = ("study", "name", "value", "bound", "pass", "source")
+LEFT_OUT = ("study", "reason")
 
 
 @dataclass
@@ -76,12 +80,15 @@ class Record:
         self.parts_left_out.append((study, reason))
 
     def save(self):
-        for name, rows in (("checks.csv", self.checks), ("left_out.csv", self.parts_left_out)):
+        for name, heading, rows in (("points.csv", POINTS, []), ("checks.csv", CHECKS, self.checks),
+                                    ("left_out.csv", LEFT_OUT, self.parts_left_out)):
             for cell in (cell for row in rows for cell in row):
                 if any(mark in cell for mark in ',"\n'):
                     raise ValueError(f"{cell}: a cell of a table has no comma, quote or line break")
             try:
                 with open(self.folder / name, "a", encoding="utf-8") as file:
+                    if not file.tell():
+                        file.write(",".join(heading) + "\n")
                     file.writelines(",".join(row) + "\n" for row in rows)
             except OSError as error:
                 raise WriteError(f"{self.folder / name}: cannot be written: {error.strerror}") from None
@@ -100,9 +107,8 @@ def _tables(checks, commit, command):
 
 def summarise(folder, commit, command):
     """Records -> tables.md and summary.json; prints them. True when every check holds."""
-    rows = Table.read(folder / "checks.csv", ("study", "name", "value", "bound", "pass", "source"))
-    left_out = [f"{row['study']}: {row['reason']}"
-                for row in Table.read(folder / "left_out.csv", ("study", "reason"))]
+    rows = Table.read(folder / "checks.csv", CHECKS)
+    left_out = [f"{row['study']}: {row['reason']}" for row in Table.read(folder / "left_out.csv", LEFT_OUT)]
     checks = [Check(f"{row['study']}: {row['name']}", row.number("value"), row["bound"],
                     row["pass"] == "1" if row["pass"] else None, command) for row in rows]
     print_checks(checks, left_out)

@@ -3,7 +3,7 @@
 
 For `make verify`, sensing, interchange, faults; the other studies end with it too."""
 from . import chart
-from .checks import summarise
+from .checks import POINTS, summarise
 from .common import study_parser
 from .rows import Table
 
@@ -61,8 +61,7 @@ def draw(points, title, folder):
 
 def finish(options):
     """Charts and summary of the records in options.dir. True when every check holds."""
-    points = Table.read(options.dir / "points.csv", ("study", "series", "x_name", "y_name", "x", "y"))
-    draw(points, options.title, options.dir)
+    draw(Table.read(options.dir / "points.csv", POINTS), options.title, options.dir)
     return summarise(options.dir, options.commit, options.command)
 
 
