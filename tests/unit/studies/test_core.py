@@ -23,6 +23,8 @@ def test_a_table_reads_cells_by_column():
     assert rows[0].number("a") == 1.5 and rows[1].number("a") == -2e-3
     assert rows[0]["b"] == "x" and math.isnan(rows[0].number("c")), "an empty cell is no value"
     assert rows.has("c") and not rows.has("d")
+    with pytest.raises(InputError, match="t.csv: has no column d"):
+        rows[0].number("d")
     assert rows.mean("c") == 7.0 and math.isnan(table("a\n\n").mean("a"))
 
 
@@ -92,6 +94,7 @@ def test_a_record_refuses_what_no_cell_can_hold(tmp_path):
 def test_incomplete_beta_gives_the_tabled_quantiles_of_student():
     for t, freedom, p in ((2.5706, 5, 0.05), (4.0321, 5, 0.01), (12.7062, 1, 0.05), (1.98397, 100, 0.05)):
         assert incomplete_beta(freedom / 2, 0.5, freedom / (freedom + t * t)) == pytest.approx(p, abs=1e-5)
+    assert incomplete_beta(0.5, 0.5, 0.5) == pytest.approx(0.5, abs=1e-14), "by symmetry, where both fractions meet"
     assert incomplete_beta(2, 3, 0) == 0 and incomplete_beta(2, 3, 1) == 1
     assert incomplete_beta(1, 1, 0.37) == pytest.approx(0.37, abs=1e-14), "uniform"
 
