@@ -3,9 +3,9 @@
 // tests/studies/prior.py compares their motion with what surgeons have measured (targets.csv).
 //
 // Writes into OUT, numbers in full:
-//   draws.csv        part,settled,cortex_mm,tumour_mm,far_side_mm,outward_mm,min_volume_ratio: a row
-//                    per part and brain; nothing else is known of one without a contact set
-//                    (settled 0); min_volume_ratio of "total" only
+//   draws.csv        a row per part and brain: part,settled,cortex_mm,tumour_mm,far_side_mm,
+//                    outward_mm,min_volume_ratio. Nothing else is known of a brain without a
+//                    contact set (settled 0); min_volume_ratio is that of "total" alone
 //   truncation.csv   place,left_out_sd_mm: what the modes leave out (prior_draws.hpp)
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -101,7 +101,8 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--strength", arguments.strengths,
                  "PART=NUMBER, in units of the case's standard deviations: what if");
-  app.add_option("--out", arguments.out, "folder of draws.csv and truncation.csv")->capture_default_str();
+  app.add_option("--out", arguments.out, "folder of draws.csv and truncation.csv")
+      ->capture_default_str();
   return brainshift::surgeries::run_study(app, argc, argv,
                                           [&] { return brainshift::prior_study::run(arguments); });
 }

@@ -27,14 +27,10 @@ struct Sheet {
   void (*sweep)(const Options&);
 };
 const std::vector<Sheet> kSheets = {
-    {"penalty", sweep_penalty},
-    {"material", sweep_material},
-    {"mesh", sweep_mesh},
-    {"load", sweep_load},
-    {"data", sweep_data},
-    {"contact", sweep_contact},
-    {"elements", sweep_elements},
-    {"consolidation", sweep_consolidation},
+    {"penalty", sweep_penalty},   {"material", sweep_material},
+    {"mesh", sweep_mesh},         {"load", sweep_load},
+    {"data", sweep_data},         {"contact", sweep_contact},
+    {"elements", sweep_elements}, {"consolidation", sweep_consolidation},
 };
 
 struct Arguments {

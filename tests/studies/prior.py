@@ -126,7 +126,7 @@ def record_figures(draws, truncation, record):
 def draw_predictive(total, targets, path):
     """Share of draws that move less, beside the published quantiles. That of the far side rests on no
     series."""
-    fig, axes = chart.figure("Motion of brains drawn from the prior", f"{len(total)} draws", columns=3, size=(12.5, 4.6))
+    fig, axes = chart.figure(f"Motion of {len(total)} brains drawn from the prior", columns=3, size=(12.5, 4.6))
     for ax, (place, title) in zip(axes, PLACES.items()):
         motion = np.maximum(LEAST_MM, np.sort(total.numbers(column_of(place))))
         ax.plot(motion, 100.0 * (np.arange(len(motion)) + 0.5) / len(motion), color=chart.BLUE, label="prior")
@@ -138,7 +138,7 @@ def draw_predictive(total, targets, path):
             ax.plot([max(LEAST_MM, one.low_mm), one.high_mm], [quantile] * 2, color=chart.VERMILLION,
                     label=f"{origin}: bracket" if quantile == 5 else None)
         ax.plot([one.target_mm for one in of_place], TARGET_QUANTILES, "s", color=chart.VERMILLION, label=f"{origin}: target")
-        ax.set_title(title + (f"; {len(total)} draws" if place == "cortex" else ""), loc="left")
+        ax.set_title(title, loc="left")
         chart.label(ax, "motion (mm)", "draws that move less (%)", log_x=True)
         chart.legend(ax, loc="upper left", bbox_to_anchor=None)
     chart.save(fig, path)
