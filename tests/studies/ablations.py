@@ -151,7 +151,7 @@ class Held:
     def __init__(self, kind, name, change, default, variant):
         self.kind, self.name, self.change = kind, name, change
         self.differences = differences(default, variant)
-        self.time = median_time_ratio(default, variant) if variant.has("update_ms") else math.nan
+        self.time = median_time_ratio(default, variant)
         counting = sorted((one for one in self.differences if one.counts()), key=lambda one: -abs(one.change()))
         # Without the part worse, or, where it was added, with it better.
         self.buys = [one for one in counting if (one.of_variant > one.of_default) != (kind == "added")]
@@ -236,7 +236,7 @@ def draw(held, folder):
                 ax.text(k, i, "–" if one is None else "1" if same else f"{ratios[i, k]:.2f}", ha="center", va="center",
                         fontsize=9, color=chart.GREY if same else chart.INK,
                         fontweight="bold" if one and one.counts() else "normal")
-        ax.set_xticks(range(len(GROUPS)), [group.replace(" ", "\n").replace("-", "-\n") for group in GROUPS], fontsize=9)
+        ax.set_xticks(range(len(GROUPS)), [group.replace(" ", "\n").replace("-", "-\n") for group in GROUPS], fontsize=8)
         ax.set_yticks(range(len(held)), [("+ " if one.kind == "added" else "– ") + one.name for one in held], fontsize=9)
         for i in range(1, len(held)):
             if held[i].kind != held[i - 1].kind:
@@ -249,7 +249,7 @@ def draw(held, folder):
 def main(arguments):
     options = study_parser("ablations", "Checks, table and pictures of rows-*.csv of the folder.", "make ablations",
                            "Ablations").parse_args(arguments)
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), ("head", "variant"))
+    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), SHORT)
     if not len(rows):
         raise InputError(f"{options.dir}: no surgery in rows-*.csv")
     held = held_parts(rows)

@@ -19,6 +19,9 @@ from .summary import finish
 SIGNIFICANT = 0.05
 FAR_OFF = ("all", "calculix")  # all ingredients together, and another code
 COVERAGE = (0.75, 0.97)  # bounds of the mean over the adverse truths
+COLUMNS = ("head", "patient", "truth", "seed", "boundary", "data", "status", "reason", "nodes", "initial_mm",
+           "recovered_pct", "tumour_mm", "shift_tumour_mm", "rigid_tumour_mm", "initial_cppd_mm", "cppd_mm",
+           "coverage_90", "direction_deg", "true_direction_deg", "quality", "contact_sets", "update_ms")
 INTERVALS = (50, 68, 80, 90, 95, 99)
 
 
@@ -237,7 +240,7 @@ def main(arguments):
     options = study_parser("evidence", "Checks, tables and pictures of rows-*.csv and landmarks-*.csv of the folder.",
                            "make evidence", "Evidence").parse_args(arguments)
     folder = options.dir
-    rows = Table.read_all(sorted(folder.glob("rows-*.csv")), ("head", "truth"))
+    rows = Table.read_all(sorted(folder.glob("rows-*.csv")), COLUMNS)
     if not len(rows):
         raise InputError(f"{folder}: no surgery in rows-*.csv")
     record = Record(folder)
