@@ -13,7 +13,7 @@ Rows (rows-CASE.csv) are those of the program `replays`, one per observation sen
 cold and stands apart, as in BENCHMARK.md. Times in units of t_solve are divided row by row.
 """
 import math
-from dataclasses import dataclass
+from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
@@ -34,20 +34,15 @@ LEAST_SOLVES = 0.05
 SAME_SUM_MM = 1e-6
 # The latency at the client has all others in it.
 STAGES = ("register", "invert", "rebuild", "encode", "journal", "latency")
+COLUMNS = ("head", "nodes", "kernel", "surgery", "seed", "speed", "pass", "update", "sequence", "source",
+           "sent_late_ms", "outcome", *(f"{stage}_ms" for stage in STAGES), "usual_ms", "late", "quality", "deadline",
+           "difference_mm", "t_solve_ms")
 
 
-@dataclass
-class StageTimes:
-    surgery: str
-    speed: str
-    stage: str
-    updates: int  # without the first of every session
-    p50_ms: float
-    p95_ms: float
-    p99_ms: float
-    max_ms: float
-    p50_solves: float
-    p95_solves: float
+# updates: without the first of every session
+StageTimes = namedtuple("StageTimes", "surgery speed stage updates p50_ms p95_ms p99_ms max_ms p50_solves p95_solves")
+# First updates; p95 - p50; standard deviation; largest lateness of the sender, NaN at full speed
+Jitter = namedtuple("Jitter", "cold_p50_ms spread_ms sd_ms sent_late_ms")
 
 
 def is_warm(row):
@@ -67,14 +62,6 @@ def stage_times(rows):
                                         *(percentile(times, q) for q in (50, 95, 99, 100)),
                                         *(percentile(solves[np.isfinite(solves)], q) for q in (50, 95))))
     return found
-
-
-@dataclass
-class Jitter:
-    cold_p50_ms: float  # latency of the first updates
-    spread_ms: float  # of the latency: p95 - p50
-    sd_ms: float
-    sent_late_ms: float  # largest lateness of the sender; NaN at full speed
 
 
 def jitter(rows):
@@ -268,8 +255,7 @@ def ms(value):
 
 def percentiles(rows):
     """percentiles.csv: a row per StageTimes."""
-    times = [vars(one) for one in stage_times(rows)]
-    return csv_text(list(StageTimes.__dataclass_fields__), [list(one.values()) for one in times])
+    return csv_text(StageTimes._fields, [[*one[:3], str(one.updates), *one[4:]] for one in stage_times(rows)])
 
 
 def latency_tables(rows):
@@ -343,14 +329,14 @@ def main(arguments):
     parser.add_argument("--committed-rows", type=Path, help="of an earlier run, if there is one")
     parser.add_argument("--committed-corpus", type=Path, help="what the corpus must hold, if that is known")
     options = parser.parse_args(arguments)
-    there = lambda path: Table.read(path) if path and path.exists() else None
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), ("head", "surgery", "speed"))
+    there = lambda path, *columns: Table.read(path, columns) if path and path.exists() else None
+    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), COLUMNS)
     if not len(rows):
         raise InputError(f"{options.dir}: no observation in rows-*.csv")
     record = Record(options.dir)
     check_corpus(there(options.committed_corpus), Table.read(options.dir / "corpus.csv"), record)
     check_replays(rows, record)
-    check_regression(rows, there(options.committed_rows) or Table(rows.columns), record)
+    check_regression(rows, there(options.committed_rows, *COLUMNS) or Table(rows.columns), record)
     record.save()
     write_file(options.dir / "percentiles.csv", percentiles(rows))
     write_file(options.dir / "latency.md", latency_tables(rows))

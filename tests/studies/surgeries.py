@@ -18,6 +18,11 @@ from .summary import finish
 # Decrement of contact by descent, in posterior standard deviations, and depth of an open slave.
 LARGEST_DECREMENT, LARGEST_VIOLATION_MM = 1e-3, 0.01
 ALL_SOURCES = "tumour+cortex+tracks"
+COLUMNS = ("head", "place", "seed", "scenario", "stage", "status", "nodes", "recovered_pct", "tumour_mm",
+           "craniotomy_mm", "craniotomy_closest_mm", "field_mean_mm", "worse_nodes", "worst_excess_mm", "coverage_90",
+           "quality", "inverted", "min_volume_ratio", "sources", "contradictions", "contact_decrement",
+           "contact_violation_mm", "update_ms", "t_solve_ms", "warm_cold_mm", "swelling_strain", "volume_strain",
+           "removed_nodes")
 
 
 def last_updates(rows):
@@ -187,7 +192,7 @@ def main(arguments):
     parser.add_argument("--before", type=Path, nargs="*", default=[],
                         help="tables of an earlier estimate on the same surgeries")
     options = parser.parse_args(arguments)
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), ("head",))
+    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), COLUMNS)
     if not len(rows):
         raise InputError(f"{options.dir}: no surgery in rows-*.csv")
     before = Table.read_all(options.before)
