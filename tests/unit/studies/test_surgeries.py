@@ -4,8 +4,8 @@ import shutil
 
 import pytest
 
+from made_up import DOCS, Verdicts, committed, judged, run, table_of, text_of
 from studies import surgeries
-from studies.made_up import DOCS, Verdicts, committed, judged, run, table_of, text_of
 from studies.rows import Table
 
 FOLDER = DOCS / "surgeries"

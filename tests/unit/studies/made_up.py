@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """For tests: tables made by hand, and what a study records of them."""
-import os
-import subprocess
-import sys
+import contextlib
+import io
 from pathlib import Path
+from types import SimpleNamespace
 
-from .checks import Record
-from .rows import Table
+import studies.__main__
+from studies.checks import Record
+from studies.rows import Table
 
-SOURCE = Path(__file__).parents[2]
+SOURCE = Path(__file__).parents[3]
 DOCS = SOURCE / "docs"
 
 
@@ -49,6 +50,8 @@ class Verdicts:
 
 
 def run(*arguments):
-    """python3 -m studies ..."""
-    return subprocess.run([sys.executable, "-m", "studies", *map(str, arguments)], capture_output=True, text=True,
-                          timeout=100, env={**os.environ, "PYTHONPATH": str(SOURCE / "tests")})
+    """The command in this process: its exit status and what it printed."""
+    output, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        status = studies.__main__.run([str(one) for one in arguments])
+    return SimpleNamespace(returncode=status, stdout=output.getvalue(), stderr=errors.getvalue())

@@ -4,9 +4,9 @@ import shutil
 
 import pytest
 
+from made_up import DOCS, Verdicts, committed, judged, run, table_of, text_of
 from studies import evidence
 from studies.evidence_tables import claims_table, landmarks_table, patient_tables, truths_table
-from studies.made_up import DOCS, Verdicts, committed, judged, run, table_of, text_of
 from studies.rows import Table
 
 FOLDER = DOCS / "evidence"

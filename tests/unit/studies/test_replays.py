@@ -5,9 +5,9 @@ import shutil
 
 import pytest
 
+from made_up import DOCS, SOURCE, Verdicts, run, table_of, text_of
 from studies import replays
 from studies.common import InputError
-from studies.made_up import DOCS, SOURCE, Verdicts, run, table_of, text_of
 from studies.replays import STAGES
 from studies.rows import Table
 

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from made_up import DOCS, SOURCE, Verdicts, committed, judged, run, table_of, text_of
 from studies import ablations
 from studies.ablations import ALL_DATA, ALONE, EVERYTHING
 from studies.common import InputError
-from studies.made_up import DOCS, SOURCE, Verdicts, committed, judged, run, table_of, text_of
 from studies.rows import Table
 
 FOLDER = DOCS / "ablations"
