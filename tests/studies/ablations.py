@@ -22,7 +22,7 @@ import numpy as np
 from . import chart
 from .checks import Record
 from .common import InputError, study_parser, write_file
-from .rows import Table
+from .rows import Table, study_rows
 from .stats import mean_std, over, paired_t_test, percentile
 from .summary import finish
 
@@ -56,8 +56,7 @@ PARTS = {
         ("across", "buoyancy across gravity", "`prior.gravity_direction_sd_deg: 10`"),
         ("resection", "resection", "`prior.resection_weight_sd: 1`, `resection_stress_sd_pa: 300`"),
         ("all-families", "these three with room for their modes", "all of these, and `condensed.max_rank: 192`"),
-        ("probe-pose", "shared error of the probe",
-         "`sensing.probe_pose_sd_mm: 0.5`, `_deg: 0.5`"),
+        ("probe-pose", "shared error of the probe", "`sensing.probe_pose_sd_mm: 0.5`, `_deg: 0.5`"),
         ("high-rank", "a higher rank", "`condensed.max_rank: 192`"),
         ("refined", "refinement",
          "half the edge at tumour and rim (`mesh.generate.tumour_edge_mm`, `craniotomy_edge_mm`)"),
@@ -168,7 +167,7 @@ def held_parts(rows):
     held = [Held(kind, name, change, default, variants.pop(variant))
             for kind, parts in PARTS.items() for variant, name, change in parts if variant in variants]
     if variants:
-        raise InputError(f"{rows.origin}: variant {next(iter(variants))} is not described in tests/studies/ablations.py")
+        raise InputError(f"{rows.origin}: variant {next(iter(variants))} is not described in studies/ablations.py")
     return held
 
 
@@ -224,7 +223,7 @@ def draw(held, folder):
     colours = chart.colour_map(chart.BLUE, "white", chart.VERMILLION)
     for measure, title in (("tumour", "Error at the tumour"), ("craniotomy", "Distance at the craniotomy")):
         fig, ax = chart.figure(f"{title} without a part (–), or with one more (+), over the default's",
-                               "geometric means over surgeries; updates from all data. Above 1 the change made it worse.\n"
+                               "geometric means over surgeries; updates from all data. Above 1: worse than the default.\n"
                                "Bold: by more than 2 % with p < 0.001. 1: by less than 2 %",
                                size=(9.8, 1.7 + 0.26 * len(held)))
         found = [[one.find(measure, group, ALL_DATA) for group in GROUPS] for one in held]
@@ -236,8 +235,10 @@ def draw(held, folder):
                 ax.text(k, i, "–" if one is None else "1" if same else f"{ratios[i, k]:.2f}", ha="center", va="center",
                         fontsize=9, color=chart.GREY if same else chart.INK,
                         fontweight="bold" if one and one.counts() else "normal")
-        ax.set_xticks(range(len(GROUPS)), [group.replace(" ", "\n").replace("-", "-\n") for group in GROUPS], fontsize=8)
-        ax.set_yticks(range(len(held)), [("+ " if one.kind == "added" else "– ") + one.name for one in held], fontsize=9)
+        ax.set_xticks(range(len(GROUPS)), [group.replace(" ", "\n").replace("-", "-\n") for group in GROUPS],
+                      fontsize=8)
+        ax.set_yticks(range(len(held)), [("+ " if one.kind == "added" else "– ") + one.name for one in held],
+                      fontsize=9)
         for i in range(1, len(held)):
             if held[i].kind != held[i - 1].kind:
                 ax.axhline(i - 0.5, color=chart.INK, linewidth=1.5)
@@ -249,9 +250,7 @@ def draw(held, folder):
 def main(arguments):
     options = study_parser("ablations", "Checks, table and pictures of rows-*.csv of the folder.", "make ablations",
                            "Ablations").parse_args(arguments)
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), SHORT)
-    if not len(rows):
-        raise InputError(f"{options.dir}: no surgery in rows-*.csv")
+    rows = study_rows(options.dir, SHORT)
     held = held_parts(rows)
     record = Record(options.dir)
     judge(rows, held, record)

@@ -6,13 +6,14 @@ Rows (rows-HEAD.csv) are those of the program `evidence`, one per update; landma
 `evidence_landmarks`. Means are over the patients' means, so that every patient counts alike.
 """
 import math
+from functools import partial
 
 from . import chart
 from .checks import Record
-from .common import InputError, study_parser, write_file
+from .common import study_parser, write_file
 from .evidence_tables import (MAPS, MEAN_CONTACT_CPPD_MM, MEAN_CONTACT_RECOVERED, MEAN_FIXED_CPPD_MM, PAPER,
                               claims_table, landmarks_table, mean_of, patient_mean, patient_tables, rms, truths_table)
-from .rows import Table
+from .rows import Table, study_rows
 from .stats import paired_t_test
 from .summary import finish
 
@@ -35,7 +36,9 @@ class EvidenceChecks:
     def __init__(self, rows, record):
         self.rows, self.record = rows, record
         self.head = rows[0]["head"]
-        self.source = f"twins of {len(rows.values('patient'))} patients; {rows[0]['nodes']} nodes"
+        source = f"twins of {len(rows.values('patient'))} patients; {rows[0]['nodes']} nodes"
+        self.check = partial(record.check, self.head, source=source)
+        self.figure = partial(record.figure, self.head, source=source)
 
     def run(self):
         for truth in self.rows.values("truth"):
@@ -58,12 +61,6 @@ class EvidenceChecks:
         for patient in self.rows.values("patient"):
             self.of_patient(patient)
         self.refused()
-
-    def check(self, name, value, bound, passes):
-        self.record.check(self.head, name, value, bound, passes, self.source)
-
-    def figure(self, name, value, note):
-        self.record.figure(self.head, name, value, note, self.source)
 
     def recovered(self, truth, by):
         alone = patient_mean(by["contact", "tumour"], "recovered_pct")
@@ -240,9 +237,7 @@ def main(arguments):
     options = study_parser("evidence", "Checks, tables and pictures of rows-*.csv and landmarks-*.csv of the folder.",
                            "make evidence", "Evidence").parse_args(arguments)
     folder = options.dir
-    rows = Table.read_all(sorted(folder.glob("rows-*.csv")), COLUMNS)
-    if not len(rows):
-        raise InputError(f"{folder}: no surgery in rows-*.csv")
+    rows = study_rows(folder, COLUMNS)
     record = Record(folder)
     landmarks = {path.stem.partition("-")[2]: Table.read(path) for path in sorted(folder.glob("landmarks-*.csv"))}
     for case, own in landmarks.items():

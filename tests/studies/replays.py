@@ -20,8 +20,8 @@ import numpy as np
 
 from . import chart
 from .checks import Record
-from .common import InputError, study_parser, write_file
-from .rows import Table, csv_text
+from .common import study_parser, write_file
+from .rows import Table, csv_text, study_rows
 from .stats import mean_std, over, percentile
 from .summary import finish
 
@@ -330,9 +330,7 @@ def main(arguments):
     parser.add_argument("--committed-corpus", type=Path, help="what the corpus must hold, if that is known")
     options = parser.parse_args(arguments)
     there = lambda path, *columns: Table.read(path, columns) if path and path.exists() else None
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), COLUMNS)
-    if not len(rows):
-        raise InputError(f"{options.dir}: no observation in rows-*.csv")
+    rows = study_rows(options.dir, COLUMNS)
     record = Record(options.dir)
     check_corpus(there(options.committed_corpus), Table.read(options.dir / "corpus.csv"), record)
     check_replays(rows, record)

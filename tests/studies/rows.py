@@ -142,6 +142,14 @@ class Table:
         return float(numbers.max()) if len(numbers) else math.nan
 
 
+def study_rows(folder, columns):
+    """rows-*.csv of a study's folder below each other; at least one row."""
+    rows = Table.read_all(sorted(folder.glob("rows-*.csv")), columns)
+    if not len(rows):
+        raise InputError(f"{folder}: no row in rows-*.csv")
+    return rows
+
+
 def significant(value, digits=6):
     """"0.825": the number rounded to so many significant digits; empty where it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else ""

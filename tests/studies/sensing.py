@@ -49,7 +49,7 @@ def draw_slice(rows, path):
     """Ours, PLUS's and their difference, in grey values from 0 to 255."""
     fig, axes = chart.figure("A slice through the compounded volume", columns=3, size=(10.5, 4.2))
     (ours, extent), (theirs, _) = grid_of(rows, "brainshift"), grid_of(rows, "PLUS")
-    for ax, (title, values) in zip(axes, (("brainshift", ours), ("PLUS", theirs), ("|difference|", abs(ours - theirs)))):
+    for ax, title, values in zip(axes, ("brainshift", "PLUS", "|difference|"), (ours, theirs, abs(ours - theirs))):
         ax.imshow(values, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
         ax.set_title(title, loc="left", fontsize=10, fontweight="normal")
         ax.grid(visible=False)

@@ -6,12 +6,13 @@ unless stated, of the last update, which knows all sources. A refused update rec
 covers nothing.
 """
 import math
+from functools import partial
 from pathlib import Path
 
 from . import chart
 from .checks import Record
-from .common import InputError, study_parser
-from .rows import Table
+from .common import study_parser
+from .rows import Table, study_rows
 from .stats import over, percentile
 from .summary import finish
 
@@ -42,7 +43,9 @@ class HeadChecks:
     def __init__(self, rows, before, record):
         self.rows, self.before, self.record = rows, before, record
         self.last = last_updates(rows)
-        self.head, self.source = rows[0]["head"], f"twin; {len(self.last)} surgeries"
+        self.head, source = rows[0]["head"], f"twin; {len(self.last)} surgeries"
+        self.check = partial(record.check, self.head, source=source)
+        self.figure = partial(record.figure, self.head, source=source)
 
     def run(self):
         for scenario in self.rows.values("scenario"):
@@ -61,12 +64,6 @@ class HeadChecks:
         self.check("warm against cold mm: largest of any node and surgery", worst, "<= 0.01", worst <= 0.01)
         self.time()
         self.verdicts()
-
-    def check(self, name, value, bound, holds):
-        self.record.check(self.head, name, value, bound, holds, self.source)
-
-    def figure(self, name, value, note):
-        self.record.figure(self.head, name, value, note, self.source)
 
     def tumour(self, scenario, last):
         recovered = last.finite("recovered_pct").sum() / len(last)
@@ -192,9 +189,7 @@ def main(arguments):
     parser.add_argument("--before", type=Path, nargs="*", default=[],
                         help="tables of an earlier estimate on the same surgeries")
     options = parser.parse_args(arguments)
-    rows = Table.read_all(sorted(options.dir.glob("rows-*.csv")), COLUMNS)
-    if not len(rows):
-        raise InputError(f"{options.dir}: no surgery in rows-*.csv")
+    rows = study_rows(options.dir, COLUMNS)
     before = Table.read_all(options.before)
     before = before if before.columns else Table(rows.columns)
     record = Record(options.dir)

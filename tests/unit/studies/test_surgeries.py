@@ -141,4 +141,4 @@ def test_a_missing_column_is_bad_input_in_one_line(tmp_path, rows):
 
 def test_no_rows_are_bad_input(tmp_path):
     done = run("surgeries", "--dir", tmp_path)
-    assert done.returncode == 2 and done.stderr == f"studies surgeries: {tmp_path}: no surgery in rows-*.csv\n"
+    assert done.returncode == 2 and done.stderr == f"studies surgeries: {tmp_path}: no row in rows-*.csv\n"
