@@ -22,6 +22,7 @@ MARKS = {"green": {"marker": "o", "color": chart.GREEN},
          "yellow": {"marker": "^", "color": chart.YELLOW, "markeredgecolor": chart.INK},
          "grey": {"marker": "s", "color": chart.GREY},
          "red": {"marker": "x", "color": chart.VERMILLION, "markeredgewidth": 3}}
+FAULTS = ("sign", "normal", "scale")  # tests/stability/stability_point.hpp
 LOG_RATIO = 30.0  # wider than this and an axis is logarithmic
 
 
@@ -44,12 +45,13 @@ def count(points, verdict):
     return sum(judge(point) == verdict for point in points)
 
 
-def seeded_faults(seeded):
+def seeded_faults(seeded, sheets):
     """[(sheet, fault, answers without a warning, red of them, rows with any, rows with a red one, the
-    others' names)]. A fault is found when every row that answers without a warning turns red."""
+    others' names)]. A fault is found when every row that answers without a warning turns red, and there
+    is one."""
     runs = []
-    for (sheet, fault), points in seeded.groups("sheet", "fault").items():
-        silent = points.where(answered="1", warned="0")
+    for sheet, fault in ((sheet, fault) for sheet in sheets for fault in FAULTS):
+        silent = seeded.where(sheet=sheet, fault=fault, answered="1", warned="0")
         rows = {f"{parameter}: {row}": count(of_row, "red")
                 for (parameter, row), of_row in silent.groups("parameter", "row").items()}
         missed = sorted(name for name, red in rows.items() if red == 0)
@@ -122,7 +124,8 @@ def main(arguments):
         print(f"  red: {point['parameter']} = {point['x']}, {point['row']}: {point['status']}, difference "
               f"{point.number('difference'):.3g}, bound {point.number('bound'):.3g} {point['unit']}; "
               f"{point['objection']}; {point['reason']}")
-    faults = seeded_faults(seeded)
+    # The coarse grid seeds nothing.
+    faults = seeded_faults(seeded, points.values("sheet") if seeded.rows or not options.partial else [])
     columns = ("sheet", "fault", "answers", "red", "rows", "red_rows", "missed")
     write_file(f"{folder}/faults.csv", csv_text(columns, faults))
     found = checks(points, faults, guards, folder)

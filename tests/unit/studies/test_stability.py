@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Verdicts on the points of stability_suite."""
+import json
+
 import pytest
 
-from conftest import table
-from studies.stability import NEEDED, checks, judge, seeded_faults
+from conftest import SOURCE, table
+from studies.checks import summary_json
+from studies.rows import Table
+from studies.stability import NEEDED, checks, count, judge, seeded_faults
 
 HEADING = ",".join(NEEDED) + "\n"
 
@@ -40,9 +44,10 @@ def test_a_fault_is_found_when_every_silent_row_turns_red():
     seeded = points(point(fault="sign", difference="1"), point(fault="sign", row="paper", warned="1"),
                     point(fault="scale", difference="1"), point(fault="scale", row="paper"),
                     point(fault="normal", warned="1"))
-    assert seeded_faults(seeded) == [("mesh", "sign", 1, 1, 1, 1, ""), ("mesh", "scale", 2, 1, 2, 1, "size (mm): paper"),
-                                     ("mesh", "normal", 0, 0, 0, 0, "")]
-    found = checks(points(point()), seeded_faults(seeded), None, "out")
+    faults = seeded_faults(seeded, ["mesh"])
+    assert faults == [("mesh", "sign", 1, 1, 1, 1, ""), ("mesh", "normal", 0, 0, 0, 0, ""),
+                      ("mesh", "scale", 2, 1, 2, 1, "size (mm): paper")]
+    found = checks(points(point()), faults, None, "out")
     assert [(check.name, check.value, check.bound, check.holds) for check in found] == [
         ("stability, mesh: points wrong without saying so, of 1", 0, "0", True),
         ("stability, mesh: seeded faults found (sign, normal, scale)", 1, "3", False)]
@@ -62,7 +67,8 @@ def test_a_product_that_refuses_everything_is_never_wrong():
 @pytest.fixture
 def swept(folder):
     folder.write("points.csv", HEADING + point() + point(x="1000", row="paper", warned="1") + point(sheet="data"))
-    folder.write("seeded.csv", HEADING + point(fault="sign", difference="1"))
+    folder.write("seeded.csv", HEADING + "".join(point(sheet=sheet, fault=fault, difference="1")
+                                                 for sheet in ("mesh", "data") for fault in ("sign", "normal", "scale")))
     folder.write("guards.csv", "name,value\nshare_percent,0.65\n")
     return folder
 
@@ -72,19 +78,22 @@ def test_a_good_sweep_ends_well_with_a_map_per_sheet(swept):
     assert status == 0 and "2 green, 1 yellow, 0 grey, 0 red" in output
     assert [check["name"] for check in swept.summary()["checks"]] == [
         "stability, mesh: points wrong without saying so, of 2", "stability, data: points wrong without saying so, of 1",
-        "stability, mesh: seeded faults found (sign, normal, scale)",
+        "stability, mesh: seeded faults found (sign, normal, scale)", "stability, data: seeded faults found (sign, normal, scale)",
         "stability: points answered accurately and without a warning, %", "guards: share of an update of the default head, %"]
-    assert swept.text("faults.csv") == "sheet,fault,answers,red,rows,red_rows,missed\nmesh,sign,1,1,1,1,\n"
+    assert swept.text("faults.csv").startswith("sheet,fault,answers,red,rows,red_rows,missed\nmesh,sign,1,1,1,1,\n")
     assert (swept.path / "mesh.png").exists() and (swept.path / "data.png").exists()
-    assert swept.run("stability", "--partial")[0] == 0 and len(swept.summary()["checks"]) == 3
+    assert swept.run("stability", "--partial")[0] == 0 and len(swept.summary()["checks"]) == 4
+    swept.write("seeded.csv", HEADING)
+    assert swept.run("stability", "--partial")[0] == 0 and len(swept.summary()["checks"]) == 2
+    assert swept.run("stability")[0] == 1, "nothing seeded where all was asked for"
 
 
-@pytest.mark.parametrize("file, row", [("points.csv", point(objection="stops otherwise")), ("seeded.csv", point(fault="scale")),
-                                       ("guards.csv", "share_percent,9\n")])
+@pytest.mark.parametrize("file, row", [("points.csv", point(objection="stops otherwise")),
+                                       ("seeded.csv", point(fault="scale", row="paper")), ("guards.csv", "share_percent,9\n")])
 def test_what_is_wrong_ends_with_1(swept, file, row):
-    swept.write(file, swept.text(file).partition("\n")[0] + "\n" + row)
+    swept.write(file, swept.text(file) + row if file != "guards.csv" else "name,value\n" + row)
     status, output, _ = swept.run("stability")
-    assert status == 1 and output.count("FAILS") == 1 + (file == "points.csv")
+    assert status == 1 and output.count("FAILS") == 1, output
 
 
 def test_bad_rows_are_refused_in_one_line(swept):
@@ -95,3 +104,14 @@ def test_bad_rows_are_refused_in_one_line(swept):
     swept.is_refused("stability", says="guards.csv: cannot be opened")
     swept.write("points.csv", HEADING + point(bound="little"))
     swept.is_refused("stability", "--partial", says='points.csv: line 2, column bound: "little" is not a number')
+
+
+def test_the_committed_summary_is_that_of_the_committed_rows():
+    """seeded.csv of that run was not kept; faults.csv is what was made of it."""
+    docs = SOURCE / "docs" / "stability"
+    rows, guards = (Table.read(docs / f"{name}.csv") for name in ("points", "guards"))
+    faults = [(row["sheet"], row["fault"], *(int(row[name]) for name in ("answers", "red", "rows", "red_rows")), row["missed"])
+              for row in Table.read(docs / "faults.csv")]
+    found = checks(rows, faults, guards, "out/stability")
+    assert json.loads(summary_json(found)) == json.loads((docs / "summary.json").read_text())
+    assert [count(rows, verdict) for verdict in ("green", "yellow", "grey", "red")] == [483, 110, 45, 0]
