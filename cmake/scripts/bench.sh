@@ -60,7 +60,7 @@ serve() {
   fact load_to_ready_s "$(seconds_since "$begin" 3)"
 }
 
-# The daemon knows its BLAS kernel. It has no session yet, so `status` ends with 1.
+# The daemon knows its BLAS kernel. `status` ends with 1 where something is not well; it says so all the same.
 note_machine() {
   "$bin/brainshift" status --endpoint "$endpoint" --json >"$out/status.json" || [ -s "$out/status.json" ] || return
   studies bench --dir "$out" --machine "$out/status.json" --commit "$(commit_name)" && rm "$out/status.json"
@@ -94,8 +94,8 @@ measure_growth() {
 # Every latency of one kernel; $1: "" or @KERNEL, $2: which recording of sag-progress.
 latencies() {
   step "serve: load the model file$1" serve colin27
-  [ -n "$1" ] || note_machine
   step "replay: $2$1" replay "$2" "sag-progress$1"
+  [ -n "$1" ] || note_machine
   [ -n "$1" ] || fact rss_session_bytes "$(daemon_rss)"
   local one
   for one in no-contact paper joint-sag joint-mixed distension; do
