@@ -22,7 +22,7 @@ build: configure ## build the programs and the tests into build/release
 	cmake --build --preset $(PRESET) -j $(JOBS)
 
 demo: configure ## build the binaries and run the whole job on the default case, into demo/
-	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift bench_error_time bench_summary
+	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift bench_error_time
 	cmake/scripts/demo.sh $(BUILD)/bin
 
 test: build ## build and run the tests of the product

@@ -31,8 +31,6 @@ resume_study "$out" "${RESUME:-1}"
 
 status=0
 step estimates "$bin/ablations" --out "$out/rows-colin27.csv" "${options[@]}"
-step summary "$bin/ablations_summary" "$out/rows-colin27.csv" || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make ablations" \
-  --title Ablations || status=1
+studies ablations --dir "$out" --commit "$(commit_name)" || status=1
 exit "$status"

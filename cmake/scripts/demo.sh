@@ -42,7 +42,7 @@ step "report: tables and pictures" \
 step "stop: daemon" stop_daemon
 step "error against time: all methods on a mesh of 5 thousand nodes (make bench has the others)" \
   "$bin/bench_error_time" --case "$case_file" --sizes 5 --scenarios paper --quick --out "$out/bench"
-step "error against time: figure" "$bin/bench_summary" --dir "$out/bench" --figures-only
+step "error against time: figure" studies bench --dir "$out/bench" --figures-only
 
 echo
 awk -f cmake/scripts/summary.awk "$out/report.json"

@@ -4,7 +4,7 @@
 # estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
 # out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
 # patients-HEAD.md (the paper's Tables 3 to 6 beside ours), page.md (the tables of docs/evidence.md),
-# tables.md, summary.json; landmarks.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks; patient-N/, a
+# tables.md, summary.json; landmarks-CASE.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks; patient-N/, a
 # report of patients 1 to 4 as the daemon and the client play them (the paper's Figs. 6 to 8).
 # Exit status 0 only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
@@ -69,7 +69,7 @@ done
 pairs=${BRAINSHIFT_EXTERNAL_DATA:-}/resect_case4/Case4-MRI-beforeUS.csv
 if [ -f "$pairs" ]; then
   step landmarks "$bin/evidence_landmarks" --pairs "$pairs" --case config/cases/resect-4.yaml \
-    --out "$out/landmarks.csv" || status=1
+    --out "$out/landmarks-resect-4.csv" || status=1
 else
   echo "landmarks,BRAINSHIFT_EXTERNAL_DATA has no landmarks of a real operation" >>"$out/left_out.csv"
 fi
@@ -80,8 +80,6 @@ else
     step "patient $patient through daemon and client" play_patient "$patient" || status=1
   done
 fi
-step summary "$bin/evidence_summary" "$out"/rows-*.csv || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make evidence" \
-  --title Evidence || status=1
+studies evidence --dir "$out" --commit "$(commit_name)" || status=1
 exit "$status"

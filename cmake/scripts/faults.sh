@@ -54,5 +54,5 @@ for topic in "${topics[@]}"; do
     --surgery "$inputs/$model-$(surgery_of "$topic").surgery" --other-model "$inputs/other.h5" "${brief[@]}" || status=1
 done
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make faults" --title Faults || status=1
+studies summary --dir "$out" --commit "$(commit_name)" --command "make faults" --title Faults || status=1
 exit "$status"

@@ -18,6 +18,6 @@ status=0
 step "the toy patient's journal" "$bin/interchange_case" "$out"
 step "other programs" /usr/bin/python3 tests/interchange/study.py --bin "$bin" --out "$out" || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make interchange" \
+studies summary --dir "$out" --commit "$(commit_name)" --command "make interchange" \
   --title Interchange || status=1
 exit "$status"

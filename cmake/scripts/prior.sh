@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # prior.sh BUILD_DIR [OUT_DIR]: what the prior says before any measurement, against published ranges of
 # brain shift, and what an unknown stiffness does to the model (docs/decisions/0018). Empties OUT_DIR
-# (default: out/prior) and writes to it: quantiles.csv (targets beside them), prior-predictive.png,
-# prior-parts.png, stiffness.csv, stiffness.txt, checks.csv, tables.md, summary.json. Exit status 0 only if
+# (default: out/prior) and writes to it: draws.csv, truncation.csv, quantiles.csv (targets
+# beside them), prior-predictive.png, prior-parts.png, stiffness.csv, stiffness.txt, checks.csv, tables.md, summary.json. Exit status 0 only if
 # every quantile lies in its bracket.
 #   QUICK=1          6 thousand nodes instead of 18
 set -euo pipefail
@@ -28,5 +28,5 @@ stiffness() {
 }
 step "unknown stiffness" stiffness || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make prior" --title Prior || status=1
+studies prior --dir "$out" --commit "$(commit_name)" || status=1
 exit "$status"

@@ -31,8 +31,6 @@ done
 name=replays
 . cmake/scripts/steps.sh
 empty_study "$out"
-BRAINSHIFT_STUDY_DIR=$(realpath "$out")
-export BRAINSHIFT_STUDY_DIR
 
 prepare() {
   "$bin/brainshiftd" prepare --case "config/cases/$head.yaml" --out "$out/$head.h5" >"$out/prepare.txt"
@@ -58,10 +56,8 @@ step "replay: 1x and full speed" "$bin/replays" "${surgeries[@]}" --endpoint "$e
 step "stop: daemon" stop_daemon
 rm -r "$out/journal" "$out/$head.h5"  # a gigabyte that nobody reads
 
-step summary "$bin/replays_summary" --rows "$out/rows-$head.csv" --corpus "$out/corpus.csv" \
+current=summary
+studies replays --dir "$out" --commit "$(commit_name)" \
   --committed-rows "${COMMITTED:-docs/replays}/rows-$head.csv" \
   --committed-corpus "tests/replays/corpus-$head.csv" || status=1
-current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make replays" \
-  --title Replays || status=1
 exit "$status"

@@ -39,6 +39,5 @@ through_the_daemon() {
 }
 step "through the daemon: joint-mixed" through_the_daemon || status=1
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make sensing" \
-  --title Sensing || status=1
+studies sensing --dir "$out" --commit "$(commit_name)" || status=1
 exit "$status"

@@ -7,6 +7,10 @@
 # A threaded BLAS only slows the factorisation down, and its results vary (docs/architecture.md).
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
+# What judges and draws the rows: studies NAME ... (tests/studies/__init__.py). It ends with 1 where a check
+# does not hold.
+studies() { PYTHONPATH=tests PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 -m studies "$@"; }
+
 current=start
 daemon=
 endpoint=

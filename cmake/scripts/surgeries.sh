@@ -38,12 +38,7 @@ if [ -n "${BRAINSHIFT_EXTERNAL_DATA:-}" ]; then
 else
   echo "mni152,BRAINSHIFT_EXTERNAL_DATA is not set" >>"$out/left_out.csv"
 fi
-earlier=()
-for table in "$before"/rows-*.csv; do
-  if [ -e "$table" ]; then earlier+=(--before "$table"); fi
-done
-step summary "$bin/surgeries_summary" "$out"/rows-*.csv "${earlier[@]}" || status=1
+shopt -s nullglob
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make surgeries" \
-  --title Surgeries || status=1
+studies surgeries --dir "$out" --commit "$(commit_name)" --before "$before"/rows-*.csv || status=1
 exit "$status"

@@ -20,5 +20,5 @@ tests() {
 }
 step "verification tests" tests
 current=summary
-"$bin/study_summary" --dir "$out" --commit "$(commit_name)" --command "make verify" || status=1
+studies summary --dir "$out" --commit "$(commit_name)" --command "make verify" || status=1
 exit "$status"

@@ -7,13 +7,10 @@
 
 #include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
-#include "tests/evidence/paper_tables.hpp"
 #include "tests/support/gross_errors.hpp"
 
 namespace brainshift::ablations {
 namespace {
-
-static_assert(kPatients == evidence::paper::kPatients);
 
 constexpr std::array kMotions = {"joint-tangential", "joint-mixed", "joint-distension", "resection",
                                  "retraction",       "mannitol",    "outliers"};
@@ -50,23 +47,6 @@ const std::vector<std::string>& truth_names() {
   return names;
 }
 
-std::string group_of(const std::string& truth) {
-  if (truth == "all") return "all ingredients";
-  return evidence::is_adverse_alone(truth) ? "one ingredient" : truth;
-}
-
-const std::vector<std::string>& group_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all = {kEverything};
-    for (const std::string& truth : truth_names()) {
-      const std::string group = group_of(truth);
-      if (std::find(all.begin(), all.end(), group) == all.end()) all.push_back(group);
-    }
-    return all;
-  }();
-  return names;
-}
-
 std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
                                           const std::vector<std::string>& truths) {
   const std::uint64_t seed = first_seed + static_cast<std::uint64_t>(patient - 1);
@@ -74,7 +54,7 @@ std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
   for (const std::string& truth : truths) {
     const int seeds = is_motion(truth) ? kSeedsPerMotion : 1;
     for (int k = 0; k < seeds; ++k) {
-      surgeries.push_back({truth, seed + static_cast<std::uint64_t>(k * kPatients)});
+      surgeries.push_back({truth, seed + static_cast<std::uint64_t>(k * evidence::kPatients)});
     }
   }
   return surgeries;

@@ -20,24 +20,16 @@ inline constexpr double kLeastShrinkage = 0.02;
 inline constexpr double kOutliers = 0.2;
 const std::vector<std::string>& truth_names();
 
-// What is averaged and tested together: a motion, "consistency", "all ingredients" alone, and the
-// ten ingredients as one.
-std::string group_of(const std::string& truth);
-inline constexpr const char* kEverything = "all surgeries";
-// kEverything, then the groups of truth_names().
-const std::vector<std::string>& group_names();
-
 struct AblationSurgery {
   std::string truth;
   std::uint64_t seed = 0;
 };
 // Of one patient: a seed for each truth, and kSeedsPerMotion for each motion, because a motion is
-// varied by its seed and has no group to join. Seeds are first_seed + patient - 1, and kPatients
-// more each time.
+// varied by its seed and has no group to join (tests/studies/ablations.py). Seeds are
+// first_seed + patient - 1, and evidence::kPatients more each time.
 inline constexpr int kSeedsPerMotion = 4;
 std::vector<AblationSurgery> surgeries_of(int patient, std::uint64_t first_seed,
                                           const std::vector<std::string>& truths);
-inline constexpr int kPatients = 5;
 
 // Errors of PatientTwin::play. Precondition: the truth is one of truth_names().
 Result<evidence::PlayedSurgery> play(evidence::PatientTwin& twin, const AblationSurgery& surgery);

@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
   CLI::App app{"The default estimate with one part off or on: a row per update.", "ablations"};
   app.add_option("--cases", arguments.cases, "folder with patient-N.yaml")->capture_default_str();
   app.add_option("--patients", arguments.patients, "of the paper, separated by spaces")
-      ->check(CLI::Range(1, brainshift::ablations::kPatients));
+      ->check(CLI::Range(1, brainshift::evidence::kPatients));
   app.add_option("--truths", arguments.truths, "names, separated by spaces; default: all of them")
       ->check(CLI::IsMember(brainshift::ablations::truth_names()));
   app.add_option("--variants", arguments.variants, "names, separated by spaces; default: all")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The parts of the estimate that `make ablations` asks after: what each buys. A variant differs
 // from the default by one part alone: without it, or, where the default leaves it out, with it.
+// tests/studies/ablations.py describes them.
 #pragma once
 
 #include <string>
@@ -12,11 +13,8 @@
 namespace brainshift::ablations {
 
 struct Part {
-  std::string name;               // what it is: "swelling about the tumour"
   evidence::Variant variant;      // its name: "no-tumour-volume"; "default" for the default
   std::vector<std::string> keys;  // of the case that differ; none: something else differs
-  std::string change;             // what differs, for tables: "`prior.opening_pressure_sd_pa: 0`"
-  bool added = false;             // the variant has the part and the default has it not
   bool slow = false;              // played for the first patient alone
 };
 inline constexpr const char* kDefault = "default";
@@ -27,11 +25,5 @@ const Part* find_part(const std::string& variant);  // by the variant's name; nu
 // The default and these, in the order of all_parts(). kNotFound names the one that is unknown and
 // lists what is known.
 Result<std::vector<Part>> parts_from(const std::vector<std::string>& variants);
-
-// Parts without a variant, each with the reason.
-struct LeftOut {
-  std::string part, reason;
-};
-const std::vector<LeftOut>& parts_left_out();
 
 }  // namespace brainshift::ablations

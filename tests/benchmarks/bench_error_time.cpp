@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Error against run time of all inversion methods, over mesh sizes (error_time.hpp). Writes raw
-// repetitions, which bench_summary turns into figures, tables and checks.
+// repetitions, which tests/studies/bench.py turns into figures, tables and checks.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -227,7 +227,7 @@ void describe(CLI::App& app, Arguments& arguments) {
       "One mesh, the condensed method alone, half a minute of repetitions at most:\n"
       "  OMP_NUM_THREADS=1 bench_error_time --sizes 18 --methods condensed --scenarios paper --out "
       "/tmp/bench\n"
-      "Then `bench_summary --dir /tmp/bench --figures-only` draws what was measured.\n"
+      "Then `PYTHONPATH=tests python3 -m studies bench --dir /tmp/bench --figures-only` draws it.\n"
       "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
 }
 

@@ -17,7 +17,6 @@
 
 #include "common/linalg/blas_kernel.hpp"
 #include "tests/evidence/evidence_patient.hpp"
-#include "tests/evidence/paper_tables.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::evidence {
@@ -115,7 +114,7 @@ int main(int argc, char** argv) {
   app.add_option("--head", arguments.head, "colin27, or another case file there: mni152")
       ->capture_default_str();
   app.add_option("--patients", arguments.patients, "of the paper, separated by spaces")
-      ->check(CLI::Range(1, brainshift::evidence::paper::kPatients));
+      ->check(CLI::Range(1, brainshift::evidence::kPatients));
   app.add_option("--truths", arguments.truths, "names, separated by spaces; default: all of them")
       ->check([](const std::string& name) {
         return brainshift::evidence::find_truth(name) ? "" : name + " is unknown";

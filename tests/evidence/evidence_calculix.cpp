@@ -19,7 +19,7 @@
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/calculix_deck.hpp"
 #include "tests/evidence/calculix_truth.hpp"
-#include "tests/evidence/paper_tables.hpp"
+#include "tests/evidence/evidence_truths.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/study_program.hpp"
 
@@ -128,7 +128,7 @@ int main(int argc, char** argv) {
   for (CLI::App* command : {write, read}) {
     command->add_option("--patient", arguments.patient, "of the paper")
         ->required()
-        ->check(CLI::Range(1, evidence::paper::kPatients));
+        ->check(CLI::Range(1, evidence::kPatients));
     command->add_option("--folder", arguments.folder, "of these files; it must exist")
         ->required()
         ->check(CLI::ExistingDirectory);

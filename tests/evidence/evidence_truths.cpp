@@ -23,9 +23,4 @@ const TruthKind* find_truth(const std::string& name) {
   return nullptr;
 }
 
-bool is_adverse_alone(const std::string& name) {
-  const TruthKind* kind = find_truth(name);
-  return kind != nullptr && kind->ingredients.size() == 1;
-}
-
 }  // namespace brainshift::evidence

@@ -10,6 +10,8 @@
 
 namespace brainshift::evidence {
 
+inline constexpr int kPatients = 5;  // of the paper; patient N has the case and scenario patient-N
+
 struct TruthKind {
   std::string name;  // "consistency", "mesh", ..., "all", "calculix"
   client::Ingredients ingredients;
@@ -19,6 +21,5 @@ struct TruthKind {
 // In this order.
 const std::vector<TruthKind>& truth_kinds();
 const TruthKind* find_truth(const std::string& name);  // nullptr when unknown
-bool is_adverse_alone(const std::string& name);
 
 }  // namespace brainshift::evidence

@@ -111,10 +111,4 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
   return result;
 }
 
-double rms_of(const std::vector<LeftOutLandmark>& landmarks, double LeftOutLandmark::*distance) {
-  double squares = 0.0;
-  for (const LeftOutLandmark& one : landmarks) squares += one.*distance * (one.*distance);
-  return std::sqrt(squares / static_cast<double>(landmarks.size()));
-}
-
 }  // namespace brainshift::evidence

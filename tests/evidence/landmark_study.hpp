@@ -39,7 +39,4 @@ struct LeftOutLandmark {
 Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
                                                    const io::NamedPairs& pairs, double sd_mm);
 
-// Root mean square of one of the distances.
-double rms_of(const std::vector<LeftOutLandmark>& landmarks, double LeftOutLandmark::*distance);
-
 }  // namespace brainshift::evidence

@@ -17,9 +17,12 @@
 #include "common/core/error.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/benchmarks/bench_head.hpp"
-#include "tests/prior_study/prior_targets.hpp"
 
 namespace brainshift::prior_study {
+
+// Centre of the craniotomy; the tumour's centroid; cortex opposite the craniotomy.
+inline constexpr int kPlaces = 3;
+inline constexpr std::array<const char*, kPlaces> kPlaceNames = {"cortex", "tumour", "far side"};
 
 // A point of the mesh.
 struct MeshPoint {

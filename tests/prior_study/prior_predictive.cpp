@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// prior_predictive: draws brains from the force prior of method condensed, with the defaults, and
-// compares their motion with what surgeons have measured (prior_targets.hpp).
+// prior_predictive: draws brains from the force prior of method condensed, with the defaults.
+// tests/studies/prior.py compares their motion with what surgeons have measured (targets.csv).
 //
-// Writes into OUT: quantiles.csv and pictures; with $BRAINSHIFT_STUDY_DIR, the checks too
-// (tests/support/study_record.hpp). Whether they hold is for study_summary to say.
+// Writes into OUT, numbers in full:
+//   draws.csv        a row per part and brain: part,settled,cortex_mm,tumour_mm,far_side_mm,
+//                    outward_mm,min_volume_ratio. Nothing else is known of a brain without a
+//                    contact set (settled 0); min_volume_ratio is that of "total" alone
+//   truncation.csv   place,left_out_sd_mm: what the modes leave out (prior_draws.hpp)
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "common/core/statistics.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
+#include "tests/benchmarks/csv_table.hpp"
 #include "tests/prior_study/prior_draws.hpp"
-#include "tests/prior_study/prior_pictures.hpp"
-#include "tests/prior_study/prior_table.hpp"
-#include "tests/support/study_record.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::prior_study {
@@ -24,7 +24,6 @@ namespace {
 
 struct Arguments {
   std::filesystem::path head = BRAINSHIFT_DEFAULT_CASE;
-  std::filesystem::path targets = BRAINSHIFT_PRIOR_TARGETS;
   double thousand_nodes = 18.0;
   int draws = 500;
   std::uint64_t seed = 1;
@@ -32,21 +31,41 @@ struct Arguments {
   std::filesystem::path out = ".";
 };
 
-void print(const std::vector<PartDraws>& all) {
-  std::printf("%-16s%-10s%6s %8s %8s %8s %8s %8s   mm\n", "part", "place", "draws", "5 %", "25 %",
-              "50 %", "75 %", "95 %");
-  for (const PartDraws& part : all) {
-    for (std::size_t p = 0; p < kPlaces; ++p) {
-      std::printf("%-16s%-10s%6zu", part.part.c_str(), kPlaceNames[p], part.motion_mm[p].size());
-      for (const double q : kQuantiles) std::printf(" %8.3f", percentile(part.motion_mm[p], q));
-      std::printf("\n");
+std::string full(double value) { return bench::csv_number(value, 17); }
+
+Status write_draws(const std::filesystem::path& file, const std::vector<PartDraws>& all) {
+  auto csv = bench::CsvWriter::create(
+      file, "part,settled,cortex_mm,tumour_mm,far_side_mm,outward_mm,min_volume_ratio");
+  if (!csv) return tl::unexpected(csv.error());
+  for (const PartDraws& draws : all) {
+    const auto& [cortex, tumour, far_side] = draws.motion_mm;
+    for (std::size_t i = 0; i < cortex.size(); ++i) {
+      const bool has_ratio = i < draws.min_volume_ratio.size();
+      if (Status ok = csv->row({draws.part, "1", full(cortex[i]), full(tumour[i]),
+                                full(far_side[i]), full(draws.outward_mm[i]),
+                                has_ratio ? full(draws.min_volume_ratio[i]) : ""});
+          !ok) {
+        return ok;
+      }
+    }
+    for (int i = 0; i < draws.unsettled; ++i) {
+      if (Status ok = csv->row({draws.part, "0", "", "", "", "", ""}); !ok) return ok;
     }
   }
+  return {};
+}
+
+Status write_truncation(const std::filesystem::path& file, const bench::Head& head) {
+  auto csv = bench::CsvWriter::create(file, "place,left_out_sd_mm");
+  if (!csv) return tl::unexpected(csv.error());
+  const auto left_out = left_out_sd_mm(*head.operators, places_of(*head.model, *head.locator));
+  for (std::size_t p = 0; p < kPlaces; ++p) {
+    if (Status ok = csv->row({kPlaceNames[p], full(left_out[p])}); !ok) return ok;
+  }
+  return {};
 }
 
 Status run(const Arguments& arguments) {
-  const auto targets = read_targets(arguments.targets);
-  if (!targets) return tl::unexpected(targets.error());
   if (!std::filesystem::is_directory(arguments.out)) {
     return fail(ErrorCode::kNotFound, arguments.out.string() + ": is no folder");
   }
@@ -58,18 +77,8 @@ Status run(const Arguments& arguments) {
   if (!head) return tl::unexpected(head.error());
   const auto all = draw_prior(*head, arguments.draws, arguments.seed, *strengths);
   if (!all) return tl::unexpected(all.error());
-  print(*all);
-  if (Status ok = write_quantiles(arguments.out / "quantiles.csv", *all, *targets); !ok) return ok;
-  if (Status ok = draw_pictures(*all, *targets, arguments.out); !ok) return ok;
-  check_quantiles(*all, *targets);
-  record_figures(all->front());
-  const auto left_out = left_out_sd_mm(*head->operators, places_of(*head->model, *head->locator));
-  for (std::size_t p = 0; p < kPlaces; ++p) {
-    test_support::record_figure("prior-predictive",
-                                std::string(kPlaceNames[p]) + " left out by truncation mm",
-                                left_out[p], "sd per component; not drawn", "");
-  }
-  return {};
+  if (Status ok = write_draws(arguments.out / "draws.csv", *all); !ok) return ok;
+  return write_truncation(arguments.out / "truncation.csv", *head);
 }
 
 }  // namespace
@@ -78,11 +87,8 @@ Status run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::prior_study::Arguments arguments;
-  CLI::App app{"Motion of brains drawn from the prior, against published ranges of brain shift.",
-               "prior_predictive"};
+  CLI::App app{"Motion of brains drawn from the prior.", "prior_predictive"};
   app.add_option("--head", arguments.head, "case file of the head")->capture_default_str();
-  app.add_option("--targets", arguments.targets, "table of published quantiles")
-      ->capture_default_str();
   app.add_option("--thousand-nodes", arguments.thousand_nodes,
                  "size of the mesh; 18: the case's own edge length")
       ->capture_default_str()
@@ -95,7 +101,8 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--strength", arguments.strengths,
                  "PART=NUMBER, in units of the case's standard deviations: what if");
-  app.add_option("--out", arguments.out, "folder of table and pictures")->capture_default_str();
+  app.add_option("--out", arguments.out, "folder of draws.csv and truncation.csv")
+      ->capture_default_str();
   return brainshift::surgeries::run_study(app, argc, argv,
                                           [&] { return brainshift::prior_study::run(arguments); });
 }

@@ -7,6 +7,7 @@
 // checksum. Two sums that every coordinate enters tell that from a changed observation:
 //   mean_mm     mean of all coordinates c_1, c_2, ... c_n
 //   ordered_mm  (1/n) sum_k cos(k) c_k, which also changes with their order
+// tests/studies/replays.py compares.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +19,6 @@
 #include "common/core/error.hpp"
 
 namespace brainshift::replays {
-
-// What rounding does to a coordinate is 1e-9 mm (docs/conventions.md); noise is 0.5 mm.
-inline constexpr double kSameSum_mm = 1e-6;
 
 struct ManifestEntry {
   std::string surgery;
@@ -38,16 +36,4 @@ ManifestEntry entry_of(const std::string& surgery, std::uint64_t seed,
 
 // kWriteFailed; an existing file is replaced.
 Status write_manifest(const std::filesystem::path& path, const std::vector<ManifestEntry>& entries);
-// kNotFound; kUnreadable names the line whose number is none.
-Result<std::vector<ManifestEntry>> read_manifest(const std::filesystem::path& path);
-
-struct ManifestComparison {
-  int same_bits = 0, same_within_rounding = 0;
-  // "resection, observation 3: 1200 coordinates, committed 1206"; also for one that is missing or
-  // that nobody expected
-  std::vector<std::string> differences;
-};
-ManifestComparison compare_manifests(const std::vector<ManifestEntry>& committed,
-                                     const std::vector<ManifestEntry>& made);
-
 }  // namespace brainshift::replays

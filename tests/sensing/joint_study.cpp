@@ -5,14 +5,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "client/tools/pictures/bars.hpp"
 #include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/statistics.hpp"
+#include "tests/benchmarks/csv_table.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
 #include "tests/support/study_record.hpp"
@@ -86,31 +85,25 @@ void check(const std::string& study, const std::string& scenario, const Stages& 
   ratio("tumour", &Stage::tumour_mm, 1.0);
 }
 
-void draw(const std::vector<Stages>& results, const std::filesystem::path& file) {
-  client::BarSpec spec;
-  spec.title = "Tumour boundary and exposed cortex together";
-  spec.subtitle = "mean error over 10 surgeries, each another truth; craniotomy by displacement";
-  spec.y_label = "error (mm)";
-  spec.series = {{"tumour boundary", client::palette::kOrange, {}},
-                 {"and stereo surface", client::palette::kSkyBlue, {}},
-                 {"and 20 tracked points", client::palette::kBlue, {}}};
-  double largest = 0.0;
+// joint.csv, a row per surgery and stage, which tests/studies/sensing.py draws.
+Status write(const std::vector<Stages>& results, const std::filesystem::path& path) {
+  auto file = bench::CsvWriter::create(
+      path, "scenario,seed,newest_source,tumour_mm,craniotomy_mm,craniotomy_vector_mm,coverage_90");
+  if (!file) return tl::unexpected(file.error());
   for (std::size_t k = 0; k < results.size(); ++k) {
-    const auto add_group = [&](const char* place, const std::vector<double> Stage::*errors) {
-      spec.groups.push_back(std::string(kScenarios[k]).substr(6) + "\n" + place);
+    for (std::size_t i = 0; i < results[k].front().tumour_mm.size(); ++i) {
       for (std::size_t s = 0; s < kStages; ++s) {
-        const double value = mean(results[k][s].*errors);
-        largest = std::max(largest, value);
-        spec.series[s].values.push_back(value);
+        const Stage& stage = results[k][s];
+        std::vector<std::string> cells = {kScenarios[k], std::to_string(i + 1), kSources[s]};
+        for (const double value : {stage.tumour_mm[i], stage.craniotomy_mm[i],
+                                   stage.craniotomy_vector_mm[i], stage.coverage[i]}) {
+          cells.push_back(bench::csv_number(value));
+        }
+        if (Status ok = file->row(cells); !ok) return ok;
       }
-    };
-    add_group("tumour", &Stage::tumour_mm);
-    add_group("craniotomy", &Stage::craniotomy_vector_mm);
+    }
   }
-  spec.figures = false;
-  spec.y_min = 0.0;
-  spec.y_max = 1.1 * largest;
-  cv::imwrite(file.string(), client::draw_bars(spec));
+  return {};
 }
 
 // `study`: file-name-like.
@@ -141,7 +134,7 @@ Status measure(const bench::Head& head, const std::string& study) {
   record_check(study, "update with three sources over one solve: p50", solves, "<= 2",
                solves <= 2.0, "t_solve of the same process");
   if (const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR"); folder != nullptr) {
-    draw(results, std::filesystem::path(folder) / (study + ".png"));
+    return write(results, std::filesystem::path(folder) / (study + ".csv"));
   }
   return {};
 }

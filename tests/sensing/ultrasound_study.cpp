@@ -13,12 +13,13 @@
 #include <filesystem>
 #include <numbers>
 
+#include "common/core/mesh.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/recording/sequence_file.hpp"
 #include "common/tracking/chain.hpp"
 #include "common/ultrasound/compound.hpp"
+#include "tests/benchmarks/csv_table.hpp"
 #include "tests/sensing/answer_volume.hpp"
-#include "tests/sensing/volume_picture.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift {
@@ -100,13 +101,42 @@ void check_counts(const std::string& name, const Sweep& sweep, int frames) {
         sweep.chain.used == frames, "status fields of the recording");
 }
 
+// Index k of the slice with the most voxels of positive weight.
+int fullest_slice(const std::vector<float>& weight, const std::array<int, 3>& dims) {
+  std::vector<long> filled(static_cast<std::size_t>(dims[2]), 0);
+  for (int k = 0; k < dims[2]; ++k) {
+    for (int j = 0; j < dims[1]; ++j) {
+      for (int i = 0; i < dims[0]; ++i) {
+        if (weight[grid_index(dims, i, j, k)] > 0.0F) ++filled[static_cast<std::size_t>(k)];
+      }
+    }
+  }
+  return static_cast<int>(std::max_element(filled.begin(), filled.end()) - filled.begin());
+}
+
+// A row per voxel of one slice of both volumes: slice_NAME.csv, which tests/studies/sensing.py draws.
 void write_slices(const std::string& name, const ultrasound::CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
   if (folder == nullptr) return;
-  const int slice = test_support::fullest_slice(ours.weight, answer.grid.dims);
-  test_support::write_slice_pair(fs::path(folder) / ("ultrasound_" + name + ".png"),
-                                 ours.image.values, answer.values, answer.grid, slice);
+  const ultrasound::VolumeGrid& grid = answer.grid;
+  const int k = fullest_slice(ours.weight, grid.dims);
+  auto file = value_or_exit(bench::CsvWriter::create(fs::path(folder) / ("slice_" + name + ".csv"),
+                                                     "x_mm,y_mm,brainshift,PLUS"));
+  for (int j = 0; j < grid.dims[1]; ++j) {
+    for (int i = 0; i < grid.dims[0]; ++i) {
+      const std::size_t voxel = grid_index(grid.dims, i, j, k);
+      std::vector<std::string> cells;
+      for (const double value : {i * grid.spacing_mm[0], j * grid.spacing_mm[1],
+                                 double(ours.image.values[voxel]), double(answer.values[voxel])}) {
+        cells.push_back(bench::csv_number(value));
+      }
+      if (const Status ok = file.row(cells); !ok) {
+        fmt::print(stderr, "sensing_ultrasound: {}\n", ok.error().message);
+        std::exit(1);
+      }
+    }
+  }
 }
 
 void check_volume(const std::string& what, const ultrasound::CompoundedVolume& ours,

@@ -5,16 +5,6 @@
 
 namespace brainshift::stability {
 
-std::string to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kGreen: return "green";
-    case Verdict::kYellow: return "yellow";
-    case Verdict::kGrey: return "grey";
-    case Verdict::kRed: return "red";
-  }
-  return "red";
-}
-
 std::string to_string(Fault fault) {
   switch (fault) {
     case Fault::kNone: return "none";
@@ -23,14 +13,6 @@ std::string to_string(Fault fault) {
     case Fault::kScale: return "scale";
   }
   return "none";
-}
-
-Verdict judge(const Point& point) {
-  if (point.reason.empty() && point.status != "solved") return Verdict::kRed;
-  if (!point.answered) return Verdict::kGrey;
-  if (point.warned) return Verdict::kYellow;
-  if (point.must_warn || !point.objection.empty()) return Verdict::kRed;
-  return point.difference <= point.bound ? Verdict::kGreen : Verdict::kRed;
 }
 
 void set_refused(const Error& error, Point& point) {

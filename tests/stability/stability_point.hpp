@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One point of a stability sweep: what was asked, what the product answered, what is right, and
-// the verdict.
-//
-//   green   answered, within the bound of its sweep
-//   yellow  answered with a warning, in status or reason
-//   grey    refused, with a reason
-//   red     wrong without a warning: outside the bound, an objection of the reference, a warning
-//           that is missing, or no reason
-//
-// docs/stability.md derives the bounds.
+// One point of a stability sweep: what was asked, what the product answered, and what is right.
+// tests/studies/stability.py judges it; docs/stability.md derives the bounds.
 #pragma once
 
 #include <functional>
@@ -21,11 +13,6 @@
 #include "common/values/estimate.hpp"
 
 namespace brainshift::stability {
-
-enum class Verdict { kGreen, kYellow, kGrey, kRed };
-inline constexpr Verdict kVerdicts[] = {Verdict::kGreen, Verdict::kYellow, Verdict::kGrey,
-                                        Verdict::kRed};
-std::string to_string(Verdict verdict);
 
 // One operator of the product is made wrong before it solves; the reference stays right. What
 // each sheet makes wrong is said where it is done: toy_problem.hpp, linear_body.hpp,
@@ -63,8 +50,6 @@ struct Point {
   // What the prior's scales leave to gain in ln p. NaN: the method does not estimate them.
   double scales_gain = std::numeric_limits<double>::quiet_NaN();
 };
-
-Verdict judge(const Point& point);
 
 // Cuts what the product reports apart: refusal, warning or answer.
 void set_refused(const Error& error, Point& point);

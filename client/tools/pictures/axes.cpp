@@ -29,14 +29,6 @@ struct Tick {
 
 std::vector<Tick> ticks_of(const Scale& scale) {
   const auto& [min, max] = scale.range;
-  if (!scale.axis.names.empty()) {
-    std::vector<Tick> named;
-    for (std::size_t i = 0; i < scale.axis.names.size(); ++i) {
-      const auto value = static_cast<double>(i);
-      if (value >= min && value <= max) named.push_back({value, scale.axis.names[i]});
-    }
-    return named;
-  }
   std::vector<double> values = scale.axis.log ? log_ticks(min, max) : nice_ticks(min, max);
   if (scale.axis.counts) {
     std::erase_if(values, [](double v) { return std::abs(v - std::round(v)) > 1e-9; });

@@ -18,8 +18,6 @@ struct Axis {
   bool log = false;       // logarithmic: shows positive values only
   bool counts = false;    // ticks at whole numbers only
   bool from_zero = true;  // a linear axis whose values are all >= 0 starts at 0
-  // Of categories: the tick at 0, 1, 2, ... bears this name. Linear axes only.
-  std::vector<std::string> names = {};
 };
 
 // Finite; positive on a logarithmic axis.

@@ -28,27 +28,17 @@ TEST(AblationTruths, AreThoseOfTheEvidenceAndMotionsThatTheTwinKnows) {
   }
 }
 
-TEST(AblationTruths, EachIsInOneOfTheGroups) {
-  for (const std::string& name : truth_names()) {
-    EXPECT_THAT(group_names(), Contains(group_of(name)));
-  }
-  EXPECT_EQ(group_names().front(), kEverything);
-  EXPECT_EQ(group_of("gap"), group_of("tracker"));
-  EXPECT_NE(group_of("gap"), group_of("all"));
-  EXPECT_NE(group_of("joint-mixed"), group_of("resection"));
-}
-
 TEST(AblationTruths, NoSeedOfAMotionIsPlayedTwice) {
   std::set<std::uint64_t> seeds;
   int motions = 0;
-  for (int patient = 1; patient <= kPatients; ++patient) {
+  for (int patient = 1; patient <= evidence::kPatients; ++patient) {
     for (const AblationSurgery& one : surgeries_of(patient, 1, {"consistency", "joint-mixed"})) {
       if (one.truth != "joint-mixed") continue;
       ++motions;
       seeds.insert(one.seed);
     }
   }
-  EXPECT_EQ(motions, kSeedsPerMotion * kPatients);
+  EXPECT_EQ(motions, kSeedsPerMotion * evidence::kPatients);
   EXPECT_EQ(static_cast<int>(seeds.size()), motions);
 }
 

@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "client/tools/twin/scenario.hpp"
 #include "common/core/random.hpp"
-#include "tests/evidence/paper_tables.hpp"
+#include "tests/evidence/evidence_truths.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::evidence {
@@ -59,11 +60,13 @@ TEST(ShippedFields, AreOfEveryPatientAndMoveItsTumourAsTheTwinDoes) {
   const auto folder = std::filesystem::path(BRAINSHIFT_SOURCE_DIR) / "tests/evidence/calculix";
   const auto nodes = read_points(folder / "nodes.csv");
   ASSERT_TRUE(nodes) << nodes.error().message;
-  for (int patient = 1; patient <= paper::kPatients; ++patient) {
+  for (int patient = 1; patient <= kPatients; ++patient) {
     const auto u = read_calculix_truth(folder, patient, *nodes);
     ASSERT_TRUE(u) << u.error().message;
     const double most = u->colwise().norm().maxCoeff();
-    const double misfit = paper::kMisfit_mm[static_cast<std::size_t>(patient - 1)];
+    const client::Scenario* twin = client::find_scenario("patient-" + std::to_string(patient));
+    ASSERT_NE(twin, nullptr);
+    const double misfit = twin->tumour_displacement_mm.value();  // Table 3's
     EXPECT_GT(most, 0.8 * misfit) << patient;
     EXPECT_LT(most, 3.0 * misfit) << patient;
   }
