@@ -91,13 +91,13 @@ struct ContactConfig {
   double penalty_n_per_mm = 5.0;                    // beta (section 2.3)
 };
 
-// Prior on forces, zero mean: families of loads (prior/load_modes.hpp), and a smooth remainder of
-// random force density with three correlation lengths (prior/force_prior.hpp). A standard deviation
-// of 0 leaves a family out. Where the strengths are estimated, a surgery may have up to
+// Prior on forces, zero mean: families of loads (prior/load_modes.hpp), and smooth residual fields
+// of random force density with three correlation lengths (prior/force_prior.hpp). A standard
+// deviation of 0 leaves a family out. Where the strengths are estimated, a surgery may have up to
 // kLargestStrength times these, or none of a family.
 struct PriorConfig {
-  // Remainder: fine (the paper's), medium and coarse correlation length. Parts that are off explain
-  // nothing that others do not explain as well (docs/ablations.md, docs/decisions/0030).
+  // Residual fields: fine (the paper's), medium and coarse correlation length. Parts that are off
+  // explain nothing that others do not explain as well (docs/ablations.md, docs/decisions/0030).
   double correlation_length_mm = 5.0;
   double medium_length_mm = 20.0;
   double coarse_length_mm = 60.0;

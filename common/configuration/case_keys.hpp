@@ -197,21 +197,23 @@ void visit(A& a, V& v) {
 template <typename A, Of<PriorConfig> V>
 void visit(A& a, V& v) {
   a({"correlation_length_mm", "mm",
-     "Fine correlation length L of the remainder, of (1 + r/L) exp(-r/L)", "paper, section 2.2"},
+     "Fine correlation length L of the residual fields, of (1 + r/L) exp(-r/L)",
+     "paper, section 2.2"},
     v.correlation_length_mm, between(0.1, 200.0));
-  a({"medium_length_mm", "mm", "Medium correlation length of the remainder",
+  a({"medium_length_mm", "mm", "Medium correlation length of the residual fields",
      "between the paper's and the coarse one"},
     v.medium_length_mm, between(1.0, 300.0));
-  a({"coarse_length_mm", "mm", "Coarse correlation length of the remainder",
+  a({"coarse_length_mm", "mm", "Coarse correlation length of the residual fields",
      "about half the width of a brain"},
     v.coarse_length_mm, between(1.0, 300.0));
-  a({"force_density_sd_n_m3", "N/m3", "Standard deviation of the fine remainder's force density",
-     "decision 0030", "0: no such modes. The paper's prior has this part alone."},
+  a({"force_density_sd_n_m3", "N/m3",
+     "Standard deviation of the fine residual field's force density", "decision 0030",
+     "0: no such modes. The paper's prior has this part alone."},
     v.force_density_sd_n_m3, not_negative());
-  a({"medium_density_sd_n_m3", "N/m3", "The same of the medium remainder", "decision 0018",
+  a({"medium_density_sd_n_m3", "N/m3", "The same of the medium residual field", "decision 0018",
      "0: no such modes."},
     v.medium_density_sd_n_m3, not_negative());
-  a({"coarse_density_sd_n_m3", "N/m3", "The same of the coarse remainder", "decision 0018",
+  a({"coarse_density_sd_n_m3", "N/m3", "The same of the coarse residual field", "decision 0018",
      "0: no such modes."},
     v.coarse_density_sd_n_m3, not_negative());
   a({"gravity_mode_sd", "in units of the full buoyancy load",
@@ -220,7 +222,7 @@ void visit(A& a, V& v) {
   a({"gravity_direction_sd_deg", "degrees", "How well the direction of gravity is known",
      "decision 0030",
      "The modes across gravity are weaker than those along it by the tangent. 0: no such modes; "
-     "the coarse remainder stands for a pose that is off."},
+     "the coarse residual field stands for a pose that is off."},
     v.gravity_direction_sd_deg, between(0.0, 80.0));
   a({"gravity_levels_mm", "mm below the reference plane along gravity",
      "Fluid planes of these modes", "", "May be empty."},

@@ -9,7 +9,7 @@
 // n nodes, r modes, s slaves. Nodal arrays are node-major (x0 y0 z0 x1 ...), 3n rows.
 //
 // The columns of U stand in the order of the prior's parts (PriorPart), part_columns[g] of them for
-// part g. Those of the load families are K^-1 M, exact. Those of each remainder come from a
+// part g. Those of the load families are K^-1 M, exact. Those of each residual field come from a
 // randomised Nystrom approximation of K^-1 Sigma_g K^-1 (Halko, Martinsson, Tropp 2011, SIAM Review
 // 53:217, sec. 5.5). Its test vectors are supported where data come from: near the tumour, at the
 // craniotomy and on the slaves.
@@ -46,7 +46,7 @@ struct CondensedOperators {
   std::vector<NodeIndex> region;     // e, sorted
   Eigen::MatrixXf region_responses;  // 3e x (r + s)
   // Nodes where the standard deviation is evaluated, and the variance per node that the
-  // truncation of each remainder leaves out: tr(C_g - U_g U_g^T) / 3, mm^2, for the free body.
+  // truncation of each residual field leaves out: tr(C_g - U_g U_g^T) / 3, mm^2, for the free body.
   std::vector<NodeIndex> control;          // c, sorted
   Eigen::MatrixXd truncated_variance_mm2;  // c x kRemainders
   // Interpolation from the control nodes to every node: 4 x n indices into `control` and 4 x n

@@ -19,32 +19,32 @@ SparseData named(SparseData data, const std::string& source) {
 
 void Evidence::clear() {
   newest_.clear();
-  suspects_.clear();
+  quarantined_.clear();
 }
 
 void Evidence::put(RegisteredObservation observation) {
   std::string source = observation.source;
-  suspects_.erase(source);
+  quarantined_.erase(source);
   newest_.insert_or_assign(std::move(source), std::move(observation));
 }
 
-void Evidence::suspect(const std::string& source) { suspects_.insert(source); }
+void Evidence::quarantine(const std::string& source) { quarantined_.insert(source); }
 
-void Evidence::trust() { suspects_.clear(); }
+void Evidence::trust() { quarantined_.clear(); }
 
-std::vector<Omission> Evidence::drop_suspects(const std::string& source, std::int64_t now_ns) {
+std::vector<Omission> Evidence::drop_quarantined(const std::string& source, std::int64_t now_ns) {
   std::vector<Omission> omissions;
-  for (const std::string& suspect : std::set<std::string>(suspects_)) {
-    const auto found = newest_.find(suspect);
-    if (suspect == source || found == newest_.end() || age_s(found->second, now_ns) > max_age_s_) {
+  for (const std::string& other : std::set<std::string>(quarantined_)) {
+    const auto found = newest_.find(other);
+    if (other == source || found == newest_.end() || age_s(found->second, now_ns) > max_age_s_) {
       continue;
     }
-    omissions.push_back({"source " + suspect,
+    omissions.push_back({"source " + other,
                          fmt::format("no usable estimate could be made with observation {}, alone "
                                      "or beside this one",
                                      found->second.sequence),
                          "what it would have shown is not known"});
-    suspects_.erase(suspect);
+    quarantined_.erase(other);
     newest_.erase(found);
   }
   return omissions;

@@ -6,9 +6,9 @@
 // view of the cortex, as long as that view is not older than sensing.max_age_s by the observations'
 // own clock.
 //
-// An observation whose own update was unusable is *suspect*: it may be wrong, or other sources may
-// be missing. The next update tries with it. If that one is usable, it is trusted again; else it is
-// forgotten, and the update is made without it. Not thread-safe.
+// An observation whose own update was unusable is *quarantined*: it may be wrong, or other sources
+// may be missing. The next update tries with it. If that one is usable, it is trusted again; else
+// it is forgotten, and the update is made without it. Not thread-safe.
 #pragma once
 
 #include <map>
@@ -26,17 +26,17 @@ class Evidence {
  public:
   explicit Evidence(double max_age_s) : max_age_s_(max_age_s) {}
   void clear();
-  // Replaces the earlier observation of the same source, suspect or not.
+  // Replaces the earlier observation of the same source, quarantined or not.
   void put(RegisteredObservation observation);
   // Forgets the source's observation: no estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
   // No usable estimate could be made with the source's observation and the others.
-  void suspect(const std::string& source);
+  void quarantine(const std::string& source);
   // A usable estimate was made with all that are fresh.
   void trust();
-  // Forgets the suspects that are fresh, but not that of `source`. Who they were and why they are
-  // not used, for Update::left_out; empty when there was none.
-  std::vector<Omission> drop_suspects(const std::string& source, std::int64_t now_ns);
+  // Forgets the quarantined ones that are fresh, but not that of `source`. Which they were and why
+  // they are not used, for Update::left_out; empty when there was none.
+  std::vector<Omission> drop_quarantined(const std::string& source, std::int64_t now_ns);
 
   // Observations to use together with one of this time, in the order of their sources' names.
   std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
@@ -48,7 +48,7 @@ class Evidence {
 
   double max_age_s_;
   std::map<std::string, RegisteredObservation> newest_;
-  std::set<std::string> suspects_;  // sources
+  std::set<std::string> quarantined_;  // sources
 };
 
 // Data of several observations as one. Data that follow the deformation begin where their

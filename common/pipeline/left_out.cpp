@@ -37,8 +37,10 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
   const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
   const bool swells = prior.tumour_volume_strain_sd > 0.0 && !prior.tumour_volume_radii_mm.empty();
   const auto where_on = [](bool on, const char* name) { return on ? name : nullptr; };
-  const char* const medium = where_on(prior.medium_density_sd_n_m3 > 0.0, "the medium remainder");
-  const char* const coarse = where_on(prior.coarse_density_sd_n_m3 > 0.0, "the coarse remainder");
+  const char* const medium =
+      where_on(prior.medium_density_sd_n_m3 > 0.0, "the medium residual field");
+  const char* const coarse =
+      where_on(prior.coarse_density_sd_n_m3 > 0.0, "the coarse residual field");
   const char* const tumour = where_on(swells, "swelling of the tumour");
   const Part parts[] = {
       {"gravity modes", "prior.gravity_mode_sd or prior.gravity_levels_mm", no_gravity, 2.1, 2.3},
@@ -52,12 +54,12 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
        prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6, tumour},
       {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
        4.4, 1.3},
-      {"fine remainder", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0, 0.1,
-       0.1, medium},
-      {"medium remainder", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0, 0.8,
-       0.8},
-      {"coarse remainder", "prior.coarse_density_sd_n_m3", prior.coarse_density_sd_n_m3 == 0.0, 1.1,
-       1.2}};
+      {"fine residual field", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0,
+       0.1, 0.1, medium},
+      {"medium residual field", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0,
+       0.8, 0.8},
+      {"coarse residual field", "prior.coarse_density_sd_n_m3", prior.coarse_density_sd_n_m3 == 0.0,
+       1.1, 1.2}};
   std::vector<Omission> omissions;
   for (const Part& part : parts) {
     if (!part.off) continue;

@@ -79,14 +79,14 @@ Status Pipeline::register_into(const Observation& observation, Update& update) {
   return {};
 }
 
-// The evidence's SparseData -> Estimate; once more without suspects where they spoil it.
+// The evidence's SparseData -> Estimate; once more without quarantined data where they spoil it.
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
                                Update& update) {
   const Stopwatch watch;
   Status status = try_estimate(observation, options, update);
   Estimate& estimate = update.estimate;
   if ((!status || !estimate.quality.usable()) && !options.stop.stop_requested()) {
-    auto dropped = evidence_.drop_suspects(observation.source, observation.acquired_ns);
+    auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
     if (!dropped.empty()) {
       append(std::move(dropped), update);
       status = try_estimate(observation, options, update);
@@ -96,7 +96,7 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
   if (estimate.quality.usable()) {
     evidence_.trust();
   } else {
-    evidence_.suspect(observation.source);
+    evidence_.quarantine(observation.source);
   }
   if (const auto errors = inverter_->omission_errors()) {
     append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);

@@ -4,8 +4,8 @@
 //
 //   Sigma = Sigma_fine + Sigma_medium + Sigma_coarse + M M^T
 //
-// The first three are a smooth remainder of three correlation lengths (force_kernel.hpp): fine is
-// the paper's, compact; medium and coarse have a basis. M: load modes, one nodal force field per
+// The first three are smooth residual fields of three correlation lengths (force_kernel.hpp): fine
+// is the paper's, compact; medium and coarse have a basis. M: load modes, one nodal force field per
 // column, each times its standard deviation (load_modes.hpp).
 // Assumption: forces in different directions and of different parts are independent.
 #pragma once
@@ -22,7 +22,7 @@ namespace brainshift::prior {
 
 class ForcePrior {
  public:
-  // kernels: of the remainders, in the order of PriorPart.
+  // kernels: of the residual fields, in the order of PriorPart.
   ForcePrior(std::array<ForceKernel, kRemainders> kernels, LoadModes modes);
 
   // f = Sigma w; w: 3 x n (mm), f: 3 x n (N).
@@ -33,10 +33,8 @@ class ForcePrior {
   // k x 3n, node-major. Thread-safe.
   void apply_remainders(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
 
-  // remainder: 0 fine, 1 medium, 2 coarse.
-  const ForceKernel& kernel(int remainder) const {
-    return kernels_[static_cast<std::size_t>(remainder)];
-  }
+  // field: 0 fine, 1 medium, 2 coarse.
+  const ForceKernel& kernel(int field) const { return kernels_[static_cast<std::size_t>(field)]; }
   int num_modes() const { return modes_.size(); }
   const Eigen::MatrixXd& modes() const { return modes_.columns; }
   const PerPart<int>& columns_of_part() const { return modes_.of_part; }

@@ -46,7 +46,7 @@ inline constexpr double kRing = 0.65, kBumpWidth = 0.45;
 
 struct LoadModes {
   Eigen::MatrixXd columns;    // 3n x k, N, node-major, in the order of the parts
-  PerPart<int> of_part = {};  // how many columns belong to each part; 0 for the remainders
+  PerPart<int> of_part = {};  // how many columns belong to each part; 0 for the residual fields
 
   int size() const { return static_cast<int>(columns.cols()); }
 };

@@ -68,7 +68,7 @@ enum class PriorPart {
   kBrainVolume,    // the same of the whole brain and of its halves
   kResection,      // removed tissue: its weight, and the stress that it carried
   kOpening,        // pull and pressure at the craniotomy
-  kFine,           // smooth remainder, shortest correlation length
+  kFine,           // smooth residual field, shortest correlation length
   kMedium,
   kCoarse,  // longest
 };
@@ -80,7 +80,7 @@ std::string_view to_string(PriorPart part);
 template <typename T>
 using PerPart = std::array<T, kPriorParts>;  // in the order of PriorPart
 using PriorScaleValues = PerPart<double>;
-// Correlation lengths of the smooth remainder: the last parts.
+// The residual fields, one for each correlation length: the last parts.
 inline constexpr int kRemainders = 3;
 inline constexpr int kLoadParts = kPriorParts - kRemainders;
 inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1};

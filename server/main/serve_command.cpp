@@ -208,9 +208,9 @@ Status serve(const ServeArguments& arguments) {
   }
   if (!options->blas_kernel.empty()) spdlog::info("OpenBLAS kernel {}", options->blas_kernel);
   if (routing->keys) {
-    spdlog::info("keys are asked for; {} are known", routing->keys->names.size());
+    spdlog::info("authentication is on: {} keys are known", routing->keys->names.size());
   } else {
-    spdlog::info("no keys are asked for: everybody who reaches the endpoint may do everything");
+    spdlog::info("authentication is off: any peer that can connect has full access");
   }
   Outbox outbox;
   options->log_lines_lost = [&log] { return log.lost(); };

@@ -50,29 +50,31 @@ class Families {
 };
 
 void add_daemon(Families& out, const wire::DaemonReport& report) {
-  add(out.open(MetricType::Gauge, "build_info", "Always 1; what runs stands in the labels."), 1.0,
-      {{"version", report.version}, {"build", report.build}, {"machine", report.machine}});
+  add(out.open(MetricType::Gauge, "build_info",
+               "Always 1; the labels name version, build and machine."),
+      1.0, {{"version", report.version}, {"build", report.build}, {"machine", report.machine}});
   out.gauge("uptime_seconds", 1e-3 * number(report.uptime_ms), "Since the daemon started.");
   out.gauge("model_ready", report.model_ready, "1: a model is loaded.");
   out.gauge("worker_busy_seconds", 1e-3 * report.working_ms,
-            "Since the worker began what it does now; 0: it waits.");
-  out.gauge("worker_hangs", report.worker_hangs(), "1: it is busy for longer than it may.");
+            "Since the worker began its job; 0: it is idle.");
+  out.gauge("worker_hangs", report.worker_hangs(),
+            "1: the worker is busy for longer than its job may take.");
   out.counter("log_lines_lost_total", number(report.log_lines_lost),
-              "Lines that gave way because the reader of the log did not keep up.");
+              "Log lines dropped because their reader did not keep up.");
 }
 
 void add_session(Families& out, const wire::DaemonReport& report) {
-  MetricFamily& phase = out.open(MetricType::Gauge, "session_phase", "1 for the phase that holds.");
+  MetricFamily& phase = out.open(MetricType::Gauge, "session_phase", "1 for the current phase.");
   for (int i = 0; i <= static_cast<int>(SessionPhase::kClosed); ++i) {
     const auto candidate = static_cast<SessionPhase>(i);
     add(phase, candidate == report.session.phase, {{"phase", std::string(to_string(candidate))}});
   }
   if (report.session.newest_usable > 0) {
     out.gauge("field_age_seconds", 1e-3 * report.session.age_ms,
-              "Since the observation that the newest usable field answers arrived.");
+              "Since the arrival of the observation behind the newest usable field.");
   }
   MetricFamily& updates =
-      out.open(MetricType::Counter, "updates_total", "Final updates, by what they are.");
+      out.open(MetricType::Counter, "updates_total", "Final updates, by result.");
   add(updates, number(report.usable), {{"result", "usable"}});
   add(updates, number(report.unusable), {{"result", "unusable"}});
   add(updates, number(report.failures), {{"result", "failed"}});
@@ -84,8 +86,8 @@ void add_session(Families& out, const wire::DaemonReport& report) {
 void add_sources(Families& out, const wire::DaemonReport& report) {
   MetricFamily received = family(MetricType::Counter, "observations_received_total",
                                  "Observation messages, by source; empty: not known.");
-  MetricFamily outcome = family(MetricType::Counter, "observations_total",
-                                "What became of them, by source and outcome.");
+  MetricFamily outcome =
+      family(MetricType::Counter, "observations_total", "Observations by source and outcome.");
   MetricFamily waiting = family(MetricType::Gauge, "observations_waiting",
                                 "Accepted and not yet answered, replaced or skipped.");
   MetricFamily age = family(MetricType::Gauge, "observation_age_seconds",

@@ -67,7 +67,7 @@ Status Gate::check_role(const std::string& caller, const wire::Frame& request) {
   const Need need = need_of(request);
   if (includes(found->second, need.least)) return {};
   return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed,
-                fmt::format("the key {} has the role {}: to {} takes the role {}", caller,
+                fmt::format("the key {} has the role {}: to {} requires the role {}", caller,
                             to_string(found->second), need.what, to_string(need.least)));
 }
 

@@ -44,7 +44,7 @@ struct Refusals {
   std::uint64_t session_starts = 0;  // too many a minute
 };
 
-// Roles by key name; nullopt: no keys are asked for.
+// Roles by key name; nullopt: authentication is off.
 using Roles = std::optional<std::map<std::string, Role>>;
 
 class Gate {

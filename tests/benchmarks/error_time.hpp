@@ -40,7 +40,7 @@ struct Prior {
   const char* name = "case";  // or "paper"
   std::shared_ptr<const inversion::PreparedModel> prepared;
 };
-// The paper's prior: its remainder alone, (1 + r/L) exp(-r/L) with L = 5 mm (section 2.2). The
+// The paper's prior: its residual field alone, (1 + r/L) exp(-r/L) with L = 5 mm (section 2.2). The
 // paper states no strength; here it is the weight of tissue in air, 9.8 kN/m3, which is what
 // drainage can change at most. Errors as PreparedModel::prepare.
 Result<Prior> papers_prior(const Head& head);

@@ -27,9 +27,9 @@ Pairs without(const Pairs& all, Eigen::Index one) {
   return {all.before(Eigen::all, others), all.during(Eigen::all, others)};
 }
 
-class Foreteller {
+class Predictor {
  public:
-  static Result<Foreteller> build(const bench::Head& head, double sd_mm) {
+  static Result<Predictor> build(const bench::Head& head, double sd_mm) {
     CaseConfig config = head.config;
     config.sensing.landmark_pose_sd_mm = kLeftPose_mm;
     config.sensing.landmark_pose_sd_deg = kLeftPose_deg;
@@ -38,11 +38,11 @@ class Foreteller {
     auto pipeline = pipeline::Pipeline::build(head.model, config, Method::kCondensed,
                                               Boundary::kContact, std::move(*inverter));
     if (!pipeline) return tl::unexpected(pipeline.error());
-    return Foreteller(head, sd_mm, std::move(*pipeline));
+    return Predictor(head, sd_mm, std::move(*pipeline));
   }
 
   // Where the estimate from `others` has the landmark, and what it says of itself.
-  Result<Vec3> foretell(const Pairs& others, const Vec3& before, LeftOutLandmark& out) {
+  Result<Vec3> predict(const Pairs& others, const Vec3& before, LeftOutLandmark& out) {
     const auto first = registration::register_fiducials(others.before, others.during);
     if (!first) return tl::unexpected(first.error());
     Observation observation;
@@ -67,7 +67,7 @@ class Foreteller {
   }
 
  private:
-  Foreteller(const bench::Head& head, double sd_mm, pipeline::Pipeline pipeline)
+  Predictor(const bench::Head& head, double sd_mm, pipeline::Pipeline pipeline)
       : head_(&head), sd_mm_(sd_mm), pipeline_(std::move(pipeline)) {}
 
   const bench::Head* head_;
@@ -85,8 +85,8 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
     return fail(ErrorCode::kInvalidArgument, "landmarks: " + std::to_string(count) +
                                                  " pairs; at least 5 are needed to leave one out");
   }
-  auto foreteller = Foreteller::build(head, sd_mm);
-  if (!foreteller) return tl::unexpected(foreteller.error());
+  auto predictor = Predictor::build(head, sd_mm);
+  if (!predictor) return tl::unexpected(predictor.error());
   std::vector<LeftOutLandmark> result;
   for (Eigen::Index i = 0; i < count; ++i) {
     const Vec3 before = all.before.col(i), during = all.during.col(i);
@@ -104,9 +104,9 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
       if (!map) return failed(map.error());
       out.*distance = ((*map)(before)-during).norm();
     }
-    const auto foretold = foreteller->foretell(others, before, out);
-    if (!foretold) return failed(foretold.error());
-    out.estimate = (*foretold - during).norm();
+    const auto predicted = predictor->predict(others, before, out);
+    if (!predicted) return failed(predicted.error());
+    out.estimate = (*predicted - during).norm();
   }
   return result;
 }

@@ -6,7 +6,7 @@
 // a_g: strength of the part that column j belongs to; 1 as in the case. f: contact forces
 // (inversion/skull/contact_at_loads.hpp). And what u is at three places. A part alone has the
 // same z in its own columns and 0 elsewhere.
-// What the modes leave out of the remainders is not drawn; left_out_sd_mm says how much that is.
+// What the modes leave out of the residual fields is not drawn; left_out_sd_mm says how much.
 #pragma once
 
 #include <array>
@@ -49,7 +49,7 @@ VecX scaled_modes(const CondensedOperators& operators, const PriorScaleValues& s
 Result<PriorScaleValues> parse_strengths(const std::vector<std::string>& texts);
 
 // Root mean square of the three components' standard deviations, mm, at each place: what the modes
-// leave out of the three remainders together.
+// leave out of the three residual fields together.
 std::array<double, kPlaces> left_out_sd_mm(const CondensedOperators& operators,
                                            const std::array<MeshPoint, kPlaces>& places);
 

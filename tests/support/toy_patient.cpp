@@ -45,8 +45,8 @@ CaseConfig toy_config() {
   config.gravity_direction = Vec3(0, 0, -1);
   config.prior.correlation_length_mm = 10.0;
   config.prior.gravity_levels_mm = {10.0, 40.0};
-  // Gravity with an unknown direction and the paper's remainder: dense references have no other
-  // loads, and there are few enough modes to keep all.
+  // Gravity with an unknown direction and the paper's residual field: dense references have no
+  // other loads, and there are few enough modes to keep all.
   config.prior.force_density_sd_n_m3 = 1000.0;
   config.prior.gravity_direction_sd_deg = 10.0;
   config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;

@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// As in the table; joint-distension is the same truth as distension with more to see.
+// joint-distension is left out: it is the same truth as distension with more to see.
 const std::vector<std::string> kScenarios = {"paper",     "paper-icp",        "distension",
                                              "joint-sag", "joint-tangential", "joint-mixed",
                                              "resection", "retraction"};

@@ -174,7 +174,7 @@ void add_bridge(CLI::App& app, Status& status) {
       "brainshift_cortex,\n"
       "brainshift_state (JSON) and brainshift (STATUS). When the field is not current, the "
       "volumes\n"
-      "are blank and the reason is told. Examples:\n"
+      "are blank and the reason is given. Examples:\n"
       "  brainshift bridge\n"
       "      then, in Slicer's OpenIGTLinkIF: a client connector to localhost, port 18945\n"
       "  brainshift bridge --region brain --margin 20mm --spacing 3mm --no-surfaces\n"

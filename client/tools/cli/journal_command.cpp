@@ -100,14 +100,15 @@ CLI::App* add_journal_action(CLI::App& journal, const std::string& name, const s
 void add_check(CLI::App& journal, const std::shared_ptr<JournalArguments>& arguments,
                Status& status) {
   CLI::App* action = add_journal_action(
-      journal, "check", "Say what files hold, and whether every record is what was written.",
+      journal, "check", "Report what files hold, and whether every record is as it was written.",
       "Examples:\n"
       "  brainshift journal check journal/*.surgery\n"
       "  brainshift journal check crashed.surgery && brainshift replay crashed.surgery --report "
       "r.json\n"
       "A file that was not closed is no error: it crashed, is still written, or lost its -wal "
       "file\n"
-      "when it was copied. Exit status: 0 all records are good; 2 a file is broken or is none.");
+      "when it was copied. Exit status: 0 all records are good; 2 a file is damaged or is not a "
+      "surgery file.");
   action->add_option("files", arguments->files, "surgery files (.surgery)")->required();
   action->callback([arguments, &status] { status = run_check(arguments->files); });
 }

@@ -66,7 +66,8 @@ Status show_top(const TopArguments& arguments) {
 
 void add_status(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<StatusArguments>();
-  CLI::App* command = app.add_subcommand("status", "Say how a running daemon fares, on one page.");
+  CLI::App* command =
+      app.add_subcommand("status", "Report the state of a running daemon, on one page.");
   command->add_option("--endpoint", arguments->endpoint, "where brainshiftd listens")
       ->capture_default_str();
   add_key_options(*command, arguments->keys);
@@ -90,12 +91,13 @@ void add_top(CLI::App& app, Status& status) {
   command->add_option("--endpoint", arguments->endpoint, "where brainshiftd listens")
       ->capture_default_str();
   add_key_options(*command, arguments->keys);
-  command->add_option("--interval", arguments->interval_s, "between two looks, s")
+  command->add_option("--interval", arguments->interval_s, "between two pages, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   command->add_flag("--once", arguments->once, "print one page with the rates of one interval");
   command->footer(
-      "On a terminal the page is drawn in place; q or Ctrl-C ends it. On a pipe every look prints\n"
+      "On a terminal the page is drawn in place; q or Ctrl-C ends it. On a pipe every interval "
+      "prints\n"
       "one line. What needs attention stands in capitals: ATTENTION, STALE, NOT RECORDING, HANGS.\n"
       "Examples:\n"
       "  brainshift top\n"

@@ -46,7 +46,7 @@ void add_inputs(CLI::App& command, RegisterArguments& arguments) {
   command.add_option("--ras", options.ras,
                      "the fiducials in the image: Slicer's .mrk.json or .fcsv, or .csv in mm RAS");
   command.add_option("--model", options.model,
-                     "prepared model (.h5): the expected error is told at its tumour");
+                     "prepared model (.h5): the expected error is reported at its tumour");
   command.add_option("--case", options.case_file,
                      "instead of --model: case file (YAML); its model is built again");
   command.add_option("--target", arguments.target, "instead of --model: a point, mm RAS")

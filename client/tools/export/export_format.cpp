@@ -42,7 +42,7 @@ Result<ExportFormats> parse_formats(const std::vector<std::string>& words) {
       for (const ExportFormat format : kAllExportFormats)
         all += fmt::format("{}, ", to_string(format));
       return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("--formats: \"{}\" is none: must be {}or all", word, all));
+                  fmt::format("--formats: \"{}\" is not a format: must be {}or all", word, all));
     }
     formats.insert(*known);
   }

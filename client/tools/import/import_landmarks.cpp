@@ -165,7 +165,7 @@ std::vector<std::string> report_lines(const LandmarkReport& report) {
         "the daemon takes it for motion of the tissue unless the case says how well that image is "
         "registered (sensing.landmark_pose_sd_mm, sensing.landmark_pose_sd_deg)");
   } else {
-    lines.emplace_back("note: no rigid part can be told: " + report.no_rigid);
+    lines.emplace_back("note: no rigid part can be computed: " + report.no_rigid);
   }
   if (report.outside > 0) {
     lines.emplace_back(

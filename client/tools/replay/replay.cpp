@@ -278,7 +278,7 @@ Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
     return fail(ErrorCode::kInvalidArgument, given + "a surgery that goes on is played once");
   }
   if (options.speed != Speed::kMax) {
-    return fail(ErrorCode::kInvalidArgument, given + "recorded times have no cycle; use speed max");
+    return fail(ErrorCode::kInvalidArgument, given + "--repeat requires --speed max");
   }
   // Without this the cycles would overlap or leave the range of a surgery file's sequences.
   const std::uint64_t first = surgery.observations.front().observation.sequence;

@@ -115,7 +115,7 @@ std::string quality_table(const std::vector<ReportedRun>& runs) {
   Table table(runs, false);
   table.row("worst update", of_quality([](const RunQuality& q) { return badge(q.worst); }));
   table.row("last update", of_quality([](const RunQuality& q) { return badge(q.last); }));
-  table.row("what is said of the last update", of_quality([](const RunQuality& q) {
+  table.row("reason given with the last update", of_quality([](const RunQuality& q) {
               return "<span class=\"words\">" + plain(q.reason) + "</span>";
             }));
   table.row("updates: good / with caution / unusable", of_quality(counts));

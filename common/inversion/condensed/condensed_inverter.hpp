@@ -15,7 +15,7 @@
 //
 // The model's own error: the patient's tissue is stiffer here and softer there than the case says,
 // so that its displacement differs from the model's by a part of itself (kModelError; decision
-// 0018). The medium remainder has that much variance besides its strength.
+// 0018). The medium residual field has that much variance besides its strength.
 //
 // An estimate depends on its data alone, not on earlier updates.
 //

@@ -50,7 +50,7 @@ class FieldRebuild {
   double greatest_control_move(const VecX& dg, const VecX& dz, const ContactReduction& contact,
                                const VecX& df) const;
   // covariance_factor: F, r x r, lower, Cov(z) = F F^T. left_out: mean squared strength of each
-  // remainder, for the variance that its modes leave out. sd: n, mm.
+  // residual field, for the variance that its modes leave out. sd: n, mm.
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
                           const linalg::blas::In<double>& covariance_factor,
                           const RemainderVariances& left_out, VecX& sd);

@@ -46,7 +46,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
       gradient_(window.count),
       shift_(SparseData::kMaxCommonErrors + window.count),
       mean_z_(VecX::Zero(window.count)),
-      foretold_(operators.num_slaves()),
+      predicted_(operators.num_slaves()),
       penetration_(operators.num_slaves()),
       newton_(window.count),
       next_(window.count),
@@ -124,7 +124,7 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
 
 Status LoadDescent::solve_contact(const VecX& z) {
   const StageClock clock(profile_, UpdateStage::kContact);
-  auto forces = foretold_.head(reduction_.size());
+  auto forces = predicted_.head(reduction_.size());
   reduction_.forces_at(z, forces);
   contact_.begin_from(reduction_.active(), forces);
   contact_at_z_ = false;

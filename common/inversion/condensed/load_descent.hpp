@@ -20,7 +20,7 @@
 //
 // A rough step is shortened where contact would change in many slaves (contact_reach.hpp); how many
 // are allowed grows with steps that fall and shrinks with others. A search for contact begins with
-// the forces that the linear model foretells.
+// the forces that the linear model predicts.
 //
 //   certificate   decrement: the length of the step that is left, in posterior standard deviations;
 //                 J falls by half its square. violation: ContactAtLoads::violation_mm()
@@ -122,7 +122,7 @@ class LoadDescent {
   Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
   bool far_from_model() const;
   int most_changes() const;
-  // Contact at z, from the forces that the linear model foretells.
+  // Contact at z, from the forces that the linear model predicts.
   Status solve_contact(const VecX& z);
   // The same at z_, unless contact_ is there already.
   Status return_contact();
@@ -145,7 +145,7 @@ class LoadDescent {
   ContactReach reach_;
   ModePosterior posterior_;
   VecX z_, trial_, step_, gradient_, shift_, mean_z_;
-  VecX foretold_;                                        // forces, N
+  VecX predicted_;                                       // forces, N
   VecX penetration_;                                     // of every slave at z_, mm
   VecX newton_, next_, direction_, change_;              // whitened
   double value_ = 0.0, after_ = 0.0;                     // J at z_ and at trial_

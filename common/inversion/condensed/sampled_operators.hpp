@@ -26,7 +26,7 @@
 
 namespace brainshift::inversion {
 
-// One number for each remainder of the prior.
+// One number for each residual field of the prior.
 using RemainderVariances = Eigen::Matrix<double, kRemainders, 1>;
 
 class SampledOperators {
@@ -41,7 +41,7 @@ class SampledOperators {
   // reserve(data.size()).
   Status locate(const SparseData& data);
   // Fills free_body for the data that locate() was given. strengths_squared: of the prior's
-  // remainders, for what their modes leave out. weights: robust weight per datum, > 0.
+  // residual fields, for what their modes leave out. weights: robust weight per datum, > 0.
   void sample(const SparseData& data, const RemainderVariances& strengths_squared,
               const Eigen::Ref<const VecX>& weights);
   int size() const { return size_; }
@@ -65,8 +65,8 @@ class SampledOperators {
   void contact_transposed(const std::vector<int>& active, const VecX& v, Eigen::Ref<VecX> out);
 
  private:
-  // What the modes of each remainder leave out at unit strength, mm^2; false when every node that
-  // counts was prepared.
+  // What the modes of each residual field leave out at unit strength, mm^2; false when every node
+  // that counts was prepared.
   bool truncated_variance(const geometry::TetLocation& location, RemainderVariances& out) const;
   Status refuse(const SparseData& data, int datum, const std::string& where);
   // The rows of one datum in a column of rows().

@@ -91,14 +91,14 @@ TestVectors test_vectors(const CondensedOperators& operators, int count) {
   return omega;
 }
 
-// How many modes each remainder keeps of those that the load families leave of `max_rank`.
+// How many modes each residual field keeps of those that the load families leave of `max_rank`.
 std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eigen::Index rows) {
   // A coarse field needs fewer than a fine one.
   std::array<double, kRemainders> share = {0.4, 0.4, 0.2};
   if (config.prior.force_density_sd_n_m3 == 0.0) share[0] = 0.0;
   if (config.prior.medium_density_sd_n_m3 == 0.0) share[1] = 0.0;
   if (config.prior.coarse_density_sd_n_m3 == 0.0) share[2] = 0.0;
-  const double all = share[0] + share[1] + share[2];  // 0: no remainder
+  const double all = share[0] + share[1] + share[2];  // 0: no residual field
   const int left = std::max(kRemainders, config.condensed.max_rank - loads);
   std::array<int, kRemainders> kept{};
   for (std::size_t g = 0; g < kept.size(); ++g) {
@@ -387,7 +387,7 @@ std::uint64_t condense_memory_bytes(const CondenseSizes& sizes) {
   // Two matrices of a member, three of its solver.
   const std::uint64_t blocks = 5 * 8 * rows * kBlock * of(sizes.threads);
   const std::uint64_t modes = 4 * rows * m, compliance = 8 * s * s;
-  // Two remainders, as the default case has them; the third is rare.
+  // Two residual fields, as the default case has them; the third is rare.
   const std::uint64_t sketches = 8 * tested * (2 * rows + 3 * (of(sizes.region) + s));
   const std::uint64_t solving =
       sizes.model_bytes + modes + blocks + std::max(sketches, compliance + columns);

@@ -5,8 +5,9 @@
 // Right-hand sides are solved in blocks that are dealt to the cores in a fixed partition
 // (block_runner.hpp), one BLAS thread each, so the result is bit-identical from run to run.
 //   1. load modes K^-1 M
-//   2. for each remainder g of the prior, with one set of test vectors: sketch F = K^-1 Sigma_g
-//      K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading columns
+//   2. for each residual field g of the prior, with one set of test vectors: sketch
+//      F = K^-1 Sigma_g K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading
+//      columns
 //   3. diag(C_g) at the control nodes: |Sigma_g^1/2 K^-1 e|^2 by one more solve per control dof
 //   4. G = K^-1 N block by block; Phi from the same blocks (contact_columns.hpp)
 //   5. [U G] made small (encode_columns.hpp)

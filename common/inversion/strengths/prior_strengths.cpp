@@ -42,7 +42,7 @@ std::size_t index_of(double strength) {
 
 tl::unexpected<Error> not_finite() {
   return fail(ErrorCode::kNotFinite,
-              "inversion: the evidence of the prior's strengths is not finite");
+              "inversion: the marginal likelihood of the prior's strengths is not finite");
 }
 
 PerPart<int> modes_of_window(const PerPart<int>& columns, ModeWindow window) {

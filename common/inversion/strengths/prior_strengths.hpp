@@ -7,8 +7,8 @@
 //
 //   p(s_g = 0) = kAbsent        p(s_g) ~ exp(-ln^2 s_g / (2 kLogStrengthSd^2)) for the others
 //
-// A *hypothesis* is one strength for every part. Its evidence p(d | s) is that of the linear model
-// of one contact set (strength_evidence.hpp).
+// A *hypothesis* is one strength for every part. Its marginal likelihood p(d | s) is that of the
+// linear model of one contact set (strength_evidence.hpp).
 //
 // A part may have a *floor*: variance that it has besides, whatever its strength, because something
 // else acts through it that is never absent (the model's own error, condensed_inverter.hpp). s_g^2

@@ -30,8 +30,7 @@ void visit(A& a, V& v) {
   a.section({"security"}, Need::kOptional, [&] {
     a({"secret_key", "", "The daemon's secret key, made by `brainshift keys make`", "",
        "A file that its owner alone may read. With both keys everything is encrypted, and only "
-       "those in allow_list are served. Without them everybody who reaches the endpoint may do "
-       "everything."},
+       "those in allow_list are served. Without them any peer that can connect has full access."},
       v.security.secret_key);
     a({"allow_list", "",
        "Who is served: a line ROLE NAME PUBLICKEY for each, made by `brainshift keys add`", "",
@@ -146,7 +145,7 @@ Status check_security(const DaemonConfig& config) {
   const SecurityConfig& security = config.security;
   if (security.on()) return {};
   if (!security.secret_key.empty()) {
-    return missing("allow_list", "a secret key serves nobody without it (brainshift keys add)");
+    return missing("allow_list", "a secret key admits no client without it (brainshift keys add)");
   }
   if (!security.allow_list.empty()) {
     return missing("secret_key", "an allow-list counts only with it (brainshift keys make)");

@@ -177,8 +177,8 @@ Result<std::vector<AllowedKey>> parse_allow_list(const fs::path& path, const std
     }
     if (!is_key(key.public_key)) {
       return line_error(path, number,
-                        fmt::format("the key of {} is none: must be {} characters of Z85", key.name,
-                                    kKeyCharacters));
+                        fmt::format("the key of {} is not a key: must be {} characters of Z85",
+                                    key.name, kKeyCharacters));
     }
     for (const AllowedKey& earlier : keys) {
       if (const auto why = conflict(earlier, key); !why.empty()) {

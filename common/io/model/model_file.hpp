@@ -42,7 +42,7 @@
 //     region                  e           int32    sorted
 //     region_responses        r + s x 3e  float32         rows of [U G] at the region, by columns
 //     control                 c           int32    sorted
-//     truncated_variance_mm2  3 x c       float64           one remainder per row
+//     truncated_variance_mm2  3 x c       float64           one residual field per row
 //     control_neighbours      n x 4       int32    into control; 0 x 4 without control nodes
 //     control_weights         n x 4       float32
 // model_id is the hash of the model (common/values/model_id.hpp).

@@ -54,7 +54,7 @@ TEST(BuildProblem, ConvertsUnits) {
   const fem::PoroMaterial& material = problem->materials.at(0);
   EXPECT_NEAR(material.elastic.shear, 0.0012, 1e-15);
   EXPECT_NEAR(material.elastic.lambda, 0.0012, 1e-15);  // nu = 1/4: lambda = G
-  EXPECT_NEAR(material.permeability, 1e5, 1e-7);        // DESIGN section 2
+  EXPECT_NEAR(material.permeability, 1e5, 1e-7);        // m^3 s/kg = 1e12 mm^4/(N s)
   EXPECT_NEAR(material.storage, 1.0, 1e-12);
   EXPECT_NEAR(problem->body_force(2, 0), -1e-5, 1e-18);
   EXPECT_NEAR(problem->body_force(0, 0), 5.0, 1e-12);

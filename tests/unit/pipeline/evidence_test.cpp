@@ -204,7 +204,7 @@ TEST_F(Sources, AnObservationThatSpoilsTheNextUpdateTooIsForgotten) {
   EXPECT_EQ(used(), std::vector<std::string>{"ius"});
 }
 
-TEST_F(Sources, ANewObservationOfASuspectSourceIsNoSuspect) {
+TEST_F(Sources, ANewObservationOfAQuarantinedSourceIsTakenAgain) {
   inversion_.spoiler = "pointer";
   EXPECT_FALSE(run(landmarks_at(1, "pointer", 0))->usable());
   inversion_.spoiler.clear();
@@ -215,7 +215,7 @@ TEST_F(Sources, ANewObservationOfASuspectSourceIsNoSuspect) {
   EXPECT_EQ(inversion_.calls, 3);
 }
 
-TEST_F(Sources, ASuspectThatIsTooOldSpoilsNothing) {
+TEST_F(Sources, AQuarantinedSourceThatIsTooOldSpoilsNothing) {
   inversion_.spoiler = "pointer";
   EXPECT_FALSE(run(landmarks_at(1, "pointer", 0))->usable());
   const auto after = run(landmarks_at(2, "ius", config_.sensing.max_age_s + 1.0));

@@ -324,15 +324,17 @@ TEST(Pipeline, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
   const auto by_default = prior_omissions(prior);
   ASSERT_EQ(by_default.size(), 3u);
   EXPECT_EQ(by_default[0].part, "buoyancy across gravity");
-  EXPECT_THAT(by_default[0].estimated_error, HasSubstr("the coarse remainder takes its place"));
+  EXPECT_THAT(by_default[0].estimated_error,
+              HasSubstr("the coarse residual field takes its place"));
   EXPECT_EQ(by_default[1].part, "resection");
   EXPECT_THAT(by_default[1].estimated_error, HasSubstr("swelling of the tumour takes its place"));
-  EXPECT_EQ(by_default[2].part, "fine remainder");
-  EXPECT_THAT(by_default[2].estimated_error, HasSubstr("the medium remainder takes its place"));
+  EXPECT_EQ(by_default[2].part, "fine residual field");
+  EXPECT_THAT(by_default[2].estimated_error,
+              HasSubstr("the medium residual field takes its place"));
   prior.medium_density_sd_n_m3 = 0.0;
   const auto none = prior_omissions(prior);
   ASSERT_EQ(none.size(), 4u);
-  EXPECT_EQ(none[2].part, "fine remainder");
+  EXPECT_EQ(none[2].part, "fine residual field");
   EXPECT_THAT(none[2].estimated_error, HasSubstr("0.1 mm at the cortex"));
 }
 

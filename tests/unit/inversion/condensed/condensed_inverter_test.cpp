@@ -284,7 +284,7 @@ TEST_P(Condensed, AnEstimateDependsOnItsDataAlone) {
   }
 }
 
-// With the medium remainder, twice the motion leaves more than the same uncertainty.
+// With the medium residual field, twice the motion leaves more than the same uncertainty.
 TEST_F(Condensed, TheModelsOwnErrorGrowsWithTheMotion) {
   CaseConfig with = config();
   with.prior.estimate_scales = true;

@@ -15,7 +15,7 @@ class Scene : public ::testing::Test {
   static CaseConfig config() {
     CaseConfig config = test_support::toy_config();
     config.condensed.max_rank = 80;
-    // The estimates hold for given strengths of gravity and the paper's remainder.
+    // The estimates hold for given strengths of gravity and the paper's residual field.
     config.prior.estimate_scales = false;
     config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;
     config.prior.tumour_volume_strain_sd = config.prior.brain_volume_strain_sd = 0.0;

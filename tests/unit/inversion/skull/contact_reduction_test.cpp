@@ -10,7 +10,7 @@ namespace brainshift::inversion {
 namespace {
 
 // Against the search for contact itself, where a step is so small that no slave changes.
-TEST(ContactReduction, ForetellsForcesAndPenetrationAlsoForModesBeforeTheWindow) {
+TEST(ContactReduction, PredictsForcesAndPenetrationAlsoForModesBeforeTheWindow) {
   const CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team{2};
   constexpr int kBefore = 2;

@@ -153,7 +153,7 @@ TEST_F(KeyFiles, ABadAllowListIsRefusedWithItsLine) {
       {"root wall " + kPublic + "\n", "list:1: must be ROLE NAME PUBLICKEY"},
       {"viewer wall " + kPublic + " more\n", "list:1: must be ROLE NAME PUBLICKEY"},
       {"viewer a/b " + kPublic + "\n", "list:1: name:"},
-      {"\nviewer wall short\n", "list:2: the key of wall is none"},
+      {"\nviewer wall short\n", "list:2: the key of wall is not a key"},
       {"viewer a " + kPublic + "\nadmin b " + kPublic + "\n", "list:2: the key of b stands there"},
       {"viewer a " + kPublic + "\nadmin a " + kOther + "\n", "list:2: the name a stands there"}};
   for (const auto& [text, message] : kBad) {

@@ -62,7 +62,7 @@ TEST(Gate, ARefusalNamesKeyRoleAndWhatItTakes) {
   const Status status = gate.admit("viewer", frame(MessageType::kObservation), kNow);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().message,
-            "the key viewer has the role viewer: to hand in observations takes the role source");
+            "the key viewer has the role viewer: to hand in observations requires the role source");
 }
 
 TEST(Gate, ANameThatIsNotInTheListMayNothing) {

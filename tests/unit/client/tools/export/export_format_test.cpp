@@ -30,7 +30,7 @@ TEST(ExportFormat, AnotherWordIsNamedWithThoseThereAre) {
     ASSERT_FALSE(formats) << word;
     EXPECT_EQ(formats.error().code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(formats.error().message, HasSubstr("--formats: \"" + std::string(word) +
-                                                   "\" is none: must be nifti-1007, "));
+                                                   "\" is not a format: must be nifti-1007, "));
     EXPECT_THAT(formats.error().message, HasSubstr("series, or all"));
   }
 }

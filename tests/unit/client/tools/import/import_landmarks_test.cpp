@@ -137,8 +137,8 @@ TEST_F(ImportLandmarks, LandmarksOnALineHaveNoRigidPart) {
   const auto report = import_landmarks(options);
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_FALSE(report->rigid);
-  EXPECT_THAT(report_lines(*report),
-              Contains(AllOf(HasSubstr("no rigid part can be told"), HasSubstr("on one line"))));
+  EXPECT_THAT(report_lines(*report), Contains(AllOf(HasSubstr("no rigid part can be computed"),
+                                                    HasSubstr("on one line"))));
 }
 
 TEST_F(ImportLandmarks, LandmarksBesideTheBrainAreToldAndFarOnesRefused) {
