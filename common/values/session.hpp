@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a daemon and its clients tell each other beside observations and fields: the daemon's status, the request for a
-// session and its answer, the receipt of an observation, an update or the error in its place. Times in the unit of the
-// name; byte and node counts as they were received.
+// What a daemon and its clients tell each other beside observations and fields: the daemon's
+// status, the request for a session and its answer, the receipt of an observation, an update or
+// the error in its place. Times in the unit of the name; byte and node counts as they were
+// received.
 #pragma once
 
 #include <cstddef>

@@ -13,8 +13,8 @@ namespace brainshift::client {
 Result<io::VoxelGrid> grid_like(const VoxelImage& image);
 
 // Along the axes of RAS, the same spacing along all three, around the brain before and after u,
-// with room for the taper outside of it. Errors of grid_around (client/tools/volume/field_grid.hpp) and
-// io::validate(VoxelGrid).
+// with room for the taper outside of it. Errors of grid_around
+// (client/tools/volume/field_grid.hpp) and io::validate(VoxelGrid).
 Result<io::VoxelGrid> grid_around_brain(const TetMesh& mesh, const Points& u, double spacing_mm,
                                         const OutsideTaper& taper = {});
 

@@ -2,8 +2,8 @@
 // A case as pictures: planes with outlines on the MRI, and the surface of the brain from outside.
 //
 // Outlines and surfaces show what a node of the brain's surface is to the mechanics. 8-bit BGR
-// (client/tools/pictures/canvas.hpp). Whatever a case lacks is not drawn; its first problem is in the
-// subtitle.
+// (client/tools/pictures/canvas.hpp). Whatever a case lacks is not drawn; its first problem is in
+// the subtitle.
 #pragma once
 
 #include <opencv2/core.hpp>
