@@ -23,6 +23,8 @@ endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/client/lib/client.hpp ${CMAKE_SOURCE_DIR}/client/lib/client_keys.hpp
   ${CMAKE_SOURCE_DIR}/client/lib/field_status.hpp
   DESTINATION include/brainshift/client/lib COMPONENT client)
+# What is included as <brainshift/client.hpp>.
+install(FILES ${CMAKE_SOURCE_DIR}/client/lib/brainshift/client.hpp DESTINATION include/brainshift COMPONENT client)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSES/Apache-2.0.txt DESTINATION share/doc/libbrainshift-client-dev COMPONENT client)
 
 # Not in the build's top folder: with its bin/ in PATH, find_package would take the files there for an installed package.

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sends the boundary of a tumour to a running brainshiftd and tells how the brain has moved.
 //   send_boundary ENDPOINT POINTS     POINTS: a text file, x y z of a point per line, RAS, mm
+#include <brainshift/client.hpp>
 #include <cstdio>
 #include <fstream>
 #include <vector>
-
-#include "client/lib/client.hpp"
 
 using namespace brainshift;
 
