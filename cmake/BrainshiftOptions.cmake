@@ -3,12 +3,6 @@ option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
 option(BRAINSHIFT_CLIENT_ONLY "Build and install the C++ client library alone: no solver, nothing under the GPL" OFF)
 set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
-# Several files of a folder are compiled as one: templates are instantiated and headers read once for all of them.
-# An edit compiles its whole batch, so the preset dev leaves it off. layout.names keeps names of a folder apart.
-option(BRAINSHIFT_UNITY "Compile the files of a folder together (unity builds)" OFF)
-set(CMAKE_UNITY_BUILD ${BRAINSHIFT_UNITY})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
-
 # See brainshift_archives in BrainshiftTargets.cmake.
 option(BRAINSHIFT_TEST_LIBRARY "Tests link the product as one shared library, and are themselves compiled with -O1" OFF)
 
@@ -33,6 +27,16 @@ target_compile_options(brainshift_warnings INTERFACE
 # headers, where it does not see that they are the system's. The sanitizer presets look at real ones.
 target_compile_options(brainshift_warnings INTERFACE -Wno-array-bounds -Wno-restrict
   -Wno-stringop-overflow -Wno-stringop-overread)
+
+# Several files of a folder are compiled as one: templates are instantiated and headers read once for all of them.
+# An edit compiles its whole batch, so the preset dev leaves it off. layout.names keeps names of a folder apart.
+option(BRAINSHIFT_UNITY "Compile the files of a folder together (unity builds)" OFF)
+set(CMAKE_UNITY_BUILD ${BRAINSHIFT_UNITY})
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+if(BRAINSHIFT_UNITY)
+  # GCC takes the files of a unit for headers, whose types must not have members of unnamed namespaces.
+  target_compile_options(brainshift_warnings INTERFACE -Wno-subobject-linkage)
+endif()
 
 if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
   # GCC is the compiler whose warnings are errors.
