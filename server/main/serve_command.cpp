@@ -10,6 +10,7 @@
 #include <memory>
 #include <utility>
 
+#include "common/core/stop_signals.hpp"
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/config/key_file.hpp"
 #include "common/io/model/model_file.hpp"
@@ -20,7 +21,6 @@
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
-#include "server/main/stop_signals.hpp"
 #include "server/operations/metrics_exporter.hpp"
 #include "server/operations/service_manager.hpp"
 #include "server/service/service.hpp"

@@ -5,9 +5,9 @@
 #include <poll.h>
 #include <csignal>
 
+#include "common/core/stop_signals.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
-#include "server/main/stop_signals.hpp"
 
 namespace brainshift::server {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "server/main/stop_signals.hpp"
+#include "common/core/stop_signals.hpp"
 
 namespace brainshift::server {
 namespace {
