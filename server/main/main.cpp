@@ -5,7 +5,7 @@
 #include <exception>
 #include <string>
 
-#include "common/core/stop_signals.hpp"
+#include "common/io/files/stop_signals.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "server/main/exit_status.hpp"
@@ -92,7 +92,7 @@ int parse_and_run(int argc, char** argv) {
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
-  survive_failing_writes();
+  brainshift::io::survive_failing_writes();
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {

@@ -10,9 +10,9 @@
 #include <memory>
 #include <utility>
 
-#include "common/core/stop_signals.hpp"
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/config/key_file.hpp"
+#include "common/io/files/stop_signals.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "server/guard/file_limit.hpp"
@@ -174,7 +174,7 @@ Result<RouterOptions> router_options(const io::DaemonConfig& config, long file_l
 
 Status serve(const ServeArguments& arguments) {
   return_large_blocks();
-  auto signals = StopSignals::catch_all();
+  auto signals = io::StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
   const auto config = configuration(arguments);
   if (!config) return tl::unexpected(config.error());

@@ -35,9 +35,10 @@ class ModelStore {
   ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
              std::vector<CondensedOperators> operators, ReadOperators read = {});
 
-  // For the request's method and boundary, with the parts that the scene carries. Errors as plan_scene, `read`,
-  // PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable when stopped, which
-  // is asked for between a factorisation and the next, and between blocks of columns.
+  // For the request's method and boundary, with the parts that the scene carries. Errors as
+  // plan_scene, `read`, PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable
+  // when stopped, which is asked for between a factorisation and the next, and between blocks of
+  // columns.
   Result<std::unique_ptr<SessionModel>> make(const SessionRequest& request,
                                              const std::stop_token& stop = {});
 

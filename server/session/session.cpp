@@ -15,7 +15,7 @@ constexpr const char* kLeft = "the client that asked for the session has left";
 constexpr const char* kSessionEnded = "the session ended";
 constexpr const char* kStopping = "the daemon is stopping";
 
-double seconds(Session::TimePoint::duration duration) {
+double seconds_of(Session::TimePoint::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
@@ -260,7 +260,7 @@ Session::State Session::state(TimePoint now) const {
   state.busy = work_ || coming() || !boxes_.empty();
   state.updates = updates_;
   if (work_) {
-    state.working_s = seconds(now - work_->since);
+    state.working_s = seconds_of(now - work_->since);
     state.deadline_s = work_->deadline_s;
   }
   if (!running_) return state;
@@ -271,7 +271,7 @@ Session::State Session::state(TimePoint now) const {
   state.shared.newest_update = running_->newest_update;
   state.shared.newest_usable = running_->newest_usable;
   if (running_->newest_usable > 0) {
-    state.shared.age_ms = 1e3 * seconds(now - running_->usable_arrived);
+    state.shared.age_ms = 1e3 * seconds_of(now - running_->usable_arrived);
   }
   if (state.shared.phase == SessionPhase::kDegraded) state.shared.reason = running_->reason;
   return state;

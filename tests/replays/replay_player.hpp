@@ -59,9 +59,9 @@ class Tap {
 Result<double> measure_t_solve_ms(const std::string& endpoint, const Recording& recording);
 
 // One pass in a session of its own: method condensed, contact, journal and all as the daemon has
-// it. facts: surgery, seed, speed, pass and t_solve are given; the rest is filled in. Errors: no daemon
-// (kUnavailable), the recording is of another case or model (kInvalidArgument). An observation that
-// fails is a row.
+// it. facts: surgery, seed, speed, pass and t_solve are given; the rest is filled in. Errors: no
+// daemon (kUnavailable), the recording is of another case or model (kInvalidArgument). An
+// observation that fails is a row.
 Result<std::vector<surgeries::Row>> play_pass(const std::string& endpoint,
                                               const Recording& recording, PassFacts facts,
                                               KnownFields& fields);

@@ -6,7 +6,7 @@
 #include "client/tools/bridge/bridge.hpp"
 #include "client/tools/cli/command.hpp"
 #include "client/tools/monitor/choice_text.hpp"
-#include "common/core/stop_signals.hpp"
+#include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -65,7 +65,7 @@ Status run_bridge(const BridgeArguments& arguments) {
                  "reads the patient's field, and may send models\n",
                  to_string(address).c_str());
   }
-  const auto signals = StopSignals::catch_into((*bridge)->stop_fd());
+  const auto signals = io::StopSignals::catch_into((*bridge)->stop_fd());
   if (!signals) return tl::unexpected(signals.error());
   return (*bridge)->run();
 }

@@ -15,7 +15,7 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/monitor/page.hpp"
-#include "common/core/stop_signals.hpp"
+#include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -87,7 +87,7 @@ class Screen {
 
 // Waits for q or a signal until then, and looks at least once: a question may have taken longer
 // than that. input: -1 for one without keys.
-bool quits(const StopSignals& signals, int input, Clock::time_point until) {
+bool quits(const io::StopSignals& signals, int input, Clock::time_point until) {
   while (true) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
     pollfd items[] = {{signals.fd(), POLLIN, 0}, {input, POLLIN, 0}};
@@ -144,7 +144,7 @@ class TopView {
   Clock::time_point answered_ = {};
 };
 
-Status print_once(TopView& view, const TopOptions& options, const StopSignals& signals) {
+Status print_once(TopView& view, const TopOptions& options, const io::StopSignals& signals) {
   if (Status ok = view.ask(); !ok) return ok;
   if (quits(signals, -1, Clock::now() + options.interval)) return {};
   if (Status ok = view.ask(); !ok) return ok;
@@ -162,7 +162,7 @@ Status top(const TopOptions& options) {
   client_options.request_timeout = std::chrono::milliseconds(1000);
   auto client = Client::connect(options.endpoint, client_options);
   if (!client) return tl::unexpected(client.error());
-  const auto signals = StopSignals::catch_all();
+  const auto signals = io::StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
   TopView view(std::move(*client), options);
   if (options.once) return print_once(view, options, *signals);

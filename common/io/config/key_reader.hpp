@@ -22,9 +22,7 @@ class KeyReader {
   // calls.
   explicit KeyReader(YamlSection& root) : here_(&root) {}
 
-  void operator()(const Key& key, double& value, const Limits&) {
-    here_->number(key.name, value);
-  }
+  void operator()(const Key& key, double& value, const Limits&) { here_->number(key.name, value); }
   void operator()(const Key& key, double& value, const Limits&, const SameAs& same) {
     value = same.value;
     here_->number(key.name, value);

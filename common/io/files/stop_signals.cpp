@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-#include "common/core/stop_signals.hpp"
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/stop_signals.hpp"
 
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace brainshift {
+namespace brainshift::io {
 namespace {
 
 std::atomic<int> event_fd{-1};
@@ -81,4 +81,4 @@ bool StopSignals::arrived() const {
   return poll(&item, 1, 0) > 0;
 }
 
-}  // namespace brainshift
+}  // namespace brainshift::io

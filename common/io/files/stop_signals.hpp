@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
 // SIGINT and SIGTERM as a file descriptor, so that a poll loop sees them like any other event.
 //
 // By handlers, not by a blocked mask and signalfd: a library may start threads before main()
@@ -10,7 +10,7 @@
 
 #include "common/core/error.hpp"
 
-namespace brainshift {
+namespace brainshift::io {
 
 // A write to a pipe that nobody reads any more, or beyond the limit on a file's size, fails with
 // EPIPE or EFBIG from here on; by default the signal that comes with it ends the process.
@@ -36,4 +36,4 @@ class StopSignals {
   struct sigaction interrupt_ = {}, terminate_ = {};  // the actions before
 };
 
-}  // namespace brainshift
+}  // namespace brainshift::io
