@@ -216,8 +216,6 @@ struct SceneConfig {
 struct CaseConfig {
   std::string case_id;
   std::filesystem::path file;  // where it was read from; empty for a case made in memory
-  // What the reader of an older case file should know, a sentence each. Not written to files.
-  std::vector<std::string> notes;
 
   std::filesystem::path mri;    // T1 MRI (NIfTI); pictures are drawn on it
   std::filesystem::path brain;  // mask or skull-stripped MRI: voxels > 0 are brain

@@ -232,12 +232,11 @@ void visit(A& a, V& v) {
      "deviation at its centre",
      "decision 0018",
      "0: no such modes. Oedema that raises the water content of white matter from 0.70 to 0.75 "
-     "adds 0.2.",
-     "swelling_strain_sd"},
+     "adds 0.2."},
     v.tumour_volume_strain_sd, between(0.0, 2.0));
   a({"tumour_volume_radii_mm", "mm",
      "Extents of these modes, standard deviations of Gaussian bumps about the tumour", "",
-     "May be empty.", "swelling_radii_mm"},
+     "May be empty."},
     v.tumour_volume_radii_mm, between(1.0, 300.0));
   a({"brain_volume_strain_sd", "",
      "Volume strain of the whole brain and of its halves (mannitol, engorgement), standard "

@@ -37,8 +37,6 @@ struct Key {
   const char* meaning = "";  // without the full stop: "Gap between brain and skull"
   const char* source = "";   // of the default: "paper, section 2.6"
   const char* note = "";     // further sentences
-  // An earlier name that files may still use. A 0 there was the default, and is not taken over.
-  const char* former = "";
 };
 
 enum class Need { kOptional, kRequired };

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "common/anatomy/brain_model_builder.hpp"
-#include "common/contact/full_solve.hpp"
 #include "common/core/fnv1a.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
@@ -98,9 +97,7 @@ Status condense_boundary(PreparedModel factorised, std::size_t which, const Prep
   const Stopwatch watch;
   const Boundary boundary = factorised.boundary();
   const Progress progress = with_prefix(options.progress, to_string(boundary));
-  report(progress, "measure", 0.0);
-  const inversion::PrepareTimings timings = factorised.timings();
-  prepared.boundaries[which] = {timings, contact::measure_full_solve_ms(factorised.forward())};
+  prepared.timings[which] = factorised.timings();
   inversion::CondenseOptions condensing;
   condensing.progress = progress;
   condensing.stop = options.stop;
@@ -110,7 +107,7 @@ Status condense_boundary(PreparedModel factorised, std::size_t which, const Prep
   }
   auto condensed = inversion::condense(std::move(factorised), condensing);
   if (!condensed) return tl::unexpected(condensed.error());
-  condensed->prepare_s = timings.total_s + watch.seconds();
+  condensed->prepare_s = prepared.timings[which].total_s + watch.seconds();
   prepared.file.condensed[which] = std::move(*condensed);
   return {};
 }
@@ -128,7 +125,7 @@ Status prepare_boundaries(const std::shared_ptr<const BrainModel>& model, const 
   if (!factorised) return tl::unexpected(factorised.error());
   const auto prior = factorised->shared_prior();
   std::optional<contact::ForwardModel> made;
-  if (beside.valid()) {  // so that the time of a solve is measured with nothing beside it
+  if (beside.valid()) {
     auto forward = beside.get();
     if (!forward) return tl::unexpected(forward.error());
     made = std::move(*forward);

@@ -42,17 +42,13 @@ struct PrepareOptions {
   int threads = 0;
 };
 
-struct BoundaryReport {
-  inversion::PrepareTimings timings;  // of the factorisation
-  double full_solve_ms = 0.0;         // contact::measure_full_solve_ms
-};
-
 struct PreparedPatient {
   io::ModelFile file;
   std::vector<std::string> notes;  // of anatomy::build_brain_model
   double read_s = 0.0;
   double mesh_s = 0.0;
-  std::array<BoundaryReport, kPreparedBoundaries.size()> boundaries;
+  std::array<inversion::PrepareTimings, kPreparedBoundaries.size()>
+      timings;  // of the factorisations
   // For the caller to remove() once the model is safe on disk; empty without a checkpoint.
   std::optional<io::CheckpointFile> checkpoint;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace brainshift::pipeline {
@@ -22,10 +23,21 @@ void Evidence::clear() {
   quarantined_.clear();
 }
 
-void Evidence::put(RegisteredObservation observation) {
-  std::string source = observation.source;
-  quarantined_.erase(source);
-  newest_.insert_or_assign(std::move(source), std::move(observation));
+std::vector<Omission> Evidence::put(RegisteredObservation observation) {
+  const std::int64_t now_ns = observation.acquired_ns;
+  std::string newest = observation.source;
+  quarantined_.erase(newest);
+  newest_.insert_or_assign(std::move(newest), std::move(observation));
+  std::vector<Omission> omissions;
+  for (const auto& [source, other] : newest_) {
+    const double age = age_s(other, now_ns);
+    if (age <= max_age_s_) continue;
+    omissions.push_back({"source " + source,
+                         fmt::format("observation {} is {:.0f} s old, sensing.max_age_s = {:g}",
+                                     other.sequence, age, max_age_s_),
+                         "what it would have shown is not known"});
+  }
+  return omissions;
 }
 
 void Evidence::quarantine(const std::string& source) { quarantined_.insert(source); }
@@ -63,19 +75,6 @@ std::vector<const RegisteredObservation*> Evidence::fresh(std::int64_t now_ns) c
   return result;
 }
 
-std::vector<Omission> Evidence::stale(std::int64_t now_ns) const {
-  std::vector<Omission> omissions;
-  for (const auto& [source, observation] : newest_) {
-    const double age = age_s(observation, now_ns);
-    if (age <= max_age_s_) continue;
-    omissions.push_back({"source " + source,
-                         fmt::format("observation {} is {:.0f} s old, sensing.max_age_s = {:g}",
-                                     observation.sequence, age, max_age_s_),
-                         "what it would have shown is not known"});
-  }
-  return omissions;
-}
-
 CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations)
     : observations_(std::move(observations)) {
   for (const RegisteredObservation* observation : observations_) {
@@ -86,28 +85,22 @@ CombinedData::CombinedData(std::vector<const RegisteredObservation*> observation
     followers_.push_back({parts_.size(), {}});
     parts_.push_back(named(observation->surface->first(), observation->source));
   }
-  gather_nodes();
-  data_ = combine(parts_);
-  moving_.relocate = [this](const Points& u, SparseData& data) { return relocate(u, data); };
-}
-
-// The union of the followers' nodes, and the place of each follower's nodes in it.
-void CombinedData::gather_nodes() {
+  // The union of the followers' nodes, and the place of each follower's nodes in it.
   std::vector<NodeIndex>& all = moving_.nodes;
-  const auto nodes_of = [&](const Follower& follower) -> const std::vector<NodeIndex>& {
-    return observations_[follower.part]->surface->nodes();
-  };
   for (const Follower& follower : followers_) {
-    all.insert(all.end(), nodes_of(follower).begin(), nodes_of(follower).end());
+    const std::vector<NodeIndex>& own = observations_[follower.part]->surface->nodes();
+    all.insert(all.end(), own.begin(), own.end());
   }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   for (Follower& follower : followers_) {
-    for (const NodeIndex node : nodes_of(follower)) {
+    for (const NodeIndex node : observations_[follower.part]->surface->nodes()) {
       const auto place = std::lower_bound(all.begin(), all.end(), node);
       follower.columns.push_back(static_cast<int>(place - all.begin()));
     }
   }
+  data_ = combine(parts_);
+  moving_.relocate = std::bind_front(&CombinedData::relocate, this);
 }
 
 bool CombinedData::relocate(const Points& u, SparseData& data) {

@@ -26,8 +26,9 @@ class Evidence {
  public:
   explicit Evidence(double max_age_s) : max_age_s_(max_age_s) {}
   void clear();
-  // Replaces the earlier observation of the same source, quarantined or not.
-  void put(RegisteredObservation observation);
+  // Replaces the earlier observation of the same source, quarantined or not. Why others are not
+  // used together with it, for Update::left_out.
+  std::vector<Omission> put(RegisteredObservation observation);
   // Forgets the source's observation: no estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
   // No usable estimate could be made with the source's observation and the others.
@@ -40,8 +41,6 @@ class Evidence {
 
   // Observations to use together with one of this time, in the order of their sources' names.
   std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
-  // Why the others are not used, for Update::left_out.
-  std::vector<Omission> stale(std::int64_t now_ns) const;
 
  private:
   double age_s(const RegisteredObservation& observation, std::int64_t now_ns) const;
@@ -74,7 +73,6 @@ class CombinedData {
     std::size_t part = 0;
     std::vector<int> columns;  // of its nodes among moving_.nodes
   };
-  void gather_nodes();
   bool relocate(const Points& u, SparseData& data);
 
   std::vector<const RegisteredObservation*> observations_;

@@ -54,10 +54,30 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   if (auto status = register_into(observation, update); !status) {
     return tl::unexpected(status.error());
   }
-  if (auto status = estimate_into(observation, options, update); !status) {
+  const Stopwatch watch;
+  const Estimate& estimate = update.estimate;
+  Status status = estimate_into(observation, options, update);
+  if ((!status || !estimate.quality.usable()) && !options.stop.stop_requested()) {
+    auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
+    if (!dropped.empty()) {  // once more without those that spoil it
+      append(std::move(dropped), update);
+      status = estimate_into(observation, options, update);
+    }
+  }
+  if (!status) {
     evidence_.drop(observation.source);
     return tl::unexpected(status.error());
   }
+  if (estimate.quality.usable()) {
+    evidence_.trust();
+  } else {
+    evidence_.quarantine(observation.source);
+  }
+  if (const auto errors = inverter_->omission_errors()) {
+    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
+  }
+  update.timings.rebuild_ms = estimate.rebuild_ms;
+  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
   return update;
 }
 
@@ -73,41 +93,14 @@ Status Pipeline::register_into(const Observation& observation, Update& update) {
                                   registered->surface.has_value()),
            update);
   }
-  evidence_.put(std::move(*registered));
-  append(evidence_.stale(observation.acquired_ns), update);
+  append(evidence_.put(std::move(*registered)), update);
   update.timings.register_ms = watch.milliseconds();
   return {};
 }
 
-// The evidence's SparseData -> Estimate; once more without quarantined data where they spoil it.
+// The evidence's SparseData -> Estimate.
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
                                Update& update) {
-  const Stopwatch watch;
-  Status status = try_estimate(observation, options, update);
-  Estimate& estimate = update.estimate;
-  if ((!status || !estimate.quality.usable()) && !options.stop.stop_requested()) {
-    auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
-    if (!dropped.empty()) {
-      append(std::move(dropped), update);
-      status = try_estimate(observation, options, update);
-    }
-  }
-  if (!status) return status;
-  if (estimate.quality.usable()) {
-    evidence_.trust();
-  } else {
-    evidence_.quarantine(observation.source);
-  }
-  if (const auto errors = inverter_->omission_errors()) {
-    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
-  }
-  update.timings.rebuild_ms = estimate.rebuild_ms;
-  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
-  return {};
-}
-
-Status Pipeline::try_estimate(const Observation& observation, const RunOptions& options,
-                              Update& update) {
   const Stopwatch watch;
   const CombinedData combined(evidence_.fresh(observation.acquired_ns));
   inversion::InversionOptions asked;

@@ -57,8 +57,6 @@ class Pipeline {
            RegistrationTargets targets);
   Status register_into(const Observation& observation, Update& update);
   Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
-  // From what the evidence holds now.
-  Status try_estimate(const Observation& observation, const RunOptions& options, Update& update);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;

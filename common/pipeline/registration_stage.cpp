@@ -218,29 +218,6 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const C
   return registered;
 }
 
-Result<RegisteredObservation> register_body(const Observation& observation,
-                                            const RegistrationTargets& targets,
-                                            const CaseConfig& config, Method method) {
-  if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    return from_boundary(*boundary, targets, config, method);
-  }
-  if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
-    return from_landmarks(*pairs, config, method);
-  }
-  if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
-    if (config.scene.surface == Carry::kOff) {
-      return fail(
-          ErrorCode::kInvalidArgument,
-          fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
-                      observation.sequence));
-    }
-    return from_surface(*surface, targets, config, method);
-  }
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation {}: a patient_pose is not assimilated in this version",
-                          observation.sequence));
-}
-
 }  // namespace
 
 Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) {
@@ -261,7 +238,23 @@ Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) 
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config, Method method) {
-  auto registered = register_body(observation, targets, config, method);
+  Result<RegisteredObservation> registered =
+      fail(ErrorCode::kInvalidArgument,
+           fmt::format("observation {}: a patient_pose is not assimilated in this version",
+                       observation.sequence));
+  if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
+    registered = from_boundary(*boundary, targets, config, method);
+  } else if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
+    registered = from_landmarks(*pairs, config, method);
+  } else if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
+    if (config.scene.surface == Carry::kOff) {
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
+                      observation.sequence));
+    }
+    registered = from_surface(*surface, targets, config, method);
+  }
   if (!registered) return registered;
   registered->source = observation.source;
   registered->sequence = observation.sequence;

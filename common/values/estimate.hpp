@@ -193,7 +193,7 @@ struct StageTimings {  // milliseconds, monotonic clock
 // How long an answer took: from the arrival of its observation at the daemon until its encoding.
 // (SourceSummary::age_s is another age: of the data, behind the newest observation.)
 struct AnswerTime {
-  double ms = 0.0;        // monotonic clock; 0: not told (iterates, older daemons)
+  double ms = 0.0;        // monotonic clock; 0: not told (iterates)
   double usual_ms = 0.0;  // median over the answers of the session before it; 0: too few yet
 
   // Later after its observation than navigation may take for granted: the brain may have moved

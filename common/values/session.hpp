@@ -35,7 +35,6 @@ struct SessionRequest {
   Method method = Method::kCondensed;
   Boundary boundary = Boundary::kContact;
   bool publish_iterates = false;
-  bool measure_full_solve = false;
   // End the running session although another client that is still connected started it.
   bool takeover = false;
   // Ages by the observations' own clock, which all sources share (a replay); false: by arrival.
@@ -50,8 +49,6 @@ struct SessionInfo {
   int slaves = 0;
   double prepare_s = 0.0;
   std::uint64_t model_bytes = 0;
-  double full_solve_ms = 0.0;
-  double factor_s = 0.0;
   std::uint64_t boot_id = 0;  // of the daemon's process
 
   SessionKey key() const { return {boot_id, session_id, model_id}; }

@@ -41,7 +41,6 @@ std::string encode(const SessionRequest& request) {
   message.set_method(std::string(to_string(request.method)));
   message.set_boundary(std::string(to_string(request.boundary)));
   message.set_publish_iterates(request.publish_iterates);
-  message.set_measure_full_solve(request.measure_full_solve);
   message.set_takeover(request.takeover);
   message.set_recorded_clock(request.recorded_clock);
   return message.SerializeAsString();
@@ -64,13 +63,9 @@ Result<SessionRequest> decode_session_request(std::string_view payload) {
                 "start_session.boundary = " + in_quotes(message.boundary()) +
                     ": must be \"contact\" or \"fixed\"");
   }
-  return SessionRequest{message.case_id(),
-                        *method,
-                        *boundary,
-                        message.publish_iterates(),
-                        message.measure_full_solve(),
-                        message.takeover(),
-                        message.recorded_clock()};
+  return SessionRequest{message.case_id(),  *method,
+                        *boundary,          message.publish_iterates(),
+                        message.takeover(), message.recorded_clock()};
 }
 
 std::string encode(const SessionInfo& info) {
@@ -82,8 +77,6 @@ std::string encode(const SessionInfo& info) {
   message.set_slaves(static_cast<std::uint32_t>(info.slaves));
   message.set_prepare_s(info.prepare_s);
   message.set_model_bytes(info.model_bytes);
-  message.set_full_solve_ms(info.full_solve_ms);
-  message.set_factor_s(info.factor_s);
   message.set_boot_id(info.boot_id);
   return message.SerializeAsString();
 }
@@ -100,8 +93,6 @@ Result<SessionInfo> decode_session_info(std::string_view payload) {
   info.slaves = checked.count(message.slaves(), "session.slaves");
   info.prepare_s = checked.non_negative(message.prepare_s(), "session.prepare_s");
   info.model_bytes = message.model_bytes();
-  info.full_solve_ms = checked.non_negative(message.full_solve_ms(), "session.full_solve_ms");
-  info.factor_s = checked.non_negative(message.factor_s(), "session.factor_s");
   info.boot_id = message.boot_id();
   if (!checked.ok()) return tl::unexpected(checked.status().error());
   return info;

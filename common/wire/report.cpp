@@ -68,6 +68,20 @@ void set(const ProcessFigures& process, pb::ProcessFigures* out) {
   out->set_threads(process.threads);
 }
 
+void set(const DoorFigures& door, pb::DoorFigures* out) {
+  out->set_accepted(door.accepted);
+  out->set_closed_for_breach(door.closed_for_breach);
+  out->set_closed_for_memory(door.closed_for_memory);
+  out->set_closed_for_silence(door.closed_for_silence);
+  out->set_closed_for_room(door.closed_for_room);
+  out->set_held_bytes(door.held_bytes);
+  out->set_unknown_keys(door.unknown_keys);
+  out->set_refused_role(door.refused_role);
+  out->set_refused_connections(door.refused_connections);
+  out->set_refused_observations(door.refused_observations);
+  out->set_refused_starts(door.refused_starts);
+}
+
 LatencyFigures figures_from(Checked& checked, const pb::LatencyFigures& value) {
   return {value.count(), checked.non_negative(value.p50_ms(), "report.stages.p50_ms"),
           checked.non_negative(value.p95_ms(), "report.stages.p95_ms"),
@@ -123,6 +137,7 @@ std::string encode(const DaemonReport& report) {
   if (report.journal) set(*report.journal, message.mutable_journal());
   message.set_log_lines_lost(report.log_lines_lost);
   set(report.process, message.mutable_process());
+  set(report.door, message.mutable_door());
   return message.SerializeAsString();
 }
 
@@ -179,6 +194,18 @@ Result<DaemonReport> decode_report(std::string_view payload) {
   const auto& process = message.process();
   report.process = {process.resident_bytes(), process.peak_bytes(), process.descriptors(),
                     process.descriptor_limit(), process.threads()};
+  const auto& door = message.door();
+  report.door = {door.accepted(),
+                 door.closed_for_breach(),
+                 door.closed_for_memory(),
+                 door.closed_for_silence(),
+                 door.closed_for_room(),
+                 door.held_bytes(),
+                 door.unknown_keys(),
+                 door.refused_role(),
+                 door.refused_connections(),
+                 door.refused_observations(),
+                 door.refused_starts()};
   if (!checked.ok()) return tl::unexpected(checked.status().error());
   return report;
 }

@@ -85,6 +85,23 @@ struct ProcessFigures {
   bool operator==(const ProcessFigures&) const = default;
 };
 
+// What the daemon's door let in and turned away since the start.
+struct DoorFigures {
+  std::uint64_t accepted = 0;              // connections
+  std::uint64_t closed_for_breach = 0;     // no ZMTP, too large, too many parts, a routing id twice
+  std::uint64_t closed_for_memory = 0;     // peers held too much of the daemon's memory
+  std::uint64_t closed_for_silence = 0;    // nothing of the peer could be delivered
+  std::uint64_t closed_for_room = 0;       // never served, when the last place was needed
+  std::uint64_t held_bytes = 0;            // of messages under way, now
+  std::uint64_t unknown_keys = 0;          // handshakes
+  std::uint64_t refused_role = 0;          // requests beyond the role of their key
+  std::uint64_t refused_connections = 0;   // beyond those that one key may have
+  std::uint64_t refused_observations = 0;  // beyond those that a caller may send a second
+  std::uint64_t refused_starts = 0;        // session starts beyond those of a minute
+
+  bool operator==(const DoorFigures&) const = default;
+};
+
 struct DaemonReport {
   std::string version;
   std::string build;
@@ -112,6 +129,7 @@ struct DaemonReport {
   std::optional<JournalFigures> journal = {};  // empty: the daemon keeps none
   std::uint64_t log_lines_lost = 0;
   ProcessFigures process = {};
+  DoorFigures door = {};
 
   // The worker is busy for longer than its work may take.
   bool worker_hangs() const { return working_ms > limit_ms; }

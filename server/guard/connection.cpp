@@ -20,7 +20,8 @@ Connection::~Connection() {
   if (inner >= 0) ::close(inner);
 }
 
-void Connection::settle(TimePoint now) {
+std::uint64_t Connection::settle(TimePoint now) {
+  const std::uint64_t before = held;
   const std::uint64_t cost = stream.cost();
   const std::uint64_t delivered = account->delivered;
   const std::uint64_t messages = account->messages;
@@ -37,6 +38,7 @@ void Connection::settle(TimePoint now) {
   cost_ = cost;
   delivered_ = delivered;
   messages_ = messages;
+  return held - before;
 }
 
 std::string socket_name(int fd, decltype(&getsockname) ask) {

@@ -38,8 +38,8 @@ struct Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // Brings `held` and `moved` up to date.
-  void settle(TimePoint now);
+  // Brings `held` and `moved` up to date. By how much `held` has changed, modulo 2^64.
+  std::uint64_t settle(TimePoint now);
   // Something cannot go on at once.
   bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
 

@@ -63,12 +63,8 @@ struct Guard::Impl {
   bool make_room();
   void open(int peer);
   void serve(Connection& connection, bool hung_up);
-  bool lost(Connection& connection);
-  bool pump_up(Connection& connection);
-  bool pump_down(Connection& connection);
-  void settle(Connection& connection);
-  bool within_memory(const Connection& connection);
-  bool claims_routing_id(Connection& connection);
+  bool pump(Connection& connection, Lane& lane, int from, int to);
+  bool within_bounds(Connection& connection);
   void listen_again(bool wanted);
   void tick();
   void end(Connection& connection, std::uint64_t* counter, const std::string& why);
@@ -206,19 +202,24 @@ void Guard::Impl::end(Connection& connection, std::uint64_t* counter, const std:
   listen_again(true);
 }
 
-void Guard::Impl::settle(Connection& connection) {
-  const std::uint64_t before = connection.held;
-  connection.settle(Clock::now());
-  held += connection.held;
-  held -= before;
-}
-
-// False when `connection` itself was closed.
-bool Guard::Impl::within_memory(const Connection& connection) {
+// Takes in what has just come up from a peer: ZMTP, a routing id of its own, memory. False when
+// `connection` was closed.
+bool Guard::Impl::within_bounds(Connection& connection) {
+  std::string wrong = connection.stream.take({connection.up.bytes.data(), connection.up.end});
+  const std::string& id = connection.stream.routing_id();
+  if (wrong.empty() && !id.empty() &&
+      routing_ids.emplace(id, &connection).first->second != &connection) {
+    wrong = "another's routing id";
+  }
+  if (!wrong.empty()) {
+    end(connection, &counts.closed_for_breach, "a peer sent " + wrong);
+    return false;
+  }
+  held += connection.settle(Clock::now());
   while (held > options.held_bytes) {
     Connection* longest = nullptr;
     for (const auto& [name, other] : connections) {
-      settle(*other);
+      held += other->settle(Clock::now());
       if (other->held == 0) continue;
       if (longest == nullptr || other->moved < longest->moved) longest = other.get();
     }
@@ -230,61 +231,32 @@ bool Guard::Impl::within_memory(const Connection& connection) {
   return true;
 }
 
-// False when another connection has the routing id that this one has just told.
-bool Guard::Impl::claims_routing_id(Connection& connection) {
-  const std::string& id = connection.stream.routing_id();
-  if (id.empty()) return true;
-  const auto [entry, added] = routing_ids.emplace(id, &connection);
-  return added || entry->second == &connection;
-}
-
-// One end has gone. Always false: there is no connection any more.
-bool Guard::Impl::lost(Connection& connection) {
-  end(connection, nullptr, {});
-  return false;
-}
-
-// From the peer to libzmq; false when the connection has ended.
-bool Guard::Impl::pump_up(Connection& connection) {
+// Passes bytes on in one direction; up, to libzmq, within the bounds. False when the connection has
+// ended.
+bool Guard::Impl::pump(Connection& connection, Lane& lane, int from, int to) {
+  const bool up = &lane == &connection.up;
   for (int i = 0; i < kReadsPerTurn; ++i) {
-    if (drain(connection.up, connection.inner) == Flow::kEnded) return lost(connection);
-    settle(connection);
-    connection.account->throttled = connection.held > options.max_message_bytes + kSlack;
-    if (!connection.up.empty() || connection.account->throttled) return true;
-    const int got = fill(connection.up, connection.peer);
-    if (got == 0) return true;
-    if (got < 0) return lost(connection);
-    const std::string wrong =
-        connection.stream.take({connection.up.bytes.data(), static_cast<std::size_t>(got)});
-    if (!wrong.empty()) {
-      end(connection, &counts.closed_for_breach, "a peer sent " + wrong);
+    bool more = true;
+    if (up) {
+      held += connection.settle(Clock::now());
+      more = connection.held <= options.max_message_bytes + kSlack;
+      connection.account->throttled = !more;
+    }
+    const int got = pass_on(lane, from, to, more);
+    if (got < 0) {
+      end(connection, nullptr, {});
       return false;
     }
-    if (!claims_routing_id(connection)) {
-      end(connection, &counts.closed_for_breach, "a peer chose another's routing id");
-      return false;
-    }
-    settle(connection);
-    if (!within_memory(connection)) return false;
-  }
-  return true;
-}
-
-// From libzmq to the peer; false when the connection has ended.
-bool Guard::Impl::pump_down(Connection& connection) {
-  for (int i = 0; i < kReadsPerTurn; ++i) {
-    if (drain(connection.down, connection.peer) == Flow::kEnded) return lost(connection);
-    if (!connection.down.empty()) return true;
-    const int got = fill(connection.down, connection.inner);
     if (got == 0) return true;
-    if (got < 0) return lost(connection);
+    if (up && !within_bounds(connection)) return false;
   }
   return true;
 }
 
 // hung_up: an end has gone; what it left is passed on, if the other end takes it.
 void Guard::Impl::serve(Connection& connection, bool hung_up) {
-  if (!pump_down(connection) || !pump_up(connection)) return;
+  if (!pump(connection, connection.down, connection.inner, connection.peer)) return;
+  if (!pump(connection, connection.up, connection.peer, connection.inner)) return;
   if (hung_up && connection.stuck()) return end(connection, nullptr, {});
   const auto interest = [](bool in, bool out) {
     return (in ? static_cast<std::uint32_t>(EPOLLIN) : 0u) |
@@ -304,7 +276,7 @@ void Guard::Impl::tick() {
     const auto found = connections.find(name);
     if (found == connections.end()) continue;
     Connection& connection = *found->second;
-    settle(connection);
+    held += connection.settle(Clock::now());
     if (connection.account->to_close) {
       end(connection, nullptr, {});
     } else if (connection.held > 0 && now - connection.moved > options.patience) {

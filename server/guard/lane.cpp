@@ -7,22 +7,18 @@
 
 namespace brainshift::server {
 
-Flow drain(Lane& lane, int to) {
+int pass_on(Lane& lane, int from, int to, bool more) {
   while (!lane.empty()) {
     const auto sent = send(to, lane.bytes.data() + lane.begin, lane.end - lane.begin, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) return errno == EAGAIN ? Flow::kGoesOn : Flow::kEnded;
+    if (sent < 0) return errno == EAGAIN ? 0 : -1;
     lane.begin += static_cast<std::size_t>(sent);
   }
   lane.begin = lane.end = 0;
-  return Flow::kGoesOn;
-}
-
-int fill(Lane& lane, int from) {
+  if (!more) return 0;
   const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
   if (got < 0) return errno == EAGAIN || errno == EINTR ? 0 : -1;
   if (got == 0) return -1;
-  lane.begin = 0;
   lane.end = static_cast<std::size_t>(got);
   return static_cast<int>(got);
 }

@@ -17,12 +17,8 @@ struct Lane {
   bool empty() const { return begin == end; }
 };
 
-enum class Flow { kGoesOn, kEnded };
-
-// Writes out what the lane holds, as far as the socket takes it.
-Flow drain(Lane& lane, int to);
-
-// Reads into the empty lane. The bytes that came; 0: none yet, -1: there will be none.
-int fill(Lane& lane, int from);
+// Writes out what the lane holds, as far as the socket takes it; once it is empty, and if `more`,
+// reads into it. The bytes that came; 0: it cannot go on now, -1: an end has gone.
+int pass_on(Lane& lane, int from, int to, bool more);
 
 }  // namespace brainshift::server

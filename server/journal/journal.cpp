@@ -73,6 +73,9 @@ void Journal::begin(const fs::path& path, const JournalMeta& meta, std::uint64_t
 }
 
 void Journal::append(io::SurgeryRecord record, std::string source) {
+  if (record.recorded_ns == 0) {
+    record.recorded_ns = Clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  }
   bool wake = false;
   {
     const std::lock_guard lock(mutex_);

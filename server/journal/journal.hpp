@@ -80,8 +80,8 @@ class Journal {
   // A session begins: closes the current file and opens the next one; returns at once.
   void begin(const std::filesystem::path& path, const JournalMeta& meta,
              std::uint64_t session_id = 0);
-  // Queues a record; never waits for the disk. Ignored before the first begin(). source: of an
-  // observation.
+  // Queues a record; never waits for the disk. Ignored before the first begin(). A recorded_ns of 0
+  // becomes now. source: of an observation.
   void append(io::SurgeryRecord record, std::string source = {});
   // Why records are lost at the moment, if they are.
   Status status() const;

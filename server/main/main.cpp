@@ -5,13 +5,13 @@
 #include <exception>
 #include <string>
 
+#include "common/io/files/stop_signals.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/health_command.hpp"
 #include "server/main/prepare_command.hpp"
 #include "server/main/serve_command.hpp"
-#include "server/main/stop_signals.hpp"
 
 namespace {
 
@@ -38,11 +38,11 @@ int parse_and_run(int argc, char** argv) {
   prepare_command->footer(
       "Reads the images that the case names, meshes the brain, finds the node sets, factorises "
       "the\n"
-      "model under both boundaries to check and time it, and writes the model file.\n"
+      "model under both boundaries, and writes the model file.\n"
       "Examples:\n"
       "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
       "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq "
-      ".prepare.contact.full_solve_ms");
+      ".prepare.contact.factor_s");
 
   ServeArguments serve;
   auto* serve_command = app.add_subcommand("serve", "Answer clients until SIGINT or SIGTERM");
@@ -92,7 +92,7 @@ int parse_and_run(int argc, char** argv) {
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
-  survive_failing_writes();
+  brainshift::io::survive_failing_writes();
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {

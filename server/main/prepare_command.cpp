@@ -45,9 +45,6 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
-  for (const std::string& note : config->notes) {
-    bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
-  }
   options.progress = bar.progress("");
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));
@@ -92,7 +89,7 @@ nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out)
       {"read_s", outcome.patient.read_s},
       {"mesh_s", outcome.patient.mesh_s}};
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {
-    const auto& [timings, full_solve_ms] = outcome.patient.boundaries[i];
+    const inversion::PrepareTimings& timings = outcome.patient.timings[i];
     const CondensedOperators& condensed = outcome.patient.file.condensed[i];
     json["prepare"][std::string(to_string(kPreparedBoundaries[i]))] = {
         {"assemble_s", timings.assemble_s},
@@ -100,7 +97,6 @@ nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out)
         {"factor_s", timings.factor_s},
         {"prior_s", timings.prior_s},
         {"total_s", timings.total_s},
-        {"full_solve_ms", full_solve_ms},
         {"factor_nonzeros", timings.factor_nonzeros},
         {"bytes", timings.bytes},
         {"condensed_s", condensed.prepare_s},
@@ -121,14 +117,14 @@ void print_table(const Outcome& outcome, const std::filesystem::path& out) {
   fmt::print("node sets   craniotomy {}, brainstem {}, slaves {}, fixed {}\n\n",
              model.craniotomy.size(), model.brainstem.size(), model.slaves.size(),
              model.fixed.size());
-  fmt::print("{:<10}{:>11}{:>11}{:>11}{:>11}{:>12}{:>13}{:>7}{:>9}\n", "boundary", "assemble s",
-             "analyse s", "factor s", "t_solve ms", "nnz(L)", "condensed s", "modes", "MiB");
+  fmt::print("{:<10}{:>11}{:>11}{:>11}{:>12}{:>13}{:>7}{:>9}\n", "boundary", "assemble s",
+             "analyse s", "factor s", "nnz(L)", "condensed s", "modes", "MiB");
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {
-    const auto& [t, full_solve_ms] = outcome.patient.boundaries[i];
+    const inversion::PrepareTimings& t = outcome.patient.timings[i];
     const CondensedOperators& condensed = outcome.patient.file.condensed[i];
-    fmt::print("{:<10}{:>11.2f}{:>11.2f}{:>11.2f}{:>11.1f}{:>12}{:>13.1f}{:>7}{:>9.0f}\n",
+    fmt::print("{:<10}{:>11.2f}{:>11.2f}{:>11.2f}{:>12}{:>13.1f}{:>7}{:>9.0f}\n",
                to_string(kPreparedBoundaries[i]), t.assemble_s, t.analyse_s, t.factor_s,
-               full_solve_ms, t.factor_nonzeros, condensed.prepare_s, condensed.num_modes(),
+               t.factor_nonzeros, condensed.prepare_s, condensed.num_modes(),
                static_cast<double>(condensed.bytes()) / 1048576.0);
   }
   fmt::print("\nwrote {} ({:.0f} MiB) in {:.1f} s, peak memory {:.2f} GiB\n", out.string(),

@@ -12,6 +12,7 @@
 
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/config/key_file.hpp"
+#include "common/io/files/stop_signals.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "server/guard/file_limit.hpp"
@@ -20,7 +21,6 @@
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
-#include "server/main/stop_signals.hpp"
 #include "server/operations/metrics_exporter.hpp"
 #include "server/operations/service_manager.hpp"
 #include "server/service/service.hpp"
@@ -174,7 +174,7 @@ Result<RouterOptions> router_options(const io::DaemonConfig& config, long file_l
 
 Status serve(const ServeArguments& arguments) {
   return_large_blocks();
-  auto signals = StopSignals::catch_all();
+  auto signals = io::StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());
   const auto config = configuration(arguments);
   if (!config) return tl::unexpected(config.error());

@@ -117,6 +117,24 @@ void add_viewers(Families& out, const wire::DaemonReport& report) {
   out.gauge("viewers_behind", number(behind), "Subscribers to whom an update is owed.");
 }
 
+void add_door(Families& out, const wire::DoorFigures& door) {
+  out.counter("connections_accepted_total", number(door.accepted), "Connections accepted.");
+  MetricFamily& closed = out.open(MetricType::Counter, "connections_closed_total",
+                                  "Connections that the daemon closed, by reason.");
+  add(closed, number(door.closed_for_breach), {{"reason", "breach"}});
+  add(closed, number(door.closed_for_memory), {{"reason", "memory"}});
+  add(closed, number(door.closed_for_silence), {{"reason", "silence"}});
+  add(closed, number(door.closed_for_room), {{"reason", "room"}});
+  MetricFamily& refused = out.open(MetricType::Counter, "refusals_total",
+                                   "Handshakes, connections and requests refused, by reason.");
+  add(refused, number(door.unknown_keys), {{"reason", "unknown_key"}});
+  add(refused, number(door.refused_role), {{"reason", "role"}});
+  add(refused, number(door.refused_connections), {{"reason", "connections"}});
+  add(refused, number(door.refused_observations), {{"reason", "observations"}});
+  add(refused, number(door.refused_starts), {{"reason", "session_starts"}});
+  out.gauge("held_bytes", number(door.held_bytes), "Messages of peers that are under way.");
+}
+
 // The buckets are cumulative here.
 ClientMetric::Histogram histogram_of(const wire::StageLatency& stage,
                                      const std::vector<double>& bounds_ms) {
@@ -182,6 +200,7 @@ std::vector<MetricFamily> metric_families(const wire::DaemonReport& report) {
   add_session(out, report);
   add_sources(out, report);
   add_viewers(out, report);
+  add_door(out, report.door);
   add_stages(out, report);
   add_journal(out, report);
   add_process(out, report.process);

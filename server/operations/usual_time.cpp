@@ -3,14 +3,14 @@
 
 namespace brainshift::server {
 
-double UsualTime::of(std::uint64_t session_id) {
+AnswerTime UsualTime::answer(std::uint64_t session_id, double ms, bool counts) {
   if (session_id != session_id_) {
     session_id_ = session_id;
     answers_ = {};
   }
-  return answers_.count() < kFew ? 0.0 : answers_.quantile_ms(0.5);
+  const AnswerTime time{ms, answers_.count() < kFew ? 0.0 : answers_.quantile_ms(0.5)};
+  if (counts) answers_.add(ms);
+  return time;
 }
-
-void UsualTime::add(double milliseconds) { answers_.add(milliseconds); }
 
 }  // namespace brainshift::server

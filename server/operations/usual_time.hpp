@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "common/values/estimate.hpp"
 #include "server/operations/latency_record.hpp"
 
 namespace brainshift::server {
@@ -15,11 +16,10 @@ class UsualTime {
   // Answers that a session needs before anything is usual.
   static constexpr std::uint64_t kFew = 8;
 
-  // Of the answers added since this session was first asked about, ms, within 1 %; 0: fewer than
-  // kFew. Another session than before forgets them.
-  double of(std::uint64_t session_id);
-  // An answer of the session that was asked about last. Allocates nothing. Precondition: finite.
-  void add(double milliseconds);
+  // An answer of the session that took `ms`, beside what is usual before it: within 1 %; 0: fewer
+  // than kFew were counted. Another session than before forgets them. counts: it is an answer to
+  // tell later ones by. Allocates nothing. Precondition: finite.
+  AnswerTime answer(std::uint64_t session_id, double ms, bool counts);
 
  private:
   std::uint64_t session_id_ = 0;

@@ -38,10 +38,6 @@ Need need_of(const wire::Frame& request) {
 
 }  // namespace
 
-std::string Gate::caller(std::string_view user_id, const std::string& routing_id) const {
-  return roles_ ? std::string(user_id) : routing_id;
-}
-
 // A peer that repeats itself fills no log: the 1st, 2nd, 4th, 8th ... refusal of a kind is told.
 tl::unexpected<Error> Gate::refuse(std::uint64_t& counter, ErrorCode code,
                                    const std::string& sentence) {
@@ -58,39 +54,27 @@ Status Gate::enter(const std::string& caller, std::size_t connections) {
                 fmt::format("the key {} has {} connections already", caller, connections));
 }
 
-Status Gate::check_role(const std::string& caller, const wire::Frame& request) {
-  if (!roles_) return {};
-  const auto found = roles_->find(caller);
-  if (found == roles_->end()) {
-    return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed, "the connection has no key");
-  }
-  const Need need = need_of(request);
-  if (includes(found->second, need.least)) return {};
-  return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed,
-                fmt::format("the key {} has the role {}: to {} requires the role {}", caller,
-                            to_string(found->second), need.what, to_string(need.least)));
-}
-
-Gate::Allowance& Gate::allowance(const std::string& caller, TimePoint now) {
-  const auto found = allowances_.find(caller);
-  if (found != allowances_.end()) return found->second;
-  const double observations = limits_.observations_per_s;
-  const double starts = limits_.session_starts_per_min;
-  return allowances_
-      .emplace(caller, Allowance{TokenBucket(observations, observations, now),
-                                 TokenBucket(starts / 60.0, starts, now)})
-      .first->second;
-}
-
 Status Gate::admit(const std::string& caller, const wire::Frame& request, TimePoint now) {
-  if (Status role = check_role(caller, request); !role) return role;
-  if (request.type == MessageType::kObservation && !allowance(caller, now).observations.take(now)) {
+  if (roles_) {
+    const auto found = roles_->find(caller);
+    if (found == roles_->end()) {
+      return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed, "the connection has no key");
+    }
+    if (const Need need = need_of(request); !includes(found->second, need.least)) {
+      return refuse(refusals_.not_allowed, ErrorCode::kNotAllowed,
+                    fmt::format("the key {} has the role {}: to {} requires the role {}", caller,
+                                to_string(found->second), need.what, to_string(need.least)));
+    }
+  }
+  const bool observation = request.type == MessageType::kObservation;
+  if (!observation && request.type != MessageType::kStartSessionRequest) return {};
+  Allowance& left = allowances_.try_emplace(caller, limits_, now).first->second;
+  if (observation && !left.observations.take(now)) {
     return refuse(
         refusals_.observations, ErrorCode::kUnavailable,
         fmt::format("more than {} observations a second: send fewer", limits_.observations_per_s));
   }
-  if (request.type == MessageType::kStartSessionRequest &&
-      !allowance(caller, now).session_starts.take(now)) {
+  if (!observation && !left.session_starts.take(now)) {
     return refuse(refusals_.session_starts, ErrorCode::kUnavailable,
                   fmt::format("more than {} session starts a minute: try again later",
                               limits_.session_starts_per_min));

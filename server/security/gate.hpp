@@ -53,8 +53,7 @@ class Gate {
 
   Gate(Roles roles, Limits limits) : roles_(std::move(roles)), limits_(limits) {}
 
-  // Under which name a message counts: that of the key, or of the connection without keys.
-  std::string caller(std::string_view user_id, const std::string& routing_id) const;
+  // caller: under which name a message counts, that of the key, or of the connection without keys.
   // Whether a caller that has `connections` may have one more. kUnavailable.
   Status enter(const std::string& caller, std::size_t connections);
   // Whether the caller may make this request, now. kNotAllowed; kUnavailable beyond a limit.
@@ -66,12 +65,14 @@ class Gate {
 
  private:
   struct Allowance {
+    Allowance(const Limits& limits, TimePoint now)
+        : observations(limits.observations_per_s, limits.observations_per_s, now),
+          session_starts(limits.session_starts_per_min / 60.0, limits.session_starts_per_min, now) {
+    }
     TokenBucket observations;
     TokenBucket session_starts;
   };
 
-  Allowance& allowance(const std::string& caller, TimePoint now);
-  Status check_role(const std::string& caller, const wire::Frame& request);
   tl::unexpected<Error> refuse(std::uint64_t& counter, ErrorCode code, const std::string& sentence);
 
   Roles roles_;

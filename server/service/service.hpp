@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Service: what the daemon answers. It turns requests into calls of the session, and what the
-// session publishes into encoded updates for the outbox and records for the journal.
+// Service: what the daemon answers. It turns requests into calls of the session, acts on the
+// session's events, and makes encoded updates for the outbox and records for the journal of its
+// results. It drives the session (server/session) from three threads, under one mutex:
+//
+//   transport   requests; clients that leave
+//   preparer    makes models ready, one at a time
+//   worker      runs the pipeline, one observation at a time
 //
 //   request                 reply
 //   StatusRequest           StatusReply, always
@@ -29,13 +34,16 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -54,6 +62,10 @@
 #include "server/transport/router.hpp"
 
 namespace brainshift::server {
+
+// On the preparer's thread, one at a time. kUnavailable when stopped.
+using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
+    const SessionRequest&, const std::stop_token&)>;
 
 struct ServiceOptions {
   std::string version;
@@ -80,7 +92,7 @@ class Service final : public RequestHandler {
 
   std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) override;
   void left(const std::string& peer) override;
-  void turned(const Peers& peers) override;
+  void turned(const Peers& peers, const wire::DoorFigures& door) override;
 
   // How the daemon fares, now. From any thread.
   wire::DaemonReport report() const;
@@ -93,19 +105,24 @@ class Service final : public RequestHandler {
   void stop();
 
  private:
-  std::optional<Reply> start_session(const std::string& peer, const wire::Frame& frame);
   Reply observe(const wire::Frame& frame);
   Reply subscribe(const wire::Frame& frame);
-  void push_state();
   DaemonStatus status() const;
   std::optional<wire::JournalFigures> journal_figures() const;
+
+  void prepare(const std::stop_token& stop);  // the preparer's loop
+  void work(const std::stop_token& stop);     // the worker's loop
+  void publish(UpdateMessage message, const Job& job);
+
+  // With the mutex held.
+  void act();  // on the session's events
   void begin_journal(const SessionRequest& request, const SessionInfo& info);
-  void publish(UpdateMessage message, const Handled& handled);
-  void record_decision(const Decision& decision);
+  void push_state();
+  void reply(const StartTicket& ticket, const Result<SessionInfo>& info);
+  SessionState state_now() const;
 
   const ServiceOptions options_;  // boot_id is set
   Outbox& outbox_;
-  std::mutex push_mutex_;
   const Stopwatch uptime_;
   std::atomic<double> journal_ms_{0.0};   // the newest observation's way into the journal
   std::string encoded_model_;             // made once, on the first request
@@ -115,8 +132,15 @@ class Service final : public RequestHandler {
   mutable std::mutex viewers_mutex_;
   std::vector<wire::ViewerFigures> viewers_;  // `peer` holds the routing id as it is
   std::uint32_t clients_ = 0;
+  wire::DoorFigures door_;
   std::unique_ptr<Journal> journal_;  // null without a journal folder
-  std::unique_ptr<Session> session_;  // null without a model; ends before the journal
+
+  mutable std::mutex mutex_;  // of the session, and of the order of states and records
+  std::condition_variable_any wake_;
+  std::optional<Session> session_;  // empty without a model
+
+  std::jthread preparer_;  // the threads last: they use everything above
+  std::jthread worker_;
 };
 
 }  // namespace brainshift::server

@@ -36,9 +36,10 @@ std::uint64_t count(const RecordRanges& ranges) {
 }  // namespace
 
 // No allocation once there is room: routing ids are short, and the figures are written over.
-void Service::turned(const Peers& peers) {
+void Service::turned(const Peers& peers, const wire::DoorFigures& door) {
   {
     const std::lock_guard lock(viewers_mutex_);
+    door_ = door;
     clients_ = static_cast<std::uint32_t>(peers.all().size());
     viewers_.resize(clients_);
     std::size_t viewers = 0;
@@ -61,7 +62,8 @@ WorkerHealth Service::worker_health() const {
   WorkerHealth health;
   health.limit = ServiceManager::kGrace;
   if (!session_) return health;
-  const Session::State state = session_->state();
+  const std::lock_guard lock(mutex_);
+  const Session::State state = session_->state(std::chrono::steady_clock::now());
   health.working = std::chrono::duration<double>(state.working_s);
   health.limit += std::chrono::duration<double>(state.deadline_s);
   return health;
@@ -83,22 +85,26 @@ wire::DaemonReport Service::report() const {
   report.machine = options_.machine;
   report.blas_kernel = options_.blas_kernel;
   report.uptime_ms = static_cast<std::uint64_t>(uptime_.milliseconds());
-  report.session = session_state();
   report.limit_ms = 1e3 * std::chrono::duration<double>(ServiceManager::kGrace).count();
-  if (session_) {
-    const Session::State state = session_->state();
-    report.model_ready = true;
-    report.case_id = options_.model->case_id;
-    report.owner = hexadecimal(state.owner);
-    report.max_age_s = state.max_age_s;
-    report.working_ms = 1e3 * state.working_s;
-    report.limit_ms += 1e3 * state.deadline_s;
+  {
+    const std::lock_guard lock(mutex_);
+    report.session = state_now();
+    if (session_) {
+      const Session::State state = session_->state(std::chrono::steady_clock::now());
+      report.model_ready = true;
+      report.case_id = options_.model->case_id;
+      report.owner = hexadecimal(state.owner);
+      report.max_age_s = state.max_age_s;
+      report.working_ms = 1e3 * state.working_s;
+      report.limit_ms += 1e3 * state.deadline_s;
+    }
   }
   counters_.report(report, std::chrono::steady_clock::now());
   {
     const std::lock_guard lock(viewers_mutex_);
     report.clients = clients_;
     report.viewers = viewers_;
+    report.door = door_;
   }
   for (wire::ViewerFigures& viewer : report.viewers) viewer.peer = hexadecimal(viewer.peer);
   report.journal = journal_figures();

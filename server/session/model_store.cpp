@@ -5,8 +5,6 @@
 
 #include <utility>
 
-#include "common/contact/forward_model.hpp"
-#include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
 
@@ -63,28 +61,6 @@ Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary bou
   auto shared = std::make_shared<const PreparedModel>(std::move(*made));
   factorised_.emplace(boundary, shared);
   return shared;
-}
-
-// A factor that nothing else needs is not kept: it is as large as all else that the daemon has.
-Result<ModelStore::FullSolve> ModelStore::full_solve(Boundary boundary,
-                                                     const std::stop_token& stop) {
-  if (const auto found = full_solves_.find(boundary); found != full_solves_.end()) {
-    return found->second;
-  }
-  const auto measure = [&](const contact::ForwardModel& forward) {
-    const FullSolve measured{forward.factor().factor_seconds(),
-                             contact::measure_full_solve_ms(forward)};
-    full_solves_.emplace(boundary, measured);
-    return measured;
-  };
-  if (const auto found = factorised_.find(boundary); found != factorised_.end()) {
-    return measure(found->second->forward());
-  }
-  if (stop.stop_requested()) return stopped();
-  spdlog::info("factorising boundary={} for its time", to_string(boundary));
-  const auto forward = contact::ForwardModel::build(*model_, config_, boundary);
-  if (!forward) return tl::unexpected(forward.error());
-  return measure(*forward);
 }
 
 Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
@@ -146,15 +122,6 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& req
   if (request.method == Method::kCondensed) {  // the work that was done before surgery counts
     const double before_s = condensed_.at(request.boundary)->prepare_s;
     if (before_s > 0.0) info.prepare_s = before_s;
-  }
-  if (request.method != Method::kCondensed) {
-    info.factor_s = factorised_.at(request.boundary)->timings().factor_s;
-  }
-  if (request.measure_full_solve) {
-    const auto measured = full_solve(request.boundary, stop);
-    if (!measured) return tl::unexpected(measured.error());
-    info.factor_s = measured->factor_s;
-    info.full_solve_ms = measured->solve_ms;
   }
   const bool ends_by_itself = request.method == Method::kCondensed;
   return std::make_unique<SessionModel>(

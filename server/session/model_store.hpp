@@ -35,19 +35,14 @@ class ModelStore {
   ModelStore(std::shared_ptr<const BrainModel> model, CaseConfig config,
              std::vector<CondensedOperators> operators, ReadOperators read = {});
 
-  // For the request's method and boundary, with the parts that the scene carries. full_solve_ms of
-  // the info is measured when a request first asks for it, and kept. Errors as plan_scene, `read`,
-  // PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable when stopped, which
-  // is asked for between a factorisation and the next, and between blocks of columns.
+  // For the request's method and boundary, with the parts that the scene carries. Errors as
+  // plan_scene, `read`, PreparedModel::prepare, condensed_inverter and make_inverter; kUnavailable
+  // when stopped, which is asked for between a factorisation and the next, and between blocks of
+  // columns.
   Result<std::unique_ptr<SessionModel>> make(const SessionRequest& request,
                                              const std::stop_token& stop = {});
 
  private:
-  struct FullSolve {
-    double factor_s = 0.0, solve_ms = 0.0;
-  };
-
-  Result<FullSolve> full_solve(Boundary boundary, const std::stop_token& stop);
   Result<std::shared_ptr<const inversion::PreparedModel>> factorised(Boundary boundary,
                                                                      const std::stop_token& stop);
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary,
@@ -62,7 +57,6 @@ class ModelStore {
   ReadOperators read_;
   std::shared_ptr<const geometry::TetLocator> locator_;
   std::map<Boundary, std::shared_ptr<const inversion::PreparedModel>> factorised_;
-  std::map<Boundary, FullSolve> full_solves_;
   std::map<Boundary, std::shared_ptr<const CondensedOperators>> condensed_;
 };
 

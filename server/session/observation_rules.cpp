@@ -9,28 +9,6 @@ namespace {
 constexpr std::size_t kMaxSourceLength = 64;
 constexpr std::size_t kMaxQuoted = 64;
 
-Status check_session(const SessionKey& given, const SessionKey& running) {
-  if (given == running) return {};
-  if (given == SessionKey{}) {
-    return fail(ErrorCode::kInvalidArgument,
-                "observation.session is absent: must name the session that it is for");
-  }
-  if (given.boot_id != running.boot_id) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, or "
-                            "this is another one ({:x})",
-                            given.boot_id, running.boot_id));
-  }
-  if (given.model_id != running.model_id) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.session.model_id = {}: the daemon serves model {}",
-                            in_quotes(given.model_id), in_quotes(running.model_id)));
-  }
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation.session.session_id = {}: the running session is {}",
-                          given.session_id, running.session_id));
-}
-
 }  // namespace
 
 Status check_observation(const Observation& observation, std::string_view case_id,
@@ -40,7 +18,26 @@ Status check_observation(const Observation& observation, std::string_view case_i
                 fmt::format("observation.case_id = {}: the running session is for {}",
                             in_quotes(observation.case_id), in_quotes(case_id)));
   }
-  if (auto status = check_session(observation.session, running); !status) return status;
+  if (const SessionKey& given = observation.session; given != running) {
+    if (given == SessionKey{}) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "observation.session is absent: must name the session that it is for");
+    }
+    if (given.boot_id != running.boot_id) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, "
+                              "or this is another one ({:x})",
+                              given.boot_id, running.boot_id));
+    }
+    if (given.model_id != running.model_id) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("observation.session.model_id = {}: the daemon serves model {}",
+                              in_quotes(given.model_id), in_quotes(running.model_id)));
+    }
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.session.session_id = {}: the running session is {}",
+                            given.session_id, running.session_id));
+  }
   if (observation.frame != "ras") {
     return fail(ErrorCode::kInvalidArgument, fmt::format("observation.frame = {}: must be \"ras\"",
                                                          in_quotes(observation.frame)));
@@ -54,21 +51,6 @@ Status check_observation(const Observation& observation, std::string_view case_i
     return fail(ErrorCode::kInvalidArgument,
                 "observation.patient_pose: a change of pose is not assimilated in this version; "
                 "start a session on a model prepared for the new pose");
-  }
-  return {};
-}
-
-Status check_sequence(const Observation& observation, std::uint64_t last_sequence) {
-  if (observation.sequence > kMaxSequence) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.sequence = {}: must be at most {}", observation.sequence,
-                            kMaxSequence));
-  }
-  if (observation.sequence <= last_sequence) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
-                            "from {}",
-                            observation.sequence, last_sequence, in_quotes(observation.source)));
   }
   return {};
 }

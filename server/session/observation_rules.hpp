@@ -11,9 +11,6 @@
 
 namespace brainshift::server {
 
-// The journal keeps sequence numbers as signed 64-bit integers.
-inline constexpr std::uint64_t kMaxSequence = (std::uint64_t{1} << 63) - 1;
-
 // Ok, or kInvalidArgument for another case, session, model or daemon than `running`, a frame other
 // than "ras", an empty or overlong source, or a body that no update uses (PatientPose). The
 // sentence names the field and its value. The numbers of the body are not looked at:
@@ -21,10 +18,6 @@ inline constexpr std::uint64_t kMaxSequence = (std::uint64_t{1} << 63) - 1;
 // negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          const SessionKey& running);
-
-// Ok, or kInvalidArgument for a sequence number that is not above `last_sequence`, the last one of
-// this source, or above kMaxSequence.
-Status check_sequence(const Observation& observation, std::uint64_t last_sequence);
 
 // The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a
 // one-line message whatever a peer sent.

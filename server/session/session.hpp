@@ -1,44 +1,50 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Session: one case under one boundary and method; two threads.
+// Session: one case under one boundary and method, as a state machine. It has no thread, calls
+// nobody and waits for nothing: server/service calls it under one lock, does the work that it
+// hands out, and acts on its events.
 //
-//   start()    asks for the next session
-//   preparer   makes its model ready (seconds to minutes, once per boundary and method) while the
-//              running session goes on; then that one ends and the new one begins. A session of
-//              another method than condensed ends first: it uses the factor that is at work then.
-//   submit()   checks an observation and leaves it in the box of its source; never waits
-//   worker     takes the observation that arrived first, runs the pipeline, hands the message to
-//              `publish`
+//   start()             asks for the next session
+//   next_preparation()  hands out what is to be made ready for it (seconds to minutes, once per
+//   prepared()          boundary and method) and takes the result. The running session goes on
+//                       until then; one of another method than condensed ends first: it uses the
+//                       factor that is at work then.
+//   submit()            checks an observation and leaves it in the box of its source
+//   next_job()          hands out the observation that arrived first,
+//   finish()            and turns its result into the message to publish
+//   take_events()       after each of these: what is to be recorded and answered
 //
-// Every source has a box for one observation: a newer one replaces an older one that has not
-// started, so a slow inversion never works through a backlog. Only a new session and stop() end a
-// running inversion early, whatever its method: their stop token reaches every iteration and every
-// contact set. The result of such an inversion is not published. After an error, and after an
-// unusable estimate, the usable one before it stays the valid one.
+//   next session   none -start-> asked -next_preparation-> preparing -prepared-> ready -> running
+//   ready waits for the job that is handed out; without one it runs at once.
+//
+// Every source has a box for one observation: a newer one replaces an older one that has not been
+// handed out, so a slow inversion never works through a backlog. Only a new session and stop() end
+// a job early, whatever its method: its stop token reaches every iteration and every contact set.
+// The result of such a job is not published. After an error, and after an unusable estimate, the
+// usable one before it stays the valid one.
 //
 // A session belongs to the client that started it, until that one leaves: another client ends it
-// only with `takeover`. A preparation ends when a later one is asked for, when its owner leaves,
-// and at stop(). All members may be called from any thread, except inside the hooks.
+// only with `takeover`. A preparation is stopped when a later one is asked for, when its owner
+// leaves, and by stop(). Every start is answered exactly once, every accepted observation decided
+// exactly once, before its update is published. Not thread-safe.
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <thread>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "common/core/error.hpp"
 #include "common/pipeline/pipeline.hpp"
+#include "common/values/decision.hpp"
 #include "common/values/observation.hpp"
+#include "common/values/session.hpp"
 #include "common/values/session_state.hpp"
-#include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 #include "server/session/sources.hpp"
 
 namespace brainshift::server {
@@ -54,87 +60,111 @@ struct SessionModel {
   double max_age_s = CaseConfig{}.sensing.max_age_s;  // older observations are not used
   double deadline_s = kNoDeadline_s;                  // an inversion ends by itself then
 };
-// On the preparer's thread, one at a time. kUnavailable when stopped.
-using MakeSessionModel = std::function<Result<std::unique_ptr<SessionModel>>(
-    const SessionRequest&, const std::stop_token&)>;
 
-// The way of an observation to its answer, monotonic clock.
-struct Handled {
-  using TimePoint = std::chrono::steady_clock::time_point;
-
-  TimePoint arrived;  // at the session
-  TimePoint begun;    // by the worker
+// Who asked for a session, and where the answer goes.
+struct StartTicket {
+  std::string client;  // empty: nobody, and anybody may end the session
+  std::uint64_t request_id = 0;
 };
 
-// Called one at a time, but for on_change and decided.
-struct SessionHooks {
-  MakeSessionModel make_model;
-  // A session is ready; called before its start is answered. May be empty.
-  std::function<void(const SessionRequest&, const SessionInfo&)> on_ready;
-  // On the worker: an iterate, a final update, or the error that an observation ended in.
-  std::function<void(UpdateMessage, const Handled&)> publish;
-  // The phase, the session or `preparing` has changed: ask state(). Called without a lock, on any
-  // thread, after the update that changed it. May be empty.
-  std::function<void()> on_change;
-  // What became of an accepted observation; once for each, before its update is published. Called
-  // on any thread and under the session's lock: it must be quick and must not call back. May be
-  // empty.
-  std::function<void(const Decision&)> decided;
+// What is to be made ready.
+struct Preparation {
+  SessionRequest request;
+  std::stop_token stop;
+};
+
+// An observation to answer.
+struct Job {
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  UpdateMessage message(Update update) const;  // with the job's number and session
+
+  Observation observation;  // its time is the daemon's
+  TimePoint arrived;
+  TimePoint begun;
+  SessionKey session;
+  SessionRequest request;
+  std::uint64_t number = 0;  // of the update
+  SessionModel* model = nullptr;
+  std::stop_token stop;
+};
+
+// In the order in which they are to be acted on.
+struct SessionEvents {
+  struct Begun {
+    SessionRequest request;
+    SessionInfo info;
+  };
+  struct Answer {
+    StartTicket ticket;
+    Result<SessionInfo> info;
+  };
+
+  std::vector<Decision> decisions;  // what became of accepted observations
+  std::optional<Begun> begun;       // a session
+  bool changed = false;             // the phase, the session or `preparing`: see state()
+  std::vector<Answer> answers;      // to start()
 };
 
 class Session {
  public:
-  using StartDone = std::function<void(Result<SessionInfo>)>;
+  using TimePoint = Job::TimePoint;
 
   struct State {
     SessionState shared;        // valid_ms is filled in by the service
     bool busy = false;          // making a session ready, or inverting
     std::uint64_t updates = 0;  // final updates of all sessions
     std::string owner;          // of the running session; empty: nobody
-    double working_s = 0.0;     // since the worker began what it does now; 0: it waits
-    double deadline_s = 0.0;    // of that; 0: it waits, or begins a session
+    double working_s = 0.0;     // since the job was handed out; 0: there is none
+    double deadline_s = 0.0;    // of that; 0: there is none
     double max_age_s = 0.0;     // of the running session; 0 without one
   };
 
   // boot_id, model_id: of the daemon's process and of the loaded model.
-  Session(std::string case_id, SessionHooks hooks, std::uint64_t boot_id, std::string model_id);
-  ~Session();
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  Session(std::string case_id, std::uint64_t boot_id, std::string model_id);
 
-  // asking: the client; empty: nobody, and anybody may end it. `done` is called exactly once. On
-  // the calling thread: kInvalidArgument for another case, kUnavailable for a session that belongs
-  // to another client (both leave the running session alone) and after stop(). Else on the preparer
-  // or the worker; kUnavailable when a later start or stop() came first.
-  void start(const SessionRequest& request, const StartDone& done, const std::string& asking = {});
-
+  // The answer is an event. At once: kInvalidArgument for another case, kUnavailable for a session
+  // that belongs to another client (both leave the running session alone) and after stop(). Later:
+  // the errors of prepared(); kUnavailable when another start or stop() came first.
+  void start(const SessionRequest& request, const StartTicket& ticket);
   // This client has gone: what it owns belongs to nobody.
   void leave(const std::string& gone);
 
-  // Called once before the worker can see an accepted observation; must be quick and must not call
-  // back. The observation's daemon_ns is set.
-  using OnAccepted = std::function<void(const Observation&)>;
+  // One at a time: handed out once, and prepared() follows. Empty: nothing is asked for, its model
+  // is at hand, or the job whose factor it would share has not been finished.
+  std::optional<Preparation> next_preparation();
+  void prepared(Result<std::unique_ptr<SessionModel>> made);
 
   // kModelNotReady without a running session; the errors of check_observation and of
-  // Sources::admit. The source's last observation once more gets its receipt once more, and nothing
-  // happens. Precondition: the observation's numbers are finite (wire::decode_observation).
-  Result<ObservationReceipt> submit(Observation observation, const OnAccepted& on_accepted = {});
+  // Sources::admit. A repeated observation gets its receipt once more, and nothing happens.
+  // Precondition: the observation's numbers are finite (wire::decode_observation).
+  Result<Admission> submit(Observation observation, TimePoint now);
 
-  State state() const;
+  // One at a time. A session that is ready begins: whatever the job before led to is published.
+  std::optional<Job> next_job(TimePoint now);
+  // What to publish; empty when the session has ended meanwhile: nobody hears of the result.
+  std::optional<UpdateMessage> finish(const Job& job, Result<Update> result);
 
-  // Ends the inversion, the preparation and both threads; idempotent.
+  // Ends job, preparation and session; idempotent.
   void stop();
 
- private:
-  using TimePoint = std::chrono::steady_clock::time_point;
+  // `changed` waits for next_job() once a job is finished, so that its update is told first.
+  SessionEvents take_events();
+  State state(TimePoint now) const;
 
-  struct PendingStart {
+ private:
+  struct Start {
     SessionRequest request;
-    StartDone done;
+    StartTicket ticket;
     std::string owner;
   };
-  struct Prepared {
-    PendingStart start;
+  struct Preparing {
+    Start start;
+    std::stop_source stop;
+    bool handed_out = false;
+  };
+  struct Ready {
+    Start start;
     SessionModel* model = nullptr;  // in models_
   };
   struct Running {
@@ -143,7 +173,7 @@ class Session {
     std::string owner;
     SessionModel* model = nullptr;  // in models_
     Sources sources;
-    std::uint64_t published = 0;  // number of the last message's update
+    std::uint64_t numbered = 0;  // updates
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
     TimePoint usable_arrived = {};  // the observation that newest_usable answers
@@ -154,47 +184,45 @@ class Session {
     std::uint64_t order = 0;
     TimePoint arrived;
   };
+  struct Work {  // the job that is handed out
+    TimePoint since;
+    double deadline_s = 0.0;
+    Method method = Method::kCondensed;
+    std::stop_source stop;
+    bool finished = false;
+  };
+  // Of the next session's boundary and method.
+  using ModelKey = std::pair<Boundary, Method>;
 
-  void prepare(const std::stop_token& stop);
-  void work(const std::stop_token& stop);
-  void begin(const Prepared& prepared);
-  Result<SessionModel*> model_for(const SessionRequest& request, const std::stop_token& stop);
-  void process(const Box& box);
-  bool finish(const Box& box, const UpdateMessage& message, const std::stop_token& stop);
-  // With the mutex held.
+  bool coming() const { return asked_ || preparing_ || ready_; }
   const std::string* owner() const;
+  SessionPhase phase() const;
+  void make_ready(Start start, SessionModel* model);
+  void begin();
   void end_running();
-  SessionState shared_state() const;
-  void changed() const;
-  void decide(const Observation& observation, Outcome outcome, std::string reason,
-              const Update* answer = nullptr) const;
+  void answer(const Start& start, Result<SessionInfo> info);
+  void refuse(const Start& start, const std::string& why);
+  void decide(const SessionKey& session, const Observation& observation, Outcome outcome,
+              std::string reason, const Update* answer = nullptr);
 
   const std::string case_id_;
-  const SessionHooks hooks_;
   const std::uint64_t boot_id_;
   const std::string model_id_;
-  // By boundary, method and whether a full solve was measured; preparer only.
-  std::map<std::tuple<Boundary, Method, bool>, std::unique_ptr<SessionModel>> models_;
+  std::map<ModelKey, std::unique_ptr<SessionModel>> models_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable_any wake_;
-  std::optional<PendingStart> pending_start_;
-  std::optional<std::string> preparing_;  // the owner of what the preparer works on
-  std::stop_source prepare_stop_;         // of that
-  std::optional<Prepared> prepared_;      // on its way to the worker
+  std::optional<Start> asked_;
+  std::optional<Preparing> preparing_;
+  std::optional<Ready> ready_;
   std::optional<Running> running_;
   std::map<std::string, Box> boxes_;  // by source
   std::uint64_t arrivals_ = 0;
-  std::stop_source run_stop_;  // of the inversion in progress
+  std::optional<Work> work_;
   std::uint64_t last_session_id_ = 0;
   std::uint64_t updates_ = 0;
-  bool working_ = false;  // the worker
-  TimePoint working_since_ = {};
-  double deadline_s_ = 0.0;  // of what it works on
   bool stopped_ = false;
 
-  std::jthread preparer_;  // the threads last: they use everything above
-  std::jthread worker_;
+  SessionEvents events_;
+  std::tuple<SessionPhase, std::uint64_t, bool> told_ = {};
 };
 
 }  // namespace brainshift::server

@@ -22,8 +22,16 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
       observation.acquired_ns == source.last_acquired_ns) {
     return Admission{source.receipt, 0, true};
   }
-  if (auto status = check_sequence(observation, last_sequence); !status) {
-    return tl::unexpected(status.error());
+  if (observation.sequence > kMaxSequence) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.sequence = {}: must be at most {}", observation.sequence,
+                            kMaxSequence));
+  }
+  if (observation.sequence <= last_sequence) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
+                            "from {}",
+                            observation.sequence, last_sequence, in_quotes(observation.source)));
   }
   const auto daemon_ns = recorded_clock_ ? recorded_time(observation)
                                          : source.clock.to_daemon(observation, arrived_ns);

@@ -10,7 +10,7 @@
 
 #include "common/core/error.hpp"
 #include "common/values/observation.hpp"
-#include "common/wire/convert.hpp"
+#include "common/values/session.hpp"
 #include "server/session/source_clock.hpp"
 
 namespace brainshift::server {
@@ -28,11 +28,14 @@ class Sources {
       : max_age_s_(max_age_s), recorded_clock_(recorded_clock) {}
 
   // arrived_ns: on the daemon's monotonic clock. replaces_pending: what the receipt says of it.
-  // Errors: as check_sequence and SourceClock; kUnavailable when kMaxSources others have observed.
+  // Errors: kInvalidArgument for a sequence number that is not above the source's last one, or
+  // above kMaxSequence; those of SourceClock; kUnavailable when kMaxSources others have observed.
   Result<Admission> admit(const Observation& observation, std::int64_t arrived_ns,
                           bool replaces_pending);
 
   static constexpr std::size_t kMaxSources = 16;
+  // The journal keeps sequence numbers as signed 64-bit integers.
+  static constexpr std::uint64_t kMaxSequence = (std::uint64_t{1} << 63) - 1;
 
  private:
   struct Source {

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Outbox: messages on their way from the worker thread to the transport thread, with a file
-// descriptor that becomes readable while something waits. Bytes are complete frames
-// (common/wire/frame.hpp).
+// descriptor that becomes readable while something waits.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
-namespace brainshift::server {
+#include "server/delivery/parcels.hpp"
 
-using Bytes = std::shared_ptr<const std::string>;
+namespace brainshift::server {
 
 enum class Delivery {
   kReply,    // to one peer

@@ -2,53 +2,10 @@
 #include "server/transport/peers.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace brainshift::server {
 
-bool Viewer::renew(const Subscription& subscription, SelectionPtr selection) {
-  const bool anew =
-      !begun_ || subscription.id != subscription_.id || subscription.choice != subscription_.choice;
-  if (anew) {
-    sent_ = 0;
-    held_.reset();
-    owe_nothing();
-  }
-  selection_ = std::move(selection);
-  begun_ = true;
-  const std::uint64_t acknowledged = anew ? 0 : subscription_.received;
-  subscription_ = subscription;
-  // A peer cannot take back what it has received, nor have received what was not sent.
-  subscription_.received = std::clamp(subscription.received, acknowledged, sent_);
-  return anew;
-}
-
-void Viewer::owe_usable(Bytes bytes) {
-  usable_ = std::move(bytes);
-  failure_.reset();
-}
-
-void Viewer::owe_nothing() {
-  usable_.reset();
-  failure_.reset();
-}
-
-Bytes Viewer::next() const {
-  if (under_way() >= subscription_.window) return {};
-  return usable_ ? usable_ : failure_;
-}
-
-void Viewer::sent() {
-  ++sent_;
-  (usable_ ? usable_ : failure_).reset();
-}
-
-bool Viewer::may_iterate() const {
-  const std::uint64_t spare = std::max<std::uint64_t>(1, subscription_.window - 1);
-  return !usable_ && !failure_ && under_way() < spare;
-}
-
-Peer* Peers::admit(const std::string& routing_id, int connection_fd) {
+Peer* Peers::add(const std::string& routing_id, int connection_fd) {
   if (Peer* known = find(routing_id)) {
     known->connection_fd = connection_fd;
     return known;

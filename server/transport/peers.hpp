@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Peers: who talks to the daemon now, who subscribed, and what each is still owed. Plain
-// bookkeeping of the transport thread.
+// Peers: who talks to the daemon now, and what each is still owed. Plain bookkeeping of the
+// transport thread.
 #pragma once
 
 #include <cstddef>
@@ -9,56 +9,11 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "common/values/session_state.hpp"
-#include "server/transport/outbox.hpp"
-#include "server/transport/parcels.hpp"
+#include "server/delivery/viewer.hpp"
 
 namespace brainshift::server {
-
-// A subscriber's credit, what it is owed, and what it chose and holds of it.
-class Viewer {
- public:
-  // Renews the subscription; true when it is a new one, or has another choice: it then begins with
-  // full credit, is owed nothing and holds nothing. selection: its choice on the loaded model.
-  bool renew(const Subscription& subscription, SelectionPtr selection = nullptr);
-
-  // From now on it is owed this usable field and nothing older.
-  void owe_usable(Bytes bytes);
-  // The newest observation that gave no usable field, beside the field before it.
-  void owe_failure(Bytes bytes) { failure_ = std::move(bytes); }
-  void owe_nothing();
-
-  // What to send next; null when nothing is owed or its credit is used up.
-  Bytes next() const;
-  // next() has gone out.
-  void sent();
-  // Whether an iterate may go out: nothing is owed, and a final update will still find credit.
-  bool may_iterate() const;
-  void iterate_sent() { ++sent_; }
-
-  const SelectionPtr& selection() const { return selection_; }  // null: every node of every update
-  // What it holds when everything sent has arrived; null: nothing, or its choice has no tolerance.
-  const Held& held() const { return held_; }
-  void hold(Held held) { held_ = std::move(held); }
-  const Subscription& subscription() const { return subscription_; }
-  std::uint64_t updates_sent() const { return sent_; }  // in this subscription
-  // Updates that wait for its credit.
-  int owed() const { return (usable_ ? 1 : 0) + (failure_ ? 1 : 0); }
-
- private:
-  std::uint64_t under_way() const { return sent_ - subscription_.received; }
-
-  Subscription subscription_;
-  bool begun_ = false;
-  std::uint64_t sent_ = 0;  // updates in this subscription
-  Bytes usable_;
-  Bytes failure_;
-  SelectionPtr selection_;
-  Held held_;
-};
 
 struct Peer {
   std::string caller;            // under which it counts (server/security/gate.hpp)
@@ -81,7 +36,7 @@ class Peers {
   explicit Peers(std::size_t max_peers) : max_peers_(max_peers) {}
 
   // The peer, added when it is new; null when max_peers others are connected.
-  Peer* admit(const std::string& routing_id, int connection_fd);
+  Peer* add(const std::string& routing_id, int connection_fd);
   Peer* find(const std::string& routing_id);
   std::size_t connections_of(const std::string& caller) const;
   void remove(const std::string& routing_id) { peers_.erase(routing_id); }

@@ -12,7 +12,6 @@
 #include "common/wire/convert.hpp"
 #include "server/guard/zmtp_stream.hpp"
 #include "server/transport/connection_monitor.hpp"
-#include "server/transport/parcels.hpp"
 #include "server/transport/peers.hpp"
 #include "server/transport/router_socket.hpp"
 #include "server/transport/zap_handler.hpp"
@@ -57,14 +56,12 @@ struct Router::Impl {
 
   void serve_requests();
   void answer(const Incoming& incoming);
-  Status admit(const Incoming& incoming);
-  std::optional<Reply> ask_handler(const std::string& peer, const wire::Frame& frame);
-  void complain(const Incoming& incoming, const Error& error);
+  Status enter(const Incoming& incoming);
   void subscribe(const std::string& routing_id, const Reply& answer);
   void reply(const std::string& routing_id, const Bytes& bytes);
   void deliver(const Outgoing& message);
   void forget_session();
-  void push(const std::string& routing_id, Viewer& viewer, const Outgoing& message);
+  void iterate(const std::string& routing_id, Viewer& viewer, const Bytes& bytes);
   void pay_owed();
   void pay(const std::string& routing_id);
   void remove(const std::string& routing_id);
@@ -143,7 +140,12 @@ std::chrono::milliseconds Router::Impl::longest_wait() const {
 
 void Router::Impl::turned() {
   last_turn = std::chrono::steady_clock::now();
-  handler->turned(peers);
+  const GuardCounts counts = guard->counts();
+  const Refusals& refusals = gate.refusals();
+  handler->turned(peers, {counts.accepted, counts.closed_for_breach, counts.closed_for_memory,
+                          counts.closed_for_silence, counts.closed_for_room, guard->held_bytes(),
+                          zap ? zap->refused() : 0, refusals.not_allowed, refusals.connections,
+                          refusals.observations, refusals.session_starts});
 }
 
 void Router::Impl::serve_requests() {
@@ -158,28 +160,35 @@ void Router::Impl::serve_requests() {
   }
 }
 
-void Router::Impl::complain(const Incoming& incoming, const Error& error) {
-  reply(incoming.peer, error_frame(0, error));
-}
-
 void Router::Impl::answer(const Incoming& incoming) {
+  const auto complain = [&](const Error& error) { reply(incoming.peer, error_frame(0, error)); };
   if (incoming.parts != 1) {
-    return complain(incoming, {ErrorCode::kProtocol, fmt::format("a message has 1 part, this one "
-                                                                 "has {}",
-                                                                 incoming.parts)});
+    return complain({ErrorCode::kProtocol,
+                     fmt::format("a message has 1 part, this one has {}", incoming.parts)});
   }
   const auto frame = wire::decode_frame(incoming.payload.to_string_view());
   if (!frame) {
     spdlog::debug("malformed frame: {}", frame.error().message);
-    return complain(incoming, frame.error());
+    return complain(frame.error());
   }
-  if (Status peer = admit(incoming); !peer) return complain(incoming, peer.error());
-  const std::string caller = gate.caller(incoming.user_id, incoming.peer);
+  const Peer* known = peers.find(incoming.peer);
+  if (known == nullptr || known->connection_fd != incoming.connection_fd) {
+    if (Status entered = enter(incoming); !entered) return complain(entered.error());
+    known = peers.find(incoming.peer);
+  }
   std::optional<Reply> answer;
-  if (Status may = gate.admit(caller, *frame, std::chrono::steady_clock::now()); may) {
-    answer = ask_handler(incoming.peer, *frame);
-  } else {
-    answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
+  try {
+    if (Status may = gate.admit(known->caller, *frame, std::chrono::steady_clock::now()); !may) {
+      answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
+    } else {
+      if (frame->type == wire::MessageType::kReportRequest) turned();
+      answer = handler->handle(incoming.peer, *frame);
+    }
+  } catch (const std::exception& exception) {
+    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
+                  exception.what());
+    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
+    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
   }
   if (!answer) return;
   reply(incoming.peer, std::make_shared<const std::string>(
@@ -187,13 +196,14 @@ void Router::Impl::answer(const Incoming& incoming) {
   if (answer->subscription) subscribe(incoming.peer, *answer);
 }
 
-// The peer of a message that is well-formed, added when it is new.
-Status Router::Impl::admit(const Incoming& incoming) {
-  const std::string caller = gate.caller(incoming.user_id, incoming.peer);
+// The peer of a first message that is well-formed is added.
+Status Router::Impl::enter(const Incoming& incoming) {
+  // With keys a message counts for its key, without for its connection.
+  const std::string& caller = options.keys ? incoming.user_id : incoming.peer;
   if (peers.find(incoming.peer) == nullptr) {
     if (Status more = gate.enter(caller, peers.connections_of(caller)); !more) return more;
   }
-  Peer* peer = peers.admit(incoming.peer, incoming.connection_fd);
+  Peer* peer = peers.add(incoming.peer, incoming.connection_fd);
   if (peer == nullptr) {
     return fail(ErrorCode::kUnavailable,
                 fmt::format("{} clients are connected already", options.max_clients));
@@ -201,18 +211,6 @@ Status Router::Impl::admit(const Incoming& incoming) {
   peer->caller = caller;
   guard->served(incoming.connection_fd);
   return {};
-}
-
-std::optional<Reply> Router::Impl::ask_handler(const std::string& peer, const wire::Frame& frame) {
-  try {
-    if (frame.type == wire::MessageType::kReportRequest) turned();
-    return handler->handle(peer, frame);
-  } catch (const std::exception& exception) {
-    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame.type),
-                  exception.what());
-    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
-    return Reply{wire::MessageType::kErrorReply, wire::encode(error)};
-  }
 }
 
 void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer) {
@@ -256,8 +254,21 @@ void Router::Impl::deliver(const Outgoing& message) {
   }
   if (message.delivery == Delivery::kFailure) failure_since = message.bytes;
   for (auto next = peers.all().begin(); next != peers.all().end();) {
-    const auto peer = next++;  // push may remove it
-    if (peer->second.viewer) push(peer->first, *peer->second.viewer, message);
+    auto& [routing_id, peer] = *next++;  // which may be removed here
+    if (!peer.viewer) continue;
+    switch (message.delivery) {
+      case Delivery::kReply: break;
+      case Delivery::kState: reply(routing_id, message.bytes); break;
+      case Delivery::kIterate: iterate(routing_id, *peer.viewer, message.bytes); break;
+      case Delivery::kFinal:
+        peer.viewer->owe_usable(message.bytes);
+        pay(routing_id);
+        break;
+      case Delivery::kFailure:
+        peer.viewer->owe_failure(message.bytes);
+        pay(routing_id);
+        break;
+    }
   }
 }
 
@@ -270,23 +281,13 @@ void Router::Impl::forget_session() {
   }
 }
 
-void Router::Impl::push(const std::string& routing_id, Viewer& viewer, const Outgoing& message) {
-  if (message.delivery == Delivery::kState) return reply(routing_id, message.bytes);
-  if (message.delivery == Delivery::kIterate) {
-    if (!viewer.may_iterate()) return;
-    const auto parcel = parcels.make(message.bytes, viewer.selection(), viewer.held());
-    if (!parcel) return;
-    const Sent sent = socket.send(routing_id, parcel->bytes);
-    if (sent == Sent::kYes) viewer.iterate_sent();
-    if (sent == Sent::kPeerGone) remove(routing_id);
-    return;
-  }
-  if (message.delivery == Delivery::kFinal) {
-    viewer.owe_usable(message.bytes);
-  } else {
-    viewer.owe_failure(message.bytes);
-  }
-  pay(routing_id);
+void Router::Impl::iterate(const std::string& routing_id, Viewer& viewer, const Bytes& bytes) {
+  if (!viewer.may_iterate()) return;
+  const auto parcel = parcels.make(bytes, viewer.selection(), viewer.held());
+  if (!parcel) return;
+  const Sent sent = socket.send(routing_id, parcel->bytes);
+  if (sent == Sent::kYes) viewer.iterate_sent();
+  if (sent == Sent::kPeerGone) remove(routing_id);
 }
 
 // Replies first: they tell a viewer what to make of the updates behind them.
@@ -308,8 +309,7 @@ void Router::Impl::pay(const std::string& routing_id) {
     const Sent sent = socket.send(routing_id, parcel->bytes);
     if (sent == Sent::kQueueFull) return;
     if (sent == Sent::kPeerGone) return remove(routing_id);
-    if (parcel->held) viewer.hold(parcel->held);
-    viewer.sent();
+    viewer.sent(parcel->held);
   }
 }
 

@@ -27,6 +27,7 @@
 #include "common/core/error.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/frame.hpp"
+#include "common/wire/report.hpp"
 #include "server/guard/guard.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router_options.hpp"
@@ -52,9 +53,9 @@ class RequestHandler {
   virtual std::optional<Reply> handle(const std::string& peer, const wire::Frame& frame) = 0;
   // The peer's connection has closed. Peers that come back have another name.
   virtual void left(const std::string& peer) = 0;
-  // How the peers stand: before every ReportRequest, and while the router's loop turns, at most
-  // every 100 ms.
-  virtual void turned(const Peers&) {}
+  // How peers and door stand: before every ReportRequest, and while the router's loop turns, at
+  // most every 100 ms.
+  virtual void turned(const Peers&, const wire::DoorFigures&) {}
 };
 
 class Router {

@@ -16,7 +16,7 @@ def test_files_that_are_no_surgery_are_named(tmp_path):
     other = tmp_path / "other.surgery"
     with sqlite3.connect(other) as database:
         database.execute("CREATE TABLE meta(key, value)")
-    with pytest.raises(brainshift.Error, match="no surgery file of version 1 or 2"):
+    with pytest.raises(brainshift.Error, match="no surgery file of version 2"):
         brainshift.Surgery(other)
 
 

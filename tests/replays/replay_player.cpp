@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/replays/replay_player.hpp"
 
+#include "client/tools/replay/run_unit.hpp"
+
 namespace brainshift::replays {
 namespace {
 
@@ -19,8 +21,7 @@ Result<SessionInfo> start(client::Client& client, const std::string& endpoint,
                     "\", but the daemon at " + endpoint + " serves \"" + status->case_id +
                     "\" and \"" + status->model_id + "\"");
   }
-  auto info = client.start_session(
-      {.case_id = meta.case_id, .measure_full_solve = true, .recorded_clock = true});
+  auto info = client.start_session({.case_id = meta.case_id, .recorded_clock = true});
   if (!info) return info;
   if (Status ok = client.subscribe(Subscription::kMaxWindow); !ok) {
     return tl::unexpected(ok.error());
@@ -28,7 +29,6 @@ Result<SessionInfo> start(client::Client& client, const std::string& endpoint,
   facts.head = status->case_id;
   facts.kernel = status->blas_kernel;
   facts.nodes = info->nodes;
-  facts.t_solve_ms = info->full_solve_ms;
   return info;
 }
 
@@ -79,6 +79,19 @@ PlayedRow Tap::row_of(const client::PlayedObservation& played) const {
   row.evidence = found->second.evidence;
   row.difference_mm = found->second.difference_mm;
   return row;
+}
+
+Result<double> measure_t_solve_ms(const std::string& endpoint, const Recording& recording) {
+  auto client = client::Client::connect(endpoint);
+  if (!client) return tl::unexpected(client.error());
+  const auto status = client->status();
+  if (!status) return tl::unexpected(status.error());
+  const auto model = client->model();
+  if (!model) return tl::unexpected(model.error());
+  const auto unit = client::measure_run_unit(endpoint, *status, *model, recording.meta.case_file,
+                                             Boundary::kContact);
+  if (!unit) return tl::unexpected(unit.error());
+  return unit->full_solve_ms;
 }
 
 Result<std::vector<surgeries::Row>> play_pass(const std::string& endpoint,

@@ -55,10 +55,13 @@ class Tap {
   std::map<std::uint64_t, Passed> passed_;  // by sequence of the observation
 };
 
+// t_solve on this machine, for the head that the daemon serves: client::measure_run_unit.
+Result<double> measure_t_solve_ms(const std::string& endpoint, const Recording& recording);
+
 // One pass in a session of its own: method condensed, contact, journal and all as the daemon has
-// it. facts: surgery, seed, speed and pass are given; the rest is filled in. Errors: no daemon
-// (kUnavailable), the recording is of another case or model (kInvalidArgument). An observation that
-// fails is a row.
+// it. facts: surgery, seed, speed, pass and t_solve are given; the rest is filled in. Errors: no
+// daemon (kUnavailable), the recording is of another case or model (kInvalidArgument). An
+// observation that fails is a row.
 Result<std::vector<surgeries::Row>> play_pass(const std::string& endpoint,
                                               const Recording& recording, PassFacts facts,
                                               KnownFields& fields);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/core/stopwatch.hpp"
+#include "common/linalg/blas_kernel.hpp"
 #include "tests/replays/replay_player.hpp"
 #include "tests/surgeries/study_program.hpp"
 
@@ -33,6 +34,9 @@ Status play_surgery(const Arguments& arguments, const fs::path& file, surgeries:
   PassFacts facts;
   facts.surgery = file.stem().string();
   facts.seed = recording->meta.seed.value_or(0);
+  const auto t_solve_ms = measure_t_solve_ms(arguments.endpoint, *recording);
+  if (!t_solve_ms) return tl::unexpected(t_solve_ms.error());
+  facts.t_solve_ms = *t_solve_ms;
   KnownFields fields;
   for (const auto& [speed, passes] :
        {std::pair{client::Speed::kRecorded, arguments.recorded_passes},
@@ -67,6 +71,7 @@ Status run(const Arguments& arguments) {
 }  // namespace brainshift::replays
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();  // that of the daemon
   brainshift::replays::Arguments arguments;
   CLI::App app{"Plays recorded surgeries to a daemon: a row per observation.", "replays"};
   app.add_option("surgeries", arguments.surgeries, "surgery files")->required();

@@ -95,8 +95,7 @@ class Client:
         return self._ask(MessageType.STATUS_REQUEST, b"", MessageType.STATUS_REPLY, codec.status)
 
     def start_session(self, case_id: Optional[str] = None, method: str = "condensed", boundary: str = "contact", *,
-                      publish_iterates: bool = False, measure_full_solve: bool = False, takeover: bool = False,
-                      recorded_clock: bool = False, timeout_s: float = 600.0) -> Session:
+                      publish_iterates: bool = False, takeover: bool = False, recorded_clock: bool = False, timeout_s: float = 600.0) -> Session:
         """Starts a session for all clients and ends the running one. Returns when it is prepared.
 
         case_id: of the daemon's case; None: whatever case it serves. takeover: end a session that
@@ -106,8 +105,7 @@ class Client:
         """
         if case_id is None:
             case_id = self.status().case_id
-        payload = codec.start_session(case_id, method, boundary, publish_iterates, measure_full_solve, takeover,
-                                      recorded_clock)
+        payload = codec.start_session(case_id, method, boundary, publish_iterates, takeover, recorded_clock)
         session = self._ask(MessageType.START_SESSION_REQUEST, payload, MessageType.START_SESSION_REPLY,
                             codec.session, timeout_s)
         self._case_id = case_id

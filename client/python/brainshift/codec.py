@@ -64,11 +64,11 @@ def _key(message: Any) -> v.SessionKey:
 # ---------- requests ----------
 
 
-def start_session(case_id: str, method: str, boundary: str, publish_iterates: bool, measure_full_solve: bool,
+def start_session(case_id: str, method: str, boundary: str, publish_iterates: bool,
                   takeover: bool, recorded_clock: bool) -> bytes:
     return bytes(pb.StartSessionRequest(
         case_id=case_id, method=method, boundary=boundary, publish_iterates=publish_iterates,
-        measure_full_solve=measure_full_solve, takeover=takeover,
+        takeover=takeover,
         recorded_clock=recorded_clock).SerializeToString())
 
 
@@ -158,7 +158,7 @@ def status(payload: bytes) -> v.Status:
 
 def session(payload: bytes) -> v.Session:
     m = parse(pb.StartSessionReply(), payload)
-    return v.Session(_key(m), m.nodes, m.tets, m.slaves, m.prepare_s, m.model_bytes, m.full_solve_ms, m.factor_s)
+    return v.Session(_key(m), m.nodes, m.tets, m.slaves, m.prepare_s, m.model_bytes)
 
 
 def session_state(payload: bytes) -> v.SessionState:

@@ -17,7 +17,7 @@ from .values import Observation, Update
 
 Path = Union[str, "os.PathLike[str]"]
 _APPLICATION_ID = 0x42534652  # "BSFR"
-_VERSIONS = (1, 2)
+_VERSION = 2
 
 
 class Surgery:
@@ -31,8 +31,8 @@ class Surgery:
             self._database = sqlite3.connect(f"file:{quote(os.path.abspath(self._path))}?mode=ro", uri=True)
             (application,) = self._database.execute("PRAGMA application_id").fetchone()
             (version,) = self._database.execute("PRAGMA user_version").fetchone()
-            if application != _APPLICATION_ID or version not in _VERSIONS:
-                raise Error("unreadable", f"{self._path}: is no surgery file of version 1 or 2")
+            if application != _APPLICATION_ID or version != _VERSION:
+                raise Error("unreadable", f"{self._path}: is no surgery file of version {_VERSION}")
             self.meta: dict[str, str] = {
                 str(key): str(value) for key, value in self._database.execute("SELECT key, value FROM meta")}
         except sqlite3.Error as error:

@@ -70,8 +70,6 @@ class Session:
     slaves: int
     prepare_s: float
     model_bytes: int
-    full_solve_ms: float  # 0 when not measured
-    factor_s: float
 
 
 @dataclass(frozen=True)

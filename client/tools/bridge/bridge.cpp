@@ -116,6 +116,8 @@ Status Bridge::run() {
   return served ? followed : served;
 }
 
+int Bridge::stop_fd() const { return impl_->stop_descriptor; }
+
 void Bridge::stop() {
   const std::uint64_t one = 1;
   static_cast<void>(!::write(impl_->stop_descriptor, &one, sizeof one));

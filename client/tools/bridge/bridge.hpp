@@ -48,8 +48,9 @@ class Bridge {
   Address address() const;
   // Until stop(). An error when the options can never be met.
   Status run();
-  // Any thread, and from a signal handler: run() sends its clients a blank picture and returns.
+  // Any thread: run() sends its clients a blank picture and returns.
   void stop();
+  int stop_fd() const;  // an event descriptor; what is written to it does the same
 
  private:
   struct Impl;

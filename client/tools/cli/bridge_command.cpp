@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
 #include "client/tools/bridge/bridge.hpp"
 #include "client/tools/cli/command.hpp"
 #include "client/tools/monitor/choice_text.hpp"
+#include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -22,19 +22,6 @@ struct BridgeArguments {
   bool without_surfaces = false;
   KeyOptions keys;
 };
-
-// The bridge that a signal ends. Bridge::stop() may be called from a signal handler.
-Bridge* running = nullptr;
-void end_running(int) {
-  if (running != nullptr) running->stop();
-}
-
-void catch_signals(Bridge* bridge) {
-  running = bridge;
-  struct sigaction action {};
-  action.sa_handler = bridge != nullptr ? end_running : SIG_DFL;
-  for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
-}
 
 Result<BridgeOptions> read_options(const BridgeArguments& arguments) {
   BridgeOptions options = arguments.options;
@@ -78,10 +65,9 @@ Status run_bridge(const BridgeArguments& arguments) {
                  "reads the patient's field, and may send models\n",
                  to_string(address).c_str());
   }
-  catch_signals(bridge->get());
-  Status status = (*bridge)->run();
-  catch_signals(nullptr);
-  return status;
+  const auto signals = io::StopSignals::catch_into((*bridge)->stop_fd());
+  if (!signals) return tl::unexpected(signals.error());
+  return (*bridge)->run();
 }
 
 void add_stream_options(CLI::App& command, BridgeArguments& arguments) {

@@ -29,8 +29,7 @@ struct JournalCheck {
   std::filesystem::path file;
   io::SurgeryMeta meta;
   io::SurgeryState state;
-  // Of the records that are proved, or of all when the file has no checksums.
-  std::uint64_t records = 0;
+  std::uint64_t records = 0;                    // that are proved
   std::map<std::string, Numbers> observations;  // by source
   Numbers updates;
   std::map<std::string, std::uint64_t> decisions;  // by outcome: how many

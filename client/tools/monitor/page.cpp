@@ -69,6 +69,7 @@ class Page {
     add_sources();
     add_stages();
     add_viewers();
+    add_door();
     add_journal();
     add_process();
     return std::move(lines_);
@@ -170,6 +171,19 @@ class Page {
                           viewer.peer, viewer.window, viewer.sent, viewer.received, viewer.owed,
                           viewer.replies_waiting));
     }
+  }
+
+  void add_door() {
+    const wire::DoorFigures& door = now_.door;
+    add("door",
+        fmt::format("{} accepted, closed for breach {}, memory {}, silence {}, room {}, "
+                    "{} held",
+                    door.accepted, door.closed_for_breach, door.closed_for_memory,
+                    door.closed_for_silence, door.closed_for_room, mebibytes(door.held_bytes)));
+    add("", fmt::format("refused: unknown keys {}, beyond a role {}, connections {}, "
+                        "observations {}, session starts {}",
+                        door.unknown_keys, door.refused_role, door.refused_connections,
+                        door.refused_observations, door.refused_starts));
   }
 
   void add_journal() {

@@ -100,6 +100,18 @@ std::string report_json(const wire::DaemonReport& report) {
                     {"descriptors", report.process.descriptors},
                     {"descriptor_limit", report.process.descriptor_limit},
                     {"threads", report.process.threads}};
+  const wire::DoorFigures& door = report.door;
+  out["door"] = {{"accepted", door.accepted},
+                 {"closed_for_breach", door.closed_for_breach},
+                 {"closed_for_memory", door.closed_for_memory},
+                 {"closed_for_silence", door.closed_for_silence},
+                 {"closed_for_room", door.closed_for_room},
+                 {"held_bytes", door.held_bytes},
+                 {"unknown_keys", door.unknown_keys},
+                 {"refused_role", door.refused_role},
+                 {"refused_connections", door.refused_connections},
+                 {"refused_observations", door.refused_observations},
+                 {"refused_starts", door.refused_starts}};
   return out.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -16,36 +15,12 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/monitor/page.hpp"
+#include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-volatile std::sig_atomic_t stop_asked = 0;
-
-// SIGINT and SIGTERM ask for the end, as long as this lives.
-class StopSignals {
- public:
-  StopSignals() {
-    stop_asked = 0;
-    struct sigaction action {};
-    action.sa_handler = [](int) { stop_asked = 1; };
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
-  }
-  ~StopSignals() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-
- private:
-  struct sigaction interrupt_ {};
-  struct sigaction terminate_ {};
-};
 
 bool write_all(int fd, std::string_view text) {
   while (!text.empty()) {
@@ -110,17 +85,18 @@ class Screen {
   termios before_{};
 };
 
-// Waits for q until then, and looks at least once: a question may have taken longer than that.
-bool quits(int input, bool keys, Clock::time_point until) {
-  while (stop_asked == 0) {
+// Waits for q or a signal until then, and looks at least once: a question may have taken longer
+// than that. input: -1 for one without keys.
+bool quits(const io::StopSignals& signals, int input, Clock::time_point until) {
+  while (true) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
-    pollfd key{input, POLLIN, 0};
-    const int ready = poll(&key, keys ? 1 : 0, static_cast<int>(std::max<long>(0, left)));
+    pollfd items[] = {{signals.fd(), POLLIN, 0}, {input, POLLIN, 0}};
+    const int ready = poll(items, 2, static_cast<int>(std::max<long>(0, left)));
+    if (ready > 0 && items[0].revents != 0) return true;
     char typed = 0;
     if (ready > 0 && (read(input, &typed, 1) != 1 || typed == 'q' || typed == 'Q')) return true;
     if (left <= 0) return false;
   }
-  return true;
 }
 
 class TopView {
@@ -168,9 +144,9 @@ class TopView {
   Clock::time_point answered_ = {};
 };
 
-Status print_once(TopView& view, const TopOptions& options) {
+Status print_once(TopView& view, const TopOptions& options, const io::StopSignals& signals) {
   if (Status ok = view.ask(); !ok) return ok;
-  if (quits(options.input, false, Clock::now() + options.interval)) return {};
+  if (quits(signals, -1, Clock::now() + options.interval)) return {};
   if (Status ok = view.ask(); !ok) return ok;
   std::string text;
   for (const Line& line : view.lines()) text += line.text + "\n";
@@ -186,19 +162,21 @@ Status top(const TopOptions& options) {
   client_options.request_timeout = std::chrono::milliseconds(1000);
   auto client = Client::connect(options.endpoint, client_options);
   if (!client) return tl::unexpected(client.error());
-  const StopSignals signals;
+  const auto signals = io::StopSignals::catch_all();
+  if (!signals) return tl::unexpected(signals.error());
   TopView view(std::move(*client), options);
-  if (options.once) return print_once(view, options);
+  if (options.once) return print_once(view, options, *signals);
   std::optional<Screen> screen;
   if (isatty(options.output) != 0) screen.emplace(options.input, options.output);
   while (true) {
     const Clock::time_point begun = Clock::now();
     static_cast<void>(view.ask());  // what is wrong is shown
-    if (stop_asked != 0) return {};
+    if (signals->arrived()) return {};
     const bool shown =
         screen ? screen->draw(view.lines()) : write_all(options.output, view.line() + "\n");
     if (!shown) return {};
-    if (quits(options.input, screen && screen->keys(), begun + options.interval)) return {};
+    const int keys = screen && screen->keys() ? options.input : -1;
+    if (quits(*signals, keys, begun + options.interval)) return {};
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/replay/resume.hpp"
+#include "client/tools/replay/run_unit.hpp"
 #include "client/tools/replay/score.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/vtu_writer.hpp"
@@ -96,7 +97,7 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   if (!file) return tl::unexpected<Error>(file.error());
   const io::SurgeryState& state = file->state();
   std::vector<std::string> notes;
-  if (state.checksums && !state.closed) notes.push_back(path.string() + ": " + describe(state));
+  if (!state.closed) notes.push_back(path.string() + ": " + describe(state));
   const io::SurgeryMeta meta = file->meta();
   if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
     return tl::unexpected<Error>(ok.error());
@@ -121,9 +122,11 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   return surgery;
 }
 
-Status check_daemon(Client& client, const Surgery& surgery, const ReplayOptions& options) {
-  const auto status = client.status();
-  if (!status) return tl::unexpected<Error>(status.error());
+// Its status, when it serves the surgery's case and model.
+Result<DaemonStatus> check_daemon(Client& client, const Surgery& surgery,
+                                  const ReplayOptions& options) {
+  auto status = client.status();
+  if (!status) return status;
   if (!status->model_ready) {
     return fail(ErrorCode::kModelNotReady, options.endpoint + ": the daemon has no model loaded");
   }
@@ -138,11 +141,12 @@ Status check_daemon(Client& client, const Surgery& surgery, const ReplayOptions&
   if (status->model_id != surgery.model_id) {
     return differs("model_id", surgery.model_id, status->model_id);
   }
-  return {};
+  return status;
 }
 
 struct Session {
   Client client;
+  DaemonStatus daemon;
   SessionInfo info;
   BrainModel model;
 };
@@ -152,14 +156,12 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
                               Boundary boundary) {
   auto client = Client::connect(options.endpoint, {.keys = options.keys});
   if (!client) return tl::unexpected<Error>(client.error());
-  if (Status ok = check_daemon(*client, surgery, options); !ok) {
-    return tl::unexpected<Error>(ok.error());
-  }
+  auto daemon = check_daemon(*client, surgery, options);
+  if (!daemon) return tl::unexpected<Error>(daemon.error());
   auto info = client->start_session({.case_id = surgery.case_id,
                                      .method = options.method,
                                      .boundary = boundary,
                                      .publish_iterates = options.repeat == 1,
-                                     .measure_full_solve = true,
                                      .takeover = options.takeover,
                                      .recorded_clock = true});
   if (!info) return tl::unexpected<Error>(info.error());
@@ -169,7 +171,7 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
   if (Status ok = client->subscribe(Subscription::kMaxWindow); !ok) {
     return tl::unexpected<Error>(ok.error());
   }
-  return Session{std::move(*client), std::move(*info), std::move(*model)};
+  return Session{std::move(*client), std::move(*daemon), std::move(*info), std::move(*model)};
 }
 
 Status write_fields(const fs::path& path, const BrainModel& model, const Points& estimated,
@@ -196,9 +198,7 @@ RunReport describe_run(const Surgery& surgery, const Session& session, const Rep
   run.surgery_file = options.surgery.string();
   run.mesh = {session.info.nodes, session.info.tets, session.info.slaves};
   run.prepare_s = session.info.prepare_s;
-  run.factor_s = session.info.factor_s;
   run.model_bytes = session.info.model_bytes;
-  run.full_solve_ms = session.info.full_solve_ms;
   return run;
 }
 
@@ -254,6 +254,15 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 
   RunReport run = describe_run(surgery, *session, options, boundary);
   summarise(played, run);
+  report(progress, "measure " + run.boundary, 0.0);
+  if (const auto unit = measure_run_unit(options.endpoint, session->daemon, session->model,
+                                         surgery.case_file, boundary)) {
+    run.factor_s = unit->factor_s;
+    run.full_solve_ms = unit->full_solve_ms;
+  } else if (options.on_note) {
+    options.on_note("full_solve_ms is not measured: " + unit.error().message);
+  }
+  report(progress, "measure " + run.boundary, 1.0);
   if (!options.latency_csv.empty()) {
     if (Status ok = io::write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
       return tl::unexpected<Error>(ok.error());

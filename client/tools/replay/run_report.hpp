@@ -125,9 +125,9 @@ struct RunReport {
 
   MeshSize mesh;
   std::optional<double> prepare_s;
-  std::optional<double> factor_s;
+  std::optional<double> factor_s;  // as full_solve_ms
   std::optional<std::uint64_t> model_bytes;
-  std::optional<double> full_solve_ms;
+  std::optional<double> full_solve_ms;  // run_unit.hpp; null where it cannot be measured
 
   int updates = 0;     // final updates received
   int superseded = 0;  // observations dropped by the daemon in favour of newer ones

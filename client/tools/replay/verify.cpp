@@ -83,11 +83,8 @@ class Verifier {
   Status compare(const io::SurgeryRecord& record) {
     const auto recorded = wire::decode_update(record.payload);
     if (!recorded) return unreadable(record, recorded.error().message);
-    auto answer = answers_.find(record.sequence);
-    if (answer == answers_.end()) {
-      if (Status ok = send_what_is_answered(record, *recorded); !ok) return ok;
-      answer = answers_.find(record.sequence);
-    }
+    const auto answer = answers_.find(record.sequence);
+    if (answer == answers_.end()) return unreadable(record, "no decision leads to it");
     const UpdateComparison comparison =
         compare_updates(*recorded, answer->second, session_.agreement);
     answers_.erase(answer);
@@ -99,26 +96,6 @@ class Verifier {
           "update {} (observation {}): {}", record.sequence, recorded->update.observation_sequence,
           fmt::join(comparison.differences, "; ")));
     }
-    return {};
-  }
-
-  // No decision came before this update: the journal has none.
-  Status send_what_is_answered(const io::SurgeryRecord& record, const UpdateMessage& recorded) {
-    std::vector<const Observation*> candidates;
-    for (const auto& [key, observation] : observations_) {
-      if (key.second == recorded.update.observation_sequence) candidates.push_back(&observation);
-    }
-    if (candidates.size() != 1) {
-      return unreadable(record,
-                        fmt::format("{} observations have the sequence {} that it answers, "
-                                    "and no decision is recorded",
-                                    candidates.size(), recorded.update.observation_sequence));
-    }
-    const Observation observation = *candidates.front();
-    observations_.erase({observation.source, observation.sequence});
-    auto answer = send(observation);
-    if (!answer) return tl::unexpected(answer.error());
-    answers_.insert_or_assign(record.sequence, std::move(*answer));
     return {};
   }
 

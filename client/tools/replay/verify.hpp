@@ -2,8 +2,7 @@
 // Verify: a journal replayed as it happened, and every update compared with the recorded one.
 //
 // The observations that were used, or tried and failed, are sent in the order of the journal's
-// decisions, each one after the former was answered; the others are not sent. In a journal without
-// decisions the updates stand for them, each for the observation that it answers.
+// decisions, each one after the former was answered; the others are not sent.
 //
 // Updates must agree bit for bit when the daemon's build, machine type and BLAS kernel are those
 // of the journal, else within rounding (compare_updates.hpp).

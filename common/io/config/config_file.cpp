@@ -30,7 +30,6 @@ Result<CaseConfig> parse_case_config(const std::string& text, const fs::path& fi
   KeyReader reader(root);
   visit(reader, config);
   root.done();
-  config.notes = reader.notes();
   if (Status status = document.status(); !status) return tl::unexpected(status.error());
   if (Status status = brainshift::validate(config); !status) {
     return tl::unexpected(document.locate(status.error()));

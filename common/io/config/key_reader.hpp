@@ -22,12 +22,7 @@ class KeyReader {
   // calls.
   explicit KeyReader(YamlSection& root) : here_(&root) {}
 
-  void operator()(const Key& key, double& value, const Limits&) {
-    double former = 0.0;
-    if (has_former(key)) here_->number(key.former, former);
-    if (former != 0.0) value = former;
-    here_->number(key.name, value);
-  }
+  void operator()(const Key& key, double& value, const Limits&) { here_->number(key.name, value); }
   void operator()(const Key& key, double& value, const Limits&, const SameAs& same) {
     value = same.value;
     here_->number(key.name, value);
@@ -37,7 +32,6 @@ class KeyReader {
     here_->vector3(key.name, value, presence(need));
   }
   void operator()(const Key& key, std::vector<double>& value, const Limits&) {
-    if (has_former(key)) here_->numbers(key.former, value);
     here_->numbers(key.name, value);
   }
   void operator()(const Key& key, std::string& value, Need need = Need::kOptional) {
@@ -104,21 +98,11 @@ class KeyReader {
     });
   }
 
-  // One sentence for each earlier name that was used.
-  const std::vector<std::string>& notes() const { return notes_; }
-
  private:
-  bool has_former(const Key& key) {
-    if (*key.former == '\0' || !here_->has(key.former)) return false;
-    notes_.push_back(std::string(key.former) + " is now called " + key.name +
-                     "; a 0 there was the default and is not taken over");
-    return true;
-  }
   static Presence presence(Need need) {
     return need == Need::kRequired ? Presence::kRequired : Presence::kOptional;
   }
   YamlSection* here_;
-  std::vector<std::string> notes_;
 };
 
 }  // namespace brainshift::io

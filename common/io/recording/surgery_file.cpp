@@ -25,12 +25,8 @@ using Access = SqliteDatabase::Access;
 
 constexpr const char* kInsert =
     "INSERT INTO record(kind, sequence, recorded_ns, payload, crc) VALUES(?1, ?2, ?3, ?4, ?5)";
-constexpr const char* kInsertOf1 =
-    "INSERT INTO record(kind, sequence, recorded_ns, payload) VALUES(?1, ?2, ?3, ?4)";
 constexpr const char* kSelect =
     "SELECT id, kind, sequence, recorded_ns, payload, crc FROM record ORDER BY id";
-constexpr const char* kSelectOf1 =
-    "SELECT id, kind, sequence, recorded_ns, payload FROM record ORDER BY id";
 
 // SQLite integers are signed; a sequence beyond them would come back negative.
 bool fits(std::uint64_t sequence) {
@@ -50,9 +46,6 @@ std::optional<RecordKind> kind_of(std::string_view text) {
 std::string describe(const SurgeryState& state) {
   const std::string count =
       fmt::format("{} record{}", state.records, state.records == 1 ? "" : "s");
-  if (!state.checksums) {
-    return fmt::format("{} without checksums (version {})", count, state.version);
-  }
   if (state.closed) return count + ", closed";
   return count + (state.log_beside
                       ? ", not closed: it crashed or is still written; its -wal file is beside it"
@@ -108,13 +101,11 @@ Result<std::unique_ptr<SurgeryFile::Impl>> SurgeryFile::Impl::open(const fs::pat
 }
 
 Status SurgeryFile::Impl::describe_state(bool damaged) {
-  state.version = header.version;
-  state.checksums = header.has_checksums();
   state.log_beside = database.has_log();
   if (!damaged) {
     if (Status ok = check_length(); !ok) return ok;
   }
-  const auto seal = read_closed_seal(database, header);
+  const auto seal = read_closed_seal(database);
   const auto last = database.query("SELECT coalesce(max(id), 0) FROM record");
   if (damaged) {
     state.closed = seal && seal->has_value();
@@ -154,16 +145,14 @@ Status SurgeryFile::Impl::check_writable(std::string_view what) const {
 }
 
 Status SurgeryFile::Impl::insert_records(std::span<const SurgeryRecord> records, Tail& end) {
-  if (!insert) {
-    insert = std::make_unique<Statement>(database.handle(), state.checksums ? kInsert : kInsertOf1);
-  }
+  if (!insert) insert = std::make_unique<Statement>(database.handle(), kInsert);
   for (const SurgeryRecord& record : records) {
     end = {end.records + 1, chain_link(end.crc, record)};
     insert->bind_text(1, to_string(record.kind))
         .bind(2, static_cast<std::int64_t>(record.sequence))
         .bind(3, record.recorded_ns)
-        .bind_blob(4, record.payload.data(), record.payload.size());
-    if (state.checksums) insert->bind(5, std::int64_t{end.crc});
+        .bind_blob(4, record.payload.data(), record.payload.size())
+        .bind(5, std::int64_t{end.crc});
     if (!insert->run()) return database.write_failure("record");
   }
   return {};
@@ -172,7 +161,7 @@ Status SurgeryFile::Impl::insert_records(std::span<const SurgeryRecord> records,
 Result<SurgeryFile::Impl::Tail> SurgeryFile::Impl::walk(
     const std::function<Status(const SurgeryRecord&)>& visitor) const {
   Tail end{0, header.chain_start};
-  Statement select(database.handle(), state.checksums ? kSelect : kSelectOf1);
+  Statement select(database.handle(), kSelect);
   while (select.row()) {
     const std::uint64_t id = end.records + 1;
     const auto kind = kind_of(select.bytes(1));
@@ -180,13 +169,11 @@ Result<SurgeryFile::Impl::Tail> SurgeryFile::Impl::walk(
     const SurgeryRecord record{*kind, static_cast<std::uint64_t>(select.integer(2)),
                                select.integer(3), select.bytes(4)};
     end = {id, chain_link(end.crc, record)};
-    if (state.checksums) {
-      if (select.integer(0) != static_cast<std::int64_t>(id)) {
-        return broken(id, fmt::format("is missing; record {} follows", select.integer(0)));
-      }
-      if (select.integer(5) != std::int64_t{end.crc}) {
-        return broken(id, "the checksum does not match; it, or the order, was changed");
-      }
+    if (select.integer(0) != static_cast<std::int64_t>(id)) {
+      return broken(id, fmt::format("is missing; record {} follows", select.integer(0)));
+    }
+    if (select.integer(5) != std::int64_t{end.crc}) {
+      return broken(id, "the checksum does not match; it, or the order, was changed");
     }
     if (Status ok = visitor(record); !ok) return tl::unexpected(ok.error());
   }
@@ -198,7 +185,7 @@ Result<SurgeryFile::Impl::Tail> SurgeryFile::Impl::walk(
 }
 
 Status SurgeryFile::Impl::check_end(const Tail& end) const {
-  const auto seal = read_closed_seal(database, header);
+  const auto seal = read_closed_seal(database);
   if (!seal) return tl::unexpected(seal.error());
   if (!*seal) return {};
   const Seal expected{end.records, chain_end(end.crc, end.records)};
@@ -237,7 +224,7 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta&
     return fail(ErrorCode::kWriteFailed, header.error().message);
   }
   impl->header = std::move(*header);
-  impl->state = {impl->header.version, impl->header.has_checksums(), false, true, 0};
+  impl->state.log_beside = true;
   impl->tail = {0, impl->header.chain_start};
   impl->writable = true;
   return SurgeryFile(std::move(impl));
@@ -315,8 +302,7 @@ Status SurgeryFile::write_truth(std::uint64_t observation_sequence, const Surger
     return file_error(ErrorCode::kInvalidArgument, impl_->database.path(),
                       "truth: sequence must be below 2^63");
   }
-  return write_truth_rows(impl_->database, impl_->state.checksums,
-                          static_cast<std::int64_t>(observation_sequence), truth);
+  return write_truth_rows(impl_->database, static_cast<std::int64_t>(observation_sequence), truth);
 }
 
 Status SurgeryFile::close() {
@@ -328,12 +314,10 @@ Status SurgeryFile::close() {
     status = file_error(ErrorCode::kWriteFailed, database.path(),
                         "was deleted or replaced while it was written");
   } else if (impl_->writable) {
-    if (impl_->state.checksums) {
-      const Impl::Tail& tail = impl_->tail;
-      status = write_closed_seal(database, {tail.records, chain_end(tail.crc, tail.records)});
-    }
+    const Impl::Tail& tail = impl_->tail;
+    status = write_closed_seal(database, {tail.records, chain_end(tail.crc, tail.records)});
     if (status) status = database.fold_log();
-    impl_->state.closed = status && impl_->state.checksums;
+    impl_->state.closed = status.has_value();
   }
   const Status closed = database.close();
   return status ? closed : status;
@@ -367,8 +351,7 @@ Result<std::vector<SurgeryRecord>> SurgeryFile::records(RecordKind kind) const {
 
 Result<SurgeryTruth> SurgeryFile::read_truth(std::uint64_t observation_sequence) const {
   if (impl_->database.handle() == nullptr) return impl_->database.read_failure("truth");
-  return read_truth_rows(impl_->database, impl_->state.checksums,
-                         static_cast<std::int64_t>(observation_sequence));
+  return read_truth_rows(impl_->database, static_cast<std::int64_t>(observation_sequence));
 }
 
 }  // namespace brainshift::io

@@ -15,8 +15,6 @@
 //                                  'sparse' | 'cross' | 'craniotomy'; a point is
 //                                  sum(weight_i * node_i)
 //   truth_scalar(observation_sequence, name, value)
-// Version 1 has no seal table and no column crc. Such files are read, and added to, as they are:
-// SurgeryState says that they carry no checksums.
 //
 // Truth is read only by the code that scores.
 // Synchronous FULL, WAL: an acknowledged record survives power loss. create() refuses to
@@ -42,10 +40,8 @@ namespace brainshift::io {
 
 // What a file is when it is opened.
 struct SurgeryState {
-  int version = 0;
-  bool checksums = false;  // false: version 1; a changed record cannot be told from a good one
   // The file was closed, and nothing was added since: no record is missing at its end. False for a
-  // file that is still written, a crashed one, and for version 1, which does not tell.
+  // file that is still written, and a crashed one.
   bool closed = false;
   bool log_beside = false;  // a -wal file with content
   std::uint64_t records = 0;
@@ -60,7 +56,7 @@ class SurgeryFile {
  public:
   // A new file; kWriteFailed if it exists or cannot be made.
   static Result<SurgeryFile> create(const std::filesystem::path& path, const SurgeryMeta& meta);
-  // An existing file, read-only; kNotFound, or kUnreadable if it is not a surgery file of a known
+  // An existing file, read-only; kNotFound, or kUnreadable if it is not a surgery file of this
   // version, lacks a part, or was closed with another number of records than it has.
   static Result<SurgeryFile> open(const std::filesystem::path& path);
   // As open, but what is missing at the end is no error here; visit() gives the valid prefix.

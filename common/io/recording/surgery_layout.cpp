@@ -48,13 +48,12 @@ CREATE TABLE truth_scalar(
 
 // Preparing a statement fails where a table or a column is missing.
 constexpr const char* kTables[] = {
-    "SELECT id, kind, sequence, recorded_ns, payload FROM record",
-    "SELECT observation_sequence, nodes, displacement FROM truth_field",
+    "SELECT id, kind, sequence, recorded_ns, payload, crc FROM record",
+    "SELECT observation_sequence, nodes, displacement, crc FROM truth_field",
+    "SELECT name, records, crc FROM seal",
     ("SELECT observation_sequence, kind, node0, node1, node2, node3, weight0, weight1, weight2, "
      "weight3 FROM truth_point"),
     "SELECT observation_sequence, name, value FROM truth_scalar"};
-constexpr const char* kTablesSince2[] = {"SELECT crc FROM record", "SELECT crc FROM truth_field",
-                                         "SELECT name, records, crc FROM seal"};
 
 // Every key of the meta table is named once; MetaWriter and MetaReader walk the same list.
 template <typename A, typename Meta>
@@ -110,27 +109,20 @@ Result<std::optional<Seal>> read_seal(const SqliteDatabase& database, std::strin
   return std::optional<Seal>();
 }
 
-Result<int> read_version(const SqliteDatabase& database) {
+Status check_version(const SqliteDatabase& database) {
   const auto application = database.query("PRAGMA application_id");
   const auto version = database.query("PRAGMA user_version");
   if (!application || !version) return database.read_failure("surgery file");
   if (*application != std::to_string(kApplicationId)) {
     return database.unreadable("is not a surgery file");
   }
-  for (int known = kFirstVersion; known <= kSurgeryVersion; ++known) {
-    if (*version == std::to_string(known)) return known;
-  }
+  if (*version == std::to_string(kSurgeryVersion)) return {};
   return database.unreadable("surgery file of version " + *version + ", must be version " +
-                             std::to_string(kFirstVersion) + " or " +
                              std::to_string(kSurgeryVersion));
 }
 
-Status check_tables(const SqliteDatabase& database, int version) {
+Status check_tables(const SqliteDatabase& database) {
   for (const char* sql : kTables) {
-    if (!Statement(database.handle(), sql).ok()) return database.read_failure("surgery file");
-  }
-  if (version < kSurgeryVersion) return {};
-  for (const char* sql : kTablesSince2) {
     if (!Statement(database.handle(), sql).ok()) return database.read_failure("surgery file");
   }
   return {};
@@ -171,29 +163,23 @@ Result<SurgeryHeader> create_layout(SqliteDatabase& database, const SurgeryMeta&
 }
 
 Result<SurgeryHeader> read_header(const SqliteDatabase& database, bool damaged) {
-  const auto version = read_version(database);
-  if (!version) return tl::unexpected(version.error());
-  if (Status ok = check_tables(database, *version); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_version(database); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_tables(database); !ok) return tl::unexpected(ok.error());
   SurgeryHeader header;
-  header.version = *version;
   MetaReader reader;
   Statement select(database.handle(), "SELECT key, value FROM meta ORDER BY key");
   while (select.row()) reader.rows[select.bytes(0)] = select.bytes(1);
   if (!select.ok()) return database.read_failure("meta");
-  if (header.has_checksums()) {
-    header.chain_start = chain_start(reader.rows);
-    const auto seal = read_seal(database, "meta");
-    if (!seal && !damaged) return tl::unexpected(seal.error());
-    const bool sealed = seal && *seal && (*seal)->crc == header.chain_start;
-    if (!sealed && !damaged) return database.unreadable("meta: the checksum does not match");
-  }
+  header.chain_start = chain_start(reader.rows);
+  const auto seal = read_seal(database, "meta");
+  if (!seal && !damaged) return tl::unexpected(seal.error());
+  const bool sealed = seal && *seal && (*seal)->crc == header.chain_start;
+  if (!sealed && !damaged) return database.unreadable("meta: the checksum does not match");
   visit(reader, header.meta);
   return header;
 }
 
-Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database,
-                                             const SurgeryHeader& header) {
-  if (!header.has_checksums()) return std::optional<Seal>();
+Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database) {
   return read_seal(database, "closed");
 }
 

@@ -11,8 +11,7 @@
 
 namespace brainshift::io {
 
-inline constexpr int kFirstVersion = 1;    // without checksums and seals
-inline constexpr int kSurgeryVersion = 2;  // what is written
+inline constexpr int kSurgeryVersion = 2;
 
 // A row of the seal table.
 struct Seal {
@@ -22,11 +21,8 @@ struct Seal {
 
 // What stands in front of the records.
 struct SurgeryHeader {
-  int version = kSurgeryVersion;
   SurgeryMeta meta;
-  std::uint32_t chain_start = 0;  // version 2
-
-  bool has_checksums() const { return version >= kSurgeryVersion; }
+  std::uint32_t chain_start = 0;
 };
 
 // Tables and meta of a new file, on disk before the first record; then the write-ahead log.
@@ -37,9 +33,8 @@ Result<SurgeryHeader> create_layout(SqliteDatabase& database, const SurgeryMeta&
 // is not what was written; the last is let pass for a damaged file.
 Result<SurgeryHeader> read_header(const SqliteDatabase& database, bool damaged);
 
-// Present after close(), gone with the first record that is added; nullopt too for version 1.
-Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database,
-                                             const SurgeryHeader& header);
+// Present after close(), gone with the first record that is added.
+Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database);
 Status write_closed_seal(const SqliteDatabase& database, const Seal& seal);
 Status remove_closed_seal(const SqliteDatabase& database);
 

@@ -18,12 +18,8 @@ static_assert(std::endian::native == std::endian::little, "truth fields are litt
 constexpr const char* kInsertField =
     "INSERT INTO truth_field(observation_sequence, nodes, displacement, crc)"
     " VALUES(?1, ?2, ?3, ?4)";
-constexpr const char* kInsertFieldOf1 =
-    "INSERT INTO truth_field(observation_sequence, nodes, displacement) VALUES(?1, ?2, ?3)";
 constexpr const char* kSelectField =
     "SELECT nodes, displacement, crc FROM truth_field WHERE observation_sequence = ?1";
-constexpr const char* kSelectFieldOf1 =
-    "SELECT nodes, displacement FROM truth_field WHERE observation_sequence = ?1";
 constexpr const char* kSelectPoints =
     "SELECT kind, node0, node1, node2, node3, weight0, weight1, weight2, weight3 FROM truth_point"
     " WHERE observation_sequence = ?1 ORDER BY id";
@@ -57,15 +53,15 @@ Status check_truth(const std::filesystem::path& path, const SurgeryTruth& truth)
   return {};
 }
 
-Status insert_rows(const SqliteDatabase& database, bool checksums, std::int64_t sequence,
+Status insert_rows(const SqliteDatabase& database, std::int64_t sequence,
                    const SurgeryTruth& truth) {
   sqlite3* db = database.handle();
   const auto bytes = static_cast<std::size_t>(truth.displacement.size()) * sizeof(double);
-  Statement field(db, checksums ? kInsertField : kInsertFieldOf1);
+  Statement field(db, kInsertField);
   field.bind(1, sequence)
       .bind(2, std::int64_t{truth.displacement.cols()})
-      .bind_blob(3, truth.displacement.data(), bytes);
-  if (checksums) field.bind(4, std::int64_t{truth_checksum(sequence, truth)});
+      .bind_blob(3, truth.displacement.data(), bytes)
+      .bind(4, std::int64_t{truth_checksum(sequence, truth)});
   if (!field.run()) return database.write_failure("truth_field");
   Statement insert(db,
                    "INSERT INTO truth_point VALUES(NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
@@ -87,10 +83,10 @@ Status insert_rows(const SqliteDatabase& database, bool checksums, std::int64_t 
   return {};
 }
 
-// The field and what the file says its checksum is; 0 in a file without checksums.
-Result<std::uint32_t> read_field(const SqliteDatabase& database, bool checksums,
-                                 std::int64_t sequence, Points& displacement) {
-  Statement field(database.handle(), checksums ? kSelectField : kSelectFieldOf1);
+// The field and what the file says its checksum is.
+Result<std::uint32_t> read_field(const SqliteDatabase& database, std::int64_t sequence,
+                                 Points& displacement) {
+  Statement field(database.handle(), kSelectField);
   if (!field.bind(1, sequence).row()) {
     if (!field.ok()) return database.read_failure("truth");
     return file_error(ErrorCode::kNotFound, database.path(),
@@ -105,26 +101,25 @@ Result<std::uint32_t> read_field(const SqliteDatabase& database, bool checksums,
   }
   displacement.resize(3, nodes);
   if (!blob.empty()) std::memcpy(displacement.data(), blob.data(), blob.size());
-  return checksums ? static_cast<std::uint32_t>(field.integer(2)) : 0;
+  return static_cast<std::uint32_t>(field.integer(2));
 }
 
 }  // namespace
 
-Status write_truth_rows(const SqliteDatabase& database, bool checksums, std::int64_t sequence,
+Status write_truth_rows(const SqliteDatabase& database, std::int64_t sequence,
                         const SurgeryTruth& truth) {
   if (Status ok = check_truth(database.path(), truth); !ok) return ok;
   if (!database.execute("BEGIN IMMEDIATE")) return database.write_failure("truth");
-  Status status = insert_rows(database, checksums, sequence, truth);
+  Status status = insert_rows(database, sequence, truth);
   if (status && !database.execute("COMMIT")) status = database.write_failure("truth");
   // After some errors SQLite has rolled back by itself; then there is nothing left to undo.
   if (!status && sqlite3_get_autocommit(database.handle()) == 0) database.execute("ROLLBACK");
   return status;
 }
 
-Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, bool checksums,
-                                     std::int64_t sequence) {
+Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, std::int64_t sequence) {
   SurgeryTruth truth;
-  const auto checksum = read_field(database, checksums, sequence, truth.displacement);
+  const auto checksum = read_field(database, sequence, truth.displacement);
   if (!checksum) return tl::unexpected(checksum.error());
   Statement points(database.handle(), kSelectPoints);
   points.bind(1, sequence);
@@ -140,7 +135,7 @@ Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, bool checks
   scalars.bind(1, sequence);
   while (scalars.row()) truth.scalars[scalars.bytes(0)] = scalars.real(1);
   if (!points.ok() || !scalars.ok()) return database.read_failure("truth");
-  if (checksums && *checksum != truth_checksum(sequence, truth)) {
+  if (*checksum != truth_checksum(sequence, truth)) {
     return database.unreadable("truth of observation " + std::to_string(sequence) +
                                ": the checksum does not match");
   }

@@ -9,13 +9,11 @@
 
 namespace brainshift::io {
 
-// All rows of one observation's truth, or none; `checksums`: of version 2. kNotFinite,
-// kInvalidArgument or kWriteFailed.
-Status write_truth_rows(const SqliteDatabase& database, bool checksums, std::int64_t sequence,
+// All rows of one observation's truth, or none. kNotFinite, kInvalidArgument or kWriteFailed.
+Status write_truth_rows(const SqliteDatabase& database, std::int64_t sequence,
                         const SurgeryTruth& truth);
 
 // kNotFound without truth for that observation; kUnreadable when it is not what was written.
-Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, bool checksums,
-                                     std::int64_t sequence);
+Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, std::int64_t sequence);
 
 }  // namespace brainshift::io

@@ -54,8 +54,7 @@ SCHEMA = {
         "publish_iterates": (4, "int"), "takeover": (6, "int"), "recorded_clock": (7, "int")},
     "StartSessionReply": {
         "session_id": (1, "int"), "model_id": (2, "text"), "nodes": (3, "int"), "tets": (4, "int"),
-        "slaves": (5, "int"), "prepare_s": (6, "double"), "model_bytes": (7, "int"),
-        "full_solve_ms": (8, "double"), "factor_s": (9, "double"), "boot_id": (10, "fixed")},
+        "slaves": (5, "int"), "prepare_s": (6, "double"), "model_bytes": (7, "int"), "boot_id": (10, "fixed")},
     "ModelReply": {
         "case_id": (1, "text"), "model_id": (2, "text"), "nodes": (3, "PointSet"),
         "tet_indices": (4, "*int"), "boundary_indices": (5, "*int"), "skull": (6, "Surface"),
@@ -118,7 +117,12 @@ SCHEMA = {
         "sources": (17, "*SourceCounts"), "clients": (18, "int"), "viewers": (19, "*ViewerFigures"),
         "recent_updates": (20, "int"), "bounds_ms": (21, "*double"), "stages": (22, "*StageLatency"),
         "journal": (23, "JournalFigures"), "log_lines_lost": (24, "int"),
-        "process": (25, "ProcessFigures"), "late": (26, "int")},
+        "process": (25, "ProcessFigures"), "late": (26, "int"), "door": (27, "DoorFigures")},
+    "DoorFigures": {
+        "accepted": (1, "int"), "closed_for_breach": (2, "int"), "closed_for_memory": (3, "int"),
+        "closed_for_silence": (4, "int"), "closed_for_room": (5, "int"), "held_bytes": (6, "int"),
+        "unknown_keys": (7, "int"), "refused_role": (8, "int"), "refused_connections": (9, "int"),
+        "refused_observations": (10, "int"), "refused_starts": (11, "int")},
 }
 
 KEY = {"boot_id": 2**64 - 3, "session_id": 3, "model_id": "0123456789abcdef"}
@@ -146,8 +150,7 @@ MESSAGES = {
         "takeover": 1, "recorded_clock": 1}),
     "start_session_reply": (4, 2, "StartSessionReply", {
         "session_id": 3, "model_id": "0123456789abcdef", "nodes": 18475, "tets": 101083, "slaves": 906,
-        "prepare_s": 12.3, "model_bytes": 5000000000, "full_solve_ms": 33.1, "factor_s": 2.3,
-        "boot_id": 2**63 + 1}),
+        "prepare_s": 12.3, "model_bytes": 5000000000, "boot_id": 2**63 + 1}),
     "model_request": (5, 3, "Empty", {}),
     "model_reply": (6, 3, "ModelReply", {
         "case_id": "one-tetrahedron", "model_id": "fedcba9876543210", "nodes": TETRAHEDRON["vertices"],
@@ -267,7 +270,11 @@ MESSAGES = {
         "log_lines_lost": 303,
         "process": {"resident_bytes": 2**32 + 1, "peak_bytes": 2**33 + 1, "descriptors": 31,
                     "descriptor_limit": 1024, "threads": 9},
-        "late": 5}),
+        "late": 5,
+        "door": {"accepted": 301, "closed_for_breach": 1, "closed_for_memory": 2,
+                 "closed_for_silence": 3, "closed_for_room": 4, "held_bytes": 2**32 + 5,
+                 "unknown_keys": 6, "refused_role": 7, "refused_connections": 8,
+                 "refused_observations": 9, "refused_starts": 10}}),
 }
 
 

@@ -32,8 +32,7 @@ TEST_F(BoxCase, IsPreparedUnderBothBoundaries) {
     EXPECT_EQ(file.condensed[i].boundary, kPreparedBoundaries[i]);
     EXPECT_EQ(file.condensed[i].model_id, file.model.model_id);
     EXPECT_GT(file.condensed[i].prepare_s, 0.0);
-    EXPECT_GT(prepared->boundaries[i].full_solve_ms, 0.0);
-    EXPECT_GT(prepared->boundaries[i].timings.factor_nonzeros, 0u);
+    EXPECT_GT(prepared->timings[i].factor_nonzeros, 0u);
   }
   ASSERT_EQ(file.inputs.size(), 2u);
   EXPECT_EQ(file.inputs[0].key, "case");

@@ -12,17 +12,12 @@ namespace brainshift::server {
 
 inline Result<std::unique_ptr<SessionModel>> fake_session(
     std::unique_ptr<inversion::Inverter> inverter, const SessionRequest& request = {}) {
-  auto pipeline =
-      Pipeline::build(small_model(), {}, request.method, request.boundary, std::move(inverter));
+  auto pipeline = pipeline::Pipeline::build(small_model(), {}, request.method, request.boundary,
+                                            std::move(inverter));
   if (!pipeline) return tl::unexpected(pipeline.error());
   SessionInfo info;
   info.model_id = kModelId;
   return std::make_unique<SessionModel>(SessionModel{std::move(info), std::move(*pipeline)});
 }
-
-class TestSession : public Session {
- public:
-  explicit TestSession(SessionHooks hooks) : Session(kCase, std::move(hooks), kBootId, kModelId) {}
-};
 
 }  // namespace brainshift::server

@@ -226,19 +226,14 @@ Subscription subscription_from(const json& value) {
 SessionRequest session_request_from(const json& value) {
   EXPECT_EQ(value["method"], "paper");
   EXPECT_EQ(value["boundary"], "fixed");
-  return {value["case_id"],
-          Method::kPaper,
-          Boundary::kFixed,
-          value["publish_iterates"] == 1,
-          false,
-          value["takeover"] == 1,
-          value["recorded_clock"] == 1};
+  return {value["case_id"],       Method::kPaper,
+          Boundary::kFixed,       value["publish_iterates"] == 1,
+          value["takeover"] == 1, value["recorded_clock"] == 1};
 }
 
 SessionInfo session_info_from(const json& value) {
   return {value["session_id"], value["model_id"],  value["nodes"],       value["tets"],
-          value["slaves"],     value["prepare_s"], value["model_bytes"], value["full_solve_ms"],
-          value["factor_s"],   value["boot_id"]};
+          value["slaves"],     value["prepare_s"], value["model_bytes"], value["boot_id"]};
 }
 
 LatencyFigures latency_from(const json& value) {
@@ -280,6 +275,18 @@ DaemonReport report_from(const json& value) {
   const json& process = value["process"];
   report.process = {process["resident_bytes"], process["peak_bytes"], process["descriptors"],
                     process["descriptor_limit"], process["threads"]};
+  const json& door = value["door"];
+  report.door = {door["accepted"],
+                 door["closed_for_breach"],
+                 door["closed_for_memory"],
+                 door["closed_for_silence"],
+                 door["closed_for_room"],
+                 door["held_bytes"],
+                 door["unknown_keys"],
+                 door["refused_role"],
+                 door["refused_connections"],
+                 door["refused_observations"],
+                 door["refused_starts"]};
   return report;
 }
 

@@ -149,7 +149,7 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
       decode_status);
   expect_round_trip(DaemonStatus{}, decode_status);
   for (const Method method : kAllMethods) {
-    expect_round_trip(SessionRequest{"c", method, Boundary::kFixed, true, true, true, true},
+    expect_round_trip(SessionRequest{"c", method, Boundary::kFixed, true, true, true},
                       decode_session_request);
   }
   expect_round_trip(SessionRequest{"", Method::kPaper, Boundary::kContact, false},

@@ -95,7 +95,6 @@ inline void expect_same(const SessionRequest& a, const SessionRequest& b) {
   EXPECT_EQ(a.method, b.method);
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.publish_iterates, b.publish_iterates);
-  EXPECT_EQ(a.measure_full_solve, b.measure_full_solve);
   EXPECT_EQ(a.takeover, b.takeover);
   EXPECT_EQ(a.recorded_clock, b.recorded_clock);
 }
@@ -112,8 +111,6 @@ inline void expect_same(const SessionInfo& a, const SessionInfo& b) {
   EXPECT_EQ(a.slaves, b.slaves);
   EXPECT_EQ(a.prepare_s, b.prepare_s);
   EXPECT_EQ(a.model_bytes, b.model_bytes);
-  EXPECT_EQ(a.full_solve_ms, b.full_solve_ms);
-  EXPECT_EQ(a.factor_s, b.factor_s);
   EXPECT_EQ(a.boot_id, b.boot_id);
 }
 

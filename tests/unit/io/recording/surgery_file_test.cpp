@@ -253,8 +253,11 @@ TEST_F(SurgeryFileTest, OpenRefusesWhatIsNoSurgeryFile) {
 
 TEST_F(SurgeryFileTest, OpenRefusesOtherVersionsAndMissingTables) {
   make_complete();
-  tamper("PRAGMA user_version = 3");
-  expect_open_refused(ErrorCode::kUnreadable, "version 3, must be version 1 or 2");
+  for (const char* version : {"1", "3"}) {
+    tamper((std::string("PRAGMA user_version = ") + version).c_str());
+    expect_open_refused(ErrorCode::kUnreadable,
+                        std::string("version ") + version + ", must be version 2");
+  }
   tamper("PRAGMA user_version = 2; DROP TABLE truth_scalar");
   expect_open_refused(ErrorCode::kUnreadable, "truth_scalar");
 }

@@ -50,8 +50,6 @@ class SurgeryLayout : public ::testing::Test {
 TEST_F(SurgeryLayout, AClosedFileSaysHowManyRecordsItHas) {
   write_numbered(path, 5);
   EXPECT_TRUE(state().closed);
-  EXPECT_TRUE(state().checksums);
-  EXPECT_EQ(state().version, 2);
   EXPECT_EQ(state().records, 5u);
   EXPECT_EQ(describe(state()), "5 records, closed");
 }
@@ -138,38 +136,6 @@ TEST_F(SurgeryLayout, AGroupOfRecordsIsKeptAsAWholeOrNotAtAll) {
   EXPECT_TRUE(visited.status);
   EXPECT_EQ(visited.records.size(), 4u);
   EXPECT_TRUE(is_prefix(visited.records));
-}
-
-// ---------- version 1 ----------
-
-TEST_F(SurgeryLayout, AFileOfVersionOneIsReadAndSaysThatItCarriesNoChecksums) {
-  write_numbered(path, 7);
-  make_version_1(path);
-  EXPECT_EQ(state().version, 1);
-  EXPECT_FALSE(state().checksums);
-  EXPECT_FALSE(state().closed);
-  EXPECT_EQ(describe(state()), "7 records without checksums (version 1)");
-  const auto file = SurgeryFile::open(path);
-  EXPECT_EQ(file->meta().case_id, "c");
-  const Visited visited = visit_all(*file);
-  EXPECT_TRUE(visited.status);
-  EXPECT_EQ(visited.records.size(), 7u);
-  EXPECT_TRUE(is_prefix(visited.records));
-}
-
-TEST_F(SurgeryLayout, AFileOfVersionOneIsAddedToInItsOwnForm) {
-  write_numbered(path, 2);
-  make_version_1(path);
-  auto file = SurgeryFile::open_to_append(path);
-  ASSERT_TRUE(file) << file.error().message;
-  ASSERT_TRUE(file->append(numbered_record(3)));
-  SurgeryTruth truth;
-  truth.displacement = Points::Ones(3, 4);
-  ASSERT_TRUE(file->write_truth(3, truth));
-  ASSERT_TRUE(file->close());
-  EXPECT_EQ(state().version, 1);
-  EXPECT_EQ(state().records, 3u);
-  EXPECT_EQ(SurgeryFile::open(path)->read_truth(3).value().displacement, truth.displacement);
 }
 
 TEST_F(SurgeryLayout, ATableOrColumnThatItsVersionNeedsMustBeThere) {

@@ -42,13 +42,6 @@ inline void run_sql(const std::filesystem::path& path, const char* sql) {
   ASSERT_EQ(sqlite3_close(db), SQLITE_OK);
 }
 
-// A closed file of version 1 has neither seals nor checksums.
-inline void make_version_1(const std::filesystem::path& path) {
-  run_sql(path,
-          "ALTER TABLE record DROP COLUMN crc; ALTER TABLE truth_field DROP COLUMN crc;"
-          " DROP TABLE seal; PRAGMA user_version = 1;");
-}
-
 // What visit() hands over before it ends, and how it ends.
 struct Visited {
   std::vector<SurgeryRecord> records;

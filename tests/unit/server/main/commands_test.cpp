@@ -2,20 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <poll.h>
-#include <csignal>
-
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
-#include "server/main/stop_signals.hpp"
 
 namespace brainshift::server {
 namespace {
-
-bool readable(int fd) {
-  pollfd item{fd, POLLIN, 0};
-  return poll(&item, 1, 0) == 1;
-}
 
 TEST(ExitStatus, IsTwoForWhatTheUserCanMendAndOneOtherwise) {
   EXPECT_EQ(exit_status(ErrorCode::kInvalidArgument), 2);
@@ -24,13 +15,6 @@ TEST(ExitStatus, IsTwoForWhatTheUserCanMendAndOneOtherwise) {
   EXPECT_EQ(exit_status(ErrorCode::kFloatingBody), 2);
   EXPECT_EQ(exit_status(ErrorCode::kWriteFailed), 1);
   EXPECT_EQ(exit_status(ErrorCode::kInternal), 1);
-}
-
-// Each ends the process by default: a dead reader of the log, a limit on the journal's size.
-TEST(FailingWrites, DoNotEndTheProcess) {
-  survive_failing_writes();
-  EXPECT_EQ(std::raise(SIGPIPE), 0);
-  EXPECT_EQ(std::raise(SIGXFSZ), 0);
 }
 
 TEST(PrintError, IsOneLine) {
@@ -68,14 +52,6 @@ TEST(ProgressBar, LeavesACleanLineOnATerminal) {
   EXPECT_THAT(drawn, testing::HasSubstr("[###############...............]  50 %  mesh"));
   EXPECT_THAT(drawn, testing::EndsWith("\r\033[K"));
   EXPECT_THAT(drawn, testing::Not(testing::HasSubstr("\n")));
-}
-
-TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
-  const auto signals = StopSignals::catch_all();
-  ASSERT_TRUE(signals.has_value());
-  EXPECT_FALSE(readable(signals->fd()));
-  std::raise(SIGTERM);
-  EXPECT_TRUE(readable(signals->fd()));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "server/main/stop_signals.hpp"
+#include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -26,7 +26,7 @@ constexpr int kPipeBytes = 4096;  // the smallest that Linux makes
 class Reader {
  public:
   Reader() {
-    survive_failing_writes();
+    io::survive_failing_writes();
     if (pipe2(ends_.data(), O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
     fcntl(ends_[1], F_SETPIPE_SZ, kPipeBytes);
   }

@@ -26,6 +26,7 @@ wire::DaemonReport sample_report() {
   report.viewers = {{"00", 1, 9, 8, 1, 0}, {"01", 1, 9, 9, 0, 0}};
   report.clients = 3;
   report.journal = wire::JournalFigures{false, "disk full", "j", 4096, 7, 2};
+  report.door = {90, 1, 2, 3, 4, 4096, 5, 6, 7, 8, 9};
   Counters counters;
   const Counters::TimePoint now{std::chrono::seconds(9)};
   for (const char* source : {"ius", "a \"quoted\\\" one"}) counters.accepted(source, now);
@@ -60,6 +61,12 @@ TEST(Metrics, CarryWhatTheReportSaysInSecondsAndBytes) {
   EXPECT_EQ(read.value("brainshift_observations_waiting{source=\"a \\\"quoted\\\\\\\" one\"}"),
             1.0);
   EXPECT_EQ(read.value("brainshift_viewers_behind"), 1.0);
+  EXPECT_EQ(read.value("brainshift_connections_accepted_total"), 90.0);
+  EXPECT_EQ(read.value("brainshift_connections_closed_total{reason=\"memory\"}"), 2.0);
+  EXPECT_EQ(read.value("brainshift_connections_closed_total{reason=\"silence\"}"), 3.0);
+  EXPECT_EQ(read.value("brainshift_refusals_total{reason=\"unknown_key\"}"), 5.0);
+  EXPECT_EQ(read.value("brainshift_refusals_total{reason=\"session_starts\"}"), 9.0);
+  EXPECT_EQ(read.value("brainshift_held_bytes"), 4096.0);
   EXPECT_EQ(read.value("brainshift_journal_recording"), 0.0);
   EXPECT_EQ(read.value("brainshift_journal_bytes"), 4096.0);
 }

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -149,6 +150,63 @@ TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
   RawPeer late(endpoint_);
   subscribe(late);
   EXPECT_EQ(next_update(late).update.observation_sequence, 1u);
+}
+
+// A throwing library costs one session or one observation, not the daemon.
+TEST_F(TransportTest, AnExceptionCostsOneStartOrOneObservation) {
+  ServiceOptions options = with_model();
+  auto starts = std::make_shared<int>(0);
+  options.make_model = [starts](const SessionRequest& request, const auto&) {
+    if (++*starts == 1) throw std::runtime_error("thrown");
+    return fake_session(std::make_unique<FakeInverter>(
+                            [](int call, const SparseData& data, const auto&, Estimate& out) {
+                              if (call == 1) throw std::runtime_error("thrown");
+                              return follow_the_data(data, out, 4);
+                            }),
+                        request);
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  const Error refused =
+      error_of(peer.ask(MessageType::kStartSessionRequest, wire::encode(SessionRequest{kCase})));
+  EXPECT_EQ(refused.code, ErrorCode::kInternal);
+  start_session(peer);
+  subscribe(peer);
+  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  const auto failed = next_update(peer);
+  ASSERT_TRUE(failed.error.has_value());
+  EXPECT_EQ(failed.error->code, ErrorCode::kInternal);
+  peer.request(MessageType::kObservation, wire::encode(landmarks(2)));
+  EXPECT_FALSE(next_update(peer).error.has_value());
+}
+
+TEST_F(TransportTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
+  ServiceOptions options = with_model();
+  options.make_model = [](const SessionRequest& request, const auto&) {
+    return fake_session(std::make_unique<FakeInverter>(
+                            [](int, const SparseData& data, const auto& asked, auto& out) {
+                              Estimate iterate;
+                              (void)follow_the_data(data, iterate, 4);
+                              iterate.status = EstimateStatus::kIterating;
+                              if (asked.on_iterate) asked.on_iterate(iterate);
+                              return follow_the_data(data, out, 4);
+                            }),
+                        request);
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  begin_with_update(peer, 1);
+  SessionRequest iterating{kCase, Method::kPaper};
+  iterating.publish_iterates = true;
+  peer.request(MessageType::kStartSessionRequest, wire::encode(iterating));
+  while (peer.receive().type != MessageType::kStartSessionReply) continue;
+  peer.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
+  const auto iterate = next_update(peer);
+  EXPECT_FALSE(iterate.update.final);
+  const auto last = next_update(peer);
+  EXPECT_TRUE(last.update.final);
+  EXPECT_EQ(iterate.update.sequence, last.update.sequence);
+  EXPECT_EQ(iterate.session_id, 2u);
 }
 
 TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {

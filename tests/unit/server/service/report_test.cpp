@@ -104,6 +104,26 @@ TEST_F(ReportTest, NamesSessionOwnerViewersAndTheirCredit) {
   EXPECT_EQ(report.viewers[0].received, 0u);
 }
 
+TEST_F(ReportTest, TellsWhatTheDoorTurnedAway) {
+  RouterOptions options;
+  options.limits.session_starts_per_min = 1;
+  options.limits.observations_per_s = 2;
+  serve(with_model(), options);
+  RawPeer peer(endpoint_);
+  start_session(peer);
+  for (int i = 0; i < 2; ++i) {
+    peer.ask(MessageType::kStartSessionRequest, wire::encode(SessionRequest{kCase}));
+  }
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    peer.ask(MessageType::kObservation, wire::encode(landmarks(sequence)));
+  }
+  const wire::DoorFigures door = report_of(peer).door;
+  EXPECT_EQ(door.accepted, 1u);
+  EXPECT_EQ(door.refused_starts, 2u);
+  EXPECT_GT(door.refused_observations, 0u);
+  EXPECT_EQ(door.closed_for_breach + door.closed_for_memory + door.closed_for_silence, 0u);
+}
+
 // The stages are parts of the way: their sum is no more than the whole.
 TEST_F(ReportTest, EveryUpdateIsTimedStageByStage) {
   serve(with_model());

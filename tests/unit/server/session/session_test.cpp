@@ -4,10 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <chrono>
-#include <future>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -19,514 +15,591 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using namespace std::chrono_literals;
 
-// Messages as they are published, to wait for.
-class Published {
- public:
-  void push(UpdateMessage message) {
-    const std::lock_guard lock(mutex_);
-    messages_.push_back(std::move(message));
-    changed_.notify_all();
-  }
-  // The first `count` messages; fewer when they do not come in time.
-  std::vector<UpdateMessage> wait_for(std::size_t count) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, 10s, [&] { return messages_.size() >= count; });
-    return messages_;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<UpdateMessage> messages_;
-};
-
-// A gate that a fake inversion waits at.
-struct Gate {
-  std::promise<void> entered;
-  std::promise<void> leave;
-};
-
-// Waits until a stop is requested.
-void wait_for_stop(const inversion::InversionOptions& options, std::promise<void>& entered) {
-  std::promise<void> stopped;
-  const std::stop_callback wake(options.stop, [&] { stopped.set_value(); });
-  entered.set_value();
-  stopped.get_future().wait();
-}
-
+// Drives a session as the service does: one call after the other, by a clock of its own.
 class SessionTest : public testing::Test {
  protected:
-  // One fake inverter per preparation.
-  SessionHooks hooks(FakeInverter::Update update) {
-    SessionHooks hooks;
-    hooks.make_model = [this, update = std::move(update)](const SessionRequest& request,
-                                                          const std::stop_token&) {
-      prepared_boundaries_.push_back(request.boundary);
-      return fake_session(std::make_unique<FakeInverter>(update), request);
-    };
-    hooks.publish = [this](UpdateMessage message, const Handled&) {
-      published_.push(std::move(message));
-    };
-    return hooks;
-  }
-
   static Status echo(int, const SparseData& data, const inversion::InversionOptions&,
                      Estimate& estimate) {
     return follow_the_data(data, estimate, 4);
   }
 
-  static Result<SessionInfo> start(Session& session, Boundary boundary = Boundary::kContact,
-                                   const std::string& case_id = kCase,
-                                   bool publish_iterates = false) {
-    auto promise = std::make_shared<std::promise<Result<SessionInfo>>>();
-    auto future = promise->get_future();
-    session.start({case_id, Method::kPaper, boundary, publish_iterates, false},
-                  [promise](Result<SessionInfo> info) { promise->set_value(std::move(info)); });
-    if (future.wait_for(10s) != std::future_status::ready) {
-      return fail(ErrorCode::kInternal, "start was not answered");
+  // ----- what the session says, in words: "used ius 1", "begun 1", "changed tracking 1",
+  // "answer viewer: session 1"
+  void act() {
+    const SessionEvents events = session_.take_events();
+    for (const Decision& decision : events.decisions) {
+      told_.push_back(std::string(to_string(decision.outcome)) + " " + decision.source + " " +
+                      std::to_string(decision.observation_sequence));
+      decisions_.push_back(decision);
     }
-    return future.get();
+    if (events.begun) told_.push_back("begun " + std::to_string(events.begun->info.session_id));
+    if (events.changed) {
+      const SessionState state = session_.state(now_).shared;
+      told_.push_back("changed " + std::string(to_string(state.phase)) + " " +
+                      std::to_string(state.session.session_id) +
+                      (state.preparing ? " preparing" : ""));
+    }
+    for (const SessionEvents::Answer& answer : events.answers) {
+      told_.push_back("answer " + answer.ticket.client + ": " +
+                      (answer.info ? "session " + std::to_string(answer.info->session_id)
+                                   : answer.info.error().message));
+      answers_.push_back(answer.info);
+    }
+  }
+  std::vector<std::string> told() { return std::exchange(told_, {}); }
+
+  // ----- what clients do
+  void ask(const SessionRequest& request, const std::string& client = "viewer") {
+    session_.start(request, {client, 7});
+    act();
+  }
+  Result<Admission> submit(Observation observation) {
+    auto admission = session_.submit(std::move(observation), now_);
+    act();
+    return admission;
   }
 
-  std::vector<Boundary> prepared_boundaries_;  // written by the worker, read after its answers
-  Published published_;
+  // ----- what the service's threads do
+  std::optional<Preparation> next_preparation() {
+    auto preparation = session_.next_preparation();
+    act();
+    if (preparation) prepared_boundaries_.push_back(preparation->request.boundary);
+    return preparation;
+  }
+  void prepare(const Preparation& preparation) {
+    auto inverter = std::make_unique<FakeInverter>(update_);
+    inverter_ = inverter.get();
+    session_.prepared(fake_session(std::move(inverter), preparation.request));
+    act();
+  }
+  void fail_to_prepare(const Error& error) {
+    session_.prepared(tl::unexpected(error));
+    act();
+  }
+  std::optional<Job> next_job() {
+    auto job = session_.next_job(now_);
+    act();
+    return job;
+  }
+  static Result<Update> run(const Job& job) {
+    return job.model->pipeline.run(job.observation, {{}, job.stop});
+  }
+  std::optional<UpdateMessage> finish(const Job& job, Result<Update> result) {
+    auto message = session_.finish(job, std::move(result));
+    act();
+    if (message) told_.push_back("update " + std::to_string(message->update.sequence));
+    return message;
+  }
+  // The next observation's message.
+  UpdateMessage answer() {
+    const auto job = next_job();
+    EXPECT_TRUE(job.has_value());
+    if (!job) return {};
+    return finish(*job, run(*job)).value_or(UpdateMessage{});
+  }
+  // A session that is asked for, made ready and begun.
+  Result<SessionInfo> start(Boundary boundary = Boundary::kContact) {
+    ask(request(boundary));
+    if (const auto preparation = next_preparation()) prepare(*preparation);
+    next_job();
+    return answers_.empty() ? fail(ErrorCode::kInternal, "not answered") : answers_.back();
+  }
+  static SessionRequest request(Boundary boundary = Boundary::kContact,
+                                Method method = Method::kPaper) {
+    SessionRequest request;
+    request.case_id = kCase;
+    request.method = method;
+    request.boundary = boundary;
+    return request;
+  }
+
+  Session session_{kCase, kBootId, kModelId};
+  Session::TimePoint now_{1h};
+  FakeInverter::Update update_ = echo;  // of the sessions that are made ready from now on
+  FakeInverter* inverter_ = nullptr;    // of the newest model
+  std::vector<Boundary> prepared_boundaries_;
+  std::vector<std::string> told_;
+  std::vector<Decision> decisions_;
+  std::vector<Result<SessionInfo>> answers_;
 };
 
 TEST_F(SessionTest, RefusesObservationsBeforeASessionRuns) {
-  TestSession session(hooks(echo));
-  const auto receipt = session.submit(landmarks(1));
-  ASSERT_FALSE(receipt.has_value());
-  EXPECT_EQ(receipt.error().code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(session.state().shared.session.session_id, 0u);
+  EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
+  EXPECT_EQ(session_.state(now_).shared.session.session_id, 0u);
+  EXPECT_FALSE(next_preparation());
+  EXPECT_FALSE(next_job());
+  EXPECT_FALSE(session_.state(now_).busy);
+  EXPECT_THAT(told(), IsEmpty());
 }
 
 TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
-  TestSession session(hooks(echo));
-  const auto info = start(session);
+  const auto info = start();
   ASSERT_TRUE(info.has_value());
-  EXPECT_EQ(info->session_id, 1u);
-  EXPECT_EQ(info->model_id, "0123456789abcdef");
-  const auto receipt = session.submit(landmarks(5));
-  ASSERT_TRUE(receipt.has_value());
-  EXPECT_EQ(receipt->observation_sequence, 5u);
-  EXPECT_FALSE(receipt->replaced_pending);
-  const auto messages = published_.wait_for(1);
-  ASSERT_EQ(messages.size(), 1u);
-  EXPECT_FALSE(messages[0].error.has_value());
-  EXPECT_EQ(messages[0].session_id, 1u);
-  EXPECT_EQ(messages[0].update.sequence, 1u);
-  EXPECT_EQ(messages[0].update.observation_sequence, 5u);
-  EXPECT_EQ(session.state().updates, 1u);
+  EXPECT_EQ(info->key(), (SessionKey{kBootId, 1, kModelId}));
+  const auto admission = submit(landmarks(5));
+  ASSERT_TRUE(admission.has_value());
+  EXPECT_EQ(admission->receipt.observation_sequence, 5u);
+  EXPECT_FALSE(admission->receipt.replaced_pending);
+  const UpdateMessage message = answer();
+  EXPECT_FALSE(message.error.has_value());
+  EXPECT_EQ(message.session_id, 1u);
+  EXPECT_EQ(message.boot_id, kBootId);
+  EXPECT_EQ(message.update.sequence, 1u);
+  EXPECT_EQ(message.update.observation_sequence, 5u);
+  EXPECT_EQ(session_.state(now_).updates, 1u);
+}
+
+// The journal begins before the state is told, and the state is told before the answer.
+TEST_F(SessionTest, SaysWhatHappensInItsOrder) {
+  ask(request());
+  EXPECT_THAT(told(), ElementsAre("changed preparing 0"));
+  const auto preparation = next_preparation();
+  ASSERT_TRUE(preparation.has_value());
+  EXPECT_FALSE(next_preparation()) << "it is handed out once";
+  prepare(*preparation);
+  EXPECT_THAT(told(), ElementsAre("begun 1", "changed ready 1", "answer viewer: session 1"));
+  ASSERT_TRUE(submit(landmarks(1)));
+  EXPECT_EQ(answer().update.sequence, 1u);
+  EXPECT_THAT(told(), ElementsAre("used pointer 1", "update 1"));
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), ElementsAre("changed tracking 1")) << "after the update that changed it";
 }
 
 TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  const auto other = start(session, Boundary::kContact, "someone-else");
-  ASSERT_FALSE(other.has_value());
-  EXPECT_EQ(other.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(other.error().message, HasSubstr("\"someone-else\""));
-  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
+  ASSERT_TRUE(start().has_value());
+  SessionRequest other = request();
+  other.case_id = "someone-else";
+  ask(other);
+  ASSERT_FALSE(answers_.back().has_value());
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(answers_.back().error().message, HasSubstr("\"someone-else\""));
+  EXPECT_TRUE(submit(landmarks(1)).has_value());
 }
 
+// ---------- the owner ----------
+
+TEST_F(SessionTest, AnotherClientEndsASessionOnlyByTakeoverOrWhenItsOwnerHasLeft) {
+  ASSERT_TRUE(start().has_value());
+  SessionRequest again = request();
+  ask(again, "another");
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(answers_.back().error().message, HasSubstr("belongs to another client"));
+  EXPECT_EQ(session_.state(now_).owner, "viewer");
+  again.takeover = true;
+  ask(again, "another");
+  EXPECT_FALSE(next_preparation()) << "its model is at hand";
+  EXPECT_EQ(session_.state(now_).owner, "another");
+  again.takeover = false;
+  ask(again, "viewer");
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
+  session_.leave("another");
+  EXPECT_EQ(session_.state(now_).owner, "");
+  ask(again, "viewer");
+  EXPECT_FALSE(next_preparation());
+  EXPECT_EQ(session_.state(now_).owner, "viewer");
+  EXPECT_EQ(session_.state(now_).shared.session.session_id, 3u);
+}
+
+// ---------- what is accepted ----------
+
 TEST_F(SessionTest, SequenceNumbersMustGrow) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  EXPECT_FALSE(session.submit(landmarks(0)).has_value());
-  EXPECT_TRUE(session.submit(landmarks(4)).has_value());
-  const auto late = session.submit(landmarks(3));
+  ASSERT_TRUE(start().has_value());
+  EXPECT_FALSE(submit(landmarks(0)).has_value());
+  EXPECT_TRUE(submit(landmarks(4)).has_value());
+  const auto late = submit(landmarks(3));
   ASSERT_FALSE(late.has_value());
   EXPECT_THAT(late.error().message, HasSubstr("observation.sequence = 3: must be above 4"));
-  EXPECT_TRUE(session.submit(landmarks(9)).has_value());
+  EXPECT_TRUE(submit(landmarks(9)).has_value());
 }
 
 // A camera that counts fast does not shut out the ultrasound.
 TEST_F(SessionTest, EverySourceCountsForItself) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  EXPECT_TRUE(session.submit(landmarks(50, "camera")).has_value());
-  EXPECT_TRUE(session.submit(landmarks(6, "ius")).has_value());
-  EXPECT_FALSE(session.submit(landmarks(49, "camera")).has_value());
-  EXPECT_TRUE(session.submit(landmarks(7, "ius")).has_value());
+  ASSERT_TRUE(start().has_value());
+  EXPECT_TRUE(submit(landmarks(50, "camera")).has_value());
+  EXPECT_TRUE(submit(landmarks(6, "ius")).has_value());
+  EXPECT_FALSE(submit(landmarks(49, "camera")).has_value());
+  EXPECT_TRUE(submit(landmarks(7, "ius")).has_value());
 }
 
 TEST_F(SessionTest, ASequenceThatTheJournalCannotHoldIsRefusedAndLocksNothing) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  for (const std::uint64_t sequence : {kMaxSequence + 1, ~std::uint64_t{0}}) {
-    const auto refused = session.submit(landmarks(sequence));
+  ASSERT_TRUE(start().has_value());
+  for (const std::uint64_t sequence : {Sources::kMaxSequence + 1, ~std::uint64_t{0}}) {
+    const auto refused = submit(landmarks(sequence));
     ASSERT_FALSE(refused.has_value());
     EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(refused.error().message, HasSubstr("must be at most 9223372036854775807"));
   }
-  EXPECT_TRUE(session.submit(landmarks(1)).has_value());
-  EXPECT_TRUE(session.submit(landmarks(kMaxSequence)).has_value());
+  EXPECT_TRUE(submit(landmarks(1)).has_value());
+  EXPECT_TRUE(submit(landmarks(Sources::kMaxSequence)).has_value());
 }
 
+TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
+  ASSERT_TRUE(start().has_value());
+  for (std::size_t i = 0; i < Sources::kMaxSources; ++i) {
+    EXPECT_TRUE(submit(landmarks(1, "source " + std::to_string(i))).has_value());
+  }
+  const auto refused = submit(landmarks(1, "one too many"));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(SessionTest, AnImplausibleClockIsRefusedAndAgesNobodyOut) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1, "camera")).has_value());
+  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
+  Observation ahead = landmarks(2, "ius");
+  ahead.acquired_ns = 3'600'000'000'000;
+  const auto refused = submit(ahead);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().message, HasSubstr("jumped ahead"));
+  EXPECT_TRUE(submit(landmarks(2, "ius")).has_value()) << "its number is still free";
+}
+
+// The clock of one source an hour ahead of the other's: both are as young as they are.
+TEST_F(SessionTest, SourcesNeedNotShareAClock) {
+  ASSERT_TRUE(start().has_value());
+  Observation camera = landmarks(1, "camera");
+  camera.acquired_ns = 3'600'000'000'000;
+  ASSERT_TRUE(submit(camera).has_value());
+  answer();
+  now_ += 1s;
+  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
+  const UpdateMessage message = answer();
+  EXPECT_EQ(message.update.estimate.sources.size(), 2u);
+  for (const Omission& omission : message.update.left_out) {
+    EXPECT_EQ(omission.part.find("source"), std::string::npos) << omission.reason;
+  }
+}
+
+// A client that has lost the first answer asks again: nothing is estimated or decided twice.
+TEST_F(SessionTest, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(3)).has_value());
+  const auto first = submit(landmarks(4));
+  ASSERT_TRUE(first.has_value());
+  EXPECT_TRUE(first->receipt.replaced_pending);
+  answer();
+  told();
+  const auto again = submit(landmarks(4));
+  ASSERT_TRUE(again.has_value());
+  EXPECT_TRUE(again->repeated);
+  EXPECT_EQ(again->receipt.observation_sequence, 4u);
+  EXPECT_TRUE(again->receipt.replaced_pending);
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), ElementsAre("changed tracking 1"));
+  Observation other = landmarks(4);
+  other.acquired_ns += 1;
+  EXPECT_FALSE(submit(other).has_value()) << "the same number for another observation";
+}
+
+// ---------- boxes and decisions ----------
+
+TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
+  const auto first = next_job();
+  told();
+  EXPECT_FALSE(submit(landmarks(2, "ius"))->receipt.replaced_pending);
+  EXPECT_TRUE(submit(landmarks(3, "ius"))->receipt.replaced_pending);
+  EXPECT_FALSE(submit(landmarks(4, "pointer"))->receipt.replaced_pending);
+  EXPECT_TRUE(submit(landmarks(5, "ius"))->receipt.replaced_pending);
+  EXPECT_TRUE(session_.state(now_).busy);
+  finish(*first, run(*first));
+  answer();
+  answer();
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), ElementsAre("superseded ius 2", "superseded ius 3", "used ius 1", "update 1",
+                                  "changed tracking 1", "used pointer 4", "update 2", "used ius 5",
+                                  "update 3"));
+  EXPECT_THAT(decisions_[0].reason, HasSubstr("observation 3"));
+  EXPECT_EQ(decisions_[0].update_sequence, 0u);
+  EXPECT_EQ(decisions_[2].session_id, 1u);
+  EXPECT_EQ(decisions_[2].update_sequence, 1u);
+  EXPECT_TRUE(decisions_[2].reason.empty());
+}
+
+TEST_F(SessionTest, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAnswered) {
+  update_ = [](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
+    if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
+    return follow_the_data(data, out, 4);
+  };
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
+  told();
+  const UpdateMessage failed = answer();
+  ASSERT_TRUE(failed.error.has_value());
+  EXPECT_EQ(failed.error->message, "no luck");
+  EXPECT_EQ(failed.update.observation_sequence, 1u);
+  EXPECT_EQ(failed.update.case_id, kCase);
+  EXPECT_EQ(failed.update.model_id, kModelId);
+  EXPECT_TRUE(failed.update.final);
+  EXPECT_THAT(told(), ElementsAre("failed ius 1", "update 1"));
+  EXPECT_THAT(decisions_[0].reason, HasSubstr("no luck"));
+  EXPECT_EQ(session_.state(now_).updates, 0u);
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kDegraded);
+  ASSERT_TRUE(submit(landmarks(2, "ius")).has_value());
+  EXPECT_FALSE(answer().error.has_value());
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kTracking);
+}
+
+TEST_F(SessionTest, AnUnusableFieldIsUsedUpAndTheOneBeforeItStays) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  answer();
+  ASSERT_TRUE(submit(landmarks(2, "pointer", kMostMotion_mm + 1.0)).has_value());
+  EXPECT_FALSE(answer().update.usable());
+  const SessionState state = session_.state(now_).shared;
+  EXPECT_EQ(state.phase, SessionPhase::kDegraded);
+  EXPECT_THAT(state.reason, HasSubstr("motion 51 mm"));
+  EXPECT_EQ(state.newest_update, 2u);
+  EXPECT_EQ(state.newest_usable, 1u);
+  EXPECT_EQ(decisions_.back().outcome, Outcome::kUsed);
+  EXPECT_EQ(decisions_.back().reason, state.reason);
+  EXPECT_EQ(session_.state(now_).updates, 2u);
+}
+
+class LeavingTest : public SessionTest {
+ protected:
+  // One observation is at work and one waits while `end` ends the session.
+  template <typename End>
+  void skips_both(const End& end) {
+    ASSERT_TRUE(start().has_value());
+    ASSERT_TRUE(submit(landmarks(1, "ius")));
+    const auto job = next_job();
+    ASSERT_TRUE(submit(landmarks(2, "ius")));
+    end();
+    EXPECT_TRUE(job->stop.stop_requested()) << "it ends early";
+    EXPECT_FALSE(finish(*job, run(*job)).has_value()) << "nobody hears of its result";
+    ASSERT_EQ(decisions_.size(), 2u);
+    EXPECT_EQ(decisions_[0].observation_sequence, 2u);
+    EXPECT_EQ(decisions_[1].observation_sequence, 1u);
+    for (const Decision& decision : decisions_) {
+      EXPECT_EQ(decision.outcome, Outcome::kSkipped);
+      EXPECT_EQ(decision.session_id, 1u);
+      EXPECT_EQ(decision.reason, "the session ended");
+    }
+    next_preparation();
+    EXPECT_FALSE(next_job());
+  }
+};
+
+TEST_F(LeavingTest, WhatANewSessionFindsIsSkippedAndNotPublished) {
+  skips_both([&] { ask(request()), next_preparation(); });
+  EXPECT_EQ(session_.state(now_).shared.session.session_id, 2u);
+}
+
+TEST_F(LeavingTest, WhatStopFindsIsSkippedAndNotPublished) {
+  skips_both([&] { session_.stop(), session_.stop(), act(); });
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kClosed);
+}
+
+TEST_F(SessionTest, WhatIsRefusedIsNotDecided) {
+  ASSERT_TRUE(start().has_value());
+  told();
+  EXPECT_FALSE(submit(landmarks(0, "ius")));
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), IsEmpty());
+}
+
+// ---------- one session after the other ----------
+
 TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(4)).has_value());
-  published_.wait_for(1);
-  const auto second = start(session);
-  ASSERT_TRUE(second.has_value());
-  EXPECT_EQ(second->session_id, 2u);
-  EXPECT_TRUE(session.submit(in_session(2, landmarks(1))).has_value());
-  const auto messages = published_.wait_for(2);
-  ASSERT_EQ(messages.size(), 2u);
-  EXPECT_EQ(messages[1].update.sequence, 1u);
-  EXPECT_EQ(messages[1].session_id, 2u);
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(4)).has_value());
+  answer();
+  ASSERT_TRUE(start().has_value());
+  EXPECT_EQ(answers_.back()->session_id, 2u);
+  EXPECT_FALSE(submit(landmarks(5)).has_value()) << "the first session has ended";
+  EXPECT_TRUE(submit(in_session(2, landmarks(1))).has_value());
+  const UpdateMessage message = answer();
+  EXPECT_EQ(message.update.sequence, 1u);
+  EXPECT_EQ(message.session_id, 2u);
 }
 
 // What an earlier session observed and estimated is not used in the next one.
 TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
   std::vector<std::size_t> sources;
-  FakeInverter* inverter = nullptr;
-  SessionHooks watched = hooks(echo);
-  watched.make_model = [&](const SessionRequest& request, const std::stop_token&) {
-    auto made = std::make_unique<FakeInverter>(
-        [&](int, const SparseData& data, const auto&, Estimate& out) {
-          sources.push_back(data.sources.size());
-          return follow_the_data(data, out, 4);
-        });
-    inverter = made.get();
-    return fake_session(std::move(made), request);
+  update_ = [&](int, const SparseData& data, const auto&, Estimate& out) {
+    sources.push_back(data.sources.size());
+    return follow_the_data(data, out, 4);
   };
-  TestSession session(std::move(watched));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
-  published_.wait_for(1);
-  ASSERT_TRUE(session.submit(landmarks(2, "pointer")).has_value());
-  published_.wait_for(2);
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(in_session(2, landmarks(1, "pointer"))).has_value());
-  ASSERT_EQ(published_.wait_for(3).size(), 3u);
-  EXPECT_THAT(sources, ElementsAre(1u, 2u, 1u));
-  EXPECT_EQ(inverter->resets, 2);  // one model for both sessions
-}
-
-TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
-  Gate gate;
-  TestSession session(hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
-    if (call == 1) {
-      gate.entered.set_value();
-      gate.leave.get_future().wait();
-    }
-    return follow_the_data(data, out, 4);
-  }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
-  gate.entered.get_future().wait();
-  EXPECT_FALSE(session.submit(landmarks(2, "ius"))->replaced_pending);
-  EXPECT_TRUE(session.submit(landmarks(3, "ius"))->replaced_pending);
-  EXPECT_FALSE(session.submit(landmarks(4, "pointer"))->replaced_pending);
-  EXPECT_TRUE(session.submit(landmarks(5, "ius"))->replaced_pending);
-  EXPECT_TRUE(session.state().busy);
-  gate.leave.set_value();
-  const auto messages = published_.wait_for(3);
-  ASSERT_EQ(messages.size(), 3u);
-  std::vector<std::uint64_t> answered;
-  for (const auto& message : messages) answered.push_back(message.update.observation_sequence);
-  EXPECT_THAT(answered, ElementsAre(1, 4, 5));  // oldest first
-}
-
-TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
-  Gate gate;
-  TestSession session(hooks([&](int call, const SparseData& data, const auto&, Estimate& out) {
-    if (call == 1) {
-      gate.entered.set_value();
-      gate.leave.get_future().wait();
-    }
-    return follow_the_data(data, out, 4);
-  }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  gate.entered.get_future().wait();
-  for (std::uint64_t i = 1; i < Sources::kMaxSources; ++i) {
-    EXPECT_TRUE(session.submit(landmarks(2 + i, "source " + std::to_string(i))).has_value());
+  ASSERT_TRUE(start().has_value());
+  for (const auto& observation : {landmarks(1, "ius"), landmarks(2, "pointer")}) {
+    ASSERT_TRUE(submit(observation).has_value());
+    answer();
   }
-  const auto refused = session.submit(landmarks(100, "one too many"));
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
-  gate.leave.set_value();
-}
-
-TEST_F(SessionTest, AnErrorIsPublishedAndTheNextObservationIsAnswered) {
-  TestSession session(
-      hooks([](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
-        if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
-        return follow_the_data(data, out, 4);
-      }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  const auto failed = published_.wait_for(1);
-  ASSERT_EQ(failed.size(), 1u);
-  ASSERT_TRUE(failed[0].error.has_value());
-  EXPECT_EQ(failed[0].error->message, "no luck");
-  EXPECT_EQ(failed[0].update.observation_sequence, 1u);
-  EXPECT_EQ(failed[0].update.case_id, kCase);
-  EXPECT_EQ(session.state().updates, 0u);
-  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
-  const auto messages = published_.wait_for(2);
-  ASSERT_EQ(messages.size(), 2u);
-  EXPECT_FALSE(messages[1].error.has_value());
-}
-
-TEST_F(SessionTest, AnExceptionCostsOneObservationOnly) {
-  TestSession session(hooks([](int call, const SparseData& data, const auto&, Estimate& out) {
-    if (call == 1) throw std::runtime_error("thrown");
-    return follow_the_data(data, out, 4);
-  }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  const auto failed = published_.wait_for(1);
-  ASSERT_EQ(failed.size(), 1u);
-  ASSERT_TRUE(failed[0].error.has_value());
-  EXPECT_EQ(failed[0].error->code, ErrorCode::kInternal);
-  ASSERT_TRUE(session.submit(landmarks(2)).has_value());
-  EXPECT_EQ(published_.wait_for(2).size(), 2u);
-}
-
-TEST_F(SessionTest, ANewSessionEndsTheRunningInversionWhoseResultIsNotPublished) {
-  std::promise<void> entered;
-  TestSession session(
-      hooks([&](int call, const SparseData& data, const auto& options, Estimate& out) {
-        if (call == 1) wait_for_stop(options, entered);
-        return follow_the_data(data, out, 4);
-      }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  entered.get_future().wait();
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(in_session(2, landmarks(2))).has_value());
-  const auto messages = published_.wait_for(1);
-  ASSERT_EQ(messages.size(), 1u);
-  EXPECT_EQ(messages[0].update.observation_sequence, 2u);
-}
-
-TEST_F(SessionTest, StopEndsARunningInversion) {
-  std::promise<void> entered;
-  TestSession session(hooks([&](int, const SparseData&, const auto& options, Estimate&) -> Status {
-    wait_for_stop(options, entered);
-    return fail(ErrorCode::kNotConverged, "stopped");
-  }));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  entered.get_future().wait();
-  session.stop();
-  session.stop();
-  EXPECT_EQ(session.submit(landmarks(2)).error().code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(start(session).error().code, ErrorCode::kUnavailable);
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(in_session(2, landmarks(1, "pointer"))).has_value());
+  answer();
+  EXPECT_THAT(sources, ElementsAre(1u, 2u, 1u));
+  EXPECT_EQ(inverter_->resets, 2);  // one model for both sessions
 }
 
 TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session, Boundary::kContact).has_value());
-  ASSERT_TRUE(start(session, Boundary::kFixed).has_value());
-  ASSERT_TRUE(start(session, Boundary::kContact).has_value());
+  ASSERT_TRUE(start(Boundary::kContact).has_value());
+  ASSERT_TRUE(start(Boundary::kFixed).has_value());
+  ASSERT_TRUE(start(Boundary::kContact).has_value());
   EXPECT_THAT(prepared_boundaries_, ElementsAre(Boundary::kContact, Boundary::kFixed));
 }
 
 TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
-  int attempts = 0;
-  SessionHooks failing = hooks(echo);
-  failing.make_model = [&, make = failing.make_model](
-                           const SessionRequest& request,
-                           const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
-    if (++attempts == 1) return fail(ErrorCode::kFloatingBody, "free to float");
-    return make(request, stop);
-  };
-  TestSession session(std::move(failing));
-  const auto first = start(session);
-  ASSERT_FALSE(first.has_value());
-  EXPECT_EQ(first.error().code, ErrorCode::kFloatingBody);
-  EXPECT_EQ(session.submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
-  EXPECT_TRUE(start(session).has_value());
+  ask(request());
+  ASSERT_TRUE(next_preparation());
+  fail_to_prepare({ErrorCode::kFloatingBody, "free to float"});
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kFloatingBody);
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kEmpty);
+  EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
+  EXPECT_TRUE(start().has_value());
 }
 
-TEST_F(SessionTest, ALaterStartAnswersAnEarlierOneThatIsStillPreparing) {
-  std::promise<void> entered;
-  std::promise<void> leave;
-  SessionHooks slow = hooks(echo);
-  bool first = true;
-  slow.make_model = [&, make = slow.make_model](const SessionRequest& request,
-                                                const std::stop_token& stop) {
-    if (std::exchange(first, false)) {
-      entered.set_value();
-      leave.get_future().wait();
-    }
-    return make(request, stop);
-  };
-  TestSession session(std::move(slow));
-  std::promise<Result<SessionInfo>> preparing;
-  session.start({kCase, Method::kPaper, Boundary::kContact},
-                [&](Result<SessionInfo> info) { preparing.set_value(std::move(info)); });
-  entered.get_future().wait();
-  EXPECT_TRUE(session.state().busy);
-  std::promise<Result<SessionInfo>> later;
-  session.start({kCase, Method::kPaper, Boundary::kFixed},
-                [&](Result<SessionInfo> info) { later.set_value(std::move(info)); });
-  leave.set_value();
-  const auto superseded = preparing.get_future().get();
-  ASSERT_FALSE(superseded.has_value());
-  EXPECT_EQ(superseded.error().code, ErrorCode::kUnavailable);
-  EXPECT_TRUE(later.get_future().get().has_value());
+TEST_F(SessionTest, ALaterStartStopsAPreparationAndAnswersIt) {
+  ask(request(Boundary::kContact));
+  const auto first = next_preparation();
+  EXPECT_TRUE(session_.state(now_).busy);
+  ask(request(Boundary::kFixed));
+  EXPECT_TRUE(first->stop.stop_requested());
+  EXPECT_FALSE(next_preparation()) << "one at a time";
+  ask(request(Boundary::kFixed));
+  EXPECT_THAT(answers_.back().error().message, HasSubstr("another session was started"));
+  told();
+  prepare(*first);
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
+  const auto second = next_preparation();
+  ASSERT_TRUE(second.has_value());
+  prepare(*second);
+  EXPECT_TRUE(answers_.back().has_value());
+  EXPECT_EQ(answers_.size(), 3u) << "each start is answered once";
 }
 
-// A model that waits in its preparation until it is let go or stopped.
-struct SlowPreparation {
-  std::promise<void> entered;
-  std::promise<void> leave;
-  std::shared_future<void> left = leave.get_future().share();
-  std::atomic<bool> stopped{false};
+// The update that is on its way to the viewers is told before the session that follows.
+TEST_F(SessionTest, AReadySessionWaitsForTheJobAndALaterOneOvertakesIt) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  const auto job = next_job();
+  ASSERT_TRUE(finish(*job, run(*job)));
+  ask(request());
+  next_preparation();
+  EXPECT_EQ(answers_.size(), 1u);
+  ask(request(), "viewer");
+  next_preparation();
+  ASSERT_EQ(answers_.size(), 2u);
+  EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
+  told();
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), ElementsAre("begun 2", "changed ready 2", "answer viewer: session 2"));
+}
 
-  // The second preparation waits.
-  MakeSessionModel around(MakeSessionModel make) {
-    return [this, make, call = std::make_shared<int>(0)](
-               const SessionRequest& request,
-               const std::stop_token& stop) -> Result<std::unique_ptr<SessionModel>> {
-      if (++*call == 2) {
-        const std::stop_callback wake(stop, [this] {
-          stopped = true;
-          leave.set_value();
-        });
-        entered.set_value();
-        left.wait();
-        if (stopped) return fail(ErrorCode::kUnavailable, "stopped");
-      }
-      return make(request, stop);
-    };
-  }
-};
+// ---------- while the next session is prepared ----------
 
-// One session runs, and the next one is being prepared.
 class PreparingTest : public SessionTest {
  protected:
   void SetUp() override {
-    SessionHooks watched = hooks(echo);
-    watched.make_model = slow_.around(watched.make_model);
-    session_ = std::make_unique<TestSession>(std::move(watched));
-    std::promise<bool> first;
-    session_->start({kCase, Method::kCondensed, Boundary::kContact},
-                    [&](const auto& info) { first.set_value(info.has_value()); });
-    ASSERT_TRUE(first.get_future().get());
-    session_->start(
-        {kCase, Method::kCondensed, Boundary::kFixed},
-        [this](Result<SessionInfo> info) { next_.set_value(std::move(info)); }, "viewer");
-    slow_.entered.get_future().wait();
+    ask(request(Boundary::kContact, Method::kCondensed), "first");
+    prepare(*next_preparation());
+    session_.leave("first");
+    ask(request(Boundary::kFixed, Method::kCondensed));
+    preparation_ = next_preparation();
+    ASSERT_TRUE(preparation_.has_value());
+    answers_.clear(), told_.clear();
   }
-
-  SlowPreparation slow_;
-  std::promise<Result<SessionInfo>> next_;
-  std::unique_ptr<TestSession> session_;
+  std::optional<Preparation> preparation_;
 };
 
 TEST_F(PreparingTest, TheRunningSessionGoesOnUntilTheNextIsReady) {
-  EXPECT_TRUE(session_->state().shared.preparing);
-  ASSERT_TRUE(session_->submit(landmarks(1)).has_value());
-  const auto messages = published_.wait_for(1);
-  ASSERT_EQ(messages.size(), 1u);
-  EXPECT_EQ(messages[0].session_id, 1u);
-  slow_.leave.set_value();
-  const auto info = next_.get_future().get();
-  ASSERT_TRUE(info.has_value());
-  EXPECT_EQ(info->key(), (SessionKey{kBootId, 2, kModelId}));
-  EXPECT_FALSE(session_->submit(landmarks(2)).has_value()) << "the first session has ended";
-  EXPECT_TRUE(session_->submit(in_session(2, landmarks(2))).has_value());
+  EXPECT_TRUE(session_.state(now_).shared.preparing);
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  EXPECT_EQ(answer().session_id, 1u);
+  next_job();
+  prepare(*preparation_);
+  ASSERT_TRUE(answers_.at(0).has_value());
+  EXPECT_EQ(answers_[0]->key(), (SessionKey{kBootId, 2, kModelId}));
+  EXPECT_FALSE(submit(landmarks(2)).has_value()) << "the first session has ended";
+  EXPECT_TRUE(submit(in_session(2, landmarks(2))).has_value());
 }
 
 TEST_F(PreparingTest, StopEndsAPreparation) {
-  session_->stop();
-  EXPECT_TRUE(slow_.stopped);
-  EXPECT_EQ(next_.get_future().get().error().code, ErrorCode::kUnavailable);
-  EXPECT_EQ(session_->state().shared.phase, SessionPhase::kClosed);
+  session_.stop();
+  act();
+  EXPECT_TRUE(preparation_->stop.stop_requested());
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kClosed);
+  fail_to_prepare({ErrorCode::kUnavailable, "stopped"});
+  EXPECT_EQ(answers_.at(0).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
+  ask(request());
+  EXPECT_THAT(told(), ElementsAre("changed closed 0", "answer viewer: the daemon is stopping",
+                                  "answer viewer: the daemon is stopping"));
 }
 
 TEST_F(PreparingTest, EndsWhenItsOwnerLeavesAndTheRunningSessionStays) {
-  session_->leave("somebody else");
-  EXPECT_FALSE(slow_.stopped);
-  session_->leave("viewer");
-  const auto refused = next_.get_future().get();
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
-  EXPECT_THAT(refused.error().message, HasSubstr("has left"));
-  EXPECT_TRUE(session_->submit(landmarks(1)).has_value());
+  session_.leave("somebody else");
+  EXPECT_FALSE(preparation_->stop.stop_requested());
+  session_.leave("viewer");
+  EXPECT_TRUE(preparation_->stop.stop_requested());
+  fail_to_prepare({ErrorCode::kUnavailable, "stopped"});
+  EXPECT_EQ(answers_.at(0).error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(answers_[0].error().message, HasSubstr("has left"));
+  EXPECT_TRUE(submit(landmarks(1)).has_value());
 }
 
-// A client that has lost the first answer asks again: nothing is estimated twice.
-TEST_F(SessionTest, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
-  std::atomic<int> calls{0};
-  TestSession session(hooks([&](int, const SparseData& data, const auto&, Estimate& out) {
-    ++calls;
-    return follow_the_data(data, out, 4);
-  }));
-  ASSERT_TRUE(start(session).has_value());
-  const auto first = session.submit(landmarks(4));
-  ASSERT_TRUE(first.has_value());
-  published_.wait_for(1);
-  const auto again = session.submit(landmarks(4));
-  ASSERT_TRUE(again.has_value());
-  EXPECT_EQ(again->observation_sequence, 4u);
-  EXPECT_EQ(again->replaced_pending, first->replaced_pending);
-  ASSERT_TRUE(session.submit(landmarks(5)).has_value());
-  ASSERT_EQ(published_.wait_for(2).size(), 2u);
-  EXPECT_EQ(calls, 2);
-  Observation other = landmarks(5);
-  other.acquired_ns += 1;
-  EXPECT_FALSE(session.submit(other).has_value()) << "the same number for another observation";
+TEST_F(PreparingTest, AStartThatWaitsForItIsAnsweredWhenItsOwnerLeaves) {
+  ask(request(Boundary::kFixed), "viewer");
+  session_.leave("viewer");
+  act();
+  EXPECT_THAT(answers_.at(0).error().message, HasSubstr("has left"));
+  prepare(*preparation_);
+  EXPECT_EQ(answers_.size(), 2u);
+  EXPECT_FALSE(next_preparation());
 }
 
-TEST_F(SessionTest, AnImplausibleClockIsRefusedAndAgesNobodyOut) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1, "camera")).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
-  Observation ahead = landmarks(2, "ius");
-  ahead.acquired_ns = 3'600'000'000'000;
-  const auto refused = session.submit(ahead);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_THAT(refused.error().message, HasSubstr("jumped ahead"));
-  EXPECT_TRUE(session.submit(landmarks(2, "ius")).has_value()) << "its number is still free";
+// Only the condensed method needs no factor: every other session ends before the next is prepared.
+TEST_F(SessionTest, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  const auto job = next_job();
+  ask(request(Boundary::kFixed));
+  EXPECT_FALSE(next_preparation()) << "the job still uses the factor";
+  EXPECT_TRUE(job->stop.stop_requested());
+  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kPreparing);
+  EXPECT_FALSE(finish(*job, run(*job)).has_value());
+  EXPECT_TRUE(next_preparation().has_value());
+  session_.stop();
+  act();
+  EXPECT_EQ(answers_.size(), 1u) << "the second is answered when its preparation has ended";
 }
 
-// The clock of one source an hour ahead of the other's: both are as young as they are.
-TEST_F(SessionTest, SourcesNeedNotShareAClock) {
-  TestSession session(hooks(echo));
-  ASSERT_TRUE(start(session).has_value());
-  Observation camera = landmarks(1, "camera");
-  camera.acquired_ns = 3'600'000'000'000;
-  ASSERT_TRUE(session.submit(camera).has_value());
-  ASSERT_EQ(published_.wait_for(1).size(), 1u);
-  ASSERT_TRUE(session.submit(landmarks(1, "ius")).has_value());
-  const auto messages = published_.wait_for(2);
-  ASSERT_EQ(messages.size(), 2u);
-  for (const Omission& omission : messages[1].update.left_out) {
-    EXPECT_EQ(omission.part.find("source"), std::string::npos) << omission.reason;
-  }
+// ---------- what is told of it ----------
+
+TEST_F(SessionTest, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
+  ASSERT_TRUE(start().has_value());
+  EXPECT_EQ(session_.state(now_).working_s, 0.0);
+  EXPECT_GT(session_.state(now_).max_age_s, 0.0);
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  now_ += 2s;
+  const auto job = next_job();
+  EXPECT_EQ(job->begun - job->arrived, 2s);
+  now_ += 3s;
+  EXPECT_EQ(session_.state(now_).working_s, 3.0);
+  EXPECT_EQ(session_.state(now_).deadline_s, kNoDeadline_s);
+  finish(*job, run(*job));
+  EXPECT_EQ(session_.state(now_).working_s, 3.0) << "it is being published";
+  next_job();
+  EXPECT_EQ(session_.state(now_).working_s, 0.0);
+  EXPECT_EQ(session_.state(now_).deadline_s, 0.0);
+  EXPECT_EQ(session_.state(now_).shared.age_ms, 5000.0) << "since the observation arrived";
 }
 
-TEST_F(SessionTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
-  const auto iterating = [](int, const SparseData& data, const auto& options, Estimate& out) {
-    Estimate iterate;
-    (void)follow_the_data(data, iterate, 4);
-    iterate.status = EstimateStatus::kIterating;
-    if (options.on_iterate) options.on_iterate(iterate);
-    return follow_the_data(data, out, 4);
-  };
-  TestSession session(hooks(iterating));
-  ASSERT_TRUE(start(session).has_value());
-  ASSERT_TRUE(session.submit(landmarks(1)).has_value());
-  ASSERT_EQ(published_.wait_for(1).size(), 1u);
-  ASSERT_TRUE(start(session, Boundary::kContact, kCase, true).has_value());
-  ASSERT_TRUE(session.submit(in_session(2, landmarks(1))).has_value());
-  const auto messages = published_.wait_for(3);
-  ASSERT_EQ(messages.size(), 3u);
-  EXPECT_TRUE(messages[0].update.final);
-  EXPECT_FALSE(messages[1].update.final);
-  EXPECT_TRUE(messages[2].update.final);
-  EXPECT_EQ(messages[1].update.sequence, messages[2].update.sequence);
+TEST_F(SessionTest, IteratesCarryTheirUpdatesNumberAndSession) {
+  ASSERT_TRUE(start().has_value());
+  ASSERT_TRUE(submit(landmarks(1)).has_value());
+  const auto job = next_job();
+  const UpdateMessage iterate = job->message({});
+  const auto last = finish(*job, run(*job));
+  EXPECT_EQ(iterate.update.sequence, last->update.sequence);
+  EXPECT_EQ(iterate.session_id, last->session_id);
+  EXPECT_EQ(iterate.boot_id, kBootId);
 }
 
 }  // namespace

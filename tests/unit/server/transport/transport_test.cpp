@@ -222,13 +222,13 @@ TEST(Peers, RepliesThatWaitAreBoundedInNumberAndBytes) {
 
 TEST(Peers, AConnectionThatClosesTakesItsPeerAlong) {
   Peers peers(2);
-  ASSERT_NE(peers.admit("a", 10), nullptr);
-  ASSERT_NE(peers.admit("b", 11), nullptr);
-  EXPECT_EQ(peers.admit("c", 12), nullptr);
-  EXPECT_NE(peers.admit("a", 10), nullptr);
+  ASSERT_NE(peers.add("a", 10), nullptr);
+  ASSERT_NE(peers.add("b", 11), nullptr);
+  EXPECT_EQ(peers.add("c", 12), nullptr);
+  EXPECT_NE(peers.add("a", 10), nullptr);
   EXPECT_THAT(peers.remove_connection(10), testing::ElementsAre("a"));
   EXPECT_TRUE(peers.remove_connection(10).empty());
-  EXPECT_NE(peers.admit("c", 12), nullptr);
+  EXPECT_NE(peers.add("c", 12), nullptr);
   EXPECT_EQ(peers.find("a"), nullptr);
 }
 

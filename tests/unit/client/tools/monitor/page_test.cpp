@@ -41,6 +41,8 @@ TEST(Page, HoldsWhatTheReportHolds) {
         "update 812, 0.2 s old", "812 usable, 1 unusable, 3 failed, 6 late",
         "2 connected, 1 of them view", "window 1, sent 800, received 799, owed 1", "recording",
         "/j/colin27-3.surgery, 8.0 MiB", "2500 records, 0 lost", "0 lines lost",
+        "90 accepted, closed for breach 1, memory 2, silence 3, room 4, 5.0 MiB held",
+        "unknown keys 6, beyond a role 7, connections 8, observations 9, session starts 10",
         "120.0 MiB resident, 140.0 MiB at most", "31 of 1024 descriptors, 9 threads",
         "(not known)"}) {
     EXPECT_THAT(text, HasSubstr(part));

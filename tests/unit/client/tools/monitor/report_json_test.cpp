@@ -26,6 +26,8 @@ TEST(ReportJson, HoldsWhatTheReportHolds) {
   EXPECT_EQ(read["stages"][1]["bucket_counts"], (json{0, 813}));
   EXPECT_EQ(read["journal"]["file"], "/j/colin27-3.surgery");
   EXPECT_EQ(read["process"]["threads"], 9);
+  EXPECT_EQ(read["door"]["closed_for_memory"], 2);
+  EXPECT_EQ(read["door"]["refused_starts"], 10);
 }
 
 TEST(ReportJson, WhatIsNotThereIsNull) {

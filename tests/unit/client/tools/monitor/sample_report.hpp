@@ -38,6 +38,7 @@ inline wire::DaemonReport sample_report() {
                     {0, 813}}};
   report.journal = wire::JournalFigures{true, "", "/j/colin27-3.surgery", 8u << 20, 2500, 0};
   report.process = {120u << 20, 140u << 20, 31, 1024, 9};
+  report.door = {90, 1, 2, 3, 4, 5u << 20, 6, 7, 8, 9, 10};
   return report;
 }
 

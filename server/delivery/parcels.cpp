@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/transport/parcels.hpp"
+#include "server/delivery/parcels.hpp"
 
 #include <spdlog/spdlog.h>
 

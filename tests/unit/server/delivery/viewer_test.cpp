@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/transport/peers.hpp"
+#include "server/delivery/viewer.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -86,13 +86,15 @@ TEST(Viewer, AnotherChoiceBeginsAnewAndHoldsNothing) {
   Viewer viewer;
   const Subscription subscription{1, 1, 0, {.tolerance_mm = 0.1}};
   EXPECT_TRUE(viewer.renew(subscription, chosen));
-  viewer.hold(std::make_shared<const HeldField>());
+  viewer.owe_usable(bytes("field"));
+  viewer.sent(std::make_shared<const HeldField>());
   EXPECT_FALSE(viewer.renew(subscription, chosen));
   EXPECT_EQ(viewer.selection(), chosen);
   EXPECT_TRUE(viewer.held());
   EXPECT_TRUE(viewer.renew({1, 1, 0, {.tolerance_mm = 0.2}}, chosen));
   EXPECT_FALSE(viewer.held());
-  viewer.hold(std::make_shared<const HeldField>());
+  viewer.owe_usable(bytes("field"));
+  viewer.sent(std::make_shared<const HeldField>());
   EXPECT_TRUE(viewer.renew({2, 1, 0, {.tolerance_mm = 0.2}}, chosen));
   EXPECT_FALSE(viewer.held());
 }

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/stop_signals.hpp"
+#include "common/io/files/stop_signals.hpp"
 
+#include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <utility>
 
-namespace brainshift::server {
+namespace brainshift::io {
 namespace {
 
 std::atomic<int> event_fd{-1};
@@ -22,15 +23,6 @@ void on_signal(int) {
   // A full counter cannot happen, and there is nobody to tell.
   [[maybe_unused]] const ssize_t written = write(event_fd.load(), &one, sizeof one);
   errno = saved_errno;
-}
-
-bool set_action(void (*action)(int)) {
-  struct sigaction description {};
-  description.sa_handler = action;
-  description.sa_flags = SA_RESTART;
-  sigemptyset(&description.sa_mask);
-  return sigaction(SIGINT, &description, nullptr) == 0 &&
-         sigaction(SIGTERM, &description, nullptr) == 0;
 }
 
 }  // namespace
@@ -47,21 +39,46 @@ void survive_failing_writes() {
 Result<StopSignals> StopSignals::catch_all() {
   const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (fd < 0) return fail(ErrorCode::kInternal, std::string("eventfd: ") + std::strerror(errno));
+  auto signals = catch_into(fd);
+  if (signals) {
+    signals->own_ = true;
+  } else {
+    close(fd);
+  }
+  return signals;
+}
+
+Result<StopSignals> StopSignals::catch_into(int fd) {
   event_fd = fd;
-  StopSignals signals(fd);
-  if (!set_action(on_signal)) {
+  StopSignals signals(fd, false);
+  struct sigaction description {};
+  description.sa_handler = on_signal;
+  description.sa_flags = SA_RESTART;
+  sigemptyset(&description.sa_mask);
+  if (sigaction(SIGINT, &description, &signals.interrupt_) != 0 ||
+      sigaction(SIGTERM, &description, &signals.terminate_) != 0) {
     return fail(ErrorCode::kInternal, "SIGINT and SIGTERM cannot be handled");
   }
   return signals;
 }
 
-StopSignals::StopSignals(StopSignals&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+StopSignals::StopSignals(StopSignals&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)),
+      own_(other.own_),
+      interrupt_(other.interrupt_),
+      terminate_(other.terminate_) {}
 
 StopSignals::~StopSignals() {
   if (fd_ < 0) return;
-  set_action(SIG_DFL);
+  sigaction(SIGINT, &interrupt_, nullptr);
+  sigaction(SIGTERM, &terminate_, nullptr);
   event_fd = -1;
-  close(fd_);
+  if (own_) close(fd_);
 }
 
-}  // namespace brainshift::server
+bool StopSignals::arrived() const {
+  pollfd item{fd_, POLLIN, 0};
+  return poll(&item, 1, 0) > 0;
+}
+
+}  // namespace brainshift::io

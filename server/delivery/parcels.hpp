@@ -20,13 +20,16 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/values/session_state.hpp"
 #include "common/wire/published_update.hpp"
-#include "server/transport/outbox.hpp"
 
 namespace brainshift::server {
+
+// A complete frame (common/wire/frame.hpp), shared by all to whom it goes.
+using Bytes = std::shared_ptr<const std::string>;
 
 // What a viewer holds once it has received what it was sent; of a choice with a tolerance.
 struct HeldField {
@@ -38,8 +41,8 @@ struct HeldField {
 using Held = std::shared_ptr<const HeldField>;
 
 struct Parcel {
-  Bytes bytes;  // a complete frame
-  Held held;    // what the viewer holds from now on; null: what it held before
+  Bytes bytes;
+  Held held;  // what the viewer holds from now on; null: what it held before
 };
 
 class Parcels {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a viewer who chose a part of every field gets, and what is made of it how often.
-#include "server/transport/parcels.hpp"
+#include "server/delivery/parcels.hpp"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <vector>
 
-#include "tests/unit/server/transport/small_updates.hpp"
+#include "tests/unit/server/delivery/small_updates.hpp"
 
 namespace brainshift::server {
 namespace {

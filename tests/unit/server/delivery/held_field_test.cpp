@@ -15,8 +15,8 @@
 
 #include "client/lib/field_assembly.hpp"
 #include "common/core/random.hpp"
-#include "server/transport/peers.hpp"
-#include "tests/unit/server/transport/small_updates.hpp"
+#include "server/delivery/viewer.hpp"
+#include "tests/unit/server/delivery/small_updates.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -123,8 +123,7 @@ class Watched {
       const auto parcel = parcels.make(next, viewer_.selection(), viewer_.held());
       ASSERT_TRUE(parcel);
       under_way_.push_back(parcel->bytes);
-      if (parcel->held) viewer_.hold(parcel->held);
-      viewer_.sent();
+      viewer_.sent(parcel->held);
     }
   }
   void restart() {  // its connection was lost with all that was under way

@@ -10,7 +10,7 @@
 
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
-#include "server/transport/outbox.hpp"
+#include "server/delivery/parcels.hpp"
 
 namespace brainshift::server {
 

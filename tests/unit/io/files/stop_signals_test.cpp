@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/files/stop_signals.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <csignal>
+
+namespace brainshift::io {
+namespace {
+
+// Each ends the process by default: a dead reader of the log, a limit on the journal's size.
+TEST(FailingWrites, DoNotEndTheProcess) {
+  survive_failing_writes();
+  EXPECT_EQ(std::raise(SIGPIPE), 0);
+  EXPECT_EQ(std::raise(SIGXFSZ), 0);
+}
+
+TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
+  const auto signals = StopSignals::catch_all();
+  ASSERT_TRUE(signals.has_value());
+  EXPECT_FALSE(signals->arrived());
+  std::raise(SIGTERM);
+  EXPECT_TRUE(signals->arrived());
+}
+
+TEST(StopSignals, WriteToAnotherDescriptorAndRestoreWhatWasThere) {
+  const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  const auto handler = +[](int) {};
+  std::signal(SIGINT, handler);
+  {
+    const auto signals = StopSignals::catch_into(fd);
+    ASSERT_TRUE(signals.has_value());
+    std::raise(SIGINT);
+    EXPECT_TRUE(signals->arrived());
+  }
+  EXPECT_EQ(std::signal(SIGINT, SIG_DFL), handler);
+  EXPECT_EQ(close(fd), 0) << "it is the caller's";
+}
+
+}  // namespace
+}  // namespace brainshift::io
