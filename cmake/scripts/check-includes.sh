@@ -31,7 +31,8 @@ includes() {  # "FILE INCLUDED", one line for each #include
 cgal_folders() { grep -lr --include=CMakeLists.txt 'CGAL::' common server client | sed 's|/CMakeLists.txt$||' || true; }
 
 found=$(awk -v cgal="$(cgal_folders | tr '\n' ' ')" '
-  function folder_of(path) { sub(/\/[^\/]*$/, "", path); return path }
+  # client/lib/brainshift holds what is included as <brainshift/...>; it is client/lib.
+  function folder_of(path) { sub(/\/[^\/]*$/, "", path); sub(/^client\/lib\/brainshift$/, "client/lib", path); return path }
   function unit_of(path) { sub(/\.[ch]pp$/, "", path); return path }
   function part_of(path) { sub(/\/.*$/, "", path); return path }
   function in_list(word, list) { return index(" " list " ", " " word " ") > 0 }

@@ -7,6 +7,7 @@ compile, or, worse, a call reaches the other file's overload. What two files sha
 with one line for each name.
 """
 import collections
+import json
 import pathlib
 import re
 import sys
@@ -64,7 +65,8 @@ def names(text):
 
 def units(build):
     """The lists of files that are compiled as one."""
-    for unit in sorted(pathlib.Path(build).rglob("Unity/unity_*.cxx")):
+    commands = json.loads((pathlib.Path(build) / "compile_commands.json").read_text())
+    for unit in sorted(pathlib.Path(command["file"]) for command in commands if "/Unity/unity_" in command["file"]):
         yield [pathlib.Path(path) for path in re.findall(r'^#include "(.*)"', unit.read_text(), re.MULTILINE)]
 
 

@@ -49,8 +49,8 @@ class Side {
 };
 
 // `what`: in which the second differs from the first ("journal and keys").
-void compare(const std::string& what, const DaemonOptions& without, const DaemonOptions& with,
-             const Settings& settings, Tally& tally) {
+void compare_cost(const std::string& what, const DaemonOptions& without, const DaemonOptions& with,
+                  const Settings& settings, Tally& tally) {
   const Feed feed(settings.surgery);
   Side first(without, feed), second(with, feed);
   first.ask(kBlock);
@@ -96,7 +96,7 @@ void run_cost(const Settings& settings, Tally& tally) {
   const DaemonOptions plain = in_folder(settings, "plain");
   DaemonOptions safe = in_folder(settings, "journal-and-keys");
   safe.journal = safe.keys = true;
-  compare("journal and keys", plain, safe, settings, tally);
+  compare_cost("journal and keys", plain, safe, settings, tally);
   fs::remove_all(safe.folder / "journal");
 }
 

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string content(const fs::path& file) {
+std::string file_content(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -31,7 +31,7 @@ std::string content(const fs::path& file) {
 // A file that is damaged at one place at a time, and mended again.
 class Damaged {
  public:
-  explicit Damaged(fs::path file) : path_(std::move(file)), good_(content(path_)) {
+  explicit Damaged(fs::path file) : path_(std::move(file)), good_(file_content(path_)) {
     if (good_.empty()) throw std::runtime_error(path_.string() + ": cannot be read");
   }
   std::size_t size() const { return good_.size(); }

@@ -20,8 +20,8 @@
 namespace brainshift::sensing {
 namespace {
 
-const char* const kScenarios[] = {"paper-icp", "joint-sag", "joint-distension", "joint-tangential",
-                                  "joint-mixed"};
+const char* const kBoundaryScenarios[] = {"paper-icp", "joint-sag", "joint-distension",
+                                          "joint-tangential", "joint-mixed"};
 constexpr int kSeeds = 4;
 constexpr double kStiffnessSd = 0.3;
 // The fluid stood so much higher at the first moment, which nothing but a warm start remembers.
@@ -99,8 +99,10 @@ Result<pipeline::Pipeline> session_of(const bench::Head& head, const Guide& guid
 }
 
 // Two moments. Adds the figures of the second and returns its displacement fields.
-Result<std::vector<Points>> play(const bench::Head& head, const client::SimulatedSurgery& surgery,
-                                 const Guide& guide, const std::string& label, ByStage& figures) {
+Result<std::vector<Points>> play_boundary(const bench::Head& head,
+                                          const client::SimulatedSurgery& surgery,
+                                          const Guide& guide, const std::string& label,
+                                          ByStage& figures) {
   int rounds = 0;
   auto session = session_of(head, guide, rounds);
   if (!session) return tl::unexpected(session.error());
@@ -153,11 +155,11 @@ void record_means(const std::string& study, const std::string& scenario, const G
   }
 }
 
-Status measure(const bench::Head& head, const std::string& study) {
+Status measure_boundary(const bench::Head& head, const std::string& study) {
   std::printf(
       "scenario,seed,guide,sources,initial mm,tumour mm,craniotomy mm,craniotomy vector mm,field "
       "%%,coverage,rounds,sets,ms\n");
-  for (const char* name : kScenarios) {
+  for (const char* name : kBoundaryScenarios) {
     std::vector<ByStage> figures(std::size(kGuides));
     double warm_cold_mm = 0.0;
     for (int seed = 1; seed <= kSeeds; ++seed) {
@@ -170,8 +172,8 @@ Status measure(const bench::Head& head, const std::string& study) {
       if (!surgery) return tl::unexpected(surgery.error());
       std::vector<std::vector<Points>> fields;
       for (std::size_t g = 0; g < std::size(kGuides); ++g) {
-        auto played = play(head, *surgery, kGuides[g],
-                           std::string(name) + "," + std::to_string(seed), figures[g]);
+        auto played = play_boundary(head, *surgery, kGuides[g],
+                                    std::string(name) + "," + std::to_string(seed), figures[g]);
         if (!played) return tl::unexpected(played.error());
         fields.push_back(std::move(*played));
       }
@@ -194,6 +196,6 @@ Status measure(const bench::Head& head, const std::string& study) {
 
 }  // namespace
 
-Status boundary_study(const bench::Head& head) { return measure(head, "boundary"); }
+Status boundary_study(const bench::Head& head) { return measure_boundary(head, "boundary"); }
 
 }  // namespace brainshift::sensing

@@ -26,8 +26,8 @@ using test_support::record_figure;
 using test_support::record_left_out;
 
 constexpr int kTrials = 31;
-constexpr int kPoints = 4000;
-constexpr double kNoise_mm = 0.3;
+constexpr int kSpeedPoints = 4000;
+constexpr double kSpeedNoise_mm = 0.3;
 
 double milliseconds_of(const std::function<void()>& work) {
   const Stopwatch watch;
@@ -40,8 +40,8 @@ std::vector<Points> trials_on(const TriangleSurface& surface) {
   std::vector<Points> trials;
   Random random(3);
   for (int trial = 0; trial < kTrials; ++trial)
-    trials.push_back(measured(geometry::sample_surface(surface, kPoints, 100 + trial),
-                              random_motion(5.0, 8.0, random), kNoise_mm, false, random));
+    trials.push_back(measured(geometry::sample_surface(surface, kSpeedPoints, 100 + trial),
+                              random_motion(5.0, 8.0, random), kSpeedNoise_mm, false, random));
   return trials;
 }
 
@@ -68,7 +68,7 @@ using registration::TargetSurface;
 
 registration::IcpResult align(const Points& points, const TargetSurface& surface) {
   registration::IcpOptions options;
-  options.sd_mm = kNoise_mm;
+  options.sd_mm = kSpeedNoise_mm;
   options.rotation_sd_deg = 0.0;
   return registration::align(points, surface, RigidTransform::Identity(), options).value();
 }

@@ -14,14 +14,15 @@
 namespace brainshift::sensing {
 namespace {
 
-constexpr int kTruths = 10;  // surgeries that differ as client/tools/twin/variation.hpp has it
+constexpr int kOutlierTruths =
+    10;  // surgeries that differ as client/tools/twin/variation.hpp has it
 constexpr int kMeasurements = 2;
 
 using Surgeries = std::vector<client::SimulatedSurgery>;
 
-Result<Surgeries> play(const bench::Head& head, const char* name) {
+Result<Surgeries> play_outliers(const bench::Head& head, const char* name) {
   Surgeries surgeries;
-  for (std::uint64_t seed = 1; seed <= kTruths; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kOutlierTruths; ++seed) {
     client::Scenario scenario = client::vary(*client::find_scenario(name), seed);
     scenario.fluid_levels_mm.assign(kMeasurements, scenario.fluid_levels_mm.front());
     auto surgery =
@@ -61,7 +62,7 @@ Status outlier_study(const bench::Head& head) {
   for (const auto& [name, what] :
        {std::pair{"paper-icp", "boundary points"}, std::pair{"paper", "displacements"},
         std::pair{"joint-sag", "boundary points and vessel forks"}}) {
-    const auto surgeries = play(head, name);
+    const auto surgeries = play_outliers(head, name);
     if (!surgeries) return tl::unexpected(surgeries.error());
     double clean = 0.0;
     for (const double fraction : {0.0, 0.1, 0.2, 0.3}) {

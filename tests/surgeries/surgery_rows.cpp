@@ -7,7 +7,7 @@
 namespace brainshift::surgeries {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 void add_errors(const std::string& prefix, const FieldErrors& errors, Cells& cells) {
   cells.add(prefix + "tumour_mm", errors.tumour_mm);
@@ -131,7 +131,7 @@ Row row_of(const SurgeryFacts& facts, const client::Scenario& scenario,
 }
 
 Row refused_row(const SurgeryFacts& facts, int stage, const std::string& reason) {
-  Row row = row_of(facts, {}, {}, stage, {}, {}, kNaN);
+  Row row = row_of(facts, {}, {}, stage, {}, {}, kNotMeasured);
   for (auto& [name, text] : row) {
     if (name == "status") text = "refused";
     if (name == "reason") text = cell_text(reason);

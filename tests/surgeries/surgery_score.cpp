@@ -12,7 +12,7 @@
 namespace brainshift::surgeries {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotScored = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNormalQuantile90 = 1.6448536269514722;
 
 // Nodes of tissue, ascending.
@@ -39,10 +39,12 @@ Result<FieldErrors> errors_of(const BrainModel& model, const io::SurgeryTruth& t
     return tl::unexpected(ok.error());
   }
   FieldErrors errors;
-  errors.tumour_mm = run.error_mm.cross ? run.error_mm.cross->mean : kNaN;
-  errors.craniotomy_mm =
-      run.error_mm.craniotomy_displacement ? run.error_mm.craniotomy_displacement->mean : kNaN;
-  errors.craniotomy_closest_mm = run.error_mm.craniotomy ? run.error_mm.craniotomy->mean : kNaN;
+  errors.tumour_mm = run.error_mm.cross ? run.error_mm.cross->mean : kNotScored;
+  errors.craniotomy_mm = run.error_mm.craniotomy_displacement
+                             ? run.error_mm.craniotomy_displacement->mean
+                             : kNotScored;
+  errors.craniotomy_closest_mm =
+      run.error_mm.craniotomy ? run.error_mm.craniotomy->mean : kNotScored;
   const VecX each =
       (displacement - truth.displacement)(Eigen::all, nodes).colwise().norm().transpose();
   errors.mean_mm = each.mean();
@@ -87,11 +89,11 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
     sum += sd;
   }
   const auto count = static_cast<double>(nodes.size());
-  score.coverage_90 = has_sd ? static_cast<double>(inside) / (3.0 * count) : kNaN;
+  score.coverage_90 = has_sd ? static_cast<double>(inside) / (3.0 * count) : kNotScored;
   for (std::size_t i = 0; i < within.size(); ++i) {
-    score.coverage[i] = has_sd ? static_cast<double>(within[i]) / (3.0 * count) : kNaN;
+    score.coverage[i] = has_sd ? static_cast<double>(within[i]) / (3.0 * count) : kNotScored;
   }
-  score.mean_sd_mm = has_sd ? sum / count : kNaN;
+  score.mean_sd_mm = has_sd ? sum / count : kNotScored;
 }
 
 }  // namespace
