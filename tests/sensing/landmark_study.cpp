@@ -23,7 +23,7 @@ namespace {
 
 using test_support::record_check;
 
-constexpr int kLandmarks = 15, kTruths = 12;
+constexpr int kLandmarks = 15, kLandmarkTruths = 12;
 constexpr double kNoise_mm = 1.0;      // length of the error
 constexpr double kFarthest_mm = 45.0;  // from the tumour's centre
 constexpr double kApart_mm = 8.0;
@@ -135,7 +135,7 @@ Status landmark_study(const bench::Head& head) {
     Random random(11);
     Errors errors;
     std::uint64_t sequence = 0;
-    for (std::uint64_t seed = 1; seed <= kTruths; ++seed) {
+    for (std::uint64_t seed = 1; seed <= kLandmarkTruths; ++seed) {
       const auto surgery =
           client::play_scenario(*head.model, head.config, head.prepared->forward(),
                                 client::vary(*client::find_scenario(name), seed), seed);
