@@ -186,13 +186,13 @@ ImageGeometry image_geometry(const std::array<int, 3>& dims, const AffineTransfo
   return geometry;
 }
 
-Status validate_image(const Image& image) {
+Status validate(const Image& image) {
   const std::uint64_t numbers =
       std::visit([](const auto& voxels) { return std::uint64_t{voxels.size()}; }, image.voxels);
   return validate_part(image.geometry, image.components, image.offset, image.part, numbers);
 }
 
-Status validate_image(const ImageView& image) {
+Status validate(const ImageView& image) {
   const std::uint64_t numbers =
       std::visit([](const auto& voxels) { return std::uint64_t{voxels.size()}; }, image.voxels);
   return validate_part(image.geometry, image.components, {0, 0, 0}, image.geometry.dims, numbers);

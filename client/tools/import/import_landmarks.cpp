@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLeastPairs = 3;  // as the daemon needs
-constexpr double kLeastSd_mm = 0.01, kMostSd_mm = 20.0;
+constexpr double kLeastSd_mm = 0.01, kMostLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
   if (options.landmarks.empty()) {
@@ -28,9 +28,10 @@ Status check_landmark_import(const LandmarkOptions& options) {
   }
   if (options.out.empty()) return fail(ErrorCode::kInvalidArgument, "--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
-  if (!(options.sd_mm >= kLeastSd_mm && options.sd_mm <= kMostSd_mm)) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("--sd-mm {}: must be {} to {}",
-                                                         options.sd_mm, kLeastSd_mm, kMostSd_mm));
+  if (!(options.sd_mm >= kLeastSd_mm && options.sd_mm <= kMostLandmarkSd_mm)) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("--sd-mm {}: must be {} to {}", options.sd_mm, kLeastSd_mm,
+                            kMostLandmarkSd_mm));
   }
   std::error_code ignored;
   if (fs::exists(options.out, ignored)) {

@@ -24,9 +24,9 @@ FieldChoice ball(const Vec3& centre_mm, double radius_mm) {
 }
 
 TEST(FieldChoice, TheDefaultAndChoicesThatCombineAreValid) {
-  EXPECT_TRUE(validate({}));
-  EXPECT_TRUE(validate({TumourRegion{0.0}, 10.0, 0.1, false}));
-  EXPECT_TRUE(validate({TumourRegion{1000.0}, 1000.0, 100.0}));
+  EXPECT_TRUE(validate(FieldChoice{}));
+  EXPECT_TRUE(validate(FieldChoice{TumourRegion{0.0}, 10.0, 0.1, false}));
+  EXPECT_TRUE(validate(FieldChoice{TumourRegion{1000.0}, 1000.0, 100.0}));
   EXPECT_TRUE(validate(ball(Vec3(-1000, 0, 1000), 1e-9)));
 }
 
