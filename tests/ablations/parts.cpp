@@ -29,7 +29,7 @@ std::vector<Part> boundary_parts() {
   return {contact};
 }
 
-// Families of loads and the smooth remainder.
+// Families of loads and the smooth residual fields.
 std::vector<Part> prior_parts() {
   const auto of = [](const char* variant, std::vector<std::string> keys, Change change) {
     return part(variant, Anew::kOperators, std::move(keys), std::move(change));

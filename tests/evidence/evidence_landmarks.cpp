@@ -67,7 +67,7 @@ Status run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::evidence::Arguments arguments;
-  CLI::App app{"Landmarks of a real operation, each foretold from the others: a row per landmark.",
+  CLI::App app{"Landmarks of a real operation, each predicted from the others: a row per landmark.",
                "evidence_landmarks"};
   app.add_option("--pairs", arguments.pairs,
                  "landmarks before and during surgery, mm RAS (docs/import.md)")

@@ -154,7 +154,7 @@ class EvidenceChecks:
 
 
 def check_landmarks(study, rows, record):
-    """Landmarks of a real operation, each foretold from the others alone."""
+    """Landmarks of a real operation, each predicted from the others alone."""
     source = f"leave-one-out over {len(rows)} landmarks; evidence_landmarks"
     estimate = rows.numbers("estimate_mm")
     for name, column in MAPS:
@@ -210,7 +210,7 @@ def draw_reliability(rows, folder):
 
 
 def draw_landmarks(rows, folder):
-    fig, ax = chart.figure("Landmarks foretold from the others", "each landmark left out once", size=(9, 4.6))
+    fig, ax = chart.figure("Landmarks predicted from the others", "each landmark left out once", size=(9, 4.6))
     colours = (chart.GREY, chart.BLUE, chart.GREEN, chart.VERMILLION, chart.INK)
     for k, ((name, column), colour, marker) in enumerate(zip(MAPS, colours, "sos^D")):
         ax.plot([i + 0.15 * (k - 2) for i in range(len(rows))], rows.numbers(column), linestyle="none", marker=marker,

@@ -29,7 +29,7 @@ MEAN_CONTACT_RECOVERED, MEAN_CONTACT_CPPD_MM, MEAN_FIXED_CPPD_MM = 85, 1.6, 3.4
 
 
 
-# Maps that foretell a landmark: name, column
+# Maps that predict a landmark: name, column
 MAPS = (("no correction", "none_mm"), ("rigid", "rigid_mm"), ("affine", "affine_mm"),
         ("thin-plate spline", "thin_plate_mm"), ("estimate", "estimate_mm"))
 
