@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surgeries of every joint scenario, each another truth (client/tools/twin/variation.hpp). The first
-// update of a surgery knows the tumour's boundary only, the second the stereo camera's surface too,
-// the third the tracked points.
+// Surgeries of every joint scenario, each another truth (client/tools/twin/variation.hpp). The
+// first update of a surgery knows the tumour's boundary only, the second the stereo camera's
+// surface too, the third the tracked points.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fifteen homologous landmarks around the tumour, each found with an error of 1 mm, as in clinical
-// data sets (Xiao et al. 2017); one set in each of twelve surgeries (client/tools/twin/variation.hpp).
-// Each landmark in turn is left out and predicted from the others: by the model, and by the best
-// rigid motion.
+// data sets (Xiao et al. 2017); one set in each of twelve surgeries
+// (client/tools/twin/variation.hpp). Each landmark in turn is left out and predicted from the
+// others: by the model, and by the best rigid motion.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

@@ -114,7 +114,8 @@ int fullest_slice(const std::vector<float>& weight, const std::array<int, 3>& di
   return static_cast<int>(std::max_element(filled.begin(), filled.end()) - filled.begin());
 }
 
-// A row per voxel of one slice of both volumes: slice_NAME.csv, which tests/studies/sensing.py draws.
+// slice_NAME.csv, a row per voxel of one slice of both volumes, which tests/studies/sensing.py
+// draws.
 void write_slices(const std::string& name, const ultrasound::CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");

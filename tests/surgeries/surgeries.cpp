@@ -2,10 +2,11 @@
 // surgeries: many different simulated surgeries on one head, estimated by the default method with
 // the case's defaults, one row of a table per update.
 //
-// Place k of a run is the patient of seed `first_seed` + k - 1 (client/tools/twin/varied_patient.hpp);
-// its surgeries have the seeds that follow those of the place before, from `first_seed`
-// (client/tools/twin/variation.hpp). The run that is published begins at seed 1. While the estimate is
-// being worked on, runs begin at 1001, so that nothing is fitted to what is published.
+// Place k of a run is the patient of seed `first_seed` + k - 1
+// (client/tools/twin/varied_patient.hpp); its surgeries have the seeds that follow those of the
+// place before, from `first_seed` (client/tools/twin/variation.hpp). The run that is published
+// begins at seed 1. While the estimate is being worked on, runs begin at 1001, so that nothing is
+// fitted to what is published.
 //
 // study_program.hpp says where the images of the case are looked for.
 #include <CLI/CLI.hpp>
