@@ -4,8 +4,8 @@
 
 Prepares the default case, simulates the surgery `paper-icp` with seed 1, plays it to a daemon with a journal, and draws
 in a coronal slice through the tumour: where the MRI says the tumour is and where it is; where the update says it is; and,
-along a line from the opening through the tumour, the true displacement with the update's own 90 % interval. Takes a
-minute. Needs Debian's python3-matplotlib and python3-vtk9. OUT.png: docs/pictures/before-and-after.png by default.
+along a line from the opening through the tumour, the true displacement with the update's own 90 % interval. Takes two
+minutes. Needs Debian's python3-matplotlib and python3-vtk9. OUT.png: docs/pictures/before-and-after.png by default.
 """
 import gzip
 import json
@@ -22,6 +22,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import vtk
+from matplotlib import patheffects
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -160,21 +161,23 @@ def draw(mesh, result, out):
     errors = [result["error_mm"][key] for key in ("initial", "cross")]
 
     plt.rcParams.update({"font.size": 10, "font.family": "DejaVu Sans"})
-    figure, axes = plt.subplots(1, 3, figsize=(13, 4.6), gridspec_kw={"width_ratios": [1, 1, 1.25]})
-    titles = [f"MRI of before surgery: {errors[0]['mean']:.1f} mm off", f"corrected: {errors[1]['mean']:.2f} mm off"]
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4.7), layout="constrained", gridspec_kw={"width_ratios": [1, 1, 1.2]})
+    edge = [patheffects.withStroke(linewidth=3, foreground="#222222")]
+    titles = [f"by the MRI: {errors[0]['mean']:.1f} mm off", f"corrected: {errors[1]['mean']:.2f} mm off"]
     for axis, title, curve, colour, word in zip(axes, titles, (curves[0], curves[2]), (BEFORE, ESTIMATE), ("by the MRI", "corrected")):
         axis.imshow(now, cmap="gray", origin="lower", extent=(x.min(), x.max(), z.min(), z.max()), vmax=np.percentile(now, 99.8))
         axis.plot(*curves[1].T, color=TRUE, lw=4, label="tumour, true")
-        axis.plot(*curve.T, color=colour, lw=2, ls="--", label=f"tumour, {word}")
+        axis.plot(*curve.T, color=colour, lw=2, ls="--", label=f"tumour, {word}", path_effects=edge)
         axis.set_xlim(x.max(), x.min())  # the patient's right on the left
         axis.set_title(title, fontsize=12, fontweight="bold")
         axis.plot([78, 58], [-32, -32], color="white", lw=2)
-        axis.text(68, -30.5, "20 mm", color="white", ha="center", va="bottom")
+        axis.text(68, -30.5, "20 mm", color="white", ha="center", va="bottom", path_effects=edge)
         axis.legend(loc="upper right", facecolor="#333333", labelcolor="white", framealpha=0.9, fontsize=9)
         axis.set_axis_off()
     down = gravity[[0, 2]] / np.linalg.norm(gravity[[0, 2]])
-    axes[0].annotate("", xy=np.array([74, 46]) + 12 * down, xytext=(74, 46), arrowprops={"color": "white", "width": 1.5, "headwidth": 7, "headlength": 7})
-    axes[0].text(*(np.array([74, 46]) - 3 * down), "gravity", color="white", ha="center", va="center", fontsize=9)
+    start = np.array([20, -18])
+    axes[0].annotate("", xy=start + 12 * down, xytext=start, arrowprops={"color": "white", "width": 1.5, "headwidth": 7, "headlength": 7, "path_effects": edge})
+    axes[0].text(*(start - 2 * down), "gravity", color="white", ha="center", va="bottom", path_effects=edge)
 
     opening = np.array(json.loads(re.search(r"^craniotomy:.*?centre_mm: (\[.*?\])", CASE.read_text(), re.MULTILINE | re.DOTALL)[1]))
     way = centre - opening
@@ -188,16 +191,15 @@ def draw(mesh, result, out):
                       label="90 % interval of the update")
     axis.plot(depth, estimate, color=ESTIMATE, lw=2, label="estimate")
     axis.plot(depth, true, color="#0072b2", lw=2, ls="--", label="truth")
-    axis.axhline(0, color="#888888", lw=0.8)
     middle = (centre - opening) @ way - along[inside][0]
     axis.axvspan(middle - 13, middle + 13, color="#999999", alpha=0.2, lw=0)
-    axis.text(middle, 0.02, "tumour", transform=axis.get_xaxis_transform(), ha="center", va="bottom", color="#444444")
+    axis.text(middle, 0.98, "tumour", transform=axis.get_xaxis_transform(), ha="center", va="top", color="#444444")
     axis.set_xlabel("distance from the opening, through the tumour (mm)")
     axis.set_ylabel("displacement along gravity (mm)")
     axis.set_title("how sure the update is", fontsize=12, fontweight="bold")
-    axis.legend(frameon=False, fontsize=9)
+    axis.legend(frameon=False, fontsize=9, loc="lower right")
+    axis.set_ylim(bottom=0)
     axis.spines[["top", "right"]].set_visible(False)
-    figure.tight_layout()
     figure.savefig(out, dpi=110)
     share = np.mean(np.abs(true - estimate) <= QUANTILE_90 * sd)
     print(f"{out}: {errors[0]['mean']:.2f} mm before, {errors[1]['mean']:.3f} mm after; truth inside on {100 * share:.0f} % of the line")

@@ -12,7 +12,8 @@ import sys
 import numpy as np
 from PIL import Image
 
-LARGEST_DIFFERENCE = 16  # of a channel, in grey levels, that the faster quantisation may cause
+LARGEST_DIFFERENCE = 16  # of a channel, in grey levels, that an octree may cause at any pixel
+SHARE_OFF = 0.005  # of the pixels that it may change by more than 6 grey levels: photographs lose their shades otherwise
 
 
 def palettes(image):
@@ -30,7 +31,7 @@ def with_palette(image):
         palette[3 * index : 3 * index + 3] = background
         candidate.putpalette(palette)
         difference = np.abs(np.asarray(candidate.convert("RGB")).astype(int) - pixels)
-        if difference.max() <= LARGEST_DIFFERENCE:
+        if difference.max() <= LARGEST_DIFFERENCE and (difference.max(axis=2) > 6).mean() <= SHARE_OFF:
             return candidate
     return candidate
 
