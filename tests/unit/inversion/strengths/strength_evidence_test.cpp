@@ -14,14 +14,14 @@ namespace {
 
 using Eigen::MatrixXd;
 
-constexpr int kCommon = 2, kModes = 30, kData = 120;
+constexpr int kShared = 2, kLoads = 30, kRows = 120;
 constexpr PerPart<int> kCounts = {3, 0, 7, 0, 0, 0, 20, 0, 0};
 constexpr std::size_t kPresentPart[] = {0, 2, 6};
 // The evidence leaves out what changes ln p by less than about this.
 constexpr double kLeftOut = 0.03;
 
 struct Model {
-  explicit Model(std::uint64_t seed) : jacobian(kData, kCommon + kModes), data(kData) {
+  explicit Model(std::uint64_t seed) : jacobian(kRows, kShared + kLoads), data(kRows) {
     Random random(seed);
     for (Eigen::Index i = 0; i < jacobian.size(); ++i) jacobian.data()[i] = 0.4 * random.normal();
     for (double& value : data) value = 2.0 * random.normal();
@@ -34,8 +34,8 @@ struct Model {
 };
 
 VecX prior_variance(const PerPart<double>& variances) {
-  VecX result = VecX::Ones(kCommon + kModes);
-  int next = kCommon;
+  VecX result = VecX::Ones(kShared + kLoads);
+  int next = kShared;
   for (std::size_t part = 0; part < kCounts.size(); ++part) {
     result.segment(next, kCounts[part]).setConstant(variances[part]);
     next += kCounts[part];
@@ -59,7 +59,7 @@ PerPart<double> of(double first, double second, double third) {
 
 class StrengthEvidenceTest : public testing::Test {
  protected:
-  StrengthEvidenceTest() : evidence(kCounts, kCommon) {
+  StrengthEvidenceTest() : evidence(kCounts, kShared) {
     taken = evidence.take(model.gram(), model.right());
   }
   void SetUp() override { ASSERT_TRUE(taken); }
@@ -130,15 +130,15 @@ TEST_F(StrengthEvidenceTest, MomentsAreThoseOfTheLinearModel) {
   MatrixXd precision = model.gram();
   precision.diagonal() += prior.cwiseInverse();
   const MatrixXd covariance = precision.inverse();
-  VecX mean(kCommon + kModes);
+  VecX mean(kShared + kLoads);
   ASSERT_TRUE(evidence.mean(variances, work, mean));
   EXPECT_LT((mean - covariance * model.right()).norm(), 1e-2 * mean.norm());
 
-  MatrixXd explained(evidence.rank(), kModes);
+  MatrixXd explained(evidence.rank(), kLoads);
   ASSERT_TRUE(evidence.explained(variances, work, explained));
   const MatrixXd left =
-      MatrixXd(prior.tail(kModes).asDiagonal()) - explained.transpose() * explained;
-  EXPECT_LT((left - covariance.bottomRightCorner(kModes, kModes)).cwiseAbs().maxCoeff(), 1e-2);
+      MatrixXd(prior.tail(kLoads).asDiagonal()) - explained.transpose() * explained;
+  EXPECT_LT((left - covariance.bottomRightCorner(kLoads, kLoads)).cwiseAbs().maxCoeff(), 1e-2);
 }
 
 TEST_F(StrengthEvidenceTest, HoldsOnlyWhatItWasGiven) {
@@ -161,7 +161,7 @@ TEST_F(StrengthEvidenceTest, NumbersThatAreNotFiniteAreRejected) {
 }
 
 TEST_F(StrengthEvidenceTest, DataThatSayNothingLeaveEveryStrengthAsProbable) {
-  ASSERT_TRUE(evidence.take(MatrixXd::Zero(kModes, kModes), VecX::Zero(kModes)));
+  ASSERT_TRUE(evidence.take(MatrixXd::Zero(kLoads, kLoads), VecX::Zero(kLoads)));
   PerPart<StrengthProfile> found{};
   ASSERT_TRUE(evidence.project(of(1, 1, 1), projection, work));
   ASSERT_TRUE(evidence.profiles(projection, of(1, 1, 1), {}, found, work));
