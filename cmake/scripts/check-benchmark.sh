@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # check-benchmark.sh: fails when BENCHMARK.md is of a commit that is no ancestor of this one, or since
 # which the inversion has changed by more than comments and blank lines. Exit status 77 without the
-# history that tells.
+# history that tells, and where the page itself tells its readers that it is outdated.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -23,6 +23,10 @@ git merge-base --is-ancestor "$commit" HEAD ||
   { echo "BENCHMARK.md is of $commit, which is no ancestor of HEAD" >&2; exit 1; }
 changed=$(git diff --ignore-blank-lines -I'^[[:space:]]*//' "$commit" -- "${inversion[@]}" |
   sed -n 's/^diff --git a\/\([^ ]*\) .*/\1/p')
+if [ -n "$changed" ] && grep -q '^\*\*Outdated\*\*' BENCHMARK.md; then
+  echo "BENCHMARK.md is of $commit and says that it is outdated (make bench)"
+  exit 77
+fi
 if [ -n "$changed" ]; then
   echo "BENCHMARK.md is of $commit; since then the inversion has changed (make bench):" >&2
   echo "$changed" >&2
