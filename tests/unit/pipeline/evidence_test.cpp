@@ -15,6 +15,7 @@
 namespace brainshift::pipeline {
 namespace {
 
+using server::FakeInverter;
 using testing::HasSubstr;
 
 constexpr std::int64_t kSecond = 1'000'000'000;

@@ -16,6 +16,9 @@
 namespace brainshift::pipeline {
 namespace {
 
+using server::FakeInverter;
+using server::kCase;
+using server::landmarks;
 using testing::HasSubstr;
 
 // Ellipsoid about the origin, latitude and longitude triangles; closed up to its two small polar

@@ -15,7 +15,7 @@ std::string sample_frame() {
   return encode_frame(MessageType::kObservation, 0x1122334455667788ull, kPayload);
 }
 
-void expect_refused(const std::string& bytes, const char* field) {
+void expect_frame_refused(const std::string& bytes, const char* field) {
   const auto frame = decode_frame(bytes);
   ASSERT_FALSE(frame);
   EXPECT_EQ(frame.error().code, ErrorCode::kProtocol);
@@ -54,13 +54,13 @@ TEST(Frame, LayoutIsTheDocumentedOne) {
 TEST(Frame, EveryTruncationIsRefused) {
   const std::string bytes = sample_frame();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    expect_refused(bytes.substr(0, size), size < kHeaderBytes ? "header" : "payload size");
+    expect_frame_refused(bytes.substr(0, size), size < kHeaderBytes ? "header" : "payload size");
   }
 }
 
 TEST(Frame, TrailingBytesAndConcatenatedFramesAreRefused) {
-  expect_refused(sample_frame() + '\0', "payload size");
-  expect_refused(sample_frame() + sample_frame(), "payload size");
+  expect_frame_refused(sample_frame() + '\0', "payload size");
+  expect_frame_refused(sample_frame() + sample_frame(), "payload size");
 }
 
 TEST(Frame, EveryFlippedBitIsNoticed) {
@@ -75,24 +75,25 @@ TEST(Frame, EveryFlippedBitIsNoticed) {
 }
 
 TEST(Frame, EachHeaderFieldIsNamedWhenItIsWrong) {
-  for (std::size_t i = 0; i < 4; ++i) expect_refused(with_byte(sample_frame(), i, 'x'), "magic");
-  expect_refused(with_byte(sample_frame(), 4, 0), "version");
-  expect_refused(with_byte(sample_frame(), 4, 1), "version");
-  expect_refused(with_byte(sample_frame(), 5, 1), "version");
-  expect_refused(with_byte(sample_frame(), 6, 0), "type");
-  expect_refused(with_byte(sample_frame(), 6, 8), "type");
-  expect_refused(with_byte(sample_frame(), 6, 16), "type");
-  expect_refused(with_byte(sample_frame(), 7, 1), "type");
-  expect_refused(with_byte(sample_frame(), 8, 3), "payload size");
-  expect_refused(with_byte(sample_frame(), 12, 0), "CRC-32");
+  for (std::size_t i = 0; i < 4; ++i)
+    expect_frame_refused(with_byte(sample_frame(), i, 'x'), "magic");
+  expect_frame_refused(with_byte(sample_frame(), 4, 0), "version");
+  expect_frame_refused(with_byte(sample_frame(), 4, 1), "version");
+  expect_frame_refused(with_byte(sample_frame(), 5, 1), "version");
+  expect_frame_refused(with_byte(sample_frame(), 6, 0), "type");
+  expect_frame_refused(with_byte(sample_frame(), 6, 8), "type");
+  expect_frame_refused(with_byte(sample_frame(), 6, 16), "type");
+  expect_frame_refused(with_byte(sample_frame(), 7, 1), "type");
+  expect_frame_refused(with_byte(sample_frame(), 8, 3), "payload size");
+  expect_frame_refused(with_byte(sample_frame(), 12, 0), "CRC-32");
 }
 
 TEST(Frame, AStatedSizeAboveTheCapIsRefusedBeforeThePayloadIsLookedAt) {
   std::string header = sample_frame().substr(0, kHeaderBytes);
   header.replace(8, 4, std::string("\x01\x00\x00\x04", 4));  // 64 MiB + 1
-  expect_refused(header, "must be at most 67108864");
+  expect_frame_refused(header, "must be at most 67108864");
   header.replace(8, 4, std::string("\xff\xff\xff\xff", 4));
-  expect_refused(header, "must be at most 67108864");
+  expect_frame_refused(header, "must be at most 67108864");
 }
 
 }  // namespace

@@ -154,9 +154,9 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
   }
   expect_round_trip(SessionRequest{"", Method::kPaper, Boundary::kContact, false},
                     decode_session_request);
-  expect_round_trip(SessionInfo{7, "id", 18475, std::numeric_limits<int>::max(), 906, 0.1,
-                                1ull << 40, 1.0 / 3.0, 2.3, ~0ull},
-                    decode_session_info);
+  expect_round_trip(
+      SessionInfo{7, "id", 18475, std::numeric_limits<int>::max(), 906, 0.1, 1ull << 40, ~0ull},
+      decode_session_info);
   expect_round_trip(ObservationReceipt{std::numeric_limits<std::uint64_t>::max(), true},
                     decode_observation_receipt);
   expect_round_trip(Subscription{~0ull, Subscription::kMaxWindow, 1ull << 40}, decode_subscription);
