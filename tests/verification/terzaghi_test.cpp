@@ -16,7 +16,7 @@ namespace {
 
 using test_support::record_check;
 constexpr double kPiTerzaghi = std::numbers::pi;
-constexpr double kLoad = 1e-4;  // N/mm^2
+constexpr double kPressedLoad = 1e-4;  // N/mm^2
 constexpr const char* kTerzaghiSource = "Terzaghi 1923; Verruijt 2016 section 2.2";
 
 double series_pressure(double depth, double time) {
@@ -43,12 +43,12 @@ double time_scale_s(const PoroMaterial& material) {  // H^2 / c_v
   return Column::kHeight * Column::kHeight / consolidation_coefficient(material);
 }
 double drained_settlement_mm(const PoroMaterial& material) {
-  return kLoad * Column::kHeight / (material.elastic.lambda + 2.0 * material.elastic.shear);
+  return kPressedLoad * Column::kHeight / (material.elastic.lambda + 2.0 * material.elastic.shear);
 }
 
 TEST(Terzaghi, PressureAndSettlementFollowTheSeries) {
   const PoroMaterial material = tissue(0.46);
-  const Column column(80, kLoad);
+  const Column column(80, kPressedLoad);
   BiotStepper stepper = column.stepper(material);
   const double scale_s = time_scale_s(material);
   BiotState state = BiotState::at_rest(column.mesh.num_nodes());
@@ -64,9 +64,9 @@ TEST(Terzaghi, PressureAndSettlementFollowTheSeries) {
     for (const NodeIndex n : column.axis) {
       const double depth = Column::kHeight - column.mesh.nodes(2, n);
       const double exact = series_pressure(depth, time);
-      pressure_error = std::max(pressure_error, std::abs(state.pressure[n] / kLoad - exact));
+      pressure_error = std::max(pressure_error, std::abs(state.pressure[n] / kPressedLoad - exact));
       test_support::record({"terzaghi", series, "depth / H", "pressure / q",
-                            depth / Column::kHeight, state.pressure[n] / kLoad});
+                            depth / Column::kHeight, state.pressure[n] / kPressedLoad});
       test_support::record({"terzaghi", series + " series", "depth / H", "pressure / q",
                             depth / Column::kHeight, exact});
     }
@@ -84,7 +84,7 @@ TEST(Terzaghi, PressureAndSettlementFollowTheSeries) {
 // A load that ramps up smoothly, so that the order of the time steps shows from the start.
 double ramped_settlement_mm(int steps) {
   const PoroMaterial material = tissue(0.46);
-  const Column column(20, kLoad);
+  const Column column(20, kPressedLoad);
   BiotStepper stepper = column.stepper(material, {.stabilise = false});
   BiotState state = BiotState::at_rest(column.mesh.num_nodes());
   const double dt = 0.2 * time_scale_s(material) / steps;
@@ -117,7 +117,7 @@ TEST(Terzaghi, BackwardEulerHasOrderOneInTheStep) {
 // Rise and fall of the pressure along the column beyond a monotone profile, over q.
 double roughness(double step_over_bound, bool stabilise) {
   const PoroMaterial material = tissue(0.46);
-  const Column column(20, kLoad);
+  const Column column(20, kPressedLoad);
   BiotStepper stepper = column.stepper(material, {.stabilise = stabilise});
   BiotState state = BiotState::at_rest(column.mesh.num_nodes());
   // The bound of the layer height, the direction in which it flows.
@@ -129,7 +129,7 @@ double roughness(double step_over_bound, bool stabilise) {
   for (std::size_t i = 1; i < column.axis.size(); ++i) {
     travelled += std::abs(state.pressure[column.axis[i]] - state.pressure[column.axis[i - 1]]);
   }
-  return (travelled - kLoad) / kLoad;
+  return (travelled - kPressedLoad) / kPressedLoad;
 }
 
 TEST(Terzaghi, StabilisedPressureIsSmoothBelowTheStepOfVermeerAndVerruijt) {
@@ -172,7 +172,7 @@ TEST(Terzaghi, LongAfterTheLoadItIsDrainedElasticity) {
       (late->displacement - drained).cwiseAbs().maxCoeff() / drained.cwiseAbs().maxCoeff();
   EXPECT_TRUE(record_check("drained-limit", "difference to drained elasticity at 1e10 R^2/c_v",
                            difference, "<= 1e-9", difference <= 1e-9, "common/fem/elasticity.hpp"));
-  EXPECT_LT(late->pressure.cwiseAbs().maxCoeff(), 1e-9 * kLoad);
+  EXPECT_LT(late->pressure.cwiseAbs().maxCoeff(), 1e-9 * kPressedLoad);
 }
 
 }  // namespace

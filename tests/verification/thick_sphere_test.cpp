@@ -16,14 +16,14 @@
 namespace brainshift::verification {
 namespace {
 
-constexpr double kInner = 10.0, kOuter = 20.0, kYoungs = 0.003, kPressure = 1e-4;
+constexpr double kInner = 10.0, kOuter = 20.0, kBallYoungs = 0.003, kPressure = 1e-4;
 constexpr char kStudy[] = "thick-sphere";
 constexpr char kThickSphereSource[] = "Lame: Timoshenko and Goodier art. 142";
 
 double exact(double r, double nu) {
   const double a3 = std::pow(kInner, 3), b3 = std::pow(kOuter, 3);
   return kPressure * a3 / (b3 - a3) * ((1.0 - 2.0 * nu) * r + (1.0 + nu) * b3 / (2.0 * r * r)) /
-         kYoungs;
+         kBallYoungs;
 }
 
 // Radial and hoop stress differ by this.
@@ -61,8 +61,8 @@ double stress_pct(const fem::DisplacementSpace& space, const Points& u, double n
     const Eigen::Vector4d centre = Eigen::Vector4d::Constant(0.25);
     const Vec3 x = 0.25 * space.mesh.nodes(Eigen::all, space.mesh.tets.col(e)).rowwise().sum();
     const double expected = exact_von_mises(x.norm());
-    const double found = fem::von_mises(
-        fem::stress_from(elasticity(kYoungs, nu), fem::displacement_gradient(space, u, e, centre)));
+    const double found = fem::von_mises(fem::stress_from(
+        elasticity(kBallYoungs, nu), fem::displacement_gradient(space, u, e, centre)));
     const double volume = fem::tet_geometry(space.mesh, e).volume;
     error += volume * (found - expected) * (found - expected);
     scale += volume * expected * expected;
@@ -71,7 +71,7 @@ double stress_pct(const fem::DisplacementSpace& space, const Points& u, double n
 }
 
 Outcome thick_sphere(fem::Element element, double nu, int cells) {
-  auto problem = problem_on(shell(cells), element, elasticity(kYoungs, nu));
+  auto problem = problem_on(shell(cells), element, elasticity(kBallYoungs, nu));
   add_symmetry(problem, true);
   add_condition(problem, "cavity", in_cavity, forward::Pressure{kPressure});
   const auto solution = solved(problem);
@@ -92,7 +92,7 @@ Outcome nodal_average(double nu, int cells) {
       if (space.nodes(axis, n) == 0.0) dofs.fix_component(n, axis);
   }
   dofs.finalise();
-  const fem::Elasticity tissue = elasticity(kYoungs, nu);
+  const fem::Elasticity tissue = elasticity(kBallYoungs, nu);
   const auto deviatoric = fem::MaterialMap::uniform(
       {fem::Elasticity{-2.0 / 3.0 * tissue.shear, tissue.shear}}, space.num_elements());
   std::vector<Eigen::Triplet<double, long>> entries;

@@ -18,6 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
+using wire::encode;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;

@@ -16,6 +16,7 @@ namespace brainshift::client {
 namespace {
 
 using std::chrono::milliseconds;
+using wire::encode;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;

@@ -66,12 +66,12 @@ TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   EXPECT_EQ(watch_line(told, false),
             "update 12  age unknown  3 of 100 nodes (2 sent, 7.1 kB)  no tumour node  good, stale: "
             "no word");
-  const auto json = nlohmann::json::parse(watch_line(told, true));
-  EXPECT_EQ(json.at("sequence"), 12);
-  EXPECT_EQ(json.at("currency"), "stale");
-  EXPECT_TRUE(json.at("age_s").is_null());
-  EXPECT_TRUE(json.at("tumour_mm").is_null());
-  EXPECT_EQ(json.at("received_nodes"), 2);
+  const auto said = nlohmann::json::parse(watch_line(told, true));
+  EXPECT_EQ(said.at("sequence"), 12);
+  EXPECT_EQ(said.at("currency"), "stale");
+  EXPECT_TRUE(said.at("age_s").is_null());
+  EXPECT_TRUE(said.at("tumour_mm").is_null());
+  EXPECT_EQ(said.at("received_nodes"), 2);
 }
 
 TEST(Watch, ALateAnswerIsMarked) {

@@ -170,22 +170,5 @@ TEST(Chart, LabelsOfEqualPointsDoNotCoverEachOther) {
   EXPECT_GT(two.area(), one.area());
 }
 
-// A grid line and a tick stand at every whole number that has a name, and nowhere else.
-TEST(Chart, ACategoryAxisHasATickForEveryName) {
-  ChartSpec spec = one_line({3.0, 1.0, 2.0});
-  spec.x.names = {"one", "two", "three"};
-  cv::Rect area;
-  const cv::Mat chart = draw_chart(spec, &area);
-  const int below = area.y + area.height + 6;  // the ticks' ends, outside the data area
-  std::vector<int> columns;
-  for (int x = area.x; x <= area.x + area.width; ++x) {
-    const bool pale = chart.at<cv::Vec3b>(below, x) == pixel_of(palette::kPale);
-    if (pale && (columns.empty() || x > columns.back() + 3)) columns.push_back(x);
-  }
-  ASSERT_EQ(columns.size(), 3u);
-  EXPECT_NEAR(columns[1] - columns[0], columns[2] - columns[1], 1);
-  EXPECT_GT(columns[1] - columns[0], area.width / 3);
-}
-
 }  // namespace
 }  // namespace brainshift::client
