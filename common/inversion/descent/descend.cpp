@@ -20,17 +20,12 @@ Result<Estimate> descend(const PreparedModel& model, Method method, const Sparse
       contact::WoodburySystem system(model.forward());
       return steepest_descent(model, data, options, system);
     }
-    case Method::kConjugateGradients: {
-      contact::WoodburySystem system(model.forward());
-      return conjugate_gradients(model, data, options, system);
-    }
     case Method::kIterativeSolver: {
       const auto system = contact::IterativeSystem::build(model.forward());
       if (!system) return tl::unexpected(system.error());
       return conjugate_gradients(model, data, options, **system);
     }
-    case Method::kCondensed:
-    case Method::kCondensedExact: break;
+    case Method::kCondensed: break;
   }
   return fail(ErrorCode::kInternal,
               "method " + std::string(to_string(method)) + " is not a descent method");

@@ -3,7 +3,6 @@
 //
 //   kPaper                steepest descent       refactorises for every new active set
 //   kPaperWoodbury        steepest descent       contact as a low-rank correction of the factor
-//   kConjugateGradients   conjugate gradients    the same correction
 //   kIterativeSolver      conjugate gradients    solves by preconditioned conjugate gradients
 #pragma once
 

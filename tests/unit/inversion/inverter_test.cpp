@@ -30,7 +30,7 @@ class Inverters : public ::testing::TestWithParam<Method> {
     config.condensed.uncertainty_nodes = 40;
     return config;
   }
-  // At nodes of the data region, which method condensed-exact needs.
+  // At nodes of the data region.
   static SparseData data() {
     const SparseData sampled = sagging_data(*model(), 0.1);
     const auto region = data_region(*patient());
