@@ -3,10 +3,14 @@
 
 #include <utility>
 
+#include "common/contact/iterative_system.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "common/contact/woodbury_system.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/contract/quality_check.hpp"
-#include "common/inversion/descent/descend.hpp"
+#include "common/inversion/descent/conjugate_gradients.hpp"
+#include "common/inversion/descent/steepest_descent.hpp"
 #include "common/inversion/prepared/condense.hpp"
 
 namespace brainshift::inversion {
@@ -33,6 +37,25 @@ class Condensed final : public Inverter {
   CondensedInverter inverter_;
   std::uint64_t bytes_;  // of the operators, which the inverter shares
 };
+
+// With the system of equations that belongs to the method.
+//   kPaper             steepest descent      refactorises for every new active set
+//   kPaperWoodbury     steepest descent      contact as a low-rank correction of the factor
+//   kIterativeSolver   conjugate gradients   solves by preconditioned conjugate gradients
+Result<Estimate> descend(const PreparedModel& model, Method method, const SparseData& data,
+                         const InversionOptions& options) {
+  if (method == Method::kPaper) {
+    contact::RefactorisedSystem system(model.forward());
+    return steepest_descent(model, data, options, system);
+  }
+  if (method == Method::kPaperWoodbury) {
+    contact::WoodburySystem system(model.forward());
+    return steepest_descent(model, data, options, system);
+  }
+  const auto system = contact::IterativeSystem::build(model.forward());
+  if (!system) return tl::unexpected(system.error());
+  return conjugate_gradients(model, data, options, **system);
+}
 
 // Every descent starts from nothing: there is no state beside the model.
 class Descent final : public Inverter {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/inversion/descent/line_search.hpp"
+#include "common/inversion/descent/objective.hpp"
 #include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
