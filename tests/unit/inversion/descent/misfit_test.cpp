@@ -44,13 +44,6 @@ TEST(Misfit, WeighsEveryDatumByItsStandardDeviation) {
   EXPECT_NEAR(misfit->inner(e, e), expected, 1e-12 * expected);
 }
 
-TEST(Misfit, RefusesADatumOutsideTheBrain) {
-  const PreparedModel model = prepare(Boundary::kFixed);
-  SparseData data = uneven_data(model);
-  data.positions.col(2) = Vec3(30, 30, 90);
-  EXPECT_FALSE(Misfit::build(model, data).has_value());
-}
-
 // Omega is quadratic for a given set: it must be higher on either side of the exact step, by the
 // same amount.
 TEST(LineSearch, StepsToTheMinimumOfTheObjective) {
