@@ -10,6 +10,9 @@
 namespace brainshift::contact {
 namespace {
 
+// Relative to the largest displacement: below it, rounding decides the sign of a penetration.
+constexpr double kHover = 1e-11;
+
 ActiveSet where_positive(const VecX& values) {
   ActiveSet active(static_cast<std::size_t>(values.size()));
   for (std::size_t i = 0; i < active.size(); ++i)
@@ -130,7 +133,7 @@ Result<UnilateralSolution> solve_unilateral(const linalg::SymmetricMatrix& stiff
     ++result.iterations;
     const VecX penetration = problem.penetration(newton);
     ActiveSet next = where_positive(penetration);
-    const double hover_mm = options.hover * newton.lpNorm<Eigen::Infinity>();
+    const double hover_mm = kHover * newton.lpNorm<Eigen::Infinity>();
     const bool converged = same_set(next, result.active, penetration, hover_mm);
     if (converged || q.size() == 0) {
       q = newton;

@@ -28,8 +28,6 @@ struct UnilateralSolution {
 struct UnilateralOptions {
   int max_iterations = 60;
   double touching_mm = 1e-9;  // a gap below this counts as touching at the start
-  // Relative to the largest displacement: below it, rounding decides the sign of a penetration.
-  double hover = 1e-11;
 };
 
 // stiffness: K of the constrained unknowns (lower); load: f - K lift, 3 x n nodal.

@@ -36,6 +36,10 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
+constexpr double kFacetAngle_deg = 25.0;         // CGAL's guarantee needs at most 30
+constexpr double kFacetDistanceOverEdge = 0.15;  // surface approximation error over edge
+constexpr double kCellRadiusEdgeRatio = 2.2;     // CGAL's guarantee needs more than 2
+
 // CGAL bounds circumradii from above; users give edge lengths. With these ratios of bound to
 // target the mean edge of the mesh is the target within a few per cent (measured on balls and on
 // the head).
@@ -134,10 +138,10 @@ Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure,
       p::p_rng = &rays);
   const ScaledField facet_radius{&edge_mm, kFacetRadiusOverEdge};
   const ScaledField cell_radius{&edge_mm, kCellRadiusOverEdge};
-  const ScaledField facet_distance{&edge_mm, options.facet_distance_over_edge};
-  const Criteria criteria(p::facet_angle = options.facet_angle_deg, p::facet_size = facet_radius,
+  const ScaledField facet_distance{&edge_mm, kFacetDistanceOverEdge};
+  const Criteria criteria(p::facet_angle = kFacetAngle_deg, p::facet_size = facet_radius,
                           p::facet_distance = facet_distance,
-                          p::cell_radius_edge_ratio = options.cell_radius_edge_ratio,
+                          p::cell_radius_edge_ratio = kCellRadiusEdgeRatio,
                           p::cell_size = cell_radius);
 
   report(progress, "mesh: refine", 0.0);

@@ -23,9 +23,6 @@ using SizingField = std::function<double(const Vec3&)>;
 
 struct MeshingOptions {
   float level = 0.5f;
-  double facet_angle_deg = 25.0;           // CGAL's guarantee needs <= 30
-  double facet_distance_over_edge = 0.15;  // surface approximation error / edge
-  double cell_radius_edge_ratio = 2.2;
   // Optimisation stops when no dihedral angle is smaller. 0: no optimisation, for callers that
   // need only the surface.
   double sliver_bound_deg = 12.0;

@@ -11,25 +11,32 @@
 namespace brainshift::geometry {
 namespace {
 
+constexpr int kFewestPoints = 50;
+// Extent over the craniotomy's size. A camera may see only a part of the craniotomy, or also drapes
+// and skin around it.
+constexpr double kLeastExtent = 0.2, kMostExtent = 6.0;
+// The brain sinks by up to 20 mm (Roberts et al. 1998). A surface farther away has a wrong pose.
+constexpr double kFarthest_mm = 25.0;
+constexpr double kLeastCosine = 0.3;
+
 Vec3 face_area_vector(const Points& vertices, const Eigen::Vector3i& t) {
   const Vec3 a = vertices.col(t[0]);
   return (vertices.col(t[1]) - a).cross(vertices.col(t[2]) - a);
 }
 
-Status check_points(const Points& points, const SurfaceCheckOptions& options) {
+Status check_points(const Points& points) {
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     if (points.col(i).allFinite()) continue;
     return fail(ErrorCode::kNotFinite, fmt::format("surface point {} is not finite", i));
   }
-  if (points.cols() >= options.min_points) return {};
+  if (points.cols() >= kFewestPoints) return {};
   return fail(ErrorCode::kEmptySet, fmt::format("the surface has {} points: must be at least {}",
-                                                points.cols(), options.min_points));
+                                                points.cols(), kFewestPoints));
 }
 
-Status check_extent(double extent_mm, const CorticalSite& site,
-                    const SurfaceCheckOptions& options) {
-  const double least = options.min_extent * site.size_mm;
-  const double most = options.max_extent * site.size_mm;
+Status check_extent(double extent_mm, const CorticalSite& site) {
+  const double least = kLeastExtent * site.size_mm;
+  const double most = kMostExtent * site.size_mm;
   if (extent_mm >= least && extent_mm <= most) return {};
   const auto fits = [&](double factor) {
     return factor * extent_mm >= least && factor * extent_mm <= most;
@@ -49,8 +56,7 @@ Status check_extent(double extent_mm, const CorticalSite& site,
 }
 
 // Turns the triangles outwards, and notes it in `checked`.
-Status orient(CheckedSurface& checked, const CorticalSite& site,
-              const SurfaceCheckOptions& options) {
+Status orient(CheckedSurface& checked, const CorticalSite& site) {
   TriangleSurface& surface = checked.surface;
   double along = 0.0, area = 0.0;
   for (int t = 0; t < surface.num_triangles(); ++t) {
@@ -59,11 +65,11 @@ Status orient(CheckedSurface& checked, const CorticalSite& site,
     area += n.norm();
   }
   const double cosine = area > 0.0 ? along / area : 0.0;
-  if (std::abs(cosine) < options.min_cosine) {
+  if (std::abs(cosine) < kLeastCosine) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
                             "mean cosine {:.2f}, must be at least {:g} either way",
-                            cosine, options.min_cosine));
+                            cosine, kLeastCosine));
   }
   if (cosine > 0.0) return {};
   surface.triangles.row(1).swap(surface.triangles.row(2));
@@ -124,27 +130,25 @@ Result<CorticalSite> craniotomy_site(const BrainModel& model) {
   return site;
 }
 
-Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const CorticalSite& site,
-                                              const SurfaceCheckOptions& options) {
-  if (Status ok = check_points(surface.vertices, options); !ok) return tl::unexpected(ok.error());
+Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const CorticalSite& site) {
+  if (Status ok = check_points(surface.vertices); !ok) return tl::unexpected(ok.error());
   CheckedSurface checked;
   checked.surface = std::move(surface);
   const Points& points = checked.surface.vertices;
   checked.extent_mm = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
-  if (Status ok = check_extent(checked.extent_mm, site, options); !ok)
-    return tl::unexpected(ok.error());
+  if (Status ok = check_extent(checked.extent_mm, site); !ok) return tl::unexpected(ok.error());
   checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
-  if (checked.distance_mm > options.max_distance_mm) {
+  if (checked.distance_mm > kFarthest_mm) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's "
                             "centre: must be within {:g} mm; is its pose right?",
-                            checked.distance_mm, options.max_distance_mm));
+                            checked.distance_mm, kFarthest_mm));
   }
   if (checked.surface.num_triangles() == 0) return checked;
   const auto rims = surface_rims(checked.surface);
   if (!rims) return tl::unexpected(rims.error());
   count_holes(checked, *rims);
-  if (Status ok = orient(checked, site, options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = orient(checked, site); !ok) return tl::unexpected(ok.error());
   return checked;
 }
 

@@ -4,13 +4,13 @@
 //
 // Rejected, with one sentence that names the figure:
 //   kNotFinite         a coordinate that is not finite
-//   kEmptySet          fewer than min_points points
+//   kEmptySet          fewer than 50 points
 //   kInvalidArgument   extent (diagonal of the bounding box) outside the bounds that the
 //                      craniotomy's size sets; the sentence names metres, centimetres or
 //                      micrometres where those would fit
-//                      closest point farther than max_distance_mm from the craniotomy's centre
+//                      closest point farther than 25 mm from the craniotomy's centre
 //                      normals that look neither outwards nor inwards (mean |cosine| below
-//                      min_cosine)
+//                      0.3)
 //   kDegenerateMesh    an edge of more than two triangles; two neighbours with opposite
 //                      orientation; a triangle that names a vertex twice, or one that does not
 //                      exist
@@ -44,17 +44,6 @@ struct CorticalSite {
 // kEmptySet: the model has no craniotomy, or its nodes span no boundary triangle.
 Result<CorticalSite> craniotomy_site(const BrainModel& model);
 
-struct SurfaceCheckOptions {
-  int min_points = 50;
-  // Extent divided by the craniotomy's size. A camera may see only a part of the craniotomy, or
-  // also drapes and skin around it.
-  double min_extent = 0.2, max_extent = 6.0;
-  // The brain sinks by up to 20 mm (Roberts et al. 1998). A surface farther away has a wrong
-  // pose.
-  double max_distance_mm = 25.0;
-  double min_cosine = 0.3;
-};
-
 struct CheckedSurface {
   TriangleSurface surface;
   bool turned = false;  // its triangles looked inwards
@@ -66,7 +55,6 @@ struct CheckedSurface {
   std::vector<std::string> notes;  // sentences on what was mended or is worth knowing
 };
 
-Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const CorticalSite& site,
-                                              const SurfaceCheckOptions& options = {});
+Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const CorticalSite& site);
 
 }  // namespace brainshift::geometry

@@ -10,9 +10,9 @@
 
 namespace brainshift::inversion {
 
-// Prepares for this one inversion and makes it. The price is the preparation: methods kCondensed
-// (the default) and kCondensedExact solve for every slave and many modes first, some thousand
-// solves, which is seconds on a toy and a minute on a head. The model's own preparation is not
+// Prepares for this one inversion and makes it. The price is the preparation: method kCondensed
+// (the default) solves for every slave and many modes first, some thousand solves, which is seconds
+// on a toy and a minute on a head. The model's own preparation is not
 // repeated. options.stop ends the preparation too (kUnavailable).
 //
 // Errors as Inverter::update and make_inverter. The data are checked before anything is prepared

@@ -3,11 +3,14 @@
 
 #include <utility>
 
-#include "common/inversion/condensed/condensed_exact.hpp"
+#include "common/contact/iterative_system.hpp"
+#include "common/contact/refactorised_system.hpp"
+#include "common/contact/woodbury_system.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/contract/quality_check.hpp"
-#include "common/inversion/descent/descend.hpp"
+#include "common/inversion/descent/conjugate_gradients.hpp"
+#include "common/inversion/descent/steepest_descent.hpp"
 #include "common/inversion/prepared/condense.hpp"
 
 namespace brainshift::inversion {
@@ -35,23 +38,24 @@ class Condensed final : public Inverter {
   std::uint64_t bytes_;  // of the operators, which the inverter shares
 };
 
-class Exact final : public Inverter {
- public:
-  Exact(std::shared_ptr<const PreparedModel> model, CondensedExact inverter)
-      : model_(std::move(model)), inverter_(std::move(inverter)) {}
-  void reset() override { inverter_.reset(); }
-  std::optional<OmissionErrors> omission_errors() const override { return std::nullopt; }
-  std::uint64_t bytes() const override { return model_->timings().bytes + inverter_.bytes(); }
-
- private:
-  Status invert(const SparseData& data, const InversionOptions& options,
-                Estimate& estimate) override {
-    return inverter_.update(data, estimate, options);
+// With the system of equations that belongs to the method.
+//   kPaper             steepest descent      refactorises for every new active set
+//   kPaperWoodbury     steepest descent      contact as a low-rank correction of the factor
+//   kIterativeSolver   conjugate gradients   solves by preconditioned conjugate gradients
+Result<Estimate> descend(const PreparedModel& model, Method method, const SparseData& data,
+                         const InversionOptions& options) {
+  if (method == Method::kPaper) {
+    contact::RefactorisedSystem system(model.forward());
+    return steepest_descent(model, data, options, system);
   }
-
-  std::shared_ptr<const PreparedModel> model_;  // the inverter refers to it
-  CondensedExact inverter_;
-};
+  if (method == Method::kPaperWoodbury) {
+    contact::WoodburySystem system(model.forward());
+    return steepest_descent(model, data, options, system);
+  }
+  const auto system = contact::IterativeSystem::build(model.forward());
+  if (!system) return tl::unexpected(system.error());
+  return conjugate_gradients(model, data, options, **system);
+}
 
 // Every descent starts from nothing: there is no state beside the model.
 class Descent final : public Inverter {
@@ -88,15 +92,6 @@ Result<std::unique_ptr<Inverter>> condense_and_build(const PreparedModel& model,
                             model.config());
 }
 
-Result<std::unique_ptr<Inverter>> build_exact(std::shared_ptr<const PreparedModel> model,
-                                              const std::stop_token& stop) {
-  CondensedExactOptions options;
-  options.stop = stop;
-  auto inverter = CondensedExact::build(*model, options);
-  if (!inverter) return tl::unexpected(inverter.error());
-  return std::make_unique<Exact>(std::move(model), std::move(*inverter));
-}
-
 }  // namespace
 
 Status Inverter::update(const SparseData& data, const InversionOptions& options,
@@ -120,11 +115,8 @@ Result<std::unique_ptr<Inverter>> condensed_inverter(
 
 Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedModel> model,
                                                 Method method, const std::stop_token& stop) {
-  switch (method) {
-    case Method::kCondensed: return condense_and_build(*model, stop);
-    case Method::kCondensedExact: return build_exact(std::move(model), stop);
-    default: return std::make_unique<Descent>(std::move(model), method);
-  }
+  if (method == Method::kCondensed) return condense_and_build(*model, stop);
+  return std::make_unique<Descent>(std::move(model), method);
 }
 
 }  // namespace brainshift::inversion

@@ -58,9 +58,9 @@ Result<std::unique_ptr<Inverter>> condensed_inverter(
     std::shared_ptr<const geometry::TetLocator> locator, const CaseConfig& config,
     const CondensedOptions& options = {});
 
-// Any method, over a factorised model. kCondensed condenses first, kCondensedExact computes the
-// outputs of the whole prior: seconds on a toy, a minute on a head; the other methods take no time
-// here. stop: of that preparation. Errors as condense() and output_operators().
+// Any method, over a factorised model. kCondensed condenses first: seconds on a toy, a
+// minute on a head; the other methods take no time here. stop: of that preparation. Errors as
+// condense().
 Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedModel> model,
                                                 Method method, const std::stop_token& stop = {});
 

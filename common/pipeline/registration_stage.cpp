@@ -61,8 +61,7 @@ SparseData select(const SparseData& data, const std::vector<int>& columns) {
 }
 
 double datum_sd_mm(double observed_mm, const InversionConfig& config, Method method) {
-  const bool condensed = method == Method::kCondensed || method == Method::kCondensedExact;
-  return condensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
+  return method == Method::kCondensed ? std::max(observed_mm, config.sigma_mm) : config.sigma_mm;
 }
 
 // The scale that fits points with these Welsch weights, never wider than the scale they came from.

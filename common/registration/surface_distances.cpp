@@ -97,7 +97,7 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
                 fmt::format("{}: {} of {} points lie over the {} within {} mm, at least {} are "
                             "needed; their mean lies {:.1f} mm from its centre",
                             options.measured, over.size(), measured.cols(), options.surface,
-                            options.farthest_mm, options.fewest, away));
+                            kFarthestPoint_mm, options.fewest, away));
   }
   std::vector<int> guiding =
       Random(kSubsetSeed).choose(options.points, static_cast<int>(over.size()));
@@ -156,7 +156,7 @@ SparseData SurfaceDistances::measure(Points vertices, const Points& measured, co
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {
     const Vec3 p = measured.col(i);
     const geometry::SurfacePlace closest = deformed.closest(p);
-    if (!(closest.distance_mm <= options_.farthest_mm) || deformed.on_rim(closest)) continue;
+    if (!(closest.distance_mm <= kFarthestPoint_mm) || deformed.on_rim(closest)) continue;
     const Vec3 n = deformed.normal(closest);
     if (n.squaredNorm() < 0.5)
       continue;  // folded to nothing: zero would stand for a whole displacement
@@ -189,8 +189,8 @@ bool SurfaceDistances::moved(const SparseData& before, const SparseData& now) co
   if (before.size() != now.size()) return true;
   for (int i = 0; i < now.size(); ++i) {
     const Vec3 way = now.positions.col(i) - before.positions.col(i);
-    if (std::abs(before.directions.col(i).dot(way)) > options_.settled_mm ||
-        way.norm() > options_.settled_along_mm) {
+    if (std::abs(before.directions.col(i).dot(way)) > kSettled_mm ||
+        way.norm() > kSettledAlong_mm) {
       return true;
     }
   }

@@ -58,18 +58,19 @@ struct SurfaceDistanceOptions {
   // pi sd^2 / (2 k) + shared_sd^2 (that of a median of many normal errors). 0, or k below
   // kFewestAveraged: the point is as it was measured.
   double average_mm = 0.0;
-  double pose_sd_mm = 0.0;    // of the instrument's place: three common errors (none if 0)
-  double pose_sd_deg = 0.0;   // of its direction, about the points' centroid: three more
-  double farthest_mm = 30.0;  // from the surface; a point farther away is not of it
-  // The data are settled when no x has moved by more: across the surface, and along it, where a
-  // distance hardly notices.
-  double settled_mm = 0.02, settled_along_mm = 0.3;
+  double pose_sd_mm = 0.0;   // of the instrument's place: three common errors (none if 0)
+  double pose_sd_deg = 0.0;  // of its direction, about the points' centroid: three more
   // Fewer points over the surface are an error, in these words.
   int fewest = 10;
   std::string measured = "cortical surface", surface = "craniotomy";
 };
 
 inline constexpr int kFewestAveraged = 3;
+// From the surface; a point farther away is not of it.
+inline constexpr double kFarthestPoint_mm = 30.0;
+// The data are settled when no x has moved by more: across the surface, and along it, where a
+// distance hardly notices.
+inline constexpr double kSettled_mm = 0.02, kSettledAlong_mm = 0.3;
 
 class SurfaceDistances {
  public:

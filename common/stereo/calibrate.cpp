@@ -115,12 +115,11 @@ StereoCalibration calibration_of(const std::vector<BoardCorners>& corners, const
   return calibration;
 }
 
-Status check_corners(const std::vector<BoardCorners>& corners, const ChessBoard& board,
-                     const CalibrationOptions& options) {
-  if (static_cast<int>(corners.size()) < options.min_pairs) {
+Status check_corners(const std::vector<BoardCorners>& corners, const ChessBoard& board) {
+  if (static_cast<int>(corners.size()) < kFewestPairs) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("a {} x {} board was found in {} pairs: at least {} are needed",
-                            board.columns, board.rows, corners.size(), options.min_pairs));
+                            board.columns, board.rows, corners.size(), kFewestPairs));
   }
   const int expected = board.columns * board.rows;
   for (const BoardCorners& pair : corners) {
@@ -188,10 +187,9 @@ Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board)
 }
 
 Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
-                                    const ChessBoard& board, int width_px, int height_px,
-                                    const CalibrationOptions& options) {
+                                    const ChessBoard& board, int width_px, int height_px) {
   if (Status ok = validate(board); !ok) return tl::unexpected(ok.error());
-  if (Status ok = check_corners(corners, board, options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_corners(corners, board); !ok) return tl::unexpected(ok.error());
   const cv::Size size(width_px, height_px);
   Views views;
   for (const BoardCorners& pair : corners) {
@@ -205,18 +203,18 @@ Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
   } catch (const cv::Exception& problem) {
     return fail(ErrorCode::kNotConverged, "the calibration cannot be computed: " + problem.err);
   }
-  if (!(calibration.rms_px <= options.max_rms_px)) {
+  if (!(calibration.rms_px <= kMaxRms_px)) {
     return fail(ErrorCode::kNotConverged,
                 fmt::format("reprojection error {:.2f} px: must be at most {} px; are all pairs of "
                             "one board, one rig and taken at once?",
-                            calibration.rms_px, options.max_rms_px));
+                            calibration.rms_px, kMaxRms_px));
   }
   if (Status ok = validate(calibration); !ok) return tl::unexpected(ok.error());
   return calibration;
 }
 
-Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs, const ChessBoard& board,
-                                    const CalibrationOptions& options) {
+Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs,
+                                    const ChessBoard& board) {
   if (Status ok = validate(board); !ok) return tl::unexpected(ok.error());
   CalibrationResult result;
   std::vector<BoardCorners> corners;
@@ -238,7 +236,7 @@ Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs, const
   }
   const int width = pairs.empty() ? 0 : pairs.front().left.width;
   const int height = pairs.empty() ? 0 : pairs.front().left.height;
-  auto calibration = calibrate(corners, board, width, height, options);
+  auto calibration = calibrate(corners, board, width, height);
   if (!calibration) return tl::unexpected(calibration.error());
   result.calibration = std::move(*calibration);
   return result;

@@ -36,11 +36,10 @@ struct ChessBoard {
 // that is not finite and > 0.
 Status validate(const ChessBoard& board);
 
-struct CalibrationOptions {
-  int min_pairs = 5;  // with fewer, the boards' tilts hardly separate focal length from distance
-  // A calibration worse than this mixed up its boards or its cameras. Good ones stay below 0.5.
-  double max_rms_px = 2.0;
-};
+// With fewer, the boards' tilts hardly separate focal length from distance.
+inline constexpr int kFewestPairs = 5;
+// A calibration worse than this mixed up its boards or its cameras. Good ones stay below 0.5.
+inline constexpr double kMaxRms_px = 2.0;
 
 // Corners of one board in both pictures, 2 x n px, row by row of the board.
 struct BoardCorners {
@@ -63,10 +62,9 @@ Eigen::Matrix2Xd find_corners(const GrayImage& picture, const ChessBoard& board)
 
 // From corners at hand. kInvalidArgument: a bad board (validate), too few pairs, a number of
 // corners that is not the board's, pictures of no size, left and right swapped. kNotConverged: rms
-// above options.max_rms_px, or a minimisation that fails.
+// above kMaxRms_px, or a minimisation that fails.
 Result<StereoCalibration> calibrate(const std::vector<BoardCorners>& corners,
-                                    const ChessBoard& board, int width_px, int height_px,
-                                    const CalibrationOptions& options = {});
+                                    const ChessBoard& board, int width_px, int height_px);
 
 struct CalibrationResult {
   StereoCalibration calibration;
@@ -75,7 +73,6 @@ struct CalibrationResult {
 
 // From pictures. Errors as above; kInvalidArgument also for pictures of different sizes, with the
 // pair's name.
-Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs, const ChessBoard& board,
-                                    const CalibrationOptions& options = {});
+Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs, const ChessBoard& board);
 
 }  // namespace brainshift::stereo

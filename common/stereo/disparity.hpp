@@ -5,13 +5,13 @@
 // Rows agree because the pair is rectified. The matching is semi-global (Hirschmueller 2008, as
 // OpenCV 4.6's StereoSGBM), once from each picture. A pixel is valid when
 //   - both matchings agree:   |d_left(x, y) - d_right(x - d_left, y)| <= max_left_right_px,
-//   - the picture has texture there: its noise alone moves the match by at most max_texture_sd_px,
+//   - the picture has texture there: its noise alone moves the match by at most kMaxTextureSd_px,
 //   - it comes from inside both original pictures, and
-//   - it is connected (parts.hpp, max_step_px) to min_part_fraction of the picture: matches by
+//   - it is connected (parts.hpp, steps of 1 px) to min_part_fraction of the picture: matches by
 //     chance are specks.
 // Standard deviation of a valid disparity, px:
-//   sd^2 = floor_px^2 + 2 s^2 / E + (difference of the two matchings)^2 / 2
-//   s = noise_grey; E = sum over the matching block of (dI/dx)^2, less what noise adds to it
+//   sd^2 = kFloor_px^2 + 2 s^2 / E + (difference of the two matchings)^2 / 2
+//   s = kNoiseGrey; E = sum over the matching block of (dI/dx)^2, less what noise adds to it
 // The second term is the Cramer-Rao bound of a shift between two noisy copies. The third treats
 // the two matchings as independent readings.
 // Confidence = probability that a normal error of this sd is below 1 px: erf(1 / (sqrt(2) sd)).
@@ -27,24 +27,20 @@
 
 namespace brainshift::stereo {
 
+inline constexpr double kMaxTextureSd_px = 0.5;
+// Standard deviation of a pixel's grey level.
+inline constexpr double kNoiseGrey = 2.0;
+// Error at any contrast, from SGBM's parabola through three costs and from light that differs
+// between the cameras. On photographs of the aloe (tests/sensing/stereo_study.cpp) it is 0.28 px
+// rms where the other two terms are small.
+inline constexpr double kFloor_px = 0.25;
+
 struct MatchOptions {
   int min_disparity_px = 0;
   int disparities = 128;        // number searched, rounded up to a multiple of 16
-  int block_px = 5;             // odd; larger blocks smooth over vessels
   int uniqueness_percent = 10;  // by which the best match must beat the second best
   double max_left_right_px = 1.0;
-  double noise_grey = 2.0;  // sd of a pixel's grey level
-  double max_texture_sd_px = 0.5;
-  // Error at any contrast, from SGBM's parabola through three costs and from light that differs
-  // between the cameras. On photographs of the aloe (tests/sensing/stereo_study.cpp) it is 0.28 px
-  // rms where the other two terms are small.
-  double floor_px = 0.25;
-  double max_step_px = 1.0;
   double min_part_fraction = 0.005;
-  // Of measure_disparity: with a smaller valid fraction it returns an error. Measured on synthetic
-  // pairs: 0.78 to 0.93 for a pair of its rig, at most 0.006 for a pair that is swapped or lies at
-  // another depth.
-  double min_valid_fraction = 0.10;
 };
 
 struct DisparityMap {
@@ -76,7 +72,7 @@ struct MeasuredDisparity {
 // min_disparity_px and disparities of the options.
 // kInvalidArgument: as rectify and match; a depth range that is not 0 < near < far, or so near
 // that no point lies in both pictures; left and right pictures swapped (the pair hardly matches,
-// and matches well the other way round). kEmptySet: a valid fraction below min_valid_fraction.
+// and matches well the other way round). kEmptySet: a valid fraction below a tenth.
 Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayImage& right,
                                             const StereoCalibration& calibration,
                                             const DepthRange& range,

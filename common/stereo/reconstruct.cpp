@@ -27,10 +27,8 @@ Status check(const ReconstructOptions& options, const RigidTransform& T_ras_came
   };
   if (!(options.spacing_mm > 0.0) || !std::isfinite(options.spacing_mm))
     return refuse("spacing_mm", options.spacing_mm, "finite and > 0");
-  if (options.max_points < options.min_points)
-    return refuse("max_points", options.max_points, "at least min_points");
-  if (!(options.max_view_angle_deg > 0.0 && options.max_view_angle_deg < 90.0))
-    return refuse("max_view_angle_deg", options.max_view_angle_deg, "between 0 and 90");
+  if (options.max_points < kFewestPoints)
+    return refuse("max_points", options.max_points, "at least 50");
   return check_rigid("T_ras_camera", T_ras_camera.matrix());
 }
 
@@ -49,8 +47,7 @@ struct Grid {
 
 // Mean of a block's pixels near their median; false when too few are valid.
 bool block_vertex(const PixelMap<float>& disparity, const PixelMap<float>& sd_px,
-                  const RectifiedGeometry& geometry, const ReconstructOptions& options, int left,
-                  int top, int step, Grid& grid) {
+                  const RectifiedGeometry& geometry, int left, int top, int step, Grid& grid) {
   std::vector<double> values;
   const int right = std::min(left + step, disparity.width);
   const int bottom = std::min(top + step, disparity.height);
@@ -64,7 +61,7 @@ bool block_vertex(const PixelMap<float>& disparity, const PixelMap<float>& sd_px
   for (int y = top; y < bottom; ++y) {
     for (int x = left; x < right; ++x) {
       const auto d = static_cast<double>(disparity.at(x, y));
-      if (!(std::abs(d - middle) <= options.max_step_px)) continue;
+      if (!(std::abs(d - middle) <= kMaxPartStep_px)) continue;
       const auto sd = static_cast<double>(sd_px.at(x, y));
       n += 1.0;
       x_sum += x;
@@ -82,7 +79,7 @@ bool block_vertex(const PixelMap<float>& disparity, const PixelMap<float>& sd_px
 }
 
 Grid grid_of(const PixelMap<float>& disparity, const PixelMap<float>& sd_px,
-             const RectifiedGeometry& geometry, const ReconstructOptions& options, int step) {
+             const RectifiedGeometry& geometry, int step) {
   Grid grid;
   grid.columns = (disparity.width + step - 1) / step;
   grid.rows = (disparity.height + step - 1) / step;
@@ -90,7 +87,7 @@ Grid grid_of(const PixelMap<float>& disparity, const PixelMap<float>& sd_px,
     for (int column = 0; column < grid.columns; ++column) {
       const int next = static_cast<int>(grid.points.size());
       const bool made =
-          block_vertex(disparity, sd_px, geometry, options, column * step, row * step, step, grid);
+          block_vertex(disparity, sd_px, geometry, column * step, row * step, step, grid);
       grid.vertex.push_back(made ? next : -1);
     }
   }
@@ -104,8 +101,8 @@ Points as_points(const std::vector<Vec3>& points) {
   return matrix;
 }
 
-void drop_outliers(Grid& grid, const ReconstructOptions& options, ReconstructedSurface& result) {
-  const std::vector<bool> outlier = distance_outliers(as_points(grid.points), options.outlier_sds);
+void drop_outliers(Grid& grid, ReconstructedSurface& result) {
+  const std::vector<bool> outlier = distance_outliers(as_points(grid.points), kOutlierSds);
   for (int& vertex : grid.vertex) {
     if (vertex < 0 || !outlier[static_cast<std::size_t>(vertex)]) continue;
     vertex = -1;
@@ -202,7 +199,7 @@ Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const Rectifie
   if (Status ok = check(options, T_ras_camera); !ok) return tl::unexpected(ok.error());
   ReconstructedSurface result;
   PixelMap<float> kept = map.disparity_px;
-  const PartSizes parts = drop_minor_parts(kept, options.max_step_px, options.min_part_fraction);
+  const PartSizes parts = drop_minor_parts(kept, kMaxPartStep_px, kLeastPart);
   result.valid_pixels = parts.left + parts.dropped;
   result.pixels_in_small_parts = parts.dropped;
   std::vector<double> depths;
@@ -210,19 +207,18 @@ Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const Rectifie
     if (!std::isnan(d)) depths.push_back(depth_at(geometry, static_cast<double>(d)));
   const auto too_few = [&](int count) {
     return fail(ErrorCode::kEmptySet, fmt::format("the surface has {} points: must be at least {}",
-                                                  count, options.min_points));
+                                                  count, kFewestPoints));
   };
   if (depths.empty()) return too_few(0);
   result.median_depth_mm = median(depths);
   if (!(result.median_depth_mm > 0.0)) return too_few(0);
   const int step =
       block_step(result.median_depth_mm, static_cast<double>(depths.size()), geometry, options);
-  Grid grid = grid_of(kept, map.sd_px, geometry, options, step);
-  drop_outliers(grid, options, result);
-  const double min_cosine = std::cos(options.max_view_angle_deg * std::numbers::pi / 180.0);
+  Grid grid = grid_of(kept, map.sd_px, geometry, step);
+  drop_outliers(grid, result);
+  const double min_cosine = std::cos(kMaxViewAngle_deg * std::numbers::pi / 180.0);
   store(grid, triangles_of(grid, min_cosine), T_ras_camera, result);
-  if (result.surface.num_vertices() < options.min_points)
-    return too_few(result.surface.num_vertices());
+  if (result.surface.num_vertices() < kFewestPoints) return too_few(result.surface.num_vertices());
   result.median_sd_mm = median({result.sd_mm.begin(), result.sd_mm.end()});
   return result;
 }

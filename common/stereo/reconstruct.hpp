@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A disparity map -> triangles in patient RAS, with the standard deviation of every vertex.
 //
-// 1. Parts of the map (parts.hpp, max_step_px) smaller than min_part_fraction of the largest are
+// 1. Parts of the map (parts.hpp, kMaxPartStep_px) smaller than kLeastPart of the largest are
 //    dropped: instruments, specks.
 // 2. A block of step x step pixels becomes one vertex where at least half of it is valid: the mean
-//    position and mean disparity of its pixels within max_step_px of their median. spacing_mm and
-//    max_points decide step.
-// 3. Vertices far from their 8 nearest neighbours are dropped (outliers.hpp, outlier_sds).
+//    position and mean disparity of its pixels within kMaxPartStep_px of their median. spacing_mm
+//    and max_points decide step.
+// 3. Vertices far from their 8 nearest neighbours are dropped (outliers.hpp, kOutlierSds).
 // 4. Blocks that are neighbours in the picture become triangles, counter-clockwise seen from the
 //    camera. Their normals point towards it: outwards, for a surgeon's camera. Triangles seen at
-//    more than max_view_angle_deg span a jump in depth and are left out, as are vertices without a
+//    more than kMaxViewAngle_deg span a jump in depth and are left out, as are vertices without a
 //    triangle.
 // 5. T_ras_camera (left camera frame) is applied.
 //
@@ -25,15 +25,16 @@
 
 namespace brainshift::stereo {
 
+inline constexpr double kMaxPartStep_px = 2.0;
+inline constexpr double kLeastPart = 0.05;
+inline constexpr double kOutlierSds = 3.0;
+inline constexpr double kMaxViewAngle_deg = 75.0;
+inline constexpr int kFewestPoints = 50;
+
 struct ReconstructOptions {
   // Between vertices, at the median depth. The model's elements are 5 times as long.
   double spacing_mm = 1.0;
   int max_points = 20000;  // the spacing grows until there are no more blocks than this
-  double max_step_px = 2.0;
-  double min_part_fraction = 0.05;
-  double outlier_sds = 3.0;
-  double max_view_angle_deg = 75.0;
-  int min_points = 50;  // a surface with fewer is an error
 };
 
 struct ReconstructedSurface {
@@ -48,7 +49,7 @@ struct ReconstructedSurface {
 };
 
 // T_ras_camera: left camera frame to patient RAS, mm. kInvalidArgument: an option out of range
-// (named), a pose that is not a rigid motion. kEmptySet: fewer than min_points vertices.
+// (named), a pose that is not a rigid motion. kEmptySet: fewer than kFewestPoints vertices.
 Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const RectifiedGeometry& geometry,
                                          const RigidTransform& T_ras_camera,
                                          const ReconstructOptions& options = {});

@@ -14,33 +14,21 @@ namespace {
 
 // Samples this close to the contour belong to neither side: smoothing mixes them.
 constexpr int kBlur = 2;
+// Standard deviation of the Gaussian; about a speckle. Speckles much larger than this are fewer
+// than the significance counts.
+constexpr double kSmoothing_px = 2.0;
+constexpr int kRays = 96;
+constexpr int kLeastRadius_px = 6;  // smaller ones are speckle
+constexpr int kMostRadius_px = 150;
+constexpr int kEdgeWidth_px = 6;
+constexpr double kStiffness = 0.3;      // of the image's sd, per pixel of radius from ray to ray
+constexpr double kRadiusChange = 0.35;  // from image to image, of the radius
 
 struct Search {
   Eigen::Vector2d centre_px;
   std::vector<RadiusRange> range;
   bool bright;
 };
-
-Status check_options(const TracerOptions& options) {
-  const auto check = [](const char* name, double value, double least, double most) -> Status {
-    if (value >= least && value <= most) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("tracer {} = {}: must be {} to {}", name, value, least, most));
-  };
-  for (const Status& ok :
-       {check("smoothing_px", options.smoothing_px, 0.0, 50.0),
-        check("rays", options.rays, 16, 720),
-        check("min_radius_px", options.min_radius_px, 1.0, 1e4),
-        check("max_radius_px", options.max_radius_px, 2.0 * options.min_radius_px, 4096.0),
-        check("edge_width_px", options.edge_width_px, 1.0, 100.0),
-        check("stiffness", options.stiffness, 0.0, 100.0),
-        check("radius_change", options.radius_change, 0.05, 1.0),
-        check("min_significance", options.min_significance, 0.0, 100.0),
-        check("min_confidence", options.min_confidence, 0.0, 1.0)}) {
-    if (!ok) return ok;
-  }
-  return {};
-}
 
 // Sum, sum of squares and count.
 struct Moments {
@@ -68,20 +56,18 @@ void add_sides(const PolarImage& polar, Eigen::Index ray, int radius, Moments& i
 
 // 1 / n_inside + 1 / n_ring, with n the areas in smoothed speckles. 4 pi sd^2 is the correlation
 // area of white noise behind a Gaussian; one pixel is added for the speckle's own size.
-double inverse_speckles(const PolarImage& polar, const std::vector<int>& path,
-                        double smoothing_px) {
+double inverse_speckles(const PolarImage& polar, const std::vector<int>& path) {
   double inside_px2 = 0.0, ring_px2 = 0.0;
   for (const int radius : path) {
     const double r = radius, end = ring_end(polar, radius);
     inside_px2 += std::numbers::pi * r * r / static_cast<double>(path.size());
     ring_px2 += std::numbers::pi * (end * end - r * r) / static_cast<double>(path.size());
   }
-  const double speckle_px2 = 4.0 * std::numbers::pi * (smoothing_px * smoothing_px + 1.0);
+  const double speckle_px2 = 4.0 * std::numbers::pi * (kSmoothing_px * kSmoothing_px + 1.0);
   return speckle_px2 / inside_px2 + speckle_px2 / ring_px2;
 }
 
-void judge(const PolarImage& polar, const std::vector<int>& path, double smoothing_px,
-           TracedContour& traced) {
+void judge(const PolarImage& polar, const std::vector<int>& path, TracedContour& traced) {
   Moments inside, ring;
   for (std::size_t j = 0; j < path.size(); ++j) {
     add_sides(polar, static_cast<Eigen::Index>(j), path[j], inside, ring);
@@ -89,7 +75,7 @@ void judge(const PolarImage& polar, const std::vector<int>& path, double smoothi
   const double sign = traced.bright ? 1.0 : -1.0;
   const double difference = sign * (inside.mean() - ring.mean());
   const double sd = std::sqrt(std::max(1e-12, 0.5 * (inside.variance() + ring.variance())));
-  traced.significance = difference / sd / std::sqrt(inverse_speckles(polar, path, smoothing_px));
+  traced.significance = difference / sd / std::sqrt(inverse_speckles(polar, path));
   int agreeing = 0;
   for (std::size_t j = 0; j < path.size(); ++j) {
     Moments own_inside, own_ring;
@@ -122,38 +108,34 @@ Eigen::Vector2d centroid(const Eigen::Matrix2Xd& polygon) {
   return area == 0.0 ? origin : Eigen::Vector2d(origin + sum / area);
 }
 
-TracedContour search_once(const Eigen::MatrixXf& image, const Search& search,
-                          const TracerOptions& options) {
-  const int radii = static_cast<int>(std::ceil(options.max_radius_px)) +
-                    static_cast<int>(std::ceil(options.edge_width_px)) + 2;
-  const PolarImage polar = polar_image(image, search.centre_px, options.rays, radii);
-  Eigen::MatrixXf gain = edge_strength(polar, static_cast<int>(std::round(options.edge_width_px)));
+TracedContour search_once(const Eigen::MatrixXf& image, const Search& search) {
+  const PolarImage polar =
+      polar_image(image, search.centre_px, kRays, kMostRadius_px + kEdgeWidth_px + 2);
+  Eigen::MatrixXf gain = edge_strength(polar, kEdgeWidth_px);
   if (!search.bright) gain = -gain;
   const double mean = image.mean();
   const double sd = std::sqrt((image.array() - static_cast<float>(mean)).square().mean());
-  const std::vector<int> path = best_closed_path(gain, search.range, options.stiffness * sd);
+  const std::vector<int> path = best_closed_path(gain, search.range, kStiffness * sd);
   TracedContour traced;
   traced.bright = search.bright;
-  traced.contour.points_px.resize(2, options.rays);
+  traced.contour.points_px.resize(2, kRays);
   for (std::size_t j = 0; j < path.size(); ++j) {
     traced.contour.points_px.col(static_cast<Eigen::Index>(j)) =
         on_ray(search.centre_px, j, path.size(), path[j]);
   }
-  judge(polar, path, options.smoothing_px, traced);
+  judge(polar, path, traced);
   return traced;
 }
 
-std::vector<RadiusRange> whole_range(const TracerOptions& options) {
-  return std::vector<RadiusRange>(static_cast<std::size_t>(options.rays),
-                                  {static_cast<int>(std::ceil(options.min_radius_px)),
-                                   static_cast<int>(options.max_radius_px)});
+std::vector<RadiusRange> whole_range() {
+  return std::vector<RadiusRange>(kRays, {kLeastRadius_px, kMostRadius_px});
 }
 
 // Radii that a contour allows around its centroid: those of the former contour along each ray,
 // plus and minus the allowed change.
 std::vector<RadiusRange> range_around(const Eigen::Matrix2Xd& contour,
-                                      const Eigen::Vector2d& centre, const TracerOptions& options) {
-  std::vector<RadiusRange> range = whole_range(options);
+                                      const Eigen::Vector2d& centre) {
+  std::vector<RadiusRange> range = whole_range();
   const RadiusRange limits = range.front();
   const auto rays = static_cast<double>(range.size());
   for (std::size_t j = 0; j < range.size(); ++j) {
@@ -165,7 +147,7 @@ std::vector<RadiusRange> range_around(const Eigen::Matrix2Xd& contour,
           std::abs(std::remainder(std::atan2(d.y(), d.x()) - angle, 2.0 * std::numbers::pi));
       if (gap < nearest) nearest = gap, radius = d.norm();
     }
-    const double play = std::max(3.0, options.radius_change * radius);
+    const double play = std::max(3.0, kRadiusChange * radius);
     range[j].first = std::clamp(static_cast<int>(radius - play), limits.first, limits.last);
     range[j].last =
         std::clamp(static_cast<int>(std::ceil(radius + play)), limits.first, limits.last);
@@ -174,24 +156,21 @@ std::vector<RadiusRange> range_around(const Eigen::Matrix2Xd& contour,
 }
 
 // Searches, moves to the centroid of what was found and searches again nearby.
-TracedContour search_twice(const Eigen::MatrixXf& image, Search search,
-                           const TracerOptions& options) {
-  const TracedContour first = search_once(image, search, options);
+TracedContour search_twice(const Eigen::MatrixXf& image, Search search) {
+  const TracedContour first = search_once(image, search);
   search.centre_px = centroid(first.contour.points_px);
-  search.range = range_around(first.contour.points_px, search.centre_px, options);
-  return search_once(image, search, options);
+  search.range = range_around(first.contour.points_px, search.centre_px);
+  return search_once(image, search);
 }
 
-Status accept(const TracedContour& traced, const TracerOptions& options) {
-  if (traced.significance >= options.min_significance &&
-      traced.confidence >= options.min_confidence)
-    return {};
+Status accept(const TracedContour& traced) {
+  if (traced.significance >= kLeastSignificance && traced.confidence >= kLeastConfidence) return {};
   return fail(
       ErrorCode::kEmptySet,
       fmt::format("no boundary found on frame {}: significance {:.2f} (at least {}), confidence "
                   "{:.2f} (at least {})",
-                  traced.contour.frame, traced.significance, options.min_significance,
-                  traced.confidence, options.min_confidence));
+                  traced.contour.frame, traced.significance, kLeastSignificance, traced.confidence,
+                  kLeastConfidence));
 }
 
 Status check_seed(const tracking::Recording& recording, const Seed& seed) {
@@ -217,18 +196,16 @@ Status check_seed(const tracking::Recording& recording, const Seed& seed) {
 
 // The images from the seed's on in one direction; returns why it ended.
 std::string follow(const tracking::Recording& recording, const TracedContour& start, int direction,
-                   const TracerOptions& options, std::vector<TracedContour>& contours) {
+                   std::vector<TracedContour>& contours) {
   TracedContour last = start;
   const int end = direction > 0 ? recording.num_frames() : -1;
   for (int frame = start.contour.frame + direction; frame != end; frame += direction) {
     if (!recording.image_ok[static_cast<std::size_t>(frame)]) continue;
     const Eigen::Vector2d centre = centroid(last.contour.points_px);
-    const Search search{centre, range_around(last.contour.points_px, centre, options),
-                        start.bright};
-    TracedContour traced =
-        search_twice(smoothed_frame(recording, frame, options.smoothing_px), search, options);
+    const Search search{centre, range_around(last.contour.points_px, centre), start.bright};
+    TracedContour traced = search_twice(smoothed_frame(recording, frame, kSmoothing_px), search);
     traced.contour.frame = frame;
-    if (Status found = accept(traced, options); !found) return found.error().message;
+    if (Status found = accept(traced); !found) return found.error().message;
     contours.push_back(traced);
     last = std::move(traced);
   }
@@ -237,31 +214,27 @@ std::string follow(const tracking::Recording& recording, const TracedContour& st
 
 }  // namespace
 
-Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed,
-                                   const TracerOptions& options) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed) {
   if (Status ok = check_seed(recording, seed); !ok) return tl::unexpected(ok.error());
-  const Eigen::MatrixXf image = smoothed_frame(recording, seed.frame, options.smoothing_px);
+  const Eigen::MatrixXf image = smoothed_frame(recording, seed.frame, kSmoothing_px);
   std::optional<TracedContour> best;
   for (const bool bright : {true, false}) {
-    if (options.echogenicity == (bright ? Echogenicity::kDark : Echogenicity::kBright)) continue;
-    TracedContour traced = search_twice(image, {seed.at_px, whole_range(options), bright}, options);
+    TracedContour traced = search_twice(image, {seed.at_px, whole_range(), bright});
     traced.contour.frame = seed.frame;
     if (!best || traced.significance > best->significance) best = std::move(traced);
   }
-  if (Status ok = accept(*best, options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = accept(*best); !ok) return tl::unexpected(ok.error());
   return *best;
 }
 
-Result<LesionSweep> trace_sweep(const tracking::Recording& recording, const Seed& seed,
-                                const TracerOptions& options) {
-  const auto start = trace_lesion(recording, seed, options);
+Result<LesionSweep> trace_sweep(const tracking::Recording& recording, const Seed& seed) {
+  const auto start = trace_lesion(recording, seed);
   if (!start) return tl::unexpected(start.error());
   LesionSweep sweep;
-  sweep.stopped_before = follow(recording, *start, -1, options, sweep.contours);
+  sweep.stopped_before = follow(recording, *start, -1, sweep.contours);
   std::reverse(sweep.contours.begin(), sweep.contours.end());
   sweep.contours.push_back(*start);
-  sweep.stopped_after = follow(recording, *start, 1, options, sweep.contours);
+  sweep.stopped_after = follow(recording, *start, 1, sweep.contours);
   return sweep;
 }
 

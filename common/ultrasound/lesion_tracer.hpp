@@ -4,13 +4,13 @@
 //
 // The smoothed image is sampled on rays from the seed: r(theta_j), j = 0 .. n-1. The contour is
 // the closed path that maximises
-//   sum_j e(theta_j, r_j) - stiffness |r_j - r_{j-1}|
-// e: the mean inside minus the mean outside over edge_width_px along the ray (its negative for a
+//   sum_j e(theta_j, r_j) - kStiffness |r_j - r_{j-1}|
+// e: the mean inside minus the mean outside over kEdgeWidth_px along the ray (its negative for a
 // lesion darker than its surroundings). Dynamic programming finds the path (Amini, Weymouth &
 // Jain, "Using dynamic programming for solving variational problems in vision", PAMI 12 (1990)).
 // The seed then moves to the contour's centroid, and the search is repeated once.
 // The next image starts from the last contour: its centroid is the seed, and radii may differ by
-// `radius_change` at most.
+// kRadiusChange at most.
 //
 // The search always finds some edge. Two numbers that it does not optimise decide whether the edge
 // bounds anything:
@@ -35,23 +35,10 @@
 
 namespace brainshift::ultrasound {
 
-enum class Echogenicity { kAuto, kBright, kDark };  // of the lesion against its surroundings
-
-struct TracerOptions {
-  Echogenicity echogenicity = Echogenicity::kAuto;
-  double smoothing_px = 2.0;  // sd of the Gaussian; about a speckle
-  int rays = 96;
-  double min_radius_px = 6.0;  // smaller ones are speckle
-  double max_radius_px = 150.0;
-  double edge_width_px = 6.0;
-  double stiffness = 0.3;       // of the image's sd, per pixel of radius from ray to ray
-  double radius_change = 0.35;  // from image to image, of the radius
-  // The best path through noise alone reaches 5.4 in 180 images of fine speckle
-  // (lesion_tracer_test.cpp). Speckles much larger than smoothing_px are fewer than this counts,
-  // so they need more smoothing.
-  double min_significance = 8.0;
-  double min_confidence = 0.7;
-};
+// The best path through noise alone reaches 5.4 in 180 images of fine speckle
+// (lesion_tracer_test.cpp).
+inline constexpr double kLeastSignificance = 8.0;
+inline constexpr double kLeastConfidence = 0.7;
 
 struct TracedContour {
   Contour contour;  // closed, one point per ray
@@ -66,10 +53,9 @@ struct Seed {
 };
 
 // One image. kInvalidArgument: a seed outside the image, a frame that does not exist or has no
-// valid image, an option out of range (named). kEmptySet: no boundary found (the sentence gives
+// valid image. kEmptySet: no boundary found (the sentence gives
 // significance and confidence). Errors name the frame.
-Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed,
-                                   const TracerOptions& options = {});
+Result<TracedContour> trace_lesion(const tracking::Recording& recording, const Seed& seed);
 
 struct LesionSweep {
   std::vector<TracedContour> contours;  // by frame, ascending
@@ -81,7 +67,6 @@ struct LesionSweep {
 
 // The seed's image and, in both directions, every valid image up to the first without a boundary.
 // Errors of trace_lesion, for the seed's image.
-Result<LesionSweep> trace_sweep(const tracking::Recording& recording, const Seed& seed,
-                                const TracerOptions& options = {});
+Result<LesionSweep> trace_sweep(const tracking::Recording& recording, const Seed& seed);
 
 }  // namespace brainshift::ultrasound

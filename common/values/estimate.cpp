@@ -12,10 +12,8 @@ std::string_view to_string(Boundary boundary) {
 std::string_view to_string(Method method) {
   switch (method) {
     case Method::kCondensed: return "condensed";
-    case Method::kCondensedExact: return "condensed-exact";
     case Method::kPaper: return "paper";
     case Method::kPaperWoodbury: return "paper-woodbury";
-    case Method::kConjugateGradients: return "cg";
     case Method::kIterativeSolver: return "pcg";
   }
   return "condensed";

@@ -24,22 +24,18 @@ enum class Boundary {
 enum class Method {
   // Prepared before surgery, prior reduced to its leading modes: the everyday method.
   kCondensed,
-  // The same with the whole prior; for comparison.
-  kCondensedExact,
   // Adjoint steepest descent, K_p refactorised for every contact set (paper section 2.4).
   kPaper,
   // The same, with contact as a low-rank correction of the factor of K instead.
   kPaperWoodbury,
-  // Conjugate gradients in place of steepest descent, contact as in kPaperWoodbury.
-  kConjugateGradients,
-  // Conjugate gradients whose linear solves are preconditioned CG too (the paper's outlook).
+  // Conjugate gradients in place of steepest descent, and linear solves by preconditioned conjugate
+  // gradients too (the paper's outlook).
   kIterativeSolver,
 };
-inline constexpr Method kAllMethods[] = {
-    Method::kCondensed,     Method::kCondensedExact,     Method::kPaper,
-    Method::kPaperWoodbury, Method::kConjugateGradients, Method::kIterativeSolver};
+inline constexpr Method kAllMethods[] = {Method::kCondensed, Method::kPaper, Method::kPaperWoodbury,
+                                         Method::kIterativeSolver};
 std::string_view to_string(Boundary boundary);  // "contact", "fixed"
-// "condensed", "condensed-exact", "paper", "paper-woodbury", "cg", "pcg"
+// "condensed", "paper", "paper-woodbury", "pcg"
 std::string_view to_string(Method method);
 
 enum class EstimateStatus {
@@ -97,12 +93,10 @@ struct ContactSummary {
   int penetrating = 0;
   double max_penetration_mm = 0.0;  // 0 when nothing penetrates
   // What was counted depends on the method.
-  //   descent methods (paper, paper-woodbury, cg, pcg): how often the active set changed to
+  //   descent methods (paper, paper-woodbury, pcg): how often the active set changed to
   //     another set that is not empty (PenalisedSystem::changes)
   //   condensed: trial loads for which contact was solved, and the answer, i.e. the length of
   //     Estimate::history. At least 1, also without contact.
-  //   condensed-exact: active sets evaluated, likewise; the best set counts again when it is
-  //     evaluated once more.
   int iterations = 0;
   // Certificate of contact; NaN: not computed. decrement: how far the loads are from the most
   // probable ones, in posterior standard deviations. max_violation_mm: the greatest depth of an

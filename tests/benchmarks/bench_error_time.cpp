@@ -19,8 +19,8 @@
 namespace brainshift::bench {
 namespace {
 
-// The largest meshes. Slow: the methods that take a minute per estimate at 18 thousand nodes, and
-// the exact one, whose preparation takes minutes and 11 GiB at 40 thousand. Iterative: the others.
+// The largest meshes. Slow: the methods that take a minute per estimate at 18 thousand nodes.
+// Iterative: the others.
 constexpr double kSlowLimitThousandNodes = 20.0;
 constexpr double kIterativeLimitThousandNodes = 50.0;
 constexpr int kQuickRepetitions = 5;
@@ -58,8 +58,7 @@ double largest_mesh_thousand_nodes(Method method) {
   switch (method) {
     case Method::kCondensed: return std::numeric_limits<double>::infinity();
     case Method::kPaper:
-    case Method::kIterativeSolver:
-    case Method::kCondensedExact: return kSlowLimitThousandNodes;
+    case Method::kIterativeSolver: return kSlowLimitThousandNodes;
     default: return kIterativeLimitThousandNodes;
   }
 }

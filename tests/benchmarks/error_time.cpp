@@ -5,7 +5,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -18,7 +17,6 @@
 #include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
 
@@ -173,41 +171,12 @@ Status run_condensed(const Head& head, const Trial& trial, int rank, CsvWriter& 
   return {};
 }
 
-using Update =
-    std::function<Result<Estimate>(const SparseData&, const inversion::InversionOptions&)>;
-
-// One update by the given method. What a method prepares before
-// surgery is prepared here, outside its times.
-Result<Update> one_update(const inversion::PreparedModel& model, Method method) {
-  if (method != Method::kCondensedExact) {
-    return Update(
-        [&model, method](const SparseData& data, const inversion::InversionOptions& options) {
-          return inversion::invert(model, data, method, options);
-        });
-  }
-  inversion::CondensedExactOptions cold;
-  cold.warm_start = false;
-  auto made = inversion::CondensedExact::build(model, cold);
-  if (!made) return tl::unexpected(made.error());
-  auto exact = std::make_shared<inversion::CondensedExact>(std::move(*made));
-  return Update([exact](const SparseData& data,
-                        const inversion::InversionOptions& options) -> Result<Estimate> {
-    Estimate estimate;
-    if (auto status = exact->update(data, estimate, options); !status) {
-      return tl::unexpected(status.error());
-    }
-    return estimate;
-  });
-}
-
 Status run_method(const Head& head, const Trial& trial, Method method, const Prior& prior,
                   int repetitions, double budget_s, CsvWriter& out) {
   Row row;
   row.method = method;
   row.prior = prior.name;
   row.t_solve_ms = contact::measure_full_solve_ms(prior.prepared->forward());
-  const auto invert = one_update(*prior.prepared, method);
-  if (!invert) return tl::unexpected(invert.error());
   const Stopwatch all;
   for (int r = 0; r < repetitions && r < static_cast<int>(trial.surgeries.size()); ++r) {
     const double left_s = budget_s - all.seconds();
@@ -217,7 +186,8 @@ Status run_method(const Head& head, const Trial& trial, Method method, const Pri
     options.stop = alarm.token();
     row.repetition = r + 1;
     const Stopwatch watch;
-    const auto estimate = (*invert)(trial.surgeries[static_cast<std::size_t>(r)].data, options);
+    const auto estimate = inversion::invert(
+        *prior.prepared, trial.surgeries[static_cast<std::size_t>(r)].data, method, options);
     row.time_ms = watch.milliseconds();
     if (estimate) {
       if (Status ok = write_estimate(head, trial, row, *estimate, out); !ok) return ok;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every bad input exits 2 with one line on stderr that names the file, key or set and the value,
-// prints nothing to stdout and leaves nothing behind.
+// prints nothing to stdout and leaves nothing behind. One input for each way into a refusal; the
+// readers' own tests have the other kinds of bad files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -169,46 +170,15 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"CaseFileThatIsNoYaml",
                 [](const Workspace& files) { return files.write("bad.yaml", "a: [1, 2\nb"); },
                 {"bad.yaml"}},
-        BadCase{"EmptyCaseFile",
-                [](const Workspace& files) { return files.write("bad.yaml", ""); },
-                {"bad.yaml"}},
         BadCase{"MissingImage",
                 with("images", "brain", "brain: /nonexistent/brain.nii.gz"),
                 {"/nonexistent/brain.nii.gz"}},
         BadCase{"ImageThatIsNone", with_brain("not an image"), {"mask.nii"}},
-        BadCase{"ImageWhoseVoxelsBeginNowhere",
-                [](const Workspace& files) {
-                  std::string bytes = nifti(1);
-                  const float offset = 1e30F;
-                  std::memcpy(bytes.data() + 108, &offset, sizeof offset);
-                  return with_brain(bytes)(files);
-                },
-                {"mask.nii", "vox_offset"}},
-        BadCase{"ImageOfNoDimensions",
-                [](const Workspace& files) {
-                  std::string bytes = nifti(1);
-                  bytes[40] = 0;
-                  return with_brain(bytes)(files);
-                },
-                {"mask.nii", "not a 3-D image"}},
-        BadCase{"TruncatedImage", with_brain(nifti(1).substr(0, 1000)), {"mask.nii"}},
         BadCase{"MaskWithoutComponent", with_brain(nifti(0)), {"brain"}},
         BadCase{"UnknownKey", with("mesh", "edge_mm", "edge_cm: 1.2"), {"bad.yaml", "edge_cm"}},
         BadCase{"EdgeInMetres",
                 with("mesh", "edge_mm", "edge_mm: 0.012"),
                 {"bad.yaml", "edge_mm", "0.012"}},
-        BadCase{"TextForANumber",
-                with("mesh", "edge_mm", "edge_mm: wide"),
-                {"bad.yaml", "edge_mm", "wide"}},
-        BadCase{"RadiusOutOfRange",
-                with("brainstem", "radius_mm", "radius_mm: -1.0"),
-                {"bad.yaml", "radius_mm", "-1"}},
-        BadCase{"RadiusNaN",
-                with("brainstem", "radius_mm", "radius_mm: .nan"),
-                {"bad.yaml", "radius_mm"}},
-        BadCase{"GravityWithoutDirection",
-                with("gravity", "direction", "direction: [0, 0, 0]"),
-                {"bad.yaml", "direction"}},
         BadCase{"TumourOutsideTheBrain",
                 with("tumour", "centre_mm", "centre_mm: [470.0, -45.0, 2.0]"),
                 {"tumour"}},
@@ -225,7 +195,6 @@ INSTANTIATE_TEST_SUITE_P(
                   return files.write("bad.yaml", mesh_from("/nonexistent/mesh.msh"));
                 },
                 {"/nonexistent/mesh.msh"}},
-        BadCase{"MeshThatIsNone", with_mesh("not a mesh"), {"mesh.msh"}},
         BadCase{"InvertedTetrahedron", with_mesh(msh(25.0, true, false)), {"mesh.msh"}},
         BadCase{"FlatTetrahedra", with_mesh(msh(25.0, false, true)), {"mesh.msh"}},
         BadCase{"MeshInMetres", with_mesh(msh(0.025, false, false)), {"mesh.msh"}},

@@ -218,7 +218,7 @@ void chessboards() {
 // ---------- a simulated patch ----------
 
 // The rms error may be as large as the stated sd, and no smaller than a third of it. It is smaller
-// because floor_px holds errors of real light, which rendered pictures have not, and because a
+// because kFloor_px holds errors of real light, which rendered pictures have not, and because a
 // vertex averages a block's pixels. Below a third, the weight 1 / sd^2 of the surface would be ten
 // times too small.
 constexpr double kLeastOverSd = 1.0 / 3.0;

@@ -3,7 +3,6 @@
 // hundreds of slaves away from its own.
 #include <algorithm>
 
-#include "common/inversion/condensed/condensed_exact.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "tests/stability/toy_problem.hpp"
@@ -19,21 +18,19 @@ double changes(std::vector<NodeIndex> a, std::vector<NodeIndex> b) {
   return static_cast<double>(differ.size());
 }
 
-// `update` starts from the set that it left.
-template <typename Update>
-void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries, const std::string& row,
-            const Update& update, bool estimated_scales, const Options& options) {
+void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries,
+            inversion::CondensedInverter& inverter, const Options& options) {
   std::vector<NodeIndex> before;
   for (const SparseData& data : surgeries) {
     Point point;
     point.sheet = "contact";
     point.parameter = "slaves that change at one update";
-    point.row = row;
+    point.row = "condensed, warm start";
     point.unit = "mm";
     point.rcond = problem.model->forward().factor().rcond();
     point.backward_error = std::numeric_limits<double>::quiet_NaN();
     Estimate estimate;
-    if (auto status = update(data, estimate); !status) {
+    if (auto status = inverter.update(data, estimate); !status) {
       set_refused(status.error(), point);
       options.record(point);
       continue;
@@ -41,7 +38,7 @@ void follow(ToyProblem& problem, const std::vector<SparseData>& surgeries, const
     set_answered(estimate, point);
     point.x = 1.0 + changes(before, estimate.active_slaves);  // a logarithmic axis has no 0
     before = estimate.active_slaves;
-    compare_with_posterior(problem, data, estimate, estimated_scales, point);
+    compare_with_posterior(problem, data, estimate, point);
     options.record(point);
   }
 }
@@ -63,13 +60,7 @@ void sweep_contact(const Options& options) {
   auto inverter = inversion::CondensedInverter::build(
       std::make_shared<const CondensedOperators>(std::move(*operators)),
       std::make_shared<const geometry::TetLocator>(problem->brain->mesh), problem->config);
-  follow(
-      *problem, surgeries, "condensed, warm start",
-      [&](const SparseData& d, Estimate& e) { return inverter->update(d, e); }, true, options);
-  auto exact = inversion::CondensedExact::build(*problem->model);
-  follow(
-      *problem, surgeries, "condensed-exact, warm start",
-      [&](const SparseData& d, Estimate& e) { return exact->update(d, e); }, false, options);
+  follow(*problem, surgeries, *inverter, options);
 }
 
 }  // namespace brainshift::stability

@@ -7,7 +7,7 @@
 namespace brainshift::stability {
 namespace {
 
-constexpr Method kMethods[] = {Method::kCondensed, Method::kCondensedExact, Method::kPaper};
+constexpr Method kMethods[] = {Method::kCondensed, Method::kPaper};
 
 void standard_deviation(const Options& options) {
   auto problem = ToyProblem::make(stability_config(), options.fault);

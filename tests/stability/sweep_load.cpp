@@ -26,7 +26,7 @@ void large_displacements(const Options& options) {
         options.record(point);
         continue;
       }
-      for (const Method method : {Method::kCondensed, Method::kCondensedExact, Method::kPaper}) {
+      for (const Method method : {Method::kCondensed, Method::kPaper}) {
         point.row = std::string(to_string(method)) + way;
         invert_and_record(*problem, *data, method, point, options);
       }

@@ -25,7 +25,7 @@ void one_patient(const CaseConfig& config, Point point, const Options& options) 
     set_refused(data.error(), point);
     return options.record(point);
   }
-  for (const Method method : {Method::kCondensed, Method::kCondensedExact, Method::kPaper}) {
+  for (const Method method : {Method::kCondensed, Method::kPaper}) {
     invert_and_record(*problem, *data, method, point, options);
   }
 }

@@ -80,8 +80,8 @@ void sweep_penalty(const Options& options) {
     solve_and_record(*problem, load, point, options);
 
     point.row.clear();
-    for (const Method method : {Method::kCondensed, Method::kCondensedExact, Method::kPaper,
-                                Method::kPaperWoodbury, Method::kConjugateGradients}) {
+    for (const Method method :
+         {Method::kCondensed, Method::kPaper, Method::kPaperWoodbury, Method::kIterativeSolver}) {
       invert_and_record(*problem, *data, method, point, options);
     }
   }

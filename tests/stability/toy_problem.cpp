@@ -86,7 +86,7 @@ void compare_with_descent(ToyProblem& problem, const SparseData& data, Method me
                           const Estimate& estimate, Point& point) {
   point.bound = kInversionBound_mm;
   point.difference = std::numeric_limits<double>::quiet_NaN();
-  const Steps steps = method == Method::kConjugateGradients ? Steps::kConjugate : Steps::kSteepest;
+  const Steps steps = method == Method::kIterativeSolver ? Steps::kConjugate : Steps::kSteepest;
   const auto right = descend(*problem.patient, data, problem.config.inversion, steps);
   if (!right) return;
   const double misfit =
@@ -176,7 +176,7 @@ Result<SparseData> sagging_data(const ToyProblem& problem, const DataOptions& op
 }
 
 void compare_with_posterior(ToyProblem& problem, const SparseData& data, const Estimate& estimate,
-                            bool estimated_scales, Point& point) {
+                            Point& point) {
   point.bound = kInversionBound_mm;
   point.difference = std::numeric_limits<double>::quiet_NaN();
   point.must_warn =
@@ -209,7 +209,6 @@ void compare_with_posterior(ToyProblem& problem, const SparseData& data, const E
       point.difference = std::max(point.difference, static_cast<double>(right->violation_mm));
     }
   }
-  if (!estimated_scales) return;
   const auto gain = reference.gain_left(judged, scales);
   if (gain) point.scales_gain = static_cast<double>(*gain);
   if (point.scales_gain <= kScalesBound) return;
@@ -231,8 +230,8 @@ void invert_and_record(ToyProblem& problem, const SparseData& data, Method metho
     return options.record(point);
   }
   set_answered(*estimate, point);
-  if (method == Method::kCondensed || method == Method::kCondensedExact) {
-    compare_with_posterior(problem, data, *estimate, method == Method::kCondensed, point);
+  if (method == Method::kCondensed) {
+    compare_with_posterior(problem, data, *estimate, point);
   } else {
     compare_with_descent(problem, data, method, *estimate, point);
   }

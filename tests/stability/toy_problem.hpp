@@ -55,8 +55,8 @@ inline constexpr double kInversionBound_mm = 0.01;
 inline constexpr double kScalesBound = 1.0;
 
 // One inversion from a cold start, compared with the reference.
-//   condensed, condensed-exact    the posterior mean, by compare_with_posterior()
-//   paper, paper-woodbury, cg     the same descent in long double (reference_descent.hpp): field,
+//   condensed                     the posterior mean, by compare_with_posterior()
+//   paper, paper-woodbury, pcg    the same descent in long double (reference_descent.hpp): field,
 //                                 contact forces times the compliance of their slave, mean misfit
 void invert_and_record(ToyProblem& problem, const SparseData& data, Method method, Point point,
                        const Options& options);
@@ -64,10 +64,9 @@ void invert_and_record(ToyProblem& problem, const SparseData& data, Method metho
 // Field and contact forces (times the compliance of their slave) against the posterior mean of
 // the set that the reference finds by itself. Where that search finds none, or one with another
 // posterior, against the posterior of the product's set, which must then fulfil contact in the
-// reference. estimated_scales: the method estimates the prior's scales; the reference objects
-// when they leave more than kScalesBound to gain.
+// reference. The reference objects when the prior's scales leave more than kScalesBound to gain.
 void compare_with_posterior(ToyProblem& problem, const SparseData& data, const Estimate& estimate,
-                            bool estimated_scales, Point& point);
+                            Point& point);
 
 // u = K_p^-1 b_p with contact, against the same in long double. Bound: rounding_bound().
 void solve_and_record(ToyProblem& problem, const Points& load, Point point, const Options& options);

@@ -10,47 +10,20 @@
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/inversion/condensed/contradictions.hpp"
-#include "common/inversion/condensed/field_rebuild.hpp"
-#include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
 #include "common/inversion/condensed/reason.hpp"
-#include "common/inversion/condensed/robust_weights.hpp"
-#include "common/inversion/condensed/sampled_operators.hpp"
-#include "common/inversion/contract/data_check.hpp"
+#include "common/inversion/condensed/settled_loads.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/contract/penetration.hpp"
-#include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {
 namespace {
 
-// Rounds of weights and places of data, each with a descent; then the data stay where they are.
-// Until half of them the strengths may change again.
-constexpr int kMaxRounds = 10;
-constexpr int kMaxFits = 6;
-constexpr int kMaxFirstRounds = 6;  // of weights
-// Variances that differ by less than this part change nothing that anyone sees.
-constexpr double kSameVariance = 0.1;
-
-// By how much the displacement of a brain differs whose tissue is 30 % stiffer here and softer
-// there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, more where tissue
-// swells (decision 0018). There the strength of the same part grows with the data.
-constexpr double kModelError = 0.1;
-
-// Standard deviation of a displacement component that the modes of `part` stand for, mm; 0 without
-// modes.
-double displacement_sd_mm(const CondensedOperators& operators, PriorPart part) {
-  const int first = operators.first_column(part), count = operators.columns(part);
-  if (count == 0) return 0.0;
-  double squares = 0.0;
-  for (int j = first; j < first + count; ++j) squares += operators.responses.squared_norm(j);
-  return std::sqrt(squares / static_cast<double>(3 * operators.num_nodes()));
-}
-
-bool same(const RemainderVariances& a, const RemainderVariances& b) {
-  return ((a - b).array().abs() <= kSameVariance * a.array().max(b.array())).all();
-}
+// Data per update for which memory is reserved up front: more than instruments give at once.
+constexpr int kReservedData = 1000;
+// Loads of one update that the history has room for before it grows: eleven descents.
+constexpr int kReservedDescents = 11;
 
 }  // namespace
 
@@ -65,14 +38,9 @@ struct CondensedInverter::Impl {
         poisson_ratio(largest_poisson_ratio(config.material)),
         team(options.threads),
         deformation(given_locator->nodes(), given_locator->tets(), team),
-        sampled(operators, std::move(given_locator), window, condensed.outside_region, team),
-        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors,
-                  config.prior.estimate_scales, team),
-        descent(*operators, window, config.contact.penalty_n_per_mm, options.contact, team,
-                profile),
         rebuild(*operators, window, team, options.region_of_interest),
-        robust(config.sensing.robust_weights),
-        medium_sd_mm(displacement_sd_mm(*operators, PriorPart::kMedium)) {
+        loads(operators, std::move(given_locator), window, config, options.contact, team, rebuild,
+              profile) {
     for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
       const NodeIndex node = operators->slaves[static_cast<std::size_t>(slave)];
       const auto& region = options.region_of_interest;
@@ -80,19 +48,10 @@ struct CondensedInverter::Impl {
         rebuilt_slaves.push_back(slave);
       }
     }
-    history.reserve(static_cast<std::size_t>(kMaxRounds + 1) *
+    history.reserve(static_cast<std::size_t>(kReservedDescents) *
                     static_cast<std::size_t>(condensed.max_contact_iterations + 1));
-    reserve(options.capacity);
-  }
-
-  // Grows what depends on the number of data; nothing happens while they fit.
-  void reserve(int data) {
-    if (data <= norms.size()) return;
-    descent.reserve(data);
-    sampled.reserve(data);
-    weights.reserve(data);
-    contradictions.reserve(data);
-    norms.resize(data);
+    loads.reserve(kReservedData);
+    contradictions.reserve(kReservedData);
   }
 
   static ModeWindow mode_window(const CondensedOperators& operators,
@@ -105,30 +64,11 @@ struct CondensedInverter::Impl {
     return window;
   }
 
-  // Checks and places data that are new.
-  Status accept(const SparseData& data);
-  // Loads with contact, strengths, weights and moving data in turn, until nothing changes. `data`
-  // follows `moved`. Errors of LoadDescent and PriorStrengths, and of moving data that are not fit.
-  Result<EstimateStatus> settle(const SparseData*& data, const InversionOptions& asked);
-  // Of the part that stands for the model's own error, in units of its standard deviation.
-  double model_error_floor(const SparseData& data);
-  // Samples the data and takes their linear model.
-  Status sample(const SparseData& data);
-  Status distrust_outliers(const SparseData& data);
-  // PriorStrengths::fit and refit for the present linear model.
-  Status fit();
-  Result<bool> refit(bool may_change);
-  // Strengths and rough descents in turn until the strengths stay.
-  Status find_strengths(const DescentLimits& limits, EstimateStatus& outcome);
-  // Weights and places of the data for the present estimate; whether anything changed.
-  Result<bool> follow(const SparseData*& data, const InversionOptions& asked);
-  RemainderVariances remainder_variances() const;
-  bool reweigh(const SparseData& data);
-  Result<bool> relocate(const SparseData& data, const MovingData& moving);
+  DescentLimits limits(const InversionOptions& asked);
   void record();
-  Status finish(const SparseData& data, Estimate& estimate);
+  Status finish(Estimate& estimate);
   Status estimate_omissions();
-  void summarise_sources(const SparseData& data, Estimate& estimate);
+  void summarise_sources(Estimate& estimate);
 
   std::shared_ptr<const CondensedOperators> operators;
   CondensedOptions options;
@@ -138,191 +78,28 @@ struct CondensedInverter::Impl {
   ThreadTeam team;
   UpdateProfile profile;  // of the last update
   fem::DeformationCheck deformation;
-  SampledOperators sampled;
-  PriorStrengths strengths;
-  LoadDescent descent;
   FieldRebuild rebuild;
-  RobustWeights weights;
+  SettledLoads loads;
   Contradictions contradictions;
-  bool robust;
-  double medium_sd_mm;
 
-  Stopwatch watch;                         // of the update
-  std::vector<int> rebuilt_slaves;         // whose displacement is not interpolated
-  VecX norms;                              // of the residuals, per datum
-  RemainderVariances left_out;             // what `sampled` knows
-  SparseData moved;                        // the data where they are now, when they move
-  std::vector<DataSource> sources_before;  // of `moved`, before they moved
-  Points moving_displacement;
+  Stopwatch watch;                  // of the update
+  std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   std::vector<IterationRecord> history;
   OmissionErrors errors;
 };
 
-Status CondensedInverter::Impl::accept(const SparseData& data) {
-  if (auto status = check_data(data); !status) return status;
-  reserve(data.size());
-  const StageClock clock(profile, UpdateStage::kLocate);
-  return sampled.locate(data);
-}
-
-bool CondensedInverter::Impl::reweigh(const SparseData& data) {
-  if (!robust) return false;
-  auto out = norms.head(data.size());
-  for (int i = 0; i < data.size(); ++i) out[i] = descent.posterior().residual_norm(sampled, i);
-  return weights.update(data, out);
-}
-
-Result<bool> CondensedInverter::Impl::relocate(const SparseData& data, const MovingData& moving) {
-  if (&data != &moved) moved = data;
-  sources_before = moved.sources;
-  {
-    const StageClock clock(profile, UpdateStage::kFollow);
-    rebuild.displacement_at(team, moving.nodes, descent.z(), descent.contact(),
-                            moving_displacement);
-    if (!moving.relocate(moving_displacement, moved)) return false;
-  }
-  if (auto status = accept(moved); !status) return tl::unexpected(status.error());
-  weights.follow(sources_before, moved);
-  return true;
-}
-
-RemainderVariances CondensedInverter::Impl::remainder_variances() const {
-  const PriorScaleValues squares = strengths.mean_square();
-  RemainderVariances variances;
-  for (int g = 0; g < kRemainders; ++g) {
-    variances[g] = squares[static_cast<std::size_t>(Eigen::Index{kLoadParts} + g)];
-  }
-  return variances;
-}
-
-// Before strengths are fitted, which would grow until gross errors are no residuals any more:
-// weights under the case's own strengths, without contact.
-Status CondensedInverter::Impl::distrust_outliers(const SparseData& data) {
-  for (int round = 0; round < kMaxFirstRounds; ++round) {
-    if (auto status = descent.minimise(strengths); !status) return status;
-    if (!reweigh(data)) return {};
-    if (auto status = sample(data); !status) return status;
-  }
-  return {};
-}
-
-Status CondensedInverter::Impl::fit() {
-  const StageClock clock(profile, UpdateStage::kHypotheses);
-  return strengths.fit(descent.posterior().gram(), descent.posterior().right_hand_side());
-}
-
-Result<bool> CondensedInverter::Impl::refit(bool may_change) {
-  const StageClock clock(profile, UpdateStage::kHypotheses);
-  return strengths.refit(descent.posterior().gram(), descent.posterior().right_hand_side(),
-                         may_change);
-}
-
-Status CondensedInverter::Impl::find_strengths(const DescentLimits& limits,
-                                               EstimateStatus& outcome) {
-  if (auto status = fit(); !status) return status;
-  for (int fit = 1;; ++fit) {
-    if (auto status = descent.jump(sampled, strengths); !status) return status;
-    const auto descended = descent.descend(sampled, strengths, false, limits);
-    if (!descended) return tl::unexpected(descended.error());
-    outcome = *descended;
-    // Strengths that change need loads of their own.
-    const bool may_change = outcome == EstimateStatus::kConverged && fit < kMaxFits;
-    const auto changed = refit(may_change);
-    if (!changed) return tl::unexpected(changed.error());
-    if (!*changed) return {};
-  }
-}
-
-Result<bool> CondensedInverter::Impl::follow(const SparseData*& data,
-                                             const InversionOptions& asked) {
-  const bool reweighed = reweigh(*data);
-  bool relocated = false;
-  if (asked.moving != nullptr) {
-    const auto changed = relocate(*data, *asked.moving);
-    if (!changed) return tl::unexpected(changed.error());
-    relocated = *changed;
-    if (relocated) data = &moved;
-  }
-  const RemainderVariances now = remainder_variances();
-  const bool resampled = sampled.data_outside_region() > 0 && !same(now, left_out);
-  return reweighed || relocated || resampled;
-}
-
-// The upper quartile of the measured motion without outliers: of a surface that is measured along
-// its normals it is near the motion itself.
-double CondensedInverter::Impl::model_error_floor(const SparseData& data) {
-  if (!(medium_sd_mm > 0.0)) return 0.0;
-  int count = 0;
-  for (int i = 0; i < data.size(); ++i) {
-    if (weights.values()[i] >= kOutlierWeight) norms[count++] = data.displacements.col(i).norm();
-  }
-  if (count == 0) return 0.0;
-  double* const upper = norms.data() + 3 * count / 4;
-  std::nth_element(norms.data(), upper, norms.data() + count);
-  return kModelError * *upper / (std::sqrt(3.0) * medium_sd_mm);
-}
-
-Status CondensedInverter::Impl::sample(const SparseData& data) {
-  left_out = remainder_variances();
-  {
-    const StageClock clock(profile, UpdateStage::kSample);
-    sampled.sample(data, left_out, weights.values());
-  }
-  return descent.take(sampled);
-}
-
-Result<EstimateStatus> CondensedInverter::Impl::settle(const SparseData*& data,
-                                                       const InversionOptions& asked) {
+DescentLimits CondensedInverter::Impl::limits(const InversionOptions& asked) {
   DescentLimits limits;
   limits.max_steps = condensed.max_contact_iterations;
   limits.stop = asked.stop;
   limits.out_of_time = [this] { return watch.milliseconds() > condensed.deadline_ms; };
   limits.on_step = [this] { record(); };
-  strengths.reset();
-  strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
-  auto outcome = EstimateStatus::kConverged;
-  if (auto status = sample(*data); !status) return tl::unexpected(status.error());
-  if (auto status = distrust_outliers(*data); !status) return tl::unexpected(status.error());
-  // Once more, without them.
-  strengths.set_floor(PriorPart::kMedium, model_error_floor(*data));
-  if (auto status = find_strengths(limits, outcome); !status) {
-    return tl::unexpected(status.error());
-  }
-  bool fine = false, unsettled = false;
-  for (int round = 0;; ++round) {
-    if (auto status = descent.average(sampled, strengths); !status)
-      return tl::unexpected(status.error());
-    if (outcome != EstimateStatus::kConverged) break;
-    if (unsettled) {
-      outcome = EstimateStatus::kIterationLimit;
-      break;
-    }
-    const auto followed = follow(data, asked);
-    if (!followed) return tl::unexpected(followed.error());
-    if (!*followed && fine) break;
-    unsettled = *followed && round >= kMaxRounds;  // the data stay where they are now
-    fine = !*followed || unsettled;
-    if (*followed) {
-      if (auto status = sample(*data); !status) return tl::unexpected(status.error());
-    }
-    const auto descended = descent.descend(sampled, strengths, fine, limits);
-    if (!descended) return tl::unexpected(descended.error());
-    outcome = *descended;
-    const bool may_change = outcome == EstimateStatus::kConverged && round < kMaxRounds / 2;
-    const auto changed = refit(may_change);
-    if (!changed) return tl::unexpected(changed.error());
-    if (*changed) {
-      if (auto status = find_strengths(limits, outcome); !status) {
-        return tl::unexpected(status.error());
-      }
-      fine = false;
-    }
-  }
-  if (auto status = descent.spread(strengths); !status) return tl::unexpected(status.error());
-  return outcome;
+  return limits;
 }
 
 void CondensedInverter::Impl::record() {
+  const SampledOperators& sampled = loads.sampled();
+  const LoadDescent& descent = loads.descent();
   const int m = sampled.size();
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < m; ++i) {
@@ -341,14 +118,16 @@ void CondensedInverter::Impl::record() {
   history.push_back(entry);
 }
 
-Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimate) {
+Status CondensedInverter::Impl::finish(Estimate& estimate) {
+  const LoadDescent& descent = loads.descent();
+  const PriorStrengths& strengths = loads.strengths();
   record();  // of the mean over the hypotheses
   const Stopwatch rebuilding;
   const double misfit_ratio = descent.posterior().misfit_ratio();
   if (options.uncertainty) {
     const StageClock clock(profile, UpdateStage::kDeviation);
     rebuild.standard_deviation(team, descent.reduction(), descent.covariance_factor(),
-                               remainder_variances(), estimate.sd_mm);
+                               loads.remainder_variances(), estimate.sd_mm);
     // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
     if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
   } else {
@@ -371,7 +150,7 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
 
   const IterationRecord& last = history.back();
   estimate.misfit_mm = last.misfit_mm;
-  estimate.initial_misfit_mm = mean_std_of_norms(data.displacements);
+  estimate.initial_misfit_mm = mean_std_of_norms(loads.data().displacements);
   estimate.contact = {contact.size(), last.penetrating, last.max_penetration_mm,
                       static_cast<int>(history.size())};
   estimate.contact.decrement = descent.decrement();
@@ -389,12 +168,13 @@ Status CondensedInverter::Impl::finish(const SparseData& data, Estimate& estimat
   std::sort(estimate.hypotheses.begin(), estimate.hypotheses.end(),
             [](const Hypothesis& a, const Hypothesis& b) { return a.weight > b.weight; });
   estimate.misfit_ratio = misfit_ratio;
-  estimate.data_outside_region = sampled.data_outside_region();
-  summarise_sources(data, estimate);
+  estimate.data_outside_region = loads.sampled().data_outside_region();
+  summarise_sources(estimate);
   return {};
 }
 
-void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate& estimate) {
+void CondensedInverter::Impl::summarise_sources(Estimate& estimate) {
+  const SparseData& data = loads.data();
   estimate.sources.resize(data.sources.size());
   for (std::size_t i = 0; i < data.sources.size(); ++i) {
     const DataSource& source = data.sources[i];
@@ -402,10 +182,10 @@ void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate
     summary = {};
     summary.source = source.name;
     summary.data = source.count;
-    summary.outliers = weights.outliers(source.first, source.count);
+    summary.outliers = loads.weights().outliers(source.first, source.count);
     Consistency consistency;
-    if (data.sources.size() < 2 ||
-        !descent.posterior().check_source(sampled, strengths, source, consistency)) {
+    if (data.sources.size() < 2 || !loads.descent().posterior().check_source(
+                                       loads.sampled(), loads.strengths(), source, consistency)) {
       continue;
     }
     summary.chi_square = consistency.chi_square;
@@ -416,6 +196,7 @@ void CondensedInverter::Impl::summarise_sources(const SparseData& data, Estimate
 }
 
 Status CondensedInverter::Impl::estimate_omissions() {
+  const LoadDescent& descent = loads.descent();
   const VecX& penetration = descent.contact().penetration();
   errors.nearest_slave_mm =
       penetration.size() > 0 ? -penetration.maxCoeff() : std::numeric_limits<double>::infinity();
@@ -423,7 +204,7 @@ Status CondensedInverter::Impl::estimate_omissions() {
   errors.far_field_mm = rebuild.far_field_error_mm();
   errors.gravity_modes_mm = 0.0;
   if (options.gravity_modes) return {};
-  const auto error = gravity_modes_error_mm(sampled, descent.reduction(), rebuild,
+  const auto error = gravity_modes_error_mm(loads.sampled(), descent.reduction(), rebuild,
                                             descent.posterior(), penetration);
   if (!error) return tl::unexpected(error.error());
   errors.gravity_modes_mm = *error;
@@ -450,35 +231,36 @@ Result<CondensedInverter> CondensedInverter::build(
 }
 
 const OmissionErrors& CondensedInverter::omission_errors() const { return impl_->errors; }
-VecX CondensedInverter::weights() const { return impl_->weights.values(); }
+VecX CondensedInverter::weights() const { return impl_->loads.weights().values(); }
 const UpdateProfile& CondensedInverter::profile() const { return impl_->profile; }
 
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
                                  const InversionOptions& asked) {
   Impl& impl = *impl_;
   impl.watch = Stopwatch();
-  impl.descent.forget();
   impl.history.clear();
   impl.profile = {};
-  if (auto status = impl.accept(data); !status) return status;
-  impl.weights.reset(data.size());
-  const SparseData* followed = &data;
-  const auto outcome = impl.settle(followed, asked);
+  if (auto status = impl.loads.take(data); !status) return status;
+  impl.contradictions.reserve(data.size());
+  const auto outcome = impl.loads.settle(asked, impl.limits(asked));
   if (!outcome) return tl::unexpected(outcome.error());
-  if (!impl.descent.z().allFinite() || !impl.descent.contact().forces().allFinite()) {
+  const LoadDescent& descent = impl.loads.descent();
+  if (!descent.z().allFinite() || !descent.contact().forces().allFinite()) {
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
-  if (auto status = impl.finish(*followed, estimate); !status) {
+  if (auto status = impl.finish(estimate); !status) {
     estimate.status = EstimateStatus::kNotRun;
     return status;
   }
   estimate.status = *outcome;
   set_reason(*outcome, impl.condensed.deadline_ms, estimate);
   append_sources(estimate);
-  if (followed->sources.empty()) {
-    append_outliers(impl.weights.outliers(0, followed->size()), followed->size(), estimate.reason);
+  const SparseData& followed = impl.loads.data();
+  if (followed.sources.empty()) {
+    append_outliers(impl.loads.weights().outliers(0, followed.size()), followed.size(),
+                    estimate.reason);
   }
-  append_contradiction(impl.contradictions.find(*followed), *followed, estimate.reason);
+  append_contradiction(impl.contradictions.find(followed), followed, estimate.reason);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
   return {};
 }

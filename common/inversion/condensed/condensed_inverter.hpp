@@ -9,9 +9,10 @@
 //   weights     of single data that chance does not explain (robust_weights.hpp)
 //   places      of data that follow the deformation (InversionOptions::moving)
 //
-// roughly at first, the loads to the end when the others are settled. Where no slave changes, the
-// estimate is the posterior mean of the paper's penalised system K_p exactly when U U^T = C. With a
-// common error of the data (SparseData) its amplitudes c ~ N(0, I) are estimated beside z.
+// roughly at first, the loads to the end when the others are settled (settled_loads.hpp). Where no
+// slave changes, the estimate is the posterior mean of the paper's penalised system K_p exactly
+// when U U^T = C. With a common error of the data (SparseData) its amplitudes c ~ N(0, I) are
+// estimated beside z.
 //
 // The model's own error: the patient's tissue is stiffer here and softer there than the case says,
 // so that its displacement differs from the model's by a part of itself (kModelError; decision
@@ -27,8 +28,8 @@
 // BLAS kernel rounds z otherwise, and the field is a sum in single precision: some 1e-7 of its
 // largest terms, and up to kDecrement where a slave at its edge flips.
 //
-// Not thread-safe. update() allocates nothing as long as the data fit the capacity, but for members
-// of the estimate whose size changes.
+// Not thread-safe. update() allocates nothing for up to 1,000 data, but for members of the estimate
+// whose size changes.
 #pragma once
 
 #include <memory>
@@ -54,9 +55,8 @@ struct CondensedOptions {
   bool gravity_modes = true;
   // Nodes that are rebuilt, sorted; the others are interpolated (far_field.hpp). Empty: every node.
   std::vector<NodeIndex> region_of_interest;
-  int rank = 0;         // use only so many modes; 0: all
-  int capacity = 1000;  // data per update reserved up front
-  int threads = 0;      // 0: as many as cores
+  int rank = 0;     // use only so many modes; 0: all
+  int threads = 0;  // 0: as many as cores
 };
 
 class CondensedInverter {

@@ -12,13 +12,13 @@
 namespace brainshift::inversion {
 
 struct InversionOptions {
-  // Called after every iteration with the iterate so far (status kIterating); may be empty. The
-  // condensed methods have no field before the last iteration and do not call it.
+  // Called after every iteration with the iterate so far (status kIterating); may be empty. Method
+  // condensed has no field before the last iteration and does not call it.
   std::function<void(const Estimate&)> on_iterate;
   // Data that follow the deformation. Method condensed takes them; the other methods reject data
   // along a direction and do not look at this. Null: no datum moves.
   const MovingData* moving = nullptr;
-  // Checked once per iteration, for the condensed methods once per contact set. A requested stop
+  // Checked once per iteration, by method condensed before every trial load. A requested stop
   // ends the inversion with the error of stopped().
   std::stop_token stop;
 };

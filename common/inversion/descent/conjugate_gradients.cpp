@@ -5,9 +5,8 @@
 #include <utility>
 
 #include "common/inversion/descent/descent_log.hpp"
-#include "common/inversion/descent/gradient.hpp"
-#include "common/inversion/descent/line_search.hpp"
 #include "common/inversion/descent/misfit.hpp"
+#include "common/inversion/descent/objective.hpp"
 
 namespace brainshift::inversion {
 namespace {

@@ -2,9 +2,8 @@
 #include "common/inversion/descent/steepest_descent.hpp"
 
 #include "common/inversion/descent/descent_log.hpp"
-#include "common/inversion/descent/gradient.hpp"
-#include "common/inversion/descent/line_search.hpp"
 #include "common/inversion/descent/misfit.hpp"
+#include "common/inversion/descent/objective.hpp"
 
 namespace brainshift::inversion {
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numeric>
 #include <span>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -15,7 +16,6 @@
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/contact_columns.hpp"
 #include "common/inversion/prepared/data_region.hpp"
-#include "common/inversion/prepared/memory_limit.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/operators/encode_columns.hpp"
 #include "common/values/quality.hpp"
@@ -148,6 +148,19 @@ void append_modes(const MatrixXd& fields, MatrixXf& modes, CondensedOperators& r
     result.slave_modes.row(row).tail(fields.rows()) =
         (fields.middleCols<3>(3L * result.slaves[i]) * result.slave_normals.col(row)).transpose();
   }
+}
+
+// Before anything is allocated.
+Status check_memory(const PreparedModel& model, std::uint64_t bytes) {
+  const double limit_gib = model.config().condensed.memory_limit_gib;
+  const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
+  if (needed_gib <= limit_gib) return {};
+  std::ostringstream text;
+  text.precision(3);
+  text << "condensed.memory_limit_gib = " << limit_gib << ": the preparation needs " << needed_gib
+       << " GiB (" << model.forward().contact().num_slaves() << " slaves, "
+       << model.model().mesh.num_nodes() << " nodes); raise the limit or coarsen the mesh";
+  return fail(ErrorCode::kInvalidArgument, text.str());
 }
 
 // Steps 1 and 2: U.

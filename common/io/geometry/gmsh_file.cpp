@@ -3,26 +3,18 @@
 // cursor differs.
 #include "common/io/geometry/gmsh_file.hpp"
 
-#include <charconv>
 #include <limits>
 #include <map>
 #include <unordered_map>
 
 #include "common/io/files/binary_codec.hpp"
+#include "common/io/files/number_cursor.hpp"
 
 namespace brainshift::io {
 namespace {
 
 constexpr int kTetrahedron = 4;
 constexpr int kTriangle = 2;
-
-// Thrown inside this file only, so that the readers stay a plain list of numbers; parse_gmsh
-// catches it.
-struct FormatProblem {
-  std::string message;
-};
-
-[[noreturn]] void refuse(const std::string& message) { throw FormatProblem{message}; }
 
 // Vertices per element type; 0 for a type this reader does not know.
 int vertices_of_type(std::int64_t type) {
@@ -32,9 +24,10 @@ int vertices_of_type(std::int64_t type) {
   return type >= 1 && type <= 31 ? kVertices[type] : 0;
 }
 
-class Cursor {
+// Numbers, lines and sections.
+class Cursor : public NumberCursor {
  public:
-  explicit Cursor(std::string_view content) : rest_(content) {}
+  explicit Cursor(std::string_view content) : NumberCursor(content) { enter("$MeshFormat"); }
 
   void set_binary(bool swap) {
     binary_ = true;
@@ -42,36 +35,17 @@ class Cursor {
   }
   bool binary() const { return binary_; }
 
-  std::string_view rest() const { return rest_; }
   std::string_view line() {
-    const std::size_t end = rest_.find('\n');
-    std::string_view text = rest_.substr(0, end);
-    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    const std::size_t end = rest().find('\n');
+    std::string_view text = rest().substr(0, end);
+    skip(end == std::string_view::npos ? end : end + 1);
     while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.remove_suffix(1);
     return text;
   }
-  // A number in text, also in binary files (counts of version 2.2).
-  template <typename T>
-  T text_number() {
-    while (!rest_.empty() &&
-           std::string_view(" \t\r\n").find(rest_.front()) != std::string_view::npos) {
-      rest_.remove_prefix(1);
-    }
-    T value{};
-    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
-    if (error != std::errc()) {
-      refuse("section '" + section_ + "' ends too early or holds something that is not a number");
-    }
-    rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
-    return value;
-  }
+  // Counts of version 2.2 are text in binary files too.
   template <typename T>
   T number() {
-    if (!binary_) return text_number<T>();
-    if (rest_.size() < sizeof(T)) refuse("section '" + section_ + "' ends too early");
-    const T value = load_number<T>(rest_.data(), swap_);
-    rest_.remove_prefix(sizeof(T));
-    return value;
+    return binary_ ? binary_number<T>(swap_) : text_number<T>();
   }
   int integer() { return number<std::int32_t>(); }
   std::int64_t size() { return number<std::int64_t>(); }  // size_t in the file
@@ -79,23 +53,25 @@ class Cursor {
   // A count of things that take at least one byte each: a larger one is a lie and would exhaust
   // memory.
   std::int64_t checked(std::int64_t count) {
-    if (count < 0 || static_cast<std::uint64_t>(count) > rest_.size()) {
-      refuse("section '" + section_ + "' promises " + std::to_string(count) + " entries");
+    if (count < 0 || static_cast<std::uint64_t>(count) > rest().size()) {
+      refuse_format("section '" + section_ + "' promises " + std::to_string(count) + " entries");
     }
     return count;
   }
-  void enter(std::string_view name) { section_ = name; }
+  void enter(std::string_view name) {
+    section_ = name;
+    NumberCursor::enter("section '" + section_ + "' ");
+  }
   void skip_section() {
     const std::string end = "$End" + section_.substr(1);
-    const std::size_t at = rest_.find(end);
-    if (at == std::string_view::npos) refuse("section '" + section_ + "' has no end");
-    rest_.remove_prefix(at + end.size());
+    const std::size_t at = rest().find(end);
+    if (at == std::string_view::npos) refuse_format("section '" + section_ + "' has no end");
+    skip(at + end.size());
     line();
   }
 
  private:
-  std::string_view rest_;
-  std::string section_ = "$MeshFormat";
+  std::string section_;
   bool binary_ = false;
   bool swap_ = false;
 };
@@ -137,22 +113,24 @@ class Reader {
 };
 
 void Reader::read_format() {
-  if (cursor_.line() != "$MeshFormat") refuse("is not a Gmsh file: it must begin with $MeshFormat");
+  if (cursor_.line() != "$MeshFormat")
+    refuse_format("is not a Gmsh file: it must begin with $MeshFormat");
   const auto version = cursor_.text_number<double>();
   const auto binary = cursor_.text_number<int>();
   const auto size = cursor_.text_number<int>();
   if (version != 2.2 && version != 4.1) {
     std::string text = std::to_string(version);
-    refuse("Gmsh format version " + text.substr(0, text.find('.') + 2) +
-           " is not supported: must be 2.2 or 4.1");
+    refuse_format("Gmsh format version " + text.substr(0, text.find('.') + 2) +
+                  " is not supported: must be 2.2 or 4.1");
   }
   version_4_ = version == 4.1;
-  if (size != 8) refuse("Gmsh data size " + std::to_string(size) + " is not supported: must be 8");
+  if (size != 8)
+    refuse_format("Gmsh data size " + std::to_string(size) + " is not supported: must be 8");
   cursor_.line();
   if (binary == 1) {
-    if (cursor_.rest().size() < 4) refuse("ends inside $MeshFormat");
+    if (cursor_.rest().size() < 4) refuse_format("ends inside $MeshFormat");
     cursor_.set_binary(load_number<std::int32_t>(cursor_.rest().data(), false) != 1);
-    if (cursor_.integer() != 1) refuse("byte order mark is damaged");
+    if (cursor_.integer() != 1) refuse_format("byte order mark is damaged");
     cursor_.line();
   }
   cursor_.skip_section();
@@ -168,7 +146,8 @@ void Reader::read_physical_names() {
     const std::string_view rest = cursor_.line();
     const std::size_t open = rest.find('"');
     const std::size_t close = rest.rfind('"');
-    if (open == close) refuse("section '$PhysicalNames' holds a name without quotation marks");
+    if (open == close)
+      refuse_format("section '$PhysicalNames' holds a name without quotation marks");
     const std::string name(rest.substr(open + 1, close - open - 1));
     if (dimension == 3) volume_names_.emplace(name, tag);
     if (dimension == 2) surface_names_.emplace(name, tag);
@@ -198,7 +177,7 @@ void Reader::read_entities() {
 void Reader::add_node(std::int64_t tag, double x, double y, double z) {
   const auto index = static_cast<int>(index_of_tag_.size());
   if (!index_of_tag_.emplace(tag, index).second) {
-    refuse("node " + std::to_string(tag) + " is given twice");
+    refuse_format("node " + std::to_string(tag) + " is given twice");
   }
   coordinates_.insert(coordinates_.end(), {x, y, z});
 }
@@ -244,7 +223,7 @@ void Reader::add_element(std::int64_t type, const std::vector<std::int64_t>& tag
 
 int checked_vertices(std::int64_t type) {
   const int vertices = vertices_of_type(type);
-  if (vertices == 0) refuse("element type " + std::to_string(type) + " is unknown");
+  if (vertices == 0) refuse_format("element type " + std::to_string(type) + " is unknown");
   return vertices;
 }
 
@@ -261,7 +240,7 @@ void Reader::read_elements_2() {
       type = cursor_.integer();
       in_run = cursor_.integer();
       tags = cursor_.integer();
-      if (in_run < 1) refuse("a run of elements is empty");
+      if (in_run < 1) refuse_format("a run of elements is empty");
     }
     for (int i = 0; i < in_run; ++i, ++read) {
       cursor_.integer();  // element number
@@ -313,8 +292,8 @@ Eigen::Matrix<int, Vertices, Eigen::Dynamic> Reader::cells(const std::vector<std
   for (std::size_t i = 0; i < tags.size(); ++i) {
     const auto found = index_of_tag_.find(tags[i]);
     if (found == index_of_tag_.end()) {
-      refuse(name + " " + std::to_string(i / Vertices) + " has node " + std::to_string(tags[i]) +
-             ", which does not exist");
+      refuse_format(name + " " + std::to_string(i / Vertices) + " has node " +
+                    std::to_string(tags[i]) + ", which does not exist");
     }
     indices.data()[i] = found->second;
   }
@@ -322,7 +301,7 @@ Eigen::Matrix<int, Vertices, Eigen::Dynamic> Reader::cells(const std::vector<std
 }
 
 GroupedMesh Reader::mesh() const {
-  if (tets_.empty()) refuse("has no 4-node tetrahedron");
+  if (tets_.empty()) refuse_format("has no 4-node tetrahedron");
   GroupedMesh result;
   TetMesh& mesh = result.mesh;
   mesh.nodes = Eigen::Map<const Points>(coordinates_.data(), 3,
@@ -346,7 +325,7 @@ GroupedMesh Reader::read() {
   while (!cursor_.rest().empty()) {
     const std::string_view name = cursor_.line();
     if (name.empty()) continue;
-    if (name.front() != '$') refuse("has text outside of its sections");
+    if (name.front() != '$') refuse_format("has text outside of its sections");
     cursor_.enter(name);
     if (name == "$Nodes") {
       version_4_ ? read_nodes_4() : read_nodes_2();
@@ -361,8 +340,8 @@ GroupedMesh Reader::read() {
     }
     cursor_.skip_section();
   }
-  if (!has_nodes_) refuse("has no $Nodes section");
-  if (!has_elements) refuse("has no $Elements section");
+  if (!has_nodes_) refuse_format("has no $Nodes section");
+  if (!has_elements) refuse_format("has no $Elements section");
   return mesh();
 }
 

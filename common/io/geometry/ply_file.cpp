@@ -1,25 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/geometry/ply_file.hpp"
 
-#include <charconv>
 #include <cstdint>
 #include <limits>
 #include <map>
 #include <sstream>
 #include <vector>
 
-#include "common/io/files/binary_codec.hpp"
+#include "common/io/files/number_cursor.hpp"
 #include "common/io/files/point_space.hpp"
 
 namespace brainshift::io {
 namespace {
-
-// Thrown inside this file only; parse_ply catches it.
-struct FormatProblem {
-  std::string message;
-};
-
-[[noreturn]] void refuse_ply(const std::string& message) { throw FormatProblem{message}; }
 
 struct Property {
   std::string name;
@@ -42,7 +34,8 @@ struct Header {
 Header read_header(std::string_view& rest) {
   constexpr std::string_view kEnd = "end_header";
   const std::size_t end = rest.find(kEnd);
-  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos) refuse_ply("is not a PLY file");
+  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos)
+    refuse_format("is not a PLY file");
   std::istringstream lines{std::string(rest.substr(0, end))};
   rest.remove_prefix(std::min(rest.size(), rest.find('\n', end) + 1));
 
@@ -55,67 +48,45 @@ Header read_header(std::string_view& rest) {
     if (first == "format") words >> header.format;
     if (first == "comment" && header.space == PointSpace::kUnsaid) {
       const Result<PointSpace> said = point_space_in(line);
-      if (!said) refuse_ply(said.error().message);
+      if (!said) refuse_format(said.error().message);
       header.space = *said;
     }
     if (first == "element") {
       Element element;
-      if (!(words >> element.name >> element.count)) refuse_ply("element without a count: " + line);
+      if (!(words >> element.name >> element.count))
+        refuse_format("element without a count: " + line);
       header.elements.push_back(element);
     }
     if (first == "property") {
-      if (header.elements.empty()) refuse_ply("property before the first element");
+      if (header.elements.empty()) refuse_format("property before the first element");
       Property property;
       words >> property.type;
       if (property.type == "list") words >> property.count_type >> property.type;
-      if (!(words >> property.name)) refuse_ply("property without a name");
+      if (!(words >> property.name)) refuse_format("property without a name");
       header.elements.back().properties.push_back(property);
     }
   }
   if (header.format != "ascii" && header.format != "binary_little_endian") {
-    refuse_ply("PLY format '" + header.format +
-               "' is not supported: must be ascii or binary_little_endian");
+    refuse_format("PLY format '" + header.format +
+                  "' is not supported: must be ascii or binary_little_endian");
   }
   return header;
 }
 
-class Cursor {
- public:
-  Cursor(std::string_view rest, bool ascii) : rest_(rest), ascii_(ascii) {}
-
-  double value(const std::string& type) {
-    if (ascii_) return text_number();
-    if (type == "char" || type == "int8") return binary<std::int8_t>();
-    if (type == "uchar" || type == "uint8") return binary<std::uint8_t>();
-    if (type == "short" || type == "int16") return binary<std::int16_t>();
-    if (type == "ushort" || type == "uint16") return binary<std::uint16_t>();
-    if (type == "int" || type == "int32") return binary<std::int32_t>();
-    if (type == "uint" || type == "uint32") return binary<std::uint32_t>();
-    if (type == "float" || type == "float32") return binary<float>();
-    if (type == "double" || type == "float64") return binary<double>();
-    refuse_ply("property type '" + type + "' is unknown");
+double read_value(NumberCursor& cursor, bool ascii, const std::string& type) {
+  if (ascii) return cursor.text_number<double>();
+  if (type == "char" || type == "int8") return cursor.binary_number<std::int8_t>(false);
+  if (type == "uchar" || type == "uint8") return cursor.binary_number<std::uint8_t>(false);
+  if (type == "short" || type == "int16") return cursor.binary_number<std::int16_t>(false);
+  if (type == "ushort" || type == "uint16") return cursor.binary_number<std::uint16_t>(false);
+  if (type == "int" || type == "int32") return cursor.binary_number<std::int32_t>(false);
+  if (type == "uint" || type == "uint32") return cursor.binary_number<std::uint32_t>(false);
+  if (type == "float" || type == "float32") {
+    return static_cast<double>(cursor.binary_number<float>(false));
   }
-  std::size_t remaining() const { return rest_.size(); }
-
- private:
-  template <typename T>
-  double binary() {
-    if (rest_.size() < sizeof(T)) refuse_ply("ends too early");
-    const T number = load_number<T>(rest_.data(), false);
-    rest_.remove_prefix(sizeof(T));
-    return static_cast<double>(number);
-  }
-  double text_number() {
-    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
-    double number = 0.0;
-    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), number);
-    if (error != std::errc()) refuse_ply("ends too early or holds something that is not a number");
-    rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
-    return number;
-  }
-  std::string_view rest_;
-  bool ascii_;
-};
+  if (type == "double" || type == "float64") return cursor.binary_number<double>(false);
+  refuse_format("property type '" + type + "' is unknown");
+}
 
 int ply_index(double value) {
   const bool fits = value >= 0.0 && value <= std::numeric_limits<int>::max();
@@ -123,21 +94,21 @@ int ply_index(double value) {
 }
 
 // One entry of an element: scalars by name; a list of vertex indices goes to `indices`.
-void read_entry(Cursor& cursor, const Element& element, std::map<std::string, double>& scalars,
-                std::vector<int>& indices) {
+void read_entry(NumberCursor& cursor, bool ascii, const Element& element,
+                std::map<std::string, double>& scalars, std::vector<int>& indices) {
   indices.clear();
   for (const Property& property : element.properties) {
     if (property.count_type.empty()) {
-      scalars[property.name] = cursor.value(property.type);
+      scalars[property.name] = read_value(cursor, ascii, property.type);
       continue;
     }
-    const double count = cursor.value(property.count_type);
-    if (!(count >= 0.0) || count > static_cast<double>(cursor.remaining())) {
-      refuse_ply("a list promises an impossible number of entries");
+    const double count = read_value(cursor, ascii, property.count_type);
+    if (!(count >= 0.0) || count > static_cast<double>(cursor.rest().size())) {
+      refuse_format("a list promises an impossible number of entries");
     }
     const bool is_face = property.name == "vertex_indices" || property.name == "vertex_index";
     for (int k = 0; k < static_cast<int>(count); ++k) {
-      const double value = cursor.value(property.type);
+      const double value = read_value(cursor, ascii, property.type);
       if (is_face) indices.push_back(ply_index(value));
     }
   }
@@ -145,30 +116,31 @@ void read_entry(Cursor& cursor, const Element& element, std::map<std::string, do
 
 TriangleSurface read_ply(std::string_view rest) {
   const Header header = read_header(rest);
-  Cursor cursor(rest, header.format == "ascii");
+  NumberCursor cursor(rest);
+  const bool ascii = header.format == "ascii";
   TriangleSurface surface;
   for (const Element& element : header.elements) {
     if (element.properties.empty()) continue;
     // Every entry takes at least a byte.
-    if (element.count > cursor.remaining())
-      refuse_ply("element '" + element.name + "' ends too early");
+    if (element.count > cursor.rest().size())
+      refuse_format("element '" + element.name + "' ends too early");
     const auto count = static_cast<Eigen::Index>(element.count);
     if (element.name == "vertex") surface.vertices.resize(3, count);
     if (element.name == "face") surface.triangles.resize(3, count);
     std::map<std::string, double> scalars;
     std::vector<int> indices;
     for (Eigen::Index i = 0; i < count; ++i) {
-      read_entry(cursor, element, scalars, indices);
+      read_entry(cursor, ascii, element, scalars, indices);
       if (element.name == "vertex") {
         if (scalars.count("x") + scalars.count("y") + scalars.count("z") != 3) {
-          refuse_ply("element 'vertex' lacks x, y or z");
+          refuse_format("element 'vertex' lacks x, y or z");
         }
         surface.vertices.col(i) << scalars["x"], scalars["y"], scalars["z"];
       }
       if (element.name == "face") {
         if (indices.size() != 3) {
-          refuse_ply("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
-                     " vertices: must have 3");
+          refuse_format("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
+                        " vertices: must have 3");
         }
         surface.triangles.col(i) << indices[0], indices[1], indices[2];
       }

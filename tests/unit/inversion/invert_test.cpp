@@ -21,7 +21,6 @@ TEST(Invert, EqualsTheFirstUpdateOfAnInverterForEveryMethod) {
   const auto model = std::make_shared<const PreparedModel>(prepare(Boundary::kContact, config()));
   const SparseData data = sagging_data(*model, 0.1);
   for (const Method method : kAllMethods) {
-    if (method == Method::kCondensedExact) continue;  // condensed_exact_test.cpp: data at nodes
     const auto once = invert(*model, data, method);
     ASSERT_TRUE(once.has_value()) << to_string(method) << ": " << once.error().message;
     Estimate estimate;

@@ -30,7 +30,7 @@ class Inverters : public ::testing::TestWithParam<Method> {
     config.condensed.uncertainty_nodes = 40;
     return config;
   }
-  // At nodes of the data region, which method condensed-exact needs.
+  // At nodes of the data region.
   static SparseData data() {
     const SparseData sampled = sagging_data(*model(), 0.1);
     const auto region = data_region(*patient());
@@ -131,15 +131,20 @@ TEST_P(Inverters, AStopEndsTheUpdateWithItsOwnReason) {
   EXPECT_TRUE(made->update(data(), {}, estimate)) << "the next update must work";
 }
 
-TEST_P(Inverters, RejectDataThatAreNotFinite) {
+TEST_P(Inverters, RejectDataThatAreNotFiniteOrOutsideTheBrain) {
   auto made = inverter();
-  SparseData bad = data();
+  SparseData bad = data(), outside = data();
   bad.displacements(1, 3) = std::numeric_limits<double>::quiet_NaN();
+  outside.positions.col(2) = Vec3(30, 30, 90);
   Estimate estimate;
   const Status status = made->update(bad, {}, estimate);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
   EXPECT_THAT(status.error().message, HasSubstr("point 3"));
+  const Status far = made->update(outside, {}, estimate);
+  ASSERT_FALSE(far);
+  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(far.error().message, HasSubstr("point 2"));
 }
 
 TEST_P(Inverters, OnlyMethodCondensedTakesDataAlongADirection) {

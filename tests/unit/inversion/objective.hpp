@@ -4,9 +4,8 @@
 #pragma once
 
 #include "common/contact/refactorised_system.hpp"
-#include "common/inversion/descent/gradient.hpp"
-#include "common/inversion/descent/line_search.hpp"
 #include "common/inversion/descent/misfit.hpp"
+#include "common/inversion/descent/objective.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 
 namespace brainshift::inversion {

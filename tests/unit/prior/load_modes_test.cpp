@@ -161,6 +161,46 @@ TEST(LoadModes, SwellingHonoursTheStiffnessOfTheTumour) {
       << "the test shows nothing";
 }
 
+// Work in a dilation of one part of the brain, u = max(0, x - m) along an axis: the integral of
+// kappa theta over what lies above m, in closed form, as kappa is one number and the plane at m one
+// of the mesh. The box is 60 mm wide about x = 37 mm and 90 mm long about y = 45 mm.
+TEST(LoadModes, TheBrainSwellsAsAWholeInOppositeHalvesAndTowardsFrontAndTop) {
+  BrainModel patient = test_support::toy_patient(12);
+  patient.mesh.nodes.row(0).array() += 7.0;
+  patient.mesh.nodes.row(1) *= 1.5;
+  const CaseConfig config = only(0.0, 0.0, 0.02, 0.0, 0.0, 0.0);
+  const LoadModes modes = modes_of(patient, config);
+  ASSERT_EQ(modes.size(), 4);
+  const double kappa = 0.02 * bulk_modulus(config.material);
+  const auto work = [&](int column, int axis, double from, double to) {
+    const auto force = mode(modes.columns, column);
+    double sum = 0.0;
+    for (Eigen::Index i = 0; i < force.cols(); ++i) {
+      sum += force(axis, i) * (std::clamp(patient.mesh.nodes(axis, i), from, to) - from);
+    }
+    return sum;
+  };
+  // Areas across x, y and z; middles and half widths along them.
+  const Vec3 area(90.0 * 60.0, 60.0 * 60.0, 60.0 * 90.0), middle(37, 45, 30), half(30, 45, 30);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = middle[axis] - half[axis], high = middle[axis] + half[axis];
+    const double upper = kappa * area[axis] * half[axis];
+    EXPECT_NEAR(work(0, axis, middle[axis], high), upper, 1e-9 * upper) << axis;
+    EXPECT_NEAR(work(0, axis, low, middle[axis]), upper, 1e-9 * upper) << axis;
+  }
+  // int tanh(t / 10) dt = 10 ln cosh(t / 10), to the right and with opposite sign to the left; the
+  // elements are 5 mm wide.
+  const double right = kappa * area.x() * 10.0 * std::log(std::cosh(3.0));
+  EXPECT_NEAR(work(1, 0, 37, 67), right, 0.01 * right);
+  EXPECT_NEAR(work(1, 0, 7, 37), -right, 0.01 * right);
+  // Linear from -1 to 1: half of the uniform strain in each half.
+  const double front = kappa * area.y() * 45.0 / 2.0, top = kappa * area.z() * 30.0 / 2.0;
+  EXPECT_NEAR(work(2, 1, 45, 90), front, 1e-9 * front);
+  EXPECT_NEAR(work(2, 1, 0, 45), -front, 1e-9 * front);
+  EXPECT_NEAR(work(3, 2, 30, 60), top, 1e-9 * top);
+  EXPECT_NEAR(work(3, 2, 0, 30), -top, 1e-9 * top);
+}
+
 // A net force of the tumour's weight along each axis. The Gaussian reaches beyond the toy's tumour,
 // but not beyond its brain.
 TEST(LoadModes, TheMissingWeightIsThatOfTheTumour) {
@@ -223,6 +263,65 @@ TEST_F(OpeningModes, HaveTheForceOfTheirPressure) {
         mode(modes.columns, j).row(j % 3).transpose().cwiseQuotient(600e-6 * areas(1.0));
     EXPECT_LE(part.maxCoeff(), 1.0 + 1e-9) << j;
     EXPECT_GT(part.maxCoeff(), 0.9) << j;
+  }
+}
+
+// The traction of a bump is a Gaussian: its logarithm over the nodes gives centre and widths. On an
+// opening that is an ellipse of half axes 27 and 16 mm, turned by 20 degrees, both are known but
+// for the ragged rim of the triangles: widths of 0.45 of the half axes, a middle, a ring at 0.65.
+TEST_F(OpeningModes, HaveCentresAndWidthsOfTheirEllipse) {
+  const Vec3 middle(30, 30, 60);
+  const double turned = std::numbers::pi / 9.0;
+  const Vec3 along(std::cos(turned), std::sin(turned), 0.0);
+  const Vec3 across(-std::sin(turned), std::cos(turned), 0.0);
+  patient.craniotomy.clear();
+  for (int i = 0; i < patient.mesh.num_nodes(); ++i) {
+    const Vec3 away = patient.mesh.nodes.col(i) - middle;
+    const double a = away.dot(along) / 27.0, b = away.dot(across) / 16.0;
+    if (away.z() == 0.0 && a * a + b * b <= 1.0) patient.craniotomy.push_back(i);
+  }
+  modes = modes_of(patient, only(0.0, 0.0, 0.0, 0.0, 0.0, 600.0));
+  ASSERT_EQ(modes.size(), 21);
+  const VecX area = areas(0.0);
+  struct Bump {
+    Vec3 centre;
+    double along_mm, across_mm;  // standard deviations
+  };
+  const auto bump = [&](int k) {
+    std::vector<Eigen::Matrix<double, 7, 1>> rows;  // 1, x, y, x^2, xy, y^2; log traction
+    for (const NodeIndex node : patient.craniotomy) {
+      if (!(area[node] > 0.0)) continue;
+      const Vec3 away = patient.mesh.nodes.col(node) - middle;
+      const double x = away.dot(along), y = away.dot(across);
+      const double traction = mode(modes.columns, 3 * k + 2)(2, node) / (600e-6 * area[node]);
+      rows.push_back({1.0, x, y, x * x, x * y, y * y, std::log(traction)});
+    }
+    Eigen::MatrixXd all(static_cast<Eigen::Index>(rows.size()), 7);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      all.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    }
+    const VecX c = all.leftCols(6).colPivHouseholderQr().solve(all.col(6));
+    EXPECT_LT((all.leftCols(6) * c - all.col(6)).norm(), 1e-9) << k;
+    Eigen::Matrix2d curvature;
+    curvature << -2.0 * c[3], -c[4], -c[4], -2.0 * c[5];
+    const Eigen::Vector2d at = curvature.inverse() * Eigen::Vector2d(c[1], c[2]);
+    return Bump{middle + at.x() * along + at.y() * across, 1.0 / std::sqrt(curvature(0, 0)),
+                1.0 / std::sqrt(curvature(1, 1))};
+  };
+  constexpr double kHalfEdge_mm = 1.25;  // so much of the rim the triangles leave out
+  EXPECT_LT((bump(0).centre - middle).norm(), 0.5);
+  for (int k = 0; k < 7; ++k) {
+    EXPECT_NEAR(bump(k).along_mm, 0.45 * 27.0, 0.45 * kHalfEdge_mm) << k;
+    EXPECT_NEAR(bump(k).across_mm, 0.45 * 16.0, 0.45 * kHalfEdge_mm) << k;
+  }
+  // The ring begins on the long axis, on either side of the middle, and goes round in sixths.
+  const double side = (bump(1).centre - middle).dot(along) > 0.0 ? 1.0 : -1.0;
+  const double turn = (bump(2).centre - middle).dot(across) > 0.0 ? 1.0 : -1.0;
+  for (int k = 0; k < 6; ++k) {
+    const double angle = k * std::numbers::pi / 3.0;
+    const Vec3 expected = middle + 0.65 * (side * 27.0 * std::cos(angle) * along +
+                                           turn * 16.0 * std::sin(angle) * across);
+    EXPECT_LT((bump(k + 1).centre - expected).norm(), kHalfEdge_mm) << k;
   }
 }
 

@@ -93,17 +93,16 @@ TEST(SurfaceDistances, OfASunkenCortexAreTheDepthAlongItsNormal) {
 TEST(SurfaceDistances, AreSettledAcrossTheSurfaceSoonerThanAlongIt) {
   const SurfaceDistances surface = built(points_on_cap(400, 6.0));
   const SparseData before = surface.at(still(surface));
-  const SurfaceDistanceOptions settled;
   const auto moved = [&](double across_mm, double along_mm) {
     SparseData now = before;
     const Vec3 n = now.directions.col(7);
     now.positions.col(7) += across_mm * n + along_mm * n.unitOrthogonal();
     return surface.moved(before, now);
   };
-  EXPECT_FALSE(moved(0.9 * settled.settled_mm, 0.0));
-  EXPECT_TRUE(moved(-1.1 * settled.settled_mm, 0.0));
-  EXPECT_FALSE(moved(0.0, 0.9 * settled.settled_along_mm));
-  EXPECT_TRUE(moved(0.0, 1.1 * settled.settled_along_mm));
+  EXPECT_FALSE(moved(0.9 * kSettled_mm, 0.0));
+  EXPECT_TRUE(moved(-1.1 * kSettled_mm, 0.0));
+  EXPECT_FALSE(moved(0.0, 0.9 * kSettledAlong_mm));
+  EXPECT_TRUE(moved(0.0, 1.1 * kSettledAlong_mm));
   SparseData fewer = before;
   fewer.positions.conservativeResize(3, before.size() - 1);
   fewer.displacements.conservativeResize(3, before.size() - 1);

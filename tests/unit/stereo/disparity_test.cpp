@@ -128,12 +128,6 @@ TEST(Match, BadOptionsAndPicturesAreNamed) {
   options.disparities = 0;
   EXPECT_EQ(match_refusal(good, options), "disparities = 0: must be between 1 and 2048");
   options = {};
-  options.block_px = 4;
-  EXPECT_EQ(match_refusal(good, options), "block_px = 4: must be odd and between 1 and 21");
-  options = {};
-  options.noise_grey = 0.0;
-  EXPECT_EQ(match_refusal(good, options), "noise_grey = 0: must be > 0");
-  options = {};
   options.max_left_right_px = NAN;
   EXPECT_EQ(match_refusal(good, options), "max_left_right_px = nan: must be > 0");
   EXPECT_EQ(match_refusal({GrayImage(40, 40), GrayImage(41, 40), {}, {}}, {}),

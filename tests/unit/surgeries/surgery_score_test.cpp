@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <numbers>
 
 #include "tests/support/toy_patient.hpp"
 
@@ -64,6 +65,27 @@ TEST_F(Score, CountsTheComponentsInsideEveryInterval) {
   EXPECT_DOUBLE_EQ(of.coverage_90, of.coverage[3]);
   estimate.sd_mm.resize(0);
   EXPECT_TRUE(std::isnan(score().coverage[0]));
+}
+
+// The share of a Gaussian within r standard deviations is erf(r / sqrt 2); within the ball of that
+// radius in three dimensions erf(r / sqrt 2) - sqrt(2 / pi) r exp(-r^2 / 2).
+TEST_F(Score, IntervalsHoldTheShareOfAGaussianThatTheySay) {
+  const auto within = [](double r) { return std::erf(r / std::sqrt(2.0)); };
+  for (const Interval& each : kIntervals) {
+    EXPECT_NEAR(100.0 * within(each.radius), each.percent, 3e-3) << each.percent;
+  }
+  const double in_ball = within(kRadius90) - std::sqrt(2.0 / std::numbers::pi) * kRadius90 *
+                                                 std::exp(-0.5 * kRadius90 * kRadius90);
+  EXPECT_NEAR(100.0 * in_ball, 90.0, 1e-3);
+}
+
+// The 0.95 quantile of the standard normal is 1.64485: just within it along x, beyond it along y.
+TEST_F(Score, CoverageOfNinetyPercentEndsAtTheQuantile) {
+  estimate.displacement.row(0).array() += 0.1 * 1.6447;
+  estimate.displacement.row(1).array() -= 0.1 * 1.6451;
+  const UpdateScore of = score();
+  EXPECT_DOUBLE_EQ(of.coverage_90, 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(of.coverage[3], 2.0 / 3.0);
 }
 
 TEST_F(Score, TheRigidMotionOfATruthThatIsRigidLeavesNothing) {

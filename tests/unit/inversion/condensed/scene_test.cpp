@@ -165,21 +165,6 @@ TEST_F(Scene, RegionOfInterestIsRebuiltAsInTheWholeField) {
   EXPECT_LT((part.sd_mm - full.sd_mm).cwiseAbs().maxCoeff(), kSameField_mm);
 }
 
-// The other half of the promise: the same build, machine and kernel repeat every bit.
-TEST_F(Scene, RepeatedUpdatesAreBitIdentical) {
-  CondensedOptions options;
-  options.region_of_interest = near_tumour(20.0);
-  auto one = inverter(options), two = inverter(options);
-  Estimate first, second;
-  for (const SparseData& each : scenes()) {
-    ASSERT_TRUE(one.update(each, first));
-    ASSERT_TRUE(two.update(each, second));
-    EXPECT_TRUE(first.displacement == second.displacement);
-    EXPECT_TRUE(first.sd_mm == second.sd_mm);
-    EXPECT_TRUE(first.contact_force_n == second.contact_force_n);
-  }
-}
-
 TEST_F(Scene, RegionOfAllNodesLeavesNothingOut) {
   CondensedOptions options;
   options.region_of_interest = near_tumour(1000.0);

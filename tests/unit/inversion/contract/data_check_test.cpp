@@ -5,9 +5,6 @@
 
 #include <limits>
 
-#include "common/inversion/invert.hpp"
-#include "tests/support/toy_patient.hpp"
-
 namespace brainshift::inversion {
 namespace {
 
@@ -124,20 +121,6 @@ TEST(CheckData, RefusesCollinearAndCoincidentPositions) {
   expect_refused(data, ErrorCode::kInvalidArgument, "one line");
   data.positions.colwise() = Vec3(30, 30, 40);
   expect_refused(data, ErrorCode::kInvalidArgument, "one point");
-}
-
-TEST(Invert, RefusesADatumFarOutsideTheBrain) {
-  const auto model =
-      PreparedModel::prepare(std::make_shared<BrainModel>(test_support::toy_patient(4)),
-                             test_support::toy_config(), Boundary::kFixed);
-  ASSERT_TRUE(model.has_value()) << model.error().message;
-  SparseData data = good_data();
-  data.positions.col(3) = Vec3(30, 30, 80);
-  const auto estimate = invert(*model, data);
-  ASSERT_FALSE(estimate.has_value());
-  EXPECT_EQ(estimate.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_NE(estimate.error().message.find("point 3"), std::string::npos)
-      << estimate.error().message;
 }
 
 }  // namespace

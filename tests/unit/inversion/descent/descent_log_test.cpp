@@ -3,7 +3,6 @@
 #include "common/inversion/descent/descent_log.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "common/inversion/invert.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
@@ -21,7 +20,7 @@ class DescentMethods : public ::testing::TestWithParam<Method> {
 
 INSTANTIATE_TEST_SUITE_P(Methods, DescentMethods,
                          ::testing::Values(Method::kPaper, Method::kPaperWoodbury,
-                                           Method::kConjugateGradients, Method::kIterativeSolver),
+                                           Method::kIterativeSolver),
                          [](const auto& each) {
                            std::string name(to_string(each.param));
                            std::replace(name.begin(), name.end(), '-', '_');
@@ -44,6 +43,7 @@ TEST_P(DescentMethods, PublishEveryIterateAndConverge) {
   EXPECT_EQ(estimate->status, EstimateStatus::kConverged);
   EXPECT_NE(estimate->reason.find("misfit changed by less than 0.001"), std::string::npos)
       << estimate->reason;
+  EXPECT_NEAR(estimate->history.front().misfit_mm.mean, estimate->initial_misfit_mm.mean, 1e-12);
   EXPECT_LT(estimate->misfit_mm.mean, 0.2 * estimate->initial_misfit_mm.mean);
   EXPECT_EQ(estimate->active_slaves.size(),
             static_cast<std::size_t>(estimate->contact_force_n.size()));
@@ -74,15 +74,6 @@ TEST_P(DescentMethods, StopWhenAsked) {
   EXPECT_EQ(estimate.error().code, ErrorCode::kNotConverged);
   EXPECT_NE(estimate.error().message.find("iteration 3"), std::string::npos)
       << estimate.error().message;
-}
-
-TEST_P(DescentMethods, RefuseBadData) {
-  const PreparedModel model = prepare(Boundary::kContact);
-  SparseData data = sagging_data(model, 0.1);
-  data.displacements(1, 0) = std::numeric_limits<double>::infinity();
-  const auto estimate = run(model, data);
-  ASSERT_FALSE(estimate.has_value());
-  EXPECT_EQ(estimate.error().code, ErrorCode::kNotFinite);
 }
 
 TEST_P(DescentMethods, AreAtTheMinimumWhenNothingMoved) {

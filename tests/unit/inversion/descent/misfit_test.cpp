@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/inversion/descent/line_search.hpp"
+#include "common/inversion/descent/objective.hpp"
 #include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
@@ -42,13 +42,6 @@ TEST(Misfit, WeighsEveryDatumByItsStandardDeviation) {
     expected += data.displacements.col(i).squaredNorm() / (data.sd_mm[i] * data.sd_mm[i]);
   }
   EXPECT_NEAR(misfit->inner(e, e), expected, 1e-12 * expected);
-}
-
-TEST(Misfit, RefusesADatumOutsideTheBrain) {
-  const PreparedModel model = prepare(Boundary::kFixed);
-  SparseData data = uneven_data(model);
-  data.positions.col(2) = Vec3(30, 30, 90);
-  EXPECT_FALSE(Misfit::build(model, data).has_value());
 }
 
 // Omega is quadratic for a given set: it must be higher on either side of the exact step, by the

@@ -325,6 +325,13 @@ TEST_F(ImageFile, TwoDimensionsAreRefused) {
   EXPECT_THAT(refusal(Header().dims({2, 4, 6})), HasSubstr("not a 3-D image"));
 }
 
+TEST_F(ImageFile, VoxelsThatBeginNowhereAreRefused) {
+  for (const float offset : {1e30f, -352.0f, 352.5f}) {
+    EXPECT_THAT(refusal(Header().set<float>(108, offset), voxels<float>(24)),
+                HasSubstr("vox_offset is"));
+  }
+}
+
 TEST_F(ImageFile, TruncatedVoxelsAreRefused) {
   EXPECT_THAT(refusal(Header(), voxels<float>(23)), HasSubstr("truncated"));
 }

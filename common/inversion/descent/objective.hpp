@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The step that minimises Omega (steepest_descent.hpp) along a direction s = Sigma dw, exact for a
-// fixed active set:
+// What a descent on Omega (steepest_descent.hpp) needs of it for the active set of a system: its
+// negative gradient by the adjoint, and the step that minimises it along a direction s = Sigma dw.
 //
+//   K_p lambda = 2 A^T W_e e        (paper eq. 5)
+//   -g = lambda - 2 W_b b           (paper eq. 6)
 //   alpha = (e . W_e A z - b . W_b s) / (A z . W_e A z + s . W_b s),     z = K_p^-1 s,  W_b s = dw
 #pragma once
 
+#include "common/contact/penalised_system.hpp"
 #include "common/core/error.hpp"
 #include "common/inversion/descent/misfit.hpp"
 
@@ -12,6 +15,11 @@ namespace brainshift::inversion {
 
 // sum of a_ij b_ij
 double inner(const Points& a, const Points& b);
+
+// e: misfit d - A u, 3 x m; w = W_b b: 3 x n. lambda: 3 x n, the first guess of an iterative
+// system. Overwrites lambda and the negative gradient, 3 x n in RAS axes. Errors as the system's.
+Status negative_gradient(contact::PenalisedSystem& system, const Misfit& misfit, const Points& e,
+                         const Points& w, Points& lambda, Points& gradient);
 
 // e: misfit, az = A z: 3 x m; b, s, dw: 3 x n. 0 when the curvature along s is 0, which it is at
 // the minimum, where the direction is zero. kNotFinite when the curvature is not a number.
