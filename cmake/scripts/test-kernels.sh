@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# test-kernels.sh PRESET [KERNEL...]: runs the tests of what links BLAS (label blas) with OpenBLAS kernels that this machine
-# would not choose
-# by itself, so that a result that holds on one processor only is found here.
+# test-kernels.sh PRESET [KERNEL...]: runs the tests of what links BLAS (label blas), and those of the studies where they are
+# built, with OpenBLAS kernels that this machine would not choose by itself, so that a result that holds on one processor only
+# is found here.
 # Without a name: one other kernel (Haswell; on a machine that chooses Haswell, SkylakeX or Nehalem).
 # Kernels: Haswell, Zen (AVX2), SkylakeX (AVX-512), Nehalem (any x86-64 with SSE4.2).
 set -euo pipefail
@@ -43,5 +43,8 @@ for kernel in "$@"; do
   [ "$used" = "$kernel" ] || { echo "test-kernels: OpenBLAS takes $used for $kernel" >&2; exit 1; }
   echo "test-kernels: tests of what links BLAS with OPENBLAS_CORETYPE=$kernel"
   OPENBLAS_CORETYPE=$kernel cmake/scripts/run-tests.sh "$preset" -L '^blas$' || failed+=("$kernel")
+  if [ -x "build/$preset/bin/stability_suite" ]; then  # make studies
+    OPENBLAS_CORETYPE=$kernel cmake/scripts/run-tests.sh studies -LE '^python$' || failed+=("$kernel, studies")
+  fi
 done
 [ ${#failed[@]} -eq 0 ] || { echo "test-kernels: tests failed with ${failed[*]}" >&2; exit 1; }
