@@ -26,6 +26,7 @@
 namespace brainshift::faults {
 namespace {
 
+using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
@@ -86,7 +87,6 @@ class Replay {
 // Plays until the daemon is gone; what it claimed until then. Every answer to subscribe() says what
 // is on the disk at that moment.
 Claims play_into(client::Client& client, const SessionInfo& info, const Feed& feed, bool paced) {
-  using Clock = std::chrono::steady_clock;
   Claims claims;
   const auto gone = [&] {
     if (!client.subscribe()) return true;
