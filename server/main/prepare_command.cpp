@@ -15,7 +15,7 @@
 #include "common/io/files/output_path.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/prepare_model.hpp"
-#include "common/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene.hpp"
 #include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
 

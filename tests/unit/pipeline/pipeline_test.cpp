@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "common/pipeline/left_out.hpp"
+#include "common/pipeline/scene.hpp"
 #include "tests/unit/server/fake_inverter.hpp"
 
 namespace brainshift::pipeline {
@@ -70,12 +70,12 @@ TetMesh cube(double edge) {
   return mesh;
 }
 
-std::shared_ptr<const BrainModel> model() {
-  auto model = std::make_shared<BrainModel>();
-  model->case_id = kCase;
-  model->model_id = "0123456789abcdef";
-  model->mesh = cube(100.0);
-  model->tumour = ellipsoid({16, 11, 8});
+BrainModel model(const Vec3& tumour_axes = {16, 11, 8}) {
+  BrainModel model;
+  model.case_id = kCase;
+  model.model_id = "0123456789abcdef";
+  model.mesh = cube(100.0);
+  model.tumour = ellipsoid(tumour_axes);
   return model;
 }
 
@@ -93,10 +93,10 @@ struct FakeEstimator {
   }
 };
 
-Pipeline pipeline_on(std::shared_ptr<const BrainModel> brain, const CaseConfig& config = {},
+Pipeline pipeline_on(const BrainModel& brain, const CaseConfig& config = {},
                      std::unique_ptr<inversion::Inverter> inverter = FakeEstimator{}.make(),
                      Method method = Method::kPaper, Boundary boundary = Boundary::kContact) {
-  auto built = Pipeline::build(std::move(brain), config, method, boundary, std::move(inverter));
+  auto built = Pipeline::build(brain, config, method, boundary, std::move(inverter));
   EXPECT_TRUE(built.has_value());
   return std::move(*built);
 }
@@ -342,11 +342,10 @@ TEST(Pipeline, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
 }
 
 TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
-  auto sphere = std::make_shared<BrainModel>(*model());
-  sphere->tumour = ellipsoid({10, 10, 10});
+  const BrainModel sphere = model({10, 10, 10});
   Pipeline built = pipeline_on(sphere);
   Observation observation = landmarks(1);
-  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
+  observation.body = TumourBoundary{sphere.tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
   const auto update = built.run(observation);
   ASSERT_TRUE(update.has_value());
   EXPECT_TRUE(leaves_out(*update, "rotation"));
@@ -389,11 +388,10 @@ TEST(Pipeline, ListsWhatTheInversionLeftOut) {
 }
 
 TEST(Pipeline, RotationForcedOffAlignsATranslationAndSaysSo) {
-  auto long_tumour = std::make_shared<BrainModel>(*model());
-  long_tumour->tumour = ellipsoid({20, 10, 15});
+  const BrainModel long_tumour = model({20, 10, 15});
   Observation observation = landmarks(1);
   observation.body = TumourBoundary{
-      Eigen::AngleAxisd(0.05, Vec3::UnitZ()).toRotationMatrix() * long_tumour->tumour.vertices,
+      Eigen::AngleAxisd(0.05, Vec3::UnitZ()).toRotationMatrix() * long_tumour.tumour.vertices,
       0.5};
   const auto run = [&](Carry rotation) {
     CaseConfig config;
@@ -409,21 +407,20 @@ TEST(Pipeline, RotationForcedOffAlignsATranslationAndSaysSo) {
 }
 
 TEST(Pipeline, RotationForcedOnIsNotLeftOutWhereASphereCannotShowIt) {
-  auto sphere = std::make_shared<BrainModel>(*model());
-  sphere->tumour = ellipsoid({10, 10, 10});
+  const BrainModel sphere = model({10, 10, 10});
   CaseConfig on;
   on.scene.rotation = Carry::kOn;
   Pipeline built = pipeline_on(sphere, on);
   Observation observation = landmarks(1);
-  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
+  observation.body = TumourBoundary{sphere.tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
   const auto update = built.run(observation);
   ASSERT_TRUE(update.has_value());
   EXPECT_FALSE(leaves_out(*update, "rotation"));
 }
 
 TEST(Pipeline, NeedsATumourSurface) {
-  auto without = std::make_shared<BrainModel>(*model());
-  without->tumour = {};
+  BrainModel without = model();
+  without.tumour = {};
   const auto built =
       Pipeline::build(without, {}, Method::kPaper, Boundary::kContact, FakeEstimator{}.make());
   ASSERT_FALSE(built.has_value());

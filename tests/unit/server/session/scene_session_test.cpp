@@ -6,7 +6,7 @@
 
 #include "common/fem/gravity.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/pipeline/left_out.hpp"
+#include "common/pipeline/scene.hpp"
 #include "server/session/model_store.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/sample_values.hpp"

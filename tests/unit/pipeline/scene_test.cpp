@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
