@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "common/wire/report.hpp"
-#include "server/guard/memory.hpp"
+#include "server/guard/process_limits.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
 namespace brainshift::server {
