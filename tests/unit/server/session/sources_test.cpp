@@ -153,6 +153,33 @@ TEST(Sources, WhatIsRefusedTakesNoPlaceAndNoNumber) {
   EXPECT_TRUE(sources.admit(landmarks(2, "source 0"), 0, false)) << "those known go on";
 }
 
+// Each source counts for itself: a camera that counts fast does not shut out the ultrasound. The
+// journal cannot hold numbers above kMaxSequence; one of those locks nothing.
+TEST(Sources, ASequenceNumberMustBeAboveTheLastOneOfItsSource) {
+  Sources sources(kMaxAge_s, false);
+  const auto refused = [&](std::uint64_t sequence, const char* source, const char* says) {
+    const auto admission = sources.admit(landmarks(sequence, source), 0, false);
+    ASSERT_FALSE(admission) << sequence;
+    EXPECT_EQ(admission.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(admission.error().message, HasSubstr(says));
+  };
+  const auto taken = [&](std::uint64_t sequence, const char* source) {
+    return sources.admit(landmarks(sequence, source), 0, false).has_value();
+  };
+  refused(0, "ius", "observation.sequence = 0: must be above 0");
+  EXPECT_TRUE(taken(4, "ius"));
+  refused(3, "ius", "observation.sequence = 3: must be above 4");
+  EXPECT_TRUE(taken(9, "ius"));
+  EXPECT_TRUE(taken(50, "camera"));
+  EXPECT_TRUE(taken(10, "ius"));
+  refused(49, "camera", "must be above 50");
+  for (const std::uint64_t beyond : {Sources::kMaxSequence + 1, ~std::uint64_t{0}}) {
+    refused(beyond, "ius", "must be at most 9223372036854775807");
+  }
+  EXPECT_TRUE(taken(11, "ius"));
+  EXPECT_TRUE(taken(Sources::kMaxSequence, "ius"));
+}
+
 TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
   Sources sources(120.0, false);
   ASSERT_TRUE(sources.admit(landmarks(4), 0, true));
