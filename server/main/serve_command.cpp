@@ -20,7 +20,7 @@
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
-#include "server/operations/metrics_exporter.hpp"
+#include "server/operations/metrics.hpp"
 #include "server/operations/service_manager.hpp"
 #include "server/service/service.hpp"
 #include "server/session/model_store.hpp"

@@ -56,7 +56,7 @@
 #include "server/journal/journal.hpp"
 #include "server/operations/counters.hpp"
 #include "server/operations/service_manager.hpp"
-#include "server/operations/usual_time.hpp"
+#include "server/operations/latency_record.hpp"
 #include "server/session/session.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"

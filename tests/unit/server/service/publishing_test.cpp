@@ -18,7 +18,7 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/wire/decision.hpp"
-#include "server/operations/usual_time.hpp"
+#include "server/operations/latency_record.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
