@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/prepare_command.hpp"
+#include "server/main/commands.hpp"
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -16,7 +16,6 @@
 #include "common/io/model/model_file.hpp"
 #include "common/patient/prepare_model.hpp"
 #include "common/pipeline/scene.hpp"
-#include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
 
 namespace brainshift::server {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/serve_command.hpp"
+#include "server/main/commands.hpp"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -16,7 +16,6 @@
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "server/guard/process_limits.hpp"
-#include "server/main/exit_status.hpp"
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
