@@ -6,10 +6,8 @@
 #include <utility>
 
 #include "client/lib/dealer.hpp"
-#include "client/lib/field_assembly.hpp"
-#include "client/lib/latest_usable.hpp"
+#include "client/lib/received_updates.hpp"
 #include "client/lib/session_watch.hpp"
-#include "client/lib/update_queue.hpp"
 #include "common/wire/frame.hpp"
 
 namespace brainshift::client {

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
+#include "client/lib/client_keys.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 
 namespace brainshift::client {
 namespace {
 
-using std::chrono::milliseconds;
 using ::testing::HasSubstr;
-using wire::encode;
-using wire::encode_frame;
+using Answers = FakeDaemon::Answers;
+using std::chrono::milliseconds;
 using wire::Frame;
 using wire::MessageType;
-using Answers = FakeDaemon::Answers;
+using wire::encode;
+using wire::encode_frame;
 
 // Long enough for a loaded machine; a test that waits for it has failed.
 constexpr milliseconds kPatient(20000);
@@ -281,6 +283,25 @@ TEST(Client, ARequestAboveThePayloadCapIsRefusedHere) {
   Observation observation;
   observation.body = TumourBoundary{Points::Constant(3, 3'000'000, 1.0), 0.5};
   expect_error(client.submit(observation), ErrorCode::kInvalidArgument, "must be at most 67108864");
+}
+
+// ---------- keys ----------
+
+TEST(ClientKeys, ANewPairBelongsTogetherAndIsAnotherEachTime) {
+  const auto one = new_keys();
+  const auto other = new_keys();
+  ASSERT_TRUE(one && other);
+  EXPECT_NE(one->secret_key, other->secret_key);
+  EXPECT_EQ(public_key_of(one->secret_key).value(), one->public_key);
+  EXPECT_EQ(public_key_of(other->secret_key).value(), other->public_key);
+}
+
+TEST(ClientKeys, ATextThatIsNoKeyHasNoPublicKey) {
+  for (const std::string& none : {std::string(), std::string(39, '0'), std::string(40, '"')}) {
+    const auto key = public_key_of(none);
+    ASSERT_FALSE(key);
+    EXPECT_EQ(key.error().code, ErrorCode::kInvalidArgument);
+  }
 }
 
 }  // namespace
