@@ -18,7 +18,6 @@
 #include "common/wire/frame.hpp"
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/raw_peer.hpp"
 #include "tests/faults/settings.hpp"
 
@@ -142,14 +141,6 @@ std::vector<Update> fields_of(const std::string& endpoint, const Feed& feed,
     fields.push_back(answer_to(opened.client, feed.recorded(i)).update);
   }
   return fields;
-}
-
-int differing(const std::vector<Update>& fields, const std::vector<Update>& expected) {
-  int count = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    count += same_bits(fields[i], expected[i]) ? 0 : 1;
-  }
-  return count;
 }
 
 std::vector<Update> undisturbed(const Settings& settings, const Feed& feed) {

@@ -11,7 +11,6 @@
 
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/raw_peer.hpp"
 #include "tests/faults/settings.hpp"
 
