@@ -50,8 +50,8 @@ class RouterSocket {
   zmq::socket_t socket_;
 };
 
-// Which connections of a socket have closed, by the daemon's file descriptor of each. ROUTER sockets
-// forget a peer silently; without this a daemon would keep subscribers that are gone.
+// Which connections of a socket have closed, by the daemon's file descriptor of each. ROUTER
+// sockets forget a peer silently; without this a daemon would keep subscribers that are gone.
 //
 // libzmq reports a close before it can deliver a message of a later connection that reuses the
 // descriptor, so draining the monitor before each message is handled never takes a new peer for an
