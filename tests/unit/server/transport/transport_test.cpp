@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -52,42 +53,25 @@ TEST_F(TransportTest, AnswersStatusModelAndSession) {
   EXPECT_EQ(state.valid_ms, 1000u);
 }
 
-TEST_F(TransportTest, RefusesAnObservationOfAnotherCase) {
+TEST_F(TransportTest, WhatIsRefusedIsToldWithItsReason) {
   serve(with_model());
   RawPeer peer(endpoint_);
+  const Error early = error_of(peer.hand_in(landmarks(1)));
+  EXPECT_EQ(early.code, ErrorCode::kModelNotReady);
+  EXPECT_THAT(early.message, HasSubstr("no session"));
   start_session(peer);
-  Observation observation = landmarks(1);
-  observation.case_id = "someone-else";
-  const Error error = error_of(peer.hand_in(observation));
-  EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(error.message, HasSubstr("someone-else"));
-}
-
-TEST_F(TransportTest, RefusesAnObservationThatIsNotFinite) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  start_session(peer);
-  Observation observation = landmarks(1);
-  std::get<LandmarkPairs>(observation.body).deformed(0, 0) =
+  Observation other_case = landmarks(1);
+  other_case.case_id = "someone-else";
+  const Error other = error_of(peer.hand_in(other_case));
+  EXPECT_EQ(other.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(other.message, HasSubstr("someone-else"));
+  Observation not_finite = landmarks(1);
+  std::get<LandmarkPairs>(not_finite.body).deformed(0, 0) =
       std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(error_of(peer.hand_in(observation)).code,
-            ErrorCode::kNotFinite);
-}
-
-TEST_F(TransportTest, RefusesASessionForAnotherCase) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  const auto reply = peer.start(session_of("someone-else"), 5);
-  EXPECT_EQ(reply.request_id, 5u);
-  EXPECT_EQ(error_of(reply).code, ErrorCode::kInvalidArgument);
-}
-
-TEST_F(TransportTest, AnObservationWithoutASessionIsRefused) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  const Error error = error_of(peer.hand_in(landmarks(1)));
-  EXPECT_EQ(error.code, ErrorCode::kModelNotReady);
-  EXPECT_THAT(error.message, HasSubstr("no session"));
+  EXPECT_EQ(error_of(peer.hand_in(not_finite)).code, ErrorCode::kNotFinite);
+  const auto start = peer.start(session_of("someone-else"), 5);
+  EXPECT_EQ(start.request_id, 5u);
+  EXPECT_EQ(error_of(start).code, ErrorCode::kInvalidArgument);
 }
 
 // ---------- malformed messages ----------
