@@ -104,7 +104,7 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
         options.on_iterate(std::move(partial));
       };
     }
-    const Status status = inverter_->update(combined.data(), asked, update.estimate);
+    Status status = inverter_->update(combined.data(), asked, update.estimate);
     if ((status && update.estimate.quality.usable()) || options.stop.stop_requested()) return status;
     auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
     if (dropped.empty()) return status;
