@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,21 +11,11 @@ namespace brainshift::client {
 namespace {
 
 using ::testing::HasSubstr;
-using Answers = FakeDaemon::Answers;
-using std::chrono::milliseconds;
-using wire::Frame;
-using wire::MessageType;
-using wire::encode;
-using wire::encode_frame;
 
-// Long enough for a loaded machine; a test that waits for it has failed.
-constexpr milliseconds kPatient(20000);
 constexpr milliseconds kShort(150);
 
-Client connect(const std::string& endpoint, milliseconds timeout = kPatient) {
-  auto client = Client::connect(endpoint, {.request_timeout = timeout, .session_timeout = timeout});
-  EXPECT_TRUE(client) << client.error().message;
-  return std::move(*client);
+Client connect(const std::string& endpoint, milliseconds timeout = kPatience) {
+  return connect_to(endpoint, {.request_timeout = timeout, .session_timeout = timeout});
 }
 
 std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3") {
@@ -37,14 +26,11 @@ std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3")
 
 std::string update_frame(std::uint64_t sequence, bool final = true,
                          Quality quality = Quality::kNotJudged) {
-  UpdateMessage message;
-  message.update.estimate.quality.quality = quality;
+  UpdateMessage message = small_update(sequence, quality);
   if (quality == Quality::kUnusable) {
     message.update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
   }
-  message.update.sequence = sequence;
   message.update.final = final;
-  message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
   return encode_frame(MessageType::kUpdate, 0, encode(message));
 }
 
@@ -204,7 +190,7 @@ TEST(Client, UpdatesBetweenRepliesAreKeptInOrder) {
   ASSERT_TRUE(client.status());
   ASSERT_TRUE(client.status());
   for (const std::uint64_t expected : {11, 12, 13, 21, 22, 23}) {
-    const auto message = client.next_update(kPatient);
+    const auto message = client.next_update(kPatience);
     ASSERT_TRUE(message) << message.error().message;
     EXPECT_EQ(message->update.sequence, expected);
     EXPECT_EQ(message->update.final, expected % 10 != 1);
@@ -227,7 +213,7 @@ TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
   ASSERT_TRUE(client.status());
   EXPECT_FALSE(client.latest_usable()) << "queued, not handed out yet";
   for (const std::uint64_t sequence : {1, 2, 3}) {
-    const auto message = client.next_update(kPatient);
+    const auto message = client.next_update(kPatience);
     ASSERT_TRUE(message) << message.error().message;
     EXPECT_EQ(message->update.sequence, sequence);
     EXPECT_EQ(message->update.usable(), sequence == 1);
@@ -247,8 +233,8 @@ TEST(Client, ABadUpdateIsReportedByNextUpdateAndNotByTheRequestItMet) {
   });
   Client client = connect(daemon.endpoint());
   ASSERT_TRUE(client.status());
-  expect_error(client.next_update(kPatient), ErrorCode::kProtocol, "Update");
-  EXPECT_EQ(client.next_update(kPatient).value().update.sequence, 2u);
+  expect_error(client.next_update(kPatience), ErrorCode::kProtocol, "Update");
+  EXPECT_EQ(client.next_update(kPatience).value().update.sequence, 2u);
 }
 
 TEST(Client, ADaemonThatDiesWhileACallWaitsIsNoticedBeforeTheTimeout) {
@@ -257,7 +243,7 @@ TEST(Client, ADaemonThatDiesWhileACallWaitsIsNoticedBeforeTheTimeout) {
   const auto start = std::chrono::steady_clock::now();
   expect_error(client.start_session({.case_id = "c"}), ErrorCode::kUnavailable,
                "lost the connection");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, kPatient / 4);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, kPatience / 4);
 }
 
 TEST(Client, WorksAgainAfterTheDaemonRestarted) {
@@ -271,7 +257,7 @@ TEST(Client, WorksAgainAfterTheDaemonRestarted) {
   Client client = connect(endpoint);
   ASSERT_TRUE(client.status());
   daemon.reset();
-  expect_error(client.next_update(kPatient), ErrorCode::kUnavailable, "lost the connection");
+  expect_error(client.next_update(kPatience), ErrorCode::kUnavailable, "lost the connection");
   daemon = std::make_unique<FakeDaemon>(handler, endpoint);
   const auto status = client.status();
   ASSERT_TRUE(status) << status.error().message;
