@@ -10,7 +10,12 @@
 namespace brainshift::client {
 namespace {
 
+using std::chrono::milliseconds;
 using ::testing::HasSubstr;
+using wire::encode;
+using wire::encode_frame;
+using wire::Frame;
+using wire::MessageType;
 
 constexpr milliseconds kShort(150);
 

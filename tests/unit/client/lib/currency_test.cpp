@@ -15,7 +15,12 @@
 namespace brainshift::client {
 namespace {
 
+using std::chrono::milliseconds;
 using testing::HasSubstr;
+using wire::encode;
+using wire::encode_frame;
+using wire::Frame;
+using wire::MessageType;
 
 Client viewer_of(const std::string& endpoint) {
   return connect_to(endpoint, {.request_timeout = kPatience,

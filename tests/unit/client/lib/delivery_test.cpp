@@ -15,6 +15,12 @@
 namespace brainshift::client {
 namespace {
 
+using std::chrono::milliseconds;
+using wire::encode;
+using wire::encode_frame;
+using wire::Frame;
+using wire::MessageType;
+
 
 const FieldChoice kChoice{.region = BallRegion{Vec3(1, 2, 3), 4.0}, .tolerance_mm = 0.5};
 

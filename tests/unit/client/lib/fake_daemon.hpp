@@ -17,14 +17,8 @@
 
 namespace brainshift::client {
 
-using std::chrono::milliseconds;
-using wire::encode;
-using wire::encode_frame;
-using wire::Frame;
-using wire::MessageType;
-
 // Long enough for a loaded machine; a test that waits for it has failed.
-inline constexpr milliseconds kPatience(20000);
+inline constexpr std::chrono::milliseconds kPatience(20000);
 
 class FakeDaemon {
  public:
