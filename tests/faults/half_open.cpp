@@ -23,8 +23,8 @@
 
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/raw_peer.hpp"
 #include "tests/faults/settings.hpp"
+#include "tests/support/zmtp_peer.hpp"
 
 namespace brainshift::faults {
 namespace {
@@ -32,6 +32,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using client::Currency;
 using std::chrono::milliseconds;
+using test_support::port_of;
 
 sockaddr_in loopback(std::uint16_t port) {
   sockaddr_in address{};
