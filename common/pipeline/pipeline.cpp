@@ -32,12 +32,10 @@ Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method met
 }
 
 Result<Pipeline> Pipeline::build(const BrainModel& model, const CaseConfig& config, Method method,
-                                 Boundary boundary,
-                                 std::unique_ptr<inversion::Inverter> inverter) {
+                                 Boundary boundary, std::unique_ptr<inversion::Inverter> inverter) {
   auto targets = RegistrationTargets::build(model);
   if (!targets) return tl::unexpected(targets.error());
-  return Pipeline(model, config, method, boundary, std::move(inverter),
-                  std::move(*targets));
+  return Pipeline(model, config, method, boundary, std::move(inverter), std::move(*targets));
 }
 
 void Pipeline::reset() {
@@ -105,7 +103,8 @@ Status Pipeline::estimate_into(const Observation& observation, const RunOptions&
       };
     }
     Status status = inverter_->update(combined.data(), asked, update.estimate);
-    if ((status && update.estimate.quality.usable()) || options.stop.stop_requested()) return status;
+    if ((status && update.estimate.quality.usable()) || options.stop.stop_requested())
+      return status;
     auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
     if (dropped.empty()) return status;
     append(std::move(dropped), update);

@@ -186,8 +186,12 @@ std::optional<Job> Session::next_job(TimePoint now) {
 
 std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> result) {
   work_->finished = true;
-  Decision decision{job.session.session_id, job.observation.source, job.observation.sequence,
-                    Outcome::kUsed,         0,                      0,
+  Decision decision{job.session.session_id,
+                    job.observation.source,
+                    job.observation.sequence,
+                    Outcome::kUsed,
+                    0,
+                    0,
                     {}};
   if (job.stop.stop_requested()) {
     decision.outcome = Outcome::kSkipped;

@@ -50,8 +50,7 @@ class Simulated {
         subscriptions_.push_back(wanted);
         if (wanted.id != subscription_) sent_ = told_ = 0;
         subscription_ = wanted.id;
-        Answers answers = {
-            encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
+        Answers answers = {encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
         push(wanted.received, answers);
         return answers;
       }
@@ -121,8 +120,7 @@ TEST(Currency, RenewsWhileItWaitsAndSoStaysCurrent) {
   EXPECT_EQ(daemon->subscriptions().back().received, 1u);
   EXPECT_EQ(viewer.field_status().currency, Currency::kCurrent);
   server.stop();
-  EXPECT_THAT(viewer.next_update(kPatience).error().message,
-              HasSubstr("lost the connection"));
+  EXPECT_THAT(viewer.next_update(kPatience).error().message, HasSubstr("lost the connection"));
   EXPECT_FALSE(viewer.next_update(milliseconds(1200)));  // longer than an answer holds
   const FieldStatus status = viewer.field_status();
   EXPECT_EQ(status.currency, Currency::kStale);

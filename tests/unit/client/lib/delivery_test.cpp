@@ -21,7 +21,6 @@ using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;
 
-
 const FieldChoice kChoice{.region = BallRegion{Vec3(1, 2, 3), 4.0}, .tolerance_mm = 0.5};
 
 // Nodes 2 and 5 of ten, both at `value`; or node 5 alone as a change of `base`.
@@ -85,8 +84,8 @@ struct Viewing {
   explicit Viewing(Scripted::Script script, std::uint32_t window = 8)
       : scripted(std::move(script)),
         daemon([this](const Frame& request) { return scripted(request); }),
-        client(Client::connect(daemon.endpoint(), {.request_timeout = kPatience,
-                                                   .renewal_interval = milliseconds(20)})
+        client(Client::connect(daemon.endpoint(),
+                               {.request_timeout = kPatience, .renewal_interval = milliseconds(20)})
                    .value()) {
     const Status subscribed = client.subscribe(window, kChoice);
     EXPECT_TRUE(subscribed) << subscribed.error().message;

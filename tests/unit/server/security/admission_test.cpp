@@ -98,20 +98,16 @@ TEST_F(Admission, ARoleThatDoesNotIncludeARequestIsToldSoAndStaysConnected) {
   RawPeer owner = peer(Role::kOwner);
   start_session(owner);
   RawPeer viewer = peer(Role::kViewer);
-  const Error refused =
-      error_of(viewer.hand_in(landmarks(1), 9));
+  const Error refused = error_of(viewer.hand_in(landmarks(1), 9));
   EXPECT_EQ(refused.code, ErrorCode::kNotAllowed);
   EXPECT_THAT(refused.message, HasSubstr("the key viewer has the role viewer"));
   EXPECT_TRUE(viewer.is_served());
   RawPeer source = peer(Role::kSource);
-  EXPECT_EQ(source.hand_in(landmarks(1)).type,
-            MessageType::kObservationReply);
+  EXPECT_EQ(source.hand_in(landmarks(1)).type, MessageType::kObservationReply);
   const SessionRequest takeover = session_of(kCase, true);
-  EXPECT_EQ(error_of(owner.start(takeover)).code,
-            ErrorCode::kNotAllowed);
+  EXPECT_EQ(error_of(owner.start(takeover)).code, ErrorCode::kNotAllowed);
   RawPeer admin = peer(Role::kAdmin);
-  EXPECT_EQ(admin.start(takeover).type,
-            MessageType::kStartSessionReply);
+  EXPECT_EQ(admin.start(takeover).type, MessageType::kStartSessionReply);
 }
 
 // ---------- ten peers times five messages ----------
@@ -279,8 +275,7 @@ TEST_F(Admission, ObservationsBeyondTheLimitAreRefusedAndTheConnectionStays) {
   serve_with_keys(limits);
   RawPeer owner = peer(Role::kOwner);
   start_session(owner);
-  EXPECT_EQ(owner.hand_in(landmarks(1)).type,
-            MessageType::kObservationReply);
+  EXPECT_EQ(owner.hand_in(landmarks(1)).type, MessageType::kObservationReply);
   const Error error = error_of(owner.hand_in(landmarks(2)));
   EXPECT_EQ(error.code, ErrorCode::kUnavailable);
   EXPECT_THAT(error.message, HasSubstr("more than 1 observations a second"));

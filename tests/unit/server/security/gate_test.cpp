@@ -142,7 +142,8 @@ TEST(TokenBucket, GivesTheBurstAtOnceAndThenTheRate) {
   EXPECT_FALSE(bucket.take(start + std::chrono::milliseconds(99)));
   EXPECT_TRUE(bucket.take(start + std::chrono::milliseconds(201)));
   taken = 0;
-  for (int ms = 202; ms < 10'202; ++ms) taken += bucket.take(start + std::chrono::milliseconds(ms)) ? 1 : 0;
+  for (int ms = 202; ms < 10'202; ++ms)
+    taken += bucket.take(start + std::chrono::milliseconds(ms)) ? 1 : 0;
   EXPECT_NEAR(taken, 100, 1);
 }
 

@@ -133,8 +133,7 @@ TEST_F(TransportTest, AnExceptionCostsOneStartOrOneObservation) {
   };
   serve(std::move(options));
   RawPeer peer(endpoint_);
-  const Error refused =
-      error_of(peer.start(SessionRequest{kCase}));
+  const Error refused = error_of(peer.start(SessionRequest{kCase}));
   EXPECT_EQ(refused.code, ErrorCode::kInternal);
   begin(peer);
   const auto failed = answer(peer, landmarks(1));
@@ -281,8 +280,7 @@ TEST_F(TransportTest, ASessionOfAnotherClientEndsOnlyByTakeoverOrWhenThatClientH
   const auto mine = owner->start(request);
   EXPECT_EQ(error_of(mine).code, ErrorCode::kUnavailable);
   request.takeover = true;
-  ASSERT_EQ(owner->start(request).type,
-            MessageType::kStartSessionReply);
+  ASSERT_EQ(owner->start(request).type, MessageType::kStartSessionReply);
   owner.reset();
   request.takeover = false;
   EXPECT_TRUE(eventually([&] { return ask().type == MessageType::kStartSessionReply; }));

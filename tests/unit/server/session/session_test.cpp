@@ -126,7 +126,7 @@ class SessionTest : public testing::Test {
   Session session_{kCase, kBootId, kModelId};
   Session::TimePoint now_{1h};
   FakeInverter::Update update_ = echo;
-  FakeInverter* inverter_ = nullptr;    // of the newest model
+  FakeInverter* inverter_ = nullptr;  // of the newest model
   std::vector<Boundary> prepared_boundaries_;
   std::vector<std::string> told_;
   std::vector<Decision> decisions_;

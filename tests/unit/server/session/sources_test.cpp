@@ -24,16 +24,15 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
   const struct {
     void (*spoil)(Observation&);
     const char* says;
-  } rows[] = {
-      {[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
-      {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
-      {[](Observation& o) { o.source.clear(); }, "source"},
-      {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
-      {[](Observation& o) { o.session = {}; }, "session is absent"},
-      {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
-      {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
-      {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
-      {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
+  } rows[] = {{[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
+              {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
+              {[](Observation& o) { o.source.clear(); }, "source"},
+              {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
+              {[](Observation& o) { o.session = {}; }, "session is absent"},
+              {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
+              {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
+              {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
+              {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
   const SessionKey running{kBootId, 1, kModelId};
   ASSERT_TRUE(check_observation(landmarks(2), kCase, running));
   for (const auto& row : rows) {
@@ -197,14 +196,12 @@ TEST(Sources, EachHasAClockOfItsOwnAndFollowsOneThatWasSet) {
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, 7);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "camera"), 0), 9, false)->daemon_ns, 9);
   EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kHour), 10, false));
-  EXPECT_EQ(
-      sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
 }
 
 TEST(Sources, OfARecordingShareItsClock) {
   Sources sources(120.0, true);
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns,
-            kHour);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, kHour);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "ius"), 3), 8, false)->daemon_ns, 3)
       << "a replay that begins again";
 }

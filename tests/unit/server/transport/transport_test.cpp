@@ -26,10 +26,8 @@ TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
   EXPECT_FALSE(status->model_ready);
   EXPECT_EQ(status->version, "1.2.3");
   EXPECT_EQ(error_of(peer.ask(MessageType::kModelRequest)).code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(error_of(peer.hand_in(landmarks(1))).code,
-            ErrorCode::kModelNotReady);
-  const auto start =
-      peer.start(session_of(), 77);
+  EXPECT_EQ(error_of(peer.hand_in(landmarks(1))).code, ErrorCode::kModelNotReady);
+  const auto start = peer.start(session_of(), 77);
   EXPECT_EQ(start.request_id, 77u);
   EXPECT_EQ(error_of(start).code, ErrorCode::kModelNotReady);
   EXPECT_EQ(error_of(start).message, "no model is loaded");
