@@ -186,13 +186,10 @@ std::optional<Job> Session::next_job(TimePoint now) {
 
 std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> result) {
   work_->finished = true;
-  Decision decision{job.session.session_id,
-                    job.observation.source,
-                    job.observation.sequence,
-                    Outcome::kUsed,
-                    0,
-                    0,
-                    {}};
+  Decision decision;
+  decision.session_id = job.session.session_id;
+  decision.source = job.observation.source;
+  decision.observation_sequence = job.observation.sequence;
   if (job.stop.stop_requested()) {
     decision.outcome = Outcome::kSkipped;
     decision.reason = kSessionEnded;
