@@ -103,7 +103,7 @@ inline Error error_of(const Received& received) {
   return wire::decode_error(received.payload);
 }
 
-// Of the case that the daemon serves, with a method that asks no more of its inverter.
+// A session of method paper under the boundary with contact.
 inline SessionRequest session_of(const std::string& case_id = kCase, bool takeover = false) {
   SessionRequest request;
   request.case_id = case_id;
