@@ -6,10 +6,8 @@
 #include <utility>
 
 #include "client/lib/dealer.hpp"
-#include "client/lib/field_assembly.hpp"
-#include "client/lib/latest_usable.hpp"
+#include "client/lib/received_updates.hpp"
 #include "client/lib/session_watch.hpp"
-#include "client/lib/update_queue.hpp"
 #include "common/wire/frame.hpp"
 
 namespace brainshift::client {
@@ -58,6 +56,10 @@ struct Client::Impl {
   // Sends a request and waits for its reply's payload. Updates met on the way are queued.
   Result<std::string> request(MessageType type, const std::string& payload, MessageType reply_type,
                               milliseconds timeout);
+  Result<std::string> request(MessageType type, const std::string& payload,
+                              MessageType reply_type) {
+    return request(type, payload, reply_type, options.request_timeout);
+  }
   // The payload if `message` answers request `id`; nullopt if it is an update or a late reply.
   std::optional<Result<std::string>> answer(const std::string& message, std::uint64_t id,
                                             MessageType reply_type);
@@ -253,24 +255,20 @@ Result<Client> Client::connect(const std::string& endpoint, const ClientOptions&
 }
 
 Result<DaemonStatus> Client::status() {
-  return impl_
-      ->request(MessageType::kStatusRequest, "", MessageType::kStatusReply,
-                impl_->options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_status(payload); });
+  return impl_->request(MessageType::kStatusRequest, "", MessageType::kStatusReply)
+      .and_then(wire::decode_status);
 }
 
 Result<wire::DaemonReport> Client::report() {
-  return impl_
-      ->request(MessageType::kReportRequest, "", MessageType::kReportReply,
-                impl_->options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_report(payload); });
+  return impl_->request(MessageType::kReportRequest, "", MessageType::kReportReply)
+      .and_then(wire::decode_report);
 }
 
 Result<SessionInfo> Client::start_session(const SessionRequest& request) {
   return impl_
       ->request(MessageType::kStartSessionRequest, wire::encode(request),
                 MessageType::kStartSessionReply, impl_->options.session_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_session_info(payload); })
+      .and_then(wire::decode_session_info)
       .map([this](SessionInfo info) {
         impl_->latest_usable.begin(info.key());
         impl_->watch.expect_model(info.model_id);
@@ -279,10 +277,8 @@ Result<SessionInfo> Client::start_session(const SessionRequest& request) {
 }
 
 Result<BrainModel> Client::model() {
-  return impl_
-      ->request(MessageType::kModelRequest, "", MessageType::kModelReply,
-                impl_->options.request_timeout)
-      .and_then([](const std::string& payload) { return wire::decode_model(payload); })
+  return impl_->request(MessageType::kModelRequest, "", MessageType::kModelReply)
+      .and_then(wire::decode_model)
       .map([this](BrainModel model) {
         impl_->watch.expect_model(model.model_id);
         return model;
@@ -305,10 +301,9 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   self.acknowledged = 0;
   self.renewed = std::chrono::steady_clock::now();
   self.watch.asked(self.last_request_id + 1, self.renewed);
-  const auto state =
-      self.request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
-                   MessageType::kSessionState, self.options.request_timeout)
-          .and_then([](const std::string& payload) { return wire::decode_session_state(payload); });
+  const auto state = self.request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
+                                  MessageType::kSessionState)
+                         .and_then(wire::decode_session_state);
   if (state) return {};
   // A daemon that refuses a choice goes on with the one before.
   if (state.error().code != ErrorCode::kUnavailable) {
@@ -319,18 +314,11 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
 }
 
 Result<ObservationReceipt> Client::submit(const Observation& observation) {
-  std::string payload;
-  if (observation.session == SessionKey{}) {
-    Observation named = observation;
-    named.session = impl_->latest_usable.session();
-    payload = wire::encode(named);
-  } else {
-    payload = wire::encode(observation);
-  }
+  Observation named = observation;
+  if (named.session == SessionKey{}) named.session = impl_->latest_usable.session();
   return impl_
-      ->request(MessageType::kObservation, payload, MessageType::kObservationReply,
-                impl_->options.request_timeout)
-      .and_then([](const std::string& reply) { return wire::decode_observation_receipt(reply); });
+      ->request(MessageType::kObservation, wire::encode(named), MessageType::kObservationReply)
+      .and_then(wire::decode_observation_receipt);
 }
 
 Result<UpdateMessage> Client::next_update(milliseconds timeout) {

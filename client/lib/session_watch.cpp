@@ -20,6 +20,17 @@ std::string one_decimal(double value) {
 
 }  // namespace
 
+std::string_view to_string(Currency currency) {
+  switch (currency) {
+    case Currency::kNone: return "none";
+    case Currency::kCurrent: return "current";
+    case Currency::kSuperseded: return "superseded";
+    case Currency::kDegraded: return "degraded";
+    case Currency::kStale: return "stale";
+  }
+  return "unknown";
+}
+
 void SessionWatch::asked(std::uint64_t request_id, TimePoint now) {
   if (asked_.size() == kMaxAsked) asked_.pop_front();
   asked_.emplace_back(request_id, now);

@@ -67,34 +67,26 @@ double Evidence::age_s(const RegisteredObservation& observation, std::int64_t no
   return std::abs(static_cast<double>(now_ns) - static_cast<double>(observation.acquired_ns)) / 1e9;
 }
 
-std::vector<const RegisteredObservation*> Evidence::fresh(std::int64_t now_ns) const {
-  std::vector<const RegisteredObservation*> result;
-  for (const auto& [source, observation] : newest_) {
-    if (age_s(observation, now_ns) <= max_age_s_) result.push_back(&observation);
-  }
-  return result;
-}
-
-CombinedData::CombinedData(std::vector<const RegisteredObservation*> observations)
-    : observations_(std::move(observations)) {
-  for (const RegisteredObservation* observation : observations_) {
-    if (!observation->surface) {
-      parts_.push_back(observation->data);
-      continue;
+CombinedData::CombinedData(const Evidence& evidence, std::int64_t now_ns) {
+  for (const auto& [source, observation] : evidence.newest_) {
+    if (evidence.age_s(observation, now_ns) > evidence.max_age_s_) continue;
+    if (observation.surface) {
+      followers_.push_back({&observation, parts_.size(), {}});
+      parts_.push_back(named(observation.surface->first(), source));
+    } else {
+      parts_.push_back(observation.data);
     }
-    followers_.push_back({parts_.size(), {}});
-    parts_.push_back(named(observation->surface->first(), observation->source));
   }
   // The union of the followers' nodes, and the place of each follower's nodes in it.
   std::vector<NodeIndex>& all = moving_.nodes;
   for (const Follower& follower : followers_) {
-    const std::vector<NodeIndex>& own = observations_[follower.part]->surface->nodes();
+    const std::vector<NodeIndex>& own = follower.observation->surface->nodes();
     all.insert(all.end(), own.begin(), own.end());
   }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   for (Follower& follower : followers_) {
-    for (const NodeIndex node : observations_[follower.part]->surface->nodes()) {
+    for (const NodeIndex node : follower.observation->surface->nodes()) {
       const auto place = std::lower_bound(all.begin(), all.end(), node);
       follower.columns.push_back(static_cast<int>(place - all.begin()));
     }
@@ -106,7 +98,7 @@ CombinedData::CombinedData(std::vector<const RegisteredObservation*> observation
 bool CombinedData::relocate(const Points& u, SparseData& data) {
   bool moved = false;
   for (const Follower& follower : followers_) {
-    const RegisteredObservation& observation = *observations_[follower.part];
+    const RegisteredObservation& observation = *follower.observation;
     SparseData now =
         named(observation.surface->at(u(Eigen::all, follower.columns)), observation.source);
     if (!observation.surface->moved(parts_[follower.part], now)) continue;
@@ -115,17 +107,6 @@ bool CombinedData::relocate(const Points& u, SparseData& data) {
   }
   if (moved) data = combine(parts_);
   return moved;
-}
-
-void CombinedData::describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const {
-  for (SourceSummary& summary : sources) {
-    for (const RegisteredObservation* observation : observations_) {
-      if (observation->source != summary.source) continue;
-      summary.observation_sequence = observation->sequence;
-      summary.outliers += observation->outliers;
-      summary.age_s = 1e-9 * static_cast<double>(now_ns - observation->acquired_ns);
-    }
-  }
 }
 
 }  // namespace brainshift::pipeline

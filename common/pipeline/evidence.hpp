@@ -39,10 +39,13 @@ class Evidence {
   // they are not used, for Update::left_out; empty when there was none.
   std::vector<Omission> drop_quarantined(const std::string& source, std::int64_t now_ns);
 
-  // Observations to use together with one of this time, in the order of their sources' names.
-  std::vector<const RegisteredObservation*> fresh(std::int64_t now_ns) const;
+  // Precondition: the source has observed, and was not dropped.
+  const RegisteredObservation& newest(const std::string& source) const {
+    return newest_.at(source);
+  }
 
  private:
+  friend class CombinedData;
   double age_s(const RegisteredObservation& observation, std::int64_t now_ns) const;
 
   double max_age_s_;
@@ -50,19 +53,17 @@ class Evidence {
   std::set<std::string> quarantined_;  // sources
 };
 
-// Data of several observations as one. Data that follow the deformation begin where their
-// observation alone says (SurfaceDistances::first), so that an estimate does not depend on earlier
-// ones. They are measured anew whenever the inversion asks with a displacement.
+// Data of the evidence's fresh observations as one, in the order of their sources' names. Data that
+// follow the deformation begin where their observation alone says (SurfaceDistances::first), so
+// that an estimate does not depend on earlier ones. They are measured anew whenever the inversion
+// asks with a displacement.
 class CombinedData {
  public:
-  explicit CombinedData(std::vector<const RegisteredObservation*> observations);
+  CombinedData(const Evidence& evidence, std::int64_t now_ns);
 
   const SparseData& data() const { return data_; }
   // Null when nothing moves. Valid as long as this object.
   const inversion::MovingData* moving() const { return followers_.empty() ? nullptr : &moving_; }
-  // Fills observation_sequence and age of the estimate's sources, and adds the outliers of their
-  // alignment.
-  void describe(std::int64_t now_ns, std::vector<SourceSummary>& sources) const;
 
   CombinedData(const CombinedData&) = delete;
   CombinedData& operator=(const CombinedData&) = delete;
@@ -70,12 +71,12 @@ class CombinedData {
  private:
   // An observation (and part) that follows the deformation.
   struct Follower {
+    const RegisteredObservation* observation = nullptr;
     std::size_t part = 0;
     std::vector<int> columns;  // of its nodes among moving_.nodes
   };
   bool relocate(const Points& u, SparseData& data);
 
-  std::vector<const RegisteredObservation*> observations_;
   std::vector<SparseData> parts_;
   std::vector<Follower> followers_;
   inversion::MovingData moving_;

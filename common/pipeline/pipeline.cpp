@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/core/stopwatch.hpp"
-#include "common/pipeline/left_out.hpp"
+#include "common/pipeline/scene.hpp"
 
 namespace brainshift::pipeline {
 namespace {
@@ -17,25 +17,25 @@ void append(std::vector<Omission> omissions, Update& update) {
 
 }  // namespace
 
-Pipeline::Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Method method,
+Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method method,
                    Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
                    RegistrationTargets targets)
-    : model_(std::move(model)),
-      config_(config),
-      method_(method),
-      boundary_(boundary),
+    : config_(config),
       targets_(std::move(targets)),
-      model_omissions_(model_omissions(*model_, config_, method_, boundary_)),
       evidence_(config_.sensing.max_age_s),
-      inverter_(std::move(inverter)) {}
+      inverter_(std::move(inverter)) {
+  blank_.case_id = model.case_id;
+  blank_.model_id = model.model_id;
+  blank_.method = method;
+  blank_.boundary = boundary;
+  blank_.left_out = model_omissions(model, config_, method, boundary);
+}
 
-Result<Pipeline> Pipeline::build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                                 Method method, Boundary boundary,
-                                 std::unique_ptr<inversion::Inverter> inverter) {
-  auto targets = RegistrationTargets::build(*model);
+Result<Pipeline> Pipeline::build(const BrainModel& model, const CaseConfig& config, Method method,
+                                 Boundary boundary, std::unique_ptr<inversion::Inverter> inverter) {
+  auto targets = RegistrationTargets::build(model);
   if (!targets) return tl::unexpected(targets.error());
-  return Pipeline(std::move(model), config, method, boundary, std::move(inverter),
-                  std::move(*targets));
+  return Pipeline(model, config, method, boundary, std::move(inverter), std::move(*targets));
 }
 
 void Pipeline::reset() {
@@ -44,27 +44,24 @@ void Pipeline::reset() {
 }
 
 Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) {
-  Update update;
-  update.case_id = model_->case_id;
-  update.model_id = model_->model_id;
+  Update update = blank_;
   update.observation_sequence = observation.sequence;
-  update.method = method_;
-  update.boundary = boundary_;
-  update.left_out = model_omissions_;
-  if (auto status = register_into(observation, update); !status) {
-    return tl::unexpected(status.error());
+
+  const Stopwatch registering;  // Observation -> SparseData
+  auto registered = register_observation(observation, targets_, config_, update.method);
+  if (!registered) return tl::unexpected(registered.error());
+  if (registered->icp) {
+    update.T_undeformed_deformed = registered->icp->T_surface_points;
+    append(registration_omissions(*registered->icp, config_.scene.rotation,
+                                  registered->surface.has_value()),
+           update);
   }
-  const Stopwatch watch;
-  const Estimate& estimate = update.estimate;
-  Status status = estimate_into(observation, options, update);
-  if ((!status || !estimate.quality.usable()) && !options.stop.stop_requested()) {
-    auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
-    if (!dropped.empty()) {  // once more without those that spoil it
-      append(std::move(dropped), update);
-      status = estimate_into(observation, options, update);
-    }
-  }
-  if (!status) {
+  append(evidence_.put(std::move(*registered)), update);
+  update.timings.register_ms = registering.milliseconds();
+
+  const Stopwatch inverting;  // SparseData -> Estimate
+  Estimate& estimate = update.estimate;
+  if (auto status = estimate_into(observation, options, update); !status) {
     evidence_.drop(observation.source);
     return tl::unexpected(status.error());
   }
@@ -73,52 +70,45 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
   } else {
     evidence_.quarantine(observation.source);
   }
+  for (SourceSummary& summary : estimate.sources) {
+    const RegisteredObservation& used = evidence_.newest(summary.source);
+    summary.observation_sequence = used.sequence;
+    summary.outliers += used.outliers;
+    summary.age_s = 1e-9 * static_cast<double>(observation.acquired_ns - used.acquired_ns);
+  }
   if (const auto errors = inverter_->omission_errors()) {
-    append(inversion_omissions(config_, boundary_, *errors, estimate.contact.active), update);
+    append(inversion_omissions(config_, update.boundary, *errors, estimate.contact.active), update);
   }
   update.timings.rebuild_ms = estimate.rebuild_ms;
-  update.timings.invert_ms = watch.milliseconds() - update.timings.rebuild_ms;
+  update.timings.invert_ms = inverting.milliseconds() - update.timings.rebuild_ms;
   return update;
 }
 
-// Observation -> SparseData, into the evidence.
-Status Pipeline::register_into(const Observation& observation, Update& update) {
-  const Stopwatch watch;
-  auto registered = register_observation(observation, targets_, config_, method_);
-  if (!registered) return tl::unexpected(registered.error());
-  if (registered->icp) {
-    update.T_undeformed_deformed = registered->icp->T_surface_points;
-    append(registration_omissions(*registered->icp, config_.scene.rotation,
-                                  registration::IcpOptions{}.rotation_sd_deg,
-                                  registered->surface.has_value()),
-           update);
-  }
-  append(evidence_.put(std::move(*registered)), update);
-  update.timings.register_ms = watch.milliseconds();
-  return {};
-}
-
-// The evidence's SparseData -> Estimate.
+// The evidence's SparseData -> Estimate; once more without those that spoil it.
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
                                Update& update) {
-  const Stopwatch watch;
-  const CombinedData combined(evidence_.fresh(observation.acquired_ns));
-  inversion::InversionOptions asked;
-  asked.stop = options.stop;
-  asked.moving = combined.moving();
-  if (options.on_iterate) {
-    asked.on_iterate = [&](const Estimate& iterate) {
-      Update partial = update;  // its estimate is empty so far
-      partial.final = false;
-      partial.estimate = iterate;
-      partial.timings.invert_ms = watch.milliseconds();
-      options.on_iterate(std::move(partial));
-    };
+  while (true) {
+    const Stopwatch watch;
+    const CombinedData combined(evidence_, observation.acquired_ns);
+    inversion::InversionOptions asked;
+    asked.stop = options.stop;
+    asked.moving = combined.moving();
+    if (options.on_iterate) {
+      asked.on_iterate = [&](const Estimate& iterate) {
+        Update partial = update;  // its estimate is empty so far
+        partial.final = false;
+        partial.estimate = iterate;
+        partial.timings.invert_ms = watch.milliseconds();
+        options.on_iterate(std::move(partial));
+      };
+    }
+    Status status = inverter_->update(combined.data(), asked, update.estimate);
+    if ((status && update.estimate.quality.usable()) || options.stop.stop_requested())
+      return status;
+    auto dropped = evidence_.drop_quarantined(observation.source, observation.acquired_ns);
+    if (dropped.empty()) return status;
+    append(std::move(dropped), update);
   }
-  Estimate& estimate = update.estimate;
-  if (auto status = inverter_->update(combined.data(), asked, estimate); !status) return status;
-  combined.describe(observation.acquired_ns, estimate.sources);
-  return {};
 }
 
 }  // namespace brainshift::pipeline

@@ -12,7 +12,6 @@
 #include <functional>
 #include <memory>
 #include <stop_token>
-#include <vector>
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
@@ -36,9 +35,8 @@ class Pipeline {
  public:
   // Indexes the surfaces; kEmptySet or kNotFinite when the model has no usable one. inverter: for
   // this method and boundary.
-  static Result<Pipeline> build(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
-                                Method method, Boundary boundary,
-                                std::unique_ptr<inversion::Inverter> inverter);
+  static Result<Pipeline> build(const BrainModel& model, const CaseConfig& config, Method method,
+                                Boundary boundary, std::unique_ptr<inversion::Inverter> inverter);
 
   // Fills everything of an Update except its sequence number and the encode and journal times,
   // which belong to later stages. The inverter writes into the update's own estimate. Errors of
@@ -52,18 +50,13 @@ class Pipeline {
   void reset();
 
  private:
-  Pipeline(std::shared_ptr<const BrainModel> model, const CaseConfig& config, Method method,
-           Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
-           RegistrationTargets targets);
-  Status register_into(const Observation& observation, Update& update);
+  Pipeline(const BrainModel& model, const CaseConfig& config, Method method, Boundary boundary,
+           std::unique_ptr<inversion::Inverter> inverter, RegistrationTargets targets);
   Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
 
-  std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;
-  Method method_;
-  Boundary boundary_;
   RegistrationTargets targets_;
-  std::vector<Omission> model_omissions_;  // the same for every update
+  Update blank_;  // what is the same in every update: names, method, boundary, omissions
 
   Evidence evidence_;
   std::unique_ptr<inversion::Inverter> inverter_;

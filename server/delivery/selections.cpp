@@ -2,13 +2,69 @@
 #include "server/delivery/selections.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <string>
+#include <unordered_map>
 #include <utility>
 
 #include "common/geometry/region_nodes.hpp"
-#include "server/delivery/thin_nodes.hpp"
 
 namespace brainshift::server {
+namespace {
+
+// Chosen nodes by cells of the spacing's size: whoever is nearer than that is in a neighbouring
+// cell.
+class ChosenNodes {
+ public:
+  ChosenNodes(const Points& nodes, double spacing_mm) : nodes_(nodes), spacing_mm_(spacing_mm) {}
+
+  bool any_near(NodeIndex node) const {
+    const std::array<std::int64_t, 3> cell = cell_of(node);
+    for (std::int64_t i = -1; i <= 1; ++i) {
+      for (std::int64_t j = -1; j <= 1; ++j) {
+        for (std::int64_t k = -1; k <= 1; ++k) {
+          if (near_in({cell[0] + i, cell[1] + j, cell[2] + k}, node)) return true;
+        }
+      }
+    }
+    return false;
+  }
+  void add(NodeIndex node) { cells_[key(cell_of(node))].push_back(node); }
+
+ private:
+  std::array<std::int64_t, 3> cell_of(NodeIndex node) const {
+    std::array<std::int64_t, 3> cell{};
+    for (int axis = 0; axis < 3; ++axis) {
+      cell[static_cast<std::size_t>(axis)] =
+          static_cast<std::int64_t>(std::floor(nodes_(axis, node) / spacing_mm_));
+    }
+    return cell;
+  }
+  // Cells that share a key only cost time: distances decide.
+  static std::uint64_t key(const std::array<std::int64_t, 3>& cell) {
+    std::uint64_t mixed = 0;
+    for (const std::int64_t part : cell) {
+      mixed = (mixed ^ static_cast<std::uint64_t>(part)) * 0x9e3779b97f4a7c15u;
+      mixed ^= mixed >> 29;
+    }
+    return mixed;
+  }
+  bool near_in(const std::array<std::int64_t, 3>& cell, NodeIndex node) const {
+    const auto found = cells_.find(key(cell));
+    if (found == cells_.end()) return false;
+    return std::any_of(found->second.begin(), found->second.end(), [&](NodeIndex other) {
+      return (nodes_.col(other) - nodes_.col(node)).norm() < spacing_mm_;
+    });
+  }
+
+  const Points& nodes_;
+  double spacing_mm_;
+  std::unordered_map<std::uint64_t, std::vector<NodeIndex>> cells_;
+};
+
+}  // namespace
 
 Selections::Selections(const std::shared_ptr<const BrainModel>& model)
     : model_(model),
@@ -45,6 +101,23 @@ Result<SelectionPtr> Selections::resolve(const FieldChoice& choice) {
     known_.push_back(selection);
     return selection;
   });
+}
+
+std::vector<NodeIndex> thin_nodes(const Points& nodes, const std::vector<NodeIndex>& candidates,
+                                  const std::vector<bool>& on_boundary, double spacing_mm) {
+  ChosenNodes chosen(nodes, spacing_mm);
+  std::vector<NodeIndex> kept;
+  for (const bool boundary : {true, false}) {
+    for (const NodeIndex node : candidates) {
+      if (on_boundary[static_cast<std::size_t>(node)] != boundary || chosen.any_near(node)) {
+        continue;
+      }
+      chosen.add(node);
+      kept.push_back(node);
+    }
+  }
+  std::sort(kept.begin(), kept.end());
+  return kept;
 }
 
 }  // namespace brainshift::server

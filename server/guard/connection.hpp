@@ -11,11 +11,21 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
-#include "server/guard/lane.hpp"
 #include "server/guard/zmtp_stream.hpp"
 
 namespace brainshift::server {
+
+// Bytes on their way in one direction, from one socket that does not block to another.
+struct Lane {
+  static constexpr std::size_t kBytes = 16u << 10;
+
+  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(kBytes);
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  bool empty() const { return begin == end; }
+};
 
 // Headers and encryption of a part: at most this was counted for it beside ZmtpStream::kPartCost.
 inline constexpr std::size_t kWrapping = 48;

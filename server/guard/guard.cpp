@@ -231,10 +231,14 @@ bool Guard::Impl::within_bounds(Connection& connection) {
   return true;
 }
 
-// Passes bytes on in one direction; up, to libzmq, within the bounds. False when the connection has
-// ended.
+// Passes bytes on in one direction: writes out what the lane holds, as far as the socket takes it,
+// then reads into it; up, to libzmq, within the bounds. False when the connection has ended.
 bool Guard::Impl::pump(Connection& connection, Lane& lane, int from, int to) {
   const bool up = &lane == &connection.up;
+  const auto gone = [&] {
+    end(connection, nullptr, {});
+    return false;
+  };
   for (int i = 0; i < kReadsPerTurn; ++i) {
     bool more = true;
     if (up) {
@@ -242,12 +246,18 @@ bool Guard::Impl::pump(Connection& connection, Lane& lane, int from, int to) {
       more = connection.held <= options.max_message_bytes + kSlack;
       connection.account->throttled = !more;
     }
-    const int got = pass_on(lane, from, to, more);
-    if (got < 0) {
-      end(connection, nullptr, {});
-      return false;
+    while (!lane.empty()) {
+      const auto sent = send(to, &lane.bytes[lane.begin], lane.end - lane.begin, MSG_NOSIGNAL);
+      if (sent < 0 && errno == EINTR) continue;
+      if (sent < 0) return errno == EAGAIN || gone();
+      lane.begin += static_cast<std::size_t>(sent);
     }
-    if (got == 0) return true;
+    if (!more) return true;
+    const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
+    if (got < 0) return errno == EAGAIN || errno == EINTR || gone();
+    if (got == 0) return gone();
+    lane.begin = 0;
+    lane.end = static_cast<std::size_t>(got);
     if (up && !within_bounds(connection)) return false;
   }
   return true;

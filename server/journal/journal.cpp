@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -28,6 +29,11 @@ std::optional<std::uintmax_t> free_bytes(const fs::path& folder) {
   const fs::space_info space = fs::space(folder, failed);
   if (failed) return std::nullopt;
   return space.available;
+}
+
+std::string sequences(const SequenceRange& range) {
+  return range.first == range.last ? fmt::format("{}", range.first)
+                                   : fmt::format("{} to {}", range.first, range.last);
 }
 
 }  // namespace
@@ -349,6 +355,38 @@ void Journal::lose(const RecordRanges& ranges) {
 
 void Journal::tell_recorded() {
   if (options_.on_recorded) options_.on_recorded(recorded());
+}
+
+// ---------- what a set of records holds ----------
+
+void SequenceRange::add(const SequenceRange& other) {
+  if (other.count == 0) return;
+  first = count == 0 ? other.first : std::min(first, other.first);
+  last = count == 0 ? other.last : std::max(last, other.last);
+  count += other.count;
+}
+
+void RecordRanges::add(io::RecordKind kind, const std::string& source, std::uint64_t sequence) {
+  const SequenceRange one{sequence, sequence, 1};
+  if (kind == io::RecordKind::kObservation) observations[source].add(one);
+  if (kind == io::RecordKind::kUpdate) updates.add(one);
+}
+
+void RecordRanges::add(const RecordRanges& other) {
+  for (const auto& [source, range] : other.observations) observations[source].add(range);
+  updates.add(other.updates);
+}
+
+std::string describe(const RecordRanges& ranges) {
+  std::string text;
+  const auto append = [&](const std::string& part) { text += (text.empty() ? "" : ", ") + part; };
+  for (const auto& [source, range] : ranges.observations) {
+    append(fmt::format("observations {} of {} ({})", sequences(range), source, range.count));
+  }
+  if (ranges.updates.count > 0) {
+    append(fmt::format("updates {} ({})", sequences(ranges.updates), ranges.updates.count));
+  }
+  return text.empty() ? "nothing" : text;
 }
 
 }  // namespace brainshift::server

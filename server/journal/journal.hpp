@@ -25,6 +25,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -35,10 +36,32 @@
 
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_record.hpp"
-#include "server/journal/record_ranges.hpp"
 #include "server/journal/record_sink.hpp"
 
 namespace brainshift::server {
+
+struct SequenceRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+  std::uint64_t count = 0;  // 0: empty; below last - first + 1 where numbers were left out
+
+  void add(const SequenceRange& other);
+  bool operator==(const SequenceRange&) const = default;
+};
+
+// Which observations and updates a set of records holds, as one range of sequences for each source
+// and one for the updates. Decisions are about these and are not counted.
+struct RecordRanges {
+  std::map<std::string, SequenceRange> observations;  // by source
+  SequenceRange updates;
+
+  void add(io::RecordKind kind, const std::string& source, std::uint64_t sequence);
+  void add(const RecordRanges& other);
+  bool empty() const { return observations.empty() && updates.count == 0; }
+};
+
+// "observations 5 to 9 of ius (5), updates 3 to 7 (4)"; "nothing" when empty.
+std::string describe(const RecordRanges& ranges);
 
 // What is durable of the running session.
 struct Recorded {

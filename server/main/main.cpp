@@ -8,10 +8,7 @@
 #include "common/io/files/stop_signals.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/linalg/blas_threads.hpp"
-#include "server/main/exit_status.hpp"
-#include "server/main/health_command.hpp"
-#include "server/main/prepare_command.hpp"
-#include "server/main/serve_command.hpp"
+#include "server/main/commands.hpp"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/prepare_command.hpp"
+#include "server/main/commands.hpp"
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -15,8 +15,7 @@
 #include "common/io/files/output_path.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/prepare_model.hpp"
-#include "common/pipeline/scene_plan.hpp"
-#include "server/main/exit_status.hpp"
+#include "common/pipeline/scene.hpp"
 #include "server/main/progress_bar.hpp"
 
 namespace brainshift::server {

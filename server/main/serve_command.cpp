@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/serve_command.hpp"
+#include "server/main/commands.hpp"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -15,13 +15,11 @@
 #include "common/io/files/stop_signals.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/linalg/blas_kernel.hpp"
-#include "server/guard/file_limit.hpp"
-#include "server/guard/memory.hpp"
-#include "server/main/exit_status.hpp"
+#include "server/guard/process_limits.hpp"
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"
 #include "server/main/platform.hpp"
-#include "server/operations/metrics_exporter.hpp"
+#include "server/operations/metrics.hpp"
 #include "server/operations/service_manager.hpp"
 #include "server/service/service.hpp"
 #include "server/session/model_store.hpp"

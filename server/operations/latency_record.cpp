@@ -62,4 +62,14 @@ wire::LatencyFigures LatencyRecord::all() const {
   return {count_, quantile_ms(0.5), quantile_ms(0.95), quantile_ms(0.99), max_ms_};
 }
 
+AnswerTime UsualTime::answer(std::uint64_t session_id, double ms, bool counts) {
+  if (session_id != session_id_) {
+    session_id_ = session_id;
+    answers_ = {};
+  }
+  const AnswerTime time{ms, answers_.count() < kFew ? 0.0 : answers_.quantile_ms(0.5)};
+  if (counts) answers_.add(ms);
+  return time;
+}
+
 }  // namespace brainshift::server

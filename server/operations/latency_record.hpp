@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // LatencyRecord: what a time was, over all updates and over the last ones, in a fixed memory.
-//
-// The last kRecent values are kept as they are: their percentiles are exact. All values are counted
-// in buckets of 64 to an octave, from 1 ns to 73 minutes: a percentile of all is off by less than
-// 1 % of itself, the greatest value and the sum are exact. Coarse buckets with the bounds of
-// kBounds_ms are counted beside them, for monitors.
+// UsualTime: what the answers of a session usually take.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
+#include "common/values/estimate.hpp"
 #include "common/wire/report.hpp"
 
 namespace brainshift::server {
 
+// The last kRecent values are kept as they are: their percentiles are exact. All values are counted
+// in buckets of 64 to an octave, from 1 ns to 73 minutes: a percentile of all is off by less than
+// 1 % of itself, the greatest value and the sum are exact. Coarse buckets with the bounds of
+// kBounds_ms are counted beside them, for monitors.
 class LatencyRecord {
  public:
   static constexpr std::size_t kRecent = 2048;
@@ -49,6 +50,23 @@ class LatencyRecord {
   std::uint64_t count_ = 0;
   double sum_ms_ = 0.0;
   double max_ms_ = 0.0;
+};
+
+// To tell late answers by (AnswerTime::usual_ms). It is the median over all of them, not over the
+// last ones: while a machine is too busy, its answers stay late, however long that lasts.
+class UsualTime {
+ public:
+  // Answers that a session needs before anything is usual.
+  static constexpr std::uint64_t kFew = 8;
+
+  // An answer of the session that took `ms`, beside what is usual before it: within 1 %; 0: fewer
+  // than kFew were counted. Another session than before forgets them. counts: it is an answer to
+  // tell later ones by. Allocates nothing. Precondition: finite.
+  AnswerTime answer(std::uint64_t session_id, double ms, bool counts);
+
+ private:
+  std::uint64_t session_id_ = 0;
+  LatencyRecord answers_;
 };
 
 }  // namespace brainshift::server

@@ -69,7 +69,11 @@ void Service::work(const std::stop_token& stop) {
     pipeline::RunOptions options;
     options.stop = job->stop;
     if (job->request.publish_iterates) {
-      options.on_iterate = [&](Update iterate) { publish(job->message(std::move(iterate)), *job); };
+      options.on_iterate = [&](Update iterate) {
+        iterate.sequence = job->number;
+        const SessionKey& of = job->session;
+        publish({of.session_id, std::move(iterate), std::nullopt, of.boot_id}, *job);
+      };
     }
     auto result = guarded(ErrorCode::kInternal, kUnexpected,
                           [&] { return job->model->pipeline.run(job->observation, options); });

@@ -115,7 +115,7 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& req
   info.tets = model_->mesh.num_tets();
   info.slaves = static_cast<int>(model_->slaves.size());
   info.model_bytes = (*made)->bytes();
-  auto pipeline = pipeline::Pipeline::build(model_, config_, request.method, request.boundary,
+  auto pipeline = pipeline::Pipeline::build(*model_, config_, request.method, request.boundary,
                                             std::move(*made));
   if (!pipeline) return tl::unexpected(pipeline.error());
   info.prepare_s = watch.seconds();

@@ -19,7 +19,7 @@
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
-#include "common/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene.hpp"
 #include "common/values/brain_model.hpp"
 #include "server/session/session.hpp"
 

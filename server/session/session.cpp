@@ -5,8 +5,6 @@
 
 #include <algorithm>
 
-#include "server/session/observation_rules.hpp"
-
 namespace brainshift::server {
 namespace {
 
@@ -20,11 +18,6 @@ double seconds_of(Session::TimePoint::duration duration) {
 }
 
 }  // namespace
-
-UpdateMessage Job::message(Update update) const {
-  update.sequence = number;
-  return {session.session_id, std::move(update), std::nullopt, session.boot_id};
-}
 
 Session::Session(std::string case_id, std::uint64_t boot_id, std::string model_id)
     : case_id_(std::move(case_id)), boot_id_(boot_id), model_id_(std::move(model_id)) {}
@@ -127,7 +120,8 @@ void Session::begin() {
 
 void Session::end_running() {
   for (const auto& [source, box] : boxes_) {
-    decide(running_->key, box.observation, Outcome::kSkipped, kSessionEnded);
+    events_.decisions.push_back({running_->key.session_id, source, box.observation.sequence,
+                                 Outcome::kSkipped, 0, 0, kSessionEnded});
   }
   boxes_.clear();
   running_.reset();
@@ -146,21 +140,6 @@ void Session::stop() {
 
 // ---------- observations ----------
 
-void Session::decide(const SessionKey& session, const Observation& observation, Outcome outcome,
-                     std::string reason, const Update* answer) {
-  Decision decision;
-  decision.session_id = session.session_id;
-  decision.source = observation.source;
-  decision.observation_sequence = observation.sequence;
-  decision.outcome = outcome;
-  decision.reason = std::move(reason);
-  if (answer != nullptr) {
-    decision.update_sequence = answer->sequence;
-    decision.active = answer->estimate.contact.active;
-  }
-  events_.decisions.push_back(std::move(decision));
-}
-
 Result<Admission> Session::submit(Observation observation, TimePoint now) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
@@ -175,8 +154,10 @@ Result<Admission> Session::submit(Observation observation, TimePoint now) {
   if (!admission || admission->repeated) return admission;
   observation.daemon_ns = observation.acquired_ns = admission->daemon_ns;
   if (waiting != boxes_.end()) {
-    decide(running_->key, waiting->second.observation, Outcome::kSuperseded,
-           fmt::format("observation {} came before it was begun", observation.sequence));
+    events_.decisions.push_back(
+        {running_->key.session_id, observation.source, waiting->second.observation.sequence,
+         Outcome::kSuperseded, 0, 0,
+         fmt::format("observation {} came before it was begun", observation.sequence)});
   }
   const std::string source = observation.source;
   boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now});
@@ -205,13 +186,22 @@ std::optional<Job> Session::next_job(TimePoint now) {
 
 std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> result) {
   work_->finished = true;
+  Decision decision;
+  decision.session_id = job.session.session_id;
+  decision.source = job.observation.source;
+  decision.observation_sequence = job.observation.sequence;
   if (job.stop.stop_requested()) {
-    decide(job.session, job.observation, Outcome::kSkipped, kSessionEnded);
+    decision.outcome = Outcome::kSkipped;
+    decision.reason = kSessionEnded;
+    events_.decisions.push_back(std::move(decision));
     return std::nullopt;
   }
-  UpdateMessage message = job.message(result ? std::move(*result) : Update{});
+  UpdateMessage message{job.session.session_id, {}, std::nullopt, job.session.boot_id};
   Update& update = message.update;
-  if (!result) {
+  if (result) {
+    update = std::move(*result);
+    ++updates_;
+  } else {
     message.error = result.error();
     update.case_id = case_id_;
     update.model_id = job.model->info.model_id;
@@ -219,18 +209,19 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
     update.method = job.request.method;
     update.boundary = job.request.boundary;
     update.final = true;
+    decision.outcome = Outcome::kFailed;
   }
-  running_->newest_update = update.sequence;
-  if (result) ++updates_;
-  const bool usable = result && update.usable();
-  if (usable) {
+  update.sequence = running_->newest_update = job.number;
+  if (result && update.usable()) {
     running_->newest_usable = update.sequence;
     running_->usable_arrived = job.arrived;
   } else {
     running_->reason = result ? update.estimate.quality.reason : message.error->message;
+    decision.reason = running_->reason;
   }
-  decide(job.session, job.observation, result ? Outcome::kUsed : Outcome::kFailed,
-         usable ? std::string() : running_->reason, &update);
+  decision.update_sequence = update.sequence;
+  decision.active = update.estimate.contact.active;
+  events_.decisions.push_back(std::move(decision));
   return message;
 }
 

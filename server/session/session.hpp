@@ -77,8 +77,6 @@ struct Preparation {
 struct Job {
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  UpdateMessage message(Update update) const;  // with the job's number and session
-
   Observation observation;  // its time is the daemon's
   TimePoint arrived;
   TimePoint begun;
@@ -202,8 +200,6 @@ class Session {
   void end_running();
   void answer(const Start& start, Result<SessionInfo> info);
   void refuse(const Start& start, const std::string& why);
-  void decide(const SessionKey& session, const Observation& observation, Outcome outcome,
-              std::string reason, const Update* answer = nullptr);
 
   const std::string case_id_;
   const std::uint64_t boot_id_;

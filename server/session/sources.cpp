@@ -3,9 +3,133 @@
 
 #include <fmt/format.h>
 
-#include "server/session/observation_rules.hpp"
+#include <algorithm>
+#include <cstdlib>
 
 namespace brainshift::server {
+namespace {
+
+constexpr std::size_t kMaxSourceLength = 64;
+constexpr std::size_t kMaxQuoted = 64;
+
+double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+Status check_stamp(const char* name, std::int64_t stamp_ns) {
+  if (stamp_ns >= -SourceClock::kMaxStamp_ns && stamp_ns <= SourceClock::kMaxStamp_ns) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("observation.{} = {}: no monotonic clock shows this, must be within {}",
+                          name, stamp_ns, SourceClock::kMaxStamp_ns));
+}
+
+tl::unexpected<Error> refuse(const Observation& observation, const std::string& why) {
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("observation.acquired_ns = {} of {}: {}", observation.acquired_ns,
+                          in_quotes(observation.source), why));
+}
+
+}  // namespace
+
+Status check_observation(const Observation& observation, std::string_view case_id,
+                         const SessionKey& running) {
+  if (observation.case_id != case_id) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.case_id = {}: the running session is for {}",
+                            in_quotes(observation.case_id), in_quotes(case_id)));
+  }
+  if (const SessionKey& given = observation.session; given != running) {
+    if (given == SessionKey{}) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "observation.session is absent: must name the session that it is for");
+    }
+    if (given.boot_id != running.boot_id) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, "
+                              "or this is another one ({:x})",
+                              given.boot_id, running.boot_id));
+    }
+    if (given.model_id != running.model_id) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("observation.session.model_id = {}: the daemon serves model {}",
+                              in_quotes(given.model_id), in_quotes(running.model_id)));
+    }
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.session.session_id = {}: the running session is {}",
+                            given.session_id, running.session_id));
+  }
+  if (observation.frame != "ras") {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("observation.frame = {}: must be \"ras\"",
+                                                         in_quotes(observation.frame)));
+  }
+  if (observation.source.empty() || observation.source.size() > kMaxSourceLength) {
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("observation.source = {}: must have 1 to {} characters",
+                            in_quotes(observation.source), kMaxSourceLength));
+  }
+  if (std::holds_alternative<PatientPose>(observation.body)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "observation.patient_pose: a change of pose is not assimilated in this version; "
+                "start a session on a model prepared for the new pose");
+  }
+  return {};
+}
+
+std::string in_quotes(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text.substr(0, kMaxQuoted)) {
+    const auto byte = static_cast<unsigned char>(c);
+    result += (byte < 0x20 || byte == 0x7f) ? '?' : c;
+  }
+  result += text.size() > kMaxQuoted ? "...\"" : "\"";
+  return result;
+}
+
+Result<std::int64_t> recorded_time(const Observation& observation) {
+  if (auto status = check_stamp("acquired_ns", observation.acquired_ns); !status) {
+    return tl::unexpected(status.error());
+  }
+  return observation.acquired_ns;
+}
+
+Result<std::int64_t> SourceClock::to_daemon(const Observation& observation,
+                                            std::int64_t arrived_ns) {
+  const std::int64_t acquired_ns = observation.acquired_ns;
+  if (auto status = check_stamp("acquired_ns", acquired_ns); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (auto status = check_stamp("sent_ns", observation.sent_ns); !status) {
+    return tl::unexpected(status.error());
+  }
+  const std::int64_t sent_ns = observation.sent_ns != 0 ? observation.sent_ns : acquired_ns;
+  if (acquired_ns > sent_ns) {
+    return refuse(observation, fmt::format("acquired {:.3g} s after it was sent",
+                                           seconds(acquired_ns - sent_ns)));
+  }
+  if (offset_ns_ && acquired_ns < last_acquired_ns_) {
+    return refuse(observation, fmt::format("acquired {:.3g} s before the one before it",
+                                           seconds(last_acquired_ns_ - acquired_ns)));
+  }
+  const std::int64_t offset_ns = arrived_ns - sent_ns;
+  if (offset_ns_ && *offset_ns_ - offset_ns > kMaxJump_ns) {
+    const bool again =
+        refused_offset_ns_ && std::abs(*refused_offset_ns_ - offset_ns) <= kMaxJump_ns;
+    const std::int64_t jump_ns = *offset_ns_ - offset_ns;
+    refused_offset_ns_ = offset_ns;
+    if (!again) {
+      return refuse(observation, fmt::format("the source's clock has jumped ahead by {:.0f} s",
+                                             seconds(jump_ns)));
+    }
+  }
+  const std::int64_t known_ns = offset_ns_ ? std::min(*offset_ns_, offset_ns) : offset_ns;
+  const double age_s = seconds(arrived_ns - (acquired_ns + known_ns));
+  if (age_s > max_age_s_) {
+    return refuse(observation, fmt::format("{:.0f} s old when it arrived, sensing.max_age_s = {:g}",
+                                           age_s, max_age_s_));
+  }
+  offset_ns_ = known_ns;
+  refused_offset_ns_.reset();
+  last_acquired_ns_ = acquired_ns;
+  return acquired_ns + known_ns;
+}
 
 Result<Admission> Sources::admit(const Observation& observation, std::int64_t arrived_ns,
                                  bool replaces_pending) {

@@ -1,19 +1,67 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sources of one session: how far each has counted, and by what clock. What is refused leaves
-// no trace: it takes no source's place and no number.
+// Which observations a session accepts, and of which sources: how far each has counted, and by what
+// clock. What is refused leaves no trace: it takes no source's place and no number.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "common/core/error.hpp"
 #include "common/values/observation.hpp"
 #include "common/values/session.hpp"
-#include "server/session/source_clock.hpp"
 
 namespace brainshift::server {
+
+// Ok, or kInvalidArgument for another case, session, model or daemon than `running`, a frame other
+// than "ras", an empty or overlong source, or a body that no update uses (PatientPose). The
+// sentence names the field and its value. The numbers of the body are not looked at:
+// wire::decode_observation has tested that they are finite and that standard deviations are not
+// negative.
+Status check_observation(const Observation& observation, std::string_view case_id,
+                         const SessionKey& running);
+
+// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a
+// one-line message whatever a peer sent.
+std::string in_quotes(std::string_view text);
+
+// The clock of one source against the daemon's, and which of its observations are plausible.
+//
+// Clocks of different machines share no zero. The offset between a source's clock and the daemon's
+// is that of the fastest message of the session so far:
+//   offset = min (arrival - hand-over)       hand-over: sent_ns, or acquired_ns where that is 0
+// An observation is then acquired_ns + offset old on the daemon's clock, and its delay is never
+// negative by more than what the fastest message took. Without sent_ns the first observation of a
+// source counts as new: nothing tells how old it is.
+class SourceClock {
+ public:
+  // max_age_s: sensing.max_age_s, beyond which an observation is not used.
+  explicit SourceClock(double max_age_s) : max_age_s_(max_age_s) {}
+
+  // When the observation was acquired, on the daemon's clock, ns. arrived_ns: on the same clock.
+  // kInvalidArgument, with the figure, and nothing is learnt:
+  //   - a stamp beyond kMaxStamp_ns
+  //   - acquired after it was sent, or before the source's last one
+  //   - older than max_age_s when it arrived
+  //   - ahead of the offset so far by more than kMaxJump_ns, unless the one refused before it says
+  //     the same: a single wrong stamp changes nothing, a source that has set its clock is followed
+  Result<std::int64_t> to_daemon(const Observation& observation, std::int64_t arrived_ns);
+
+  static constexpr std::int64_t kMaxStamp_ns = std::int64_t{1} << 60;  // 36 years
+  static constexpr std::int64_t kMaxJump_ns = 60'000'000'000;
+
+ private:
+  double max_age_s_;
+  std::optional<std::int64_t> offset_ns_;
+  std::optional<std::int64_t> refused_offset_ns_;
+  std::int64_t last_acquired_ns_ = 0;
+};
+
+// As above for sessions whose sources share the recording's clock: only kMaxStamp_ns holds.
+Result<std::int64_t> recorded_time(const Observation& observation);
 
 struct Admission {
   ObservationReceipt receipt;

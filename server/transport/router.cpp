@@ -11,7 +11,6 @@
 
 #include "common/wire/convert.hpp"
 #include "server/guard/zmtp_stream.hpp"
-#include "server/transport/connection_monitor.hpp"
 #include "server/transport/peers.hpp"
 #include "server/transport/router_socket.hpp"
 #include "server/transport/zap_handler.hpp"
@@ -25,6 +24,7 @@ constexpr int kRequestsPerTurn = 64;
 constexpr std::chrono::milliseconds kRetryInterval{20};
 // How often the handler is told that the loop turns.
 constexpr std::chrono::milliseconds kTurnInterval{100};
+constexpr std::size_t kMostParts = ZmtpStream::Bounds{}.parts;
 
 Bytes error_frame(std::uint64_t request_id, const Error& error) {
   return std::make_shared<const std::string>(
@@ -54,7 +54,6 @@ struct Router::Impl {
     guard.emplace(std::move(listener), socket.bind(), guarding);
   }
 
-  void serve_requests();
   void answer(const Incoming& incoming);
   Status enter(const Incoming& incoming);
   void subscribe(const std::string& routing_id, const Reply& answer);
@@ -121,7 +120,15 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
       if (items[3].revents != 0) return {};
       self.parcels.begin_turn();
       self.forget_closed();
-      if (items[0].revents != 0) self.serve_requests();
+      for (int served = 0; items[0].revents != 0 && served < kRequestsPerTurn; ++served) {
+        const auto incoming = self.socket.receive();
+        if (!incoming) break;
+        self.guard->delivered(incoming->connection_fd, incoming->bytes, incoming->parts);
+        self.forget_closed();  // before the peer is looked up, see ConnectionMonitor
+        self.answer(*incoming);
+        // With CURVE the guard cannot count the parts before.
+        if (incoming->parts > kMostParts) self.guard->close(incoming->connection_fd);
+      }
       for (const Outgoing& message : outbox.take()) self.deliver(message);
       if (self.peers.anything_owed()) self.pay_owed();
       if (std::chrono::steady_clock::now() - self.last_turn >= kTurnInterval) self.turned();
@@ -146,18 +153,6 @@ void Router::Impl::turned() {
                           counts.closed_for_silence, counts.closed_for_room, guard->held_bytes(),
                           zap ? zap->refused() : 0, refusals.not_allowed, refusals.connections,
                           refusals.observations, refusals.session_starts});
-}
-
-void Router::Impl::serve_requests() {
-  for (int served = 0; served < kRequestsPerTurn; ++served) {
-    const auto incoming = socket.receive();
-    if (!incoming) return;
-    guard->delivered(incoming->connection_fd, incoming->bytes, incoming->parts);
-    forget_closed();  // before the peer is looked up, see ConnectionMonitor
-    answer(*incoming);
-    // With CURVE the guard cannot count the parts before.
-    if (incoming->parts > ZmtpStream::Bounds{}.parts) guard->close(incoming->connection_fd);
-  }
 }
 
 void Router::Impl::answer(const Incoming& incoming) {

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "server/security/gate.hpp"
-#include "server/security/server_keys.hpp"
 
 namespace brainshift::server {
 

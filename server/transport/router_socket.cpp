@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
+#include <cstring>
 #include <random>
 #include <utility>
 
@@ -103,6 +104,32 @@ Sent RouterSocket::send(const std::string& peer, const Bytes& bytes) {
     if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
     throw;
   }
+}
+
+ConnectionMonitor::ConnectionMonitor(zmq::context_t& context, zmq::socket_t& watched)
+    : watched_(watched), receiver_(context, zmq::socket_type::pair) {
+  constexpr const char* kAddress = "inproc://brainshiftd-connections";
+  if (zmq_socket_monitor(watched.handle(), kAddress, ZMQ_EVENT_DISCONNECTED) != 0) {
+    throw zmq::error_t();
+  }
+  receiver_.set(zmq::sockopt::linger, 0);
+  receiver_.connect(kAddress);
+}
+
+std::vector<int> ConnectionMonitor::closed() {
+  std::vector<int> descriptors;
+  zmq::message_t event;
+  while (receiver_.recv(event, zmq::recv_flags::dontwait)) {
+    // An event is 16 bits of number and 32 bits of value, followed by a frame with the address.
+    if (event.size() == sizeof(std::uint16_t) + sizeof(std::int32_t)) {
+      std::int32_t descriptor = -1;
+      std::memcpy(&descriptor, event.data<char>() + sizeof(std::uint16_t), sizeof descriptor);
+      descriptors.push_back(descriptor);
+    }
+    zmq::message_t address;
+    static_cast<void>(receiver_.recv(address, zmq::recv_flags::dontwait));
+  }
+  return descriptors;
 }
 
 }  // namespace brainshift::server

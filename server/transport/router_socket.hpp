@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 #include <zmq.hpp>
 
 #include "server/transport/outbox.hpp"
@@ -47,6 +48,31 @@ class RouterSocket {
 
  private:
   zmq::socket_t socket_;
+};
+
+// Which connections of a socket have closed, by the daemon's file descriptor of each. ROUTER
+// sockets forget a peer silently; without this a daemon would keep subscribers that are gone.
+//
+// libzmq reports a close before it can deliver a message of a later connection that reuses the
+// descriptor, so draining the monitor before each message is handled never takes a new peer for an
+// old one.
+class ConnectionMonitor {
+ public:
+  // watched: outlives this.
+  ConnectionMonitor(zmq::context_t& context, zmq::socket_t& watched);
+  // Watching ends first: libzmq loses the memory of an event that it reports after the receiver has
+  // closed.
+  ~ConnectionMonitor() { zmq_socket_monitor(watched_.handle(), nullptr, 0); }
+  ConnectionMonitor(const ConnectionMonitor&) = delete;
+  ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;
+
+  zmq::socket_t& socket() { return receiver_; }
+  // Descriptors of the connections closed since the last call, oldest first.
+  std::vector<int> closed();
+
+ private:
+  zmq::socket_t& watched_;
+  zmq::socket_t receiver_;
 };
 
 }  // namespace brainshift::server

@@ -13,7 +13,7 @@
 #include <thread>
 #include <zmq.hpp>
 
-#include "server/security/server_keys.hpp"
+#include "server/security/gate.hpp"
 
 namespace brainshift::server {
 

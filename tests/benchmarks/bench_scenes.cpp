@@ -19,7 +19,7 @@
 #include "common/inversion/prepared/condense.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
-#include "common/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"
 
 namespace brainshift {

@@ -69,7 +69,7 @@ struct Player {
         value_or_exit(inversion::condensed_inverter(head.operators, head.locator, head.config));
     inverter = made.get();
     pipeline = std::make_unique<pipeline::Pipeline>(value_or_exit(pipeline::Pipeline::build(
-        head.model, head.config, Method::kCondensed, Boundary::kContact, std::move(made))));
+        *head.model, head.config, Method::kCondensed, Boundary::kContact, std::move(made))));
   }
   const inversion::Inverter* inverter = nullptr;
   std::unique_ptr<pipeline::Pipeline> pipeline;

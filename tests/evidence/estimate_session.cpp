@@ -36,7 +36,7 @@ Result<EstimateSession> begin_session(const bench::Head& head, const Variant& va
   }
   auto inverter = inversion::condensed_inverter(session.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
-  auto pipeline = pipeline::Pipeline::build(head.model, config, Method::kCondensed,
+  auto pipeline = pipeline::Pipeline::build(*head.model, config, Method::kCondensed,
                                             variant.boundary, std::move(*inverter));
   if (!pipeline) return tl::unexpected(pipeline.error());
   session.pipeline = std::make_unique<pipeline::Pipeline>(std::move(*pipeline));

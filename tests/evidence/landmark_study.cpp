@@ -35,7 +35,7 @@ class Predictor {
     config.sensing.landmark_pose_sd_deg = kLeftPose_deg;
     auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
     if (!inverter) return tl::unexpected(inverter.error());
-    auto pipeline = pipeline::Pipeline::build(head.model, config, Method::kCondensed,
+    auto pipeline = pipeline::Pipeline::build(*head.model, config, Method::kCondensed,
                                               Boundary::kContact, std::move(*inverter));
     if (!pipeline) return tl::unexpected(pipeline.error());
     return Predictor(head, sd_mm, std::move(*pipeline));

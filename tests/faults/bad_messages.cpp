@@ -18,13 +18,14 @@
 #include "common/wire/frame.hpp"
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
-#include "tests/faults/raw_peer.hpp"
 #include "tests/faults/settings.hpp"
+#include "tests/support/zmtp_peer.hpp"
 
 namespace brainshift::faults {
 namespace {
 
+using test_support::port_of;
+using test_support::ZmtpPeer;
 using wire::MessageType;
 using Parts = std::vector<std::string>;
 
@@ -144,14 +145,6 @@ std::vector<Update> fields_of(const std::string& endpoint, const Feed& feed,
   return fields;
 }
 
-int differing(const std::vector<Update>& fields, const std::vector<Update>& expected) {
-  int count = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    count += same_bits(fields[i], expected[i]) ? 0 : 1;
-  }
-  return count;
-}
-
 std::vector<Update> undisturbed(const Settings& settings, const Feed& feed) {
   const DaemonProcess daemon({.model = settings.model, .folder = settings.work, .log = false});
   return fields_of(daemon.endpoint(), feed, [](const Opened&) {});
@@ -187,7 +180,7 @@ void run_bad_messages(const Settings& settings, Tally& tally) {
       }
       accepted += sender.drain();
       // Sizes beyond ZeroMQ's own cap end their connection.
-      RawPeer liar(port_of(daemon.endpoint()));
+      ZmtpPeer liar(port_of(daemon.endpoint()));
       if (liar.shake_hands()) liar.claim_part(std::uint64_t{1} << 62);
       most_mib = std::max(most_mib, daemon.resident_mib());
       rows.add({double(sent), daemon.resident_mib()});
@@ -208,7 +201,7 @@ void run_unfinished_messages(const Settings& settings, Tally& tally) {
   Rows rows(settings.work / "unfinished.csv", "sent_mib,resident_mib,client_waited_s");
   double idle_mib = 0.0, most_mib = 0.0, slowest_s = 0.0;
   const auto flood = [&](const std::string& bytes_of_a_part, int parts_at_once, double all_mib) {
-    RawPeer peer(port_of(daemon.endpoint()));
+    ZmtpPeer peer(port_of(daemon.endpoint()));
     bool taken = peer.shake_hands();
     double sent_mib = 0.0;
     while (taken && sent_mib < all_mib) {

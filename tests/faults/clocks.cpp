@@ -13,7 +13,6 @@
 
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/settings.hpp"
 
 namespace brainshift::faults {
@@ -41,14 +40,6 @@ Updates with_right_clocks(const DaemonProcess& daemon, const Feed& feed) {
   Opened opened = open_session(daemon.endpoint(), feed, false);
   need(opened.client.subscribe(), "subscribe");
   return play(opened.client, feed, [](std::size_t) { return std::int64_t{0}; });
-}
-
-int differing(const Updates& updates, const Updates& expected) {
-  int count = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    count += same_bits(updates[i], expected[i]) ? 0 : 1;
-  }
-  return count;
 }
 
 double oldest_source_s(const Updates& updates) {

@@ -11,15 +11,16 @@
 
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
-#include "tests/faults/raw_peer.hpp"
 #include "tests/faults/settings.hpp"
+#include "tests/support/zmtp_peer.hpp"
 
 namespace brainshift::faults {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::seconds;
+using test_support::port_of;
+using test_support::ZmtpPeer;
 
 constexpr int kHeld = 400;       // raw connections at a time
 constexpr double kIdle_s = 5.0;  // over which processor time is taken
@@ -52,7 +53,7 @@ void raw_connections(const Settings& settings, Tally& tally) {
   const DaemonProcess daemon({.model = settings.model, .folder = settings.work});
   answered_within_s(daemon.endpoint());
   const int before = daemon.descriptors();
-  std::deque<RawPeer> held;
+  std::deque<ZmtpPeer> held;
   double slowest_s = 0.0;
   int refused = 0;
   for (int i = 0; i < settings.count; ++i) {
@@ -79,7 +80,7 @@ void bad_peers(const Settings& settings, Tally& tally) {
       {.model = settings.model, .folder = settings.work, .max_clients = kPeers});
   answered_within_s(daemon.endpoint());
   const int before = daemon.descriptors();
-  std::deque<RawPeer> peers;
+  std::deque<ZmtpPeer> peers;
   for (int i = 0; i < kPeers; ++i) {
     peers.emplace_back(port_of(daemon.endpoint()));
     if (peers.back().shake_hands()) peers.back().send_part("x", false);
@@ -104,7 +105,7 @@ void few_descriptors(const Settings& settings, Tally& tally) {
                               .max_descriptors = kLimit});
   answered_within_s(daemon.endpoint());
   const int before = daemon.descriptors();
-  std::deque<RawPeer> held;
+  std::deque<ZmtpPeer> held;
   for (int i = 0; i < kConnections; ++i) {
     held.emplace_back(port_of(daemon.endpoint()));
     held.back().greet();

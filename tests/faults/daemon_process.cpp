@@ -19,7 +19,7 @@
 #include <system_error>
 
 #include "common/io/config/key_file.hpp"
-#include "tests/faults/need.hpp"
+#include "tests/faults/settings.hpp"
 #include "tests/integration/workspace.hpp"
 
 extern char** environ;

@@ -13,7 +13,6 @@
 
 #include "common/io/recording/surgery_file.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/settings.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
@@ -23,15 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string file_content(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 // A file that is damaged at one place at a time, and mended again.
 class Damaged {
  public:
-  explicit Damaged(fs::path file) : path_(std::move(file)), good_(file_content(path_)) {
+  explicit Damaged(fs::path file) : path_(std::move(file)), good_(content_of(path_)) {
     if (good_.empty()) throw std::runtime_error(path_.string() + ": cannot be read");
   }
   std::size_t size() const { return good_.size(); }

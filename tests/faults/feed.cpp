@@ -3,6 +3,8 @@
 
 #include <chrono>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -10,7 +12,7 @@
 
 #include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
-#include "tests/faults/need.hpp"
+#include "tests/faults/settings.hpp"
 
 namespace brainshift::faults {
 namespace {
@@ -117,6 +119,19 @@ bool same_bits(const Update& one, const Update& other) {
   return one.estimate.displacement.size() > 0 &&
          same_bytes(one.estimate.displacement, other.estimate.displacement) &&
          same_bytes(one.estimate.sd_mm, other.estimate.sd_mm);
+}
+
+int differing(const std::vector<Update>& updates, const std::vector<Update>& expected) {
+  int count = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    count += same_bits(updates[i], expected[i]) ? 0 : 1;
+  }
+  return count;
+}
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 double answered_within_s(const std::string& endpoint) {

@@ -55,6 +55,12 @@ UpdateMessage answer_to(client::Client& client, const Observation& observation);
 // Whether the fields have the same bits, standard deviations too.
 bool same_bits(const Update& one, const Update& other);
 
+// Of as many as are expected, those with other bits.
+int differing(const std::vector<Update>& updates, const std::vector<Update>& expected);
+
+// The bytes of a file; empty when it cannot be read.
+std::string content_of(const std::filesystem::path& file);
+
 // Whether a daemon answers a new client within the limit; s.
 double answered_within_s(const std::string& endpoint);
 

@@ -18,7 +18,6 @@
 #include "common/wire/convert.hpp"
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/settings.hpp"
 #include "tests/integration/process.hpp"
 #include "tests/integration/workspace.hpp"
@@ -35,11 +34,6 @@ constexpr std::size_t kSources = 3;
 constexpr int kFloodedLast_ms = 60;  // the last moment of a kill after a session's start
 constexpr int kPacedLast_ms = 300;
 constexpr milliseconds kPace{4};
-
-std::string content(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 // By source: what the daemon said is on its disk.
 struct Claims {
@@ -74,7 +68,7 @@ class Replay {
     if (!resume.empty()) command.insert(command.end(), {"--resume", resume});
     const auto done = integration::run(command);
     if (done.exit_status != 0) throw std::runtime_error("brainshift replay: " + done.err);
-    return content(field());
+    return content_of(field());
   }
 
  private:

@@ -5,7 +5,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <utility>
 
+#include "common/core/error.hpp"
 #include "tests/faults/tally.hpp"
 
 namespace brainshift::faults {
@@ -19,6 +23,17 @@ struct Settings {
   double seconds = 0.0;               // for topics that last
   std::uint32_t seed = 1;
 };
+
+// The value of a Result, or an exception that ends the topic with the error's sentence.
+template <typename T>
+T need(Result<T> result, const std::string& what) {
+  if (!result) throw std::runtime_error(what + ": " + result.error().message);
+  return *std::move(result);
+}
+
+inline void need(const Status& status, const std::string& what) {
+  if (!status) throw std::runtime_error(what + ": " + status.error().message);
+}
 
 void run_kills(const Settings& settings, Tally& tally);
 void run_damaged_files(const Settings& settings, Tally& tally);

@@ -9,7 +9,6 @@
 
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
-#include "tests/faults/need.hpp"
 #include "tests/faults/settings.hpp"
 
 namespace brainshift::faults {

@@ -94,7 +94,7 @@ Result<pipeline::Pipeline> session_of(const bench::Head& head, const Guide& guid
   auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
   return pipeline::Pipeline::build(
-      head.model, config, Method::kCondensed, Boundary::kContact,
+      *head.model, config, Method::kCondensed, Boundary::kContact,
       std::make_unique<WatchedInverter>(std::move(*inverter), guide.cold, rounds));
 }
 

@@ -29,7 +29,7 @@ Result<bench::Head> make_default_head(double thousand_nodes) {
 Result<pipeline::Pipeline> begin_surgery(const bench::Head& head, const CaseConfig& config) {
   auto inverter = inversion::condensed_inverter(head.operators, head.locator, config);
   if (!inverter) return tl::unexpected(inverter.error());
-  return pipeline::Pipeline::build(head.model, config, Method::kCondensed, Boundary::kContact,
+  return pipeline::Pipeline::build(*head.model, config, Method::kCondensed, Boundary::kContact,
                                    std::move(*inverter));
 }
 

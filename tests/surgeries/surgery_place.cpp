@@ -98,7 +98,7 @@ class Sessions {
   static Result<pipeline::Pipeline> build(const bench::Head& head,
                                           Result<std::unique_ptr<inversion::Inverter>> inverter) {
     if (!inverter) return tl::unexpected(inverter.error());
-    return pipeline::Pipeline::build(head.model, head.config, Method::kCondensed,
+    return pipeline::Pipeline::build(*head.model, head.config, Method::kCondensed,
                                      Boundary::kContact, std::move(*inverter));
   }
 

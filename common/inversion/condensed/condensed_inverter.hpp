@@ -48,7 +48,7 @@
 namespace brainshift::inversion {
 
 struct CondensedOptions {
-  // Parts that a scene may leave out (common/pipeline/scene_plan.hpp decides); omission_errors()
+  // Parts that a scene may leave out (common/pipeline/scene.hpp decides); omission_errors()
   // estimates the price.
   bool contact = true;
   bool uncertainty = true;

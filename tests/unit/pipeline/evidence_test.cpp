@@ -105,7 +105,7 @@ class Sources : public testing::Test {
  protected:
   Pipeline pipeline(Method method) {
     return std::move(*Pipeline::build(
-        patient(), config_, method, Boundary::kContact,
+        *patient(), config_, method, Boundary::kContact,
         std::make_unique<FakeInverter>(
             [this](int call, const SparseData& data, const auto& options, Estimate& estimate) {
               return inversion_(call, data, options, estimate);

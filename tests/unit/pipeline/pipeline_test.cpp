@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "common/pipeline/left_out.hpp"
+#include "common/pipeline/scene.hpp"
 #include "tests/unit/server/fake_inverter.hpp"
 
 namespace brainshift::pipeline {
@@ -70,40 +70,13 @@ TetMesh cube(double edge) {
   return mesh;
 }
 
-std::shared_ptr<const BrainModel> model() {
-  auto model = std::make_shared<BrainModel>();
-  model->case_id = kCase;
-  model->model_id = "0123456789abcdef";
-  model->mesh = cube(100.0);
-  model->tumour = ellipsoid({16, 11, 8});
+BrainModel model(const Vec3& tumour_axes = {16, 11, 8}) {
+  BrainModel model;
+  model.case_id = kCase;
+  model.model_id = "0123456789abcdef";
+  model.mesh = cube(100.0);
+  model.tumour = ellipsoid(tumour_axes);
   return model;
-}
-
-// An inversion that remembers what it was given.
-struct FakeEstimator {
-  std::shared_ptr<std::optional<SparseData>> seen = std::make_shared<std::optional<SparseData>>();
-  std::unique_ptr<FakeInverter> make() const {
-    return std::make_unique<FakeInverter>(
-        [seen = seen](int, const SparseData& data, const auto&, Estimate& estimate) -> Status {
-          *seen = data;
-          estimate.status = EstimateStatus::kConverged;
-          estimate.displacement = Points::Zero(3, 8);
-          return {};
-        });
-  }
-};
-
-Pipeline pipeline_on(std::shared_ptr<const BrainModel> brain, const CaseConfig& config = {},
-                     std::unique_ptr<inversion::Inverter> inverter = FakeEstimator{}.make(),
-                     Method method = Method::kPaper, Boundary boundary = Boundary::kContact) {
-  auto built = Pipeline::build(std::move(brain), config, method, boundary, std::move(inverter));
-  EXPECT_TRUE(built.has_value());
-  return std::move(*built);
-}
-
-Pipeline pipeline(const FakeEstimator& inversion, Boundary boundary = Boundary::kContact,
-                  const CaseConfig& config = {}, Method method = Method::kPaper) {
-  return pipeline_on(model(), config, inversion.make(), method, boundary);
 }
 
 Observation boundary_moved_by(const Vec3& shift) {
@@ -115,49 +88,73 @@ Observation boundary_moved_by(const Vec3& shift) {
   return observation;
 }
 
-bool leaves_out(const Update& update, const std::string& part) {
+const Omission* left_out(const Update& update, const std::string& part) {
   for (const Omission& omission : update.left_out) {
-    if (omission.part == part) return true;
+    if (omission.part == part) return &omission;
   }
-  return false;
+  return nullptr;
 }
 
-TEST(Pipeline, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
-  const FakeEstimator inversion;
-  CaseConfig config;
-  config.inversion.sigma_mm = 0.25;
-  const auto update = pipeline(inversion, Boundary::kContact, config).run(landmarks(3), {});
+class PipelineTest : public testing::Test {
+ protected:
+  // An inversion that remembers what it was given.
+  std::unique_ptr<FakeInverter> remembering() {
+    return std::make_unique<FakeInverter>(
+        [this](int, const SparseData& data, const auto&, Estimate& estimate) -> Status {
+          seen_ = data;
+          estimate.status = EstimateStatus::kConverged;
+          estimate.displacement = Points::Zero(3, 8);
+          return {};
+        });
+  }
+  Pipeline pipeline(const BrainModel& brain, std::unique_ptr<inversion::Inverter> inverter) {
+    auto built = Pipeline::build(brain, config_, method_, boundary_, std::move(inverter));
+    EXPECT_TRUE(built.has_value());
+    return std::move(*built);
+  }
+  Result<Update> run(const Observation& observation, const BrainModel& brain = model()) {
+    return pipeline(brain, remembering()).run(observation);
+  }
+  Result<Update> run_with(FakeInverter::Update inversion, const RunOptions& options = {}) {
+    return pipeline(model(), std::make_unique<FakeInverter>(std::move(inversion)))
+        .run(landmarks(1), options);
+  }
+
+  CaseConfig config_;
+  Method method_ = Method::kPaper;
+  Boundary boundary_ = Boundary::kContact;
+  std::optional<SparseData> seen_;
+};
+
+TEST_F(PipelineTest, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
+  config_.inversion.sigma_mm = 0.25;
+  const auto update = run(landmarks(3));
   ASSERT_TRUE(update.has_value());
-  const SparseData& data = inversion.seen->value();
-  ASSERT_EQ(data.size(), 4);
-  EXPECT_EQ(data.displacements, Points(Vec3(1, 0, 0).replicate(1, 4)));
-  EXPECT_EQ(data.positions, std::get<LandmarkPairs>(landmarks(3).body).undeformed);
-  EXPECT_EQ(data.sd_mm, VecX(VecX::Constant(4, 0.25)));
+  ASSERT_EQ(seen_->size(), 4);
+  EXPECT_EQ(seen_->displacements, Points(Vec3(1, 0, 0).replicate(1, 4)));
+  EXPECT_EQ(seen_->positions, std::get<LandmarkPairs>(landmarks(3).body).undeformed);
+  EXPECT_EQ(seen_->sd_mm, VecX(VecX::Constant(4, 0.25)));
   EXPECT_TRUE(update->T_undeformed_deformed.isApprox(RigidTransform::Identity()));
   EXPECT_EQ(update->observation_sequence, 3u);
   EXPECT_EQ(update->case_id, kCase);
   EXPECT_TRUE(update->final);
 }
 
-TEST(Pipeline, AShiftedTumourBoundaryGivesBackItsShift) {
-  const FakeEstimator inversion;
+TEST_F(PipelineTest, AShiftedTumourBoundaryGivesBackItsShift) {
   const Vec3 shift(1.5, -2.0, 1.0);
-  const auto update = pipeline(inversion).run(boundary_moved_by(shift), {});
+  const auto update = run(boundary_moved_by(shift));
   ASSERT_TRUE(update.has_value());
   EXPECT_LT((update->T_undeformed_deformed.translation() + shift).norm(), 0.05);
-  const SparseData& data = inversion.seen->value();
-  ASSERT_EQ(data.size(), CaseConfig{}.inversion.sparse_points);
-  EXPECT_LT((data.displacements.colwise() - shift).colwise().norm().maxCoeff(), 0.1);
+  ASSERT_EQ(seen_->size(), CaseConfig{}.inversion.sparse_points);
+  EXPECT_LT((seen_->displacements.colwise() - shift).colwise().norm().maxCoeff(), 0.1);
 }
 
-TEST(Pipeline, GuidingPointsAreDistinctAndTheSameInEveryRun) {
-  const FakeEstimator inversion;
-  Pipeline once = pipeline(inversion);
-  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0}), {}).has_value());
-  const SparseData first = inversion.seen->value();
-  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0}), {}).has_value());
-  const SparseData second = inversion.seen->value();
-  EXPECT_EQ(first.positions, second.positions);
+TEST_F(PipelineTest, GuidingPointsAreDistinctAndTheSameInEveryRun) {
+  Pipeline once = pipeline(model(), remembering());
+  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0})).has_value());
+  const SparseData first = *seen_;
+  ASSERT_TRUE(once.run(boundary_moved_by({1, 0, 0})).has_value());
+  EXPECT_EQ(first.positions, seen_->positions);
   std::set<std::pair<double, std::pair<double, double>>> distinct;
   for (int i = 0; i < first.size(); ++i) {
     distinct.insert({first.positions(0, i), {first.positions(1, i), first.positions(2, i)}});
@@ -165,84 +162,76 @@ TEST(Pipeline, GuidingPointsAreDistinctAndTheSameInEveryRun) {
   EXPECT_EQ(static_cast<int>(distinct.size()), first.size());
 }
 
-TEST(Pipeline, FewerBoundaryPointsThanWantedAreAllUsed) {
-  const FakeEstimator inversion;
-  CaseConfig config;
-  config.inversion.sparse_points = 1'000'000;
+TEST_F(PipelineTest, FewerBoundaryPointsThanWantedAreAllUsed) {
+  config_.inversion.sparse_points = 1'000'000;
   const Observation observation = boundary_moved_by({1, 0, 0});
-  ASSERT_TRUE(pipeline(inversion, Boundary::kContact, config).run(observation, {}).has_value());
-  EXPECT_EQ(inversion.seen->value().size(),
-            std::get<TumourBoundary>(observation.body).points.cols());
+  ASSERT_TRUE(run(observation).has_value());
+  EXPECT_EQ(seen_->size(), std::get<TumourBoundary>(observation.body).points.cols());
 }
 
-TEST(Pipeline, RefusesWhatIsNotAssimilated) {
-  const FakeEstimator inversion;
+TEST_F(PipelineTest, RefusesWhatIsNotAssimilated) {
   Observation observation = landmarks(1);
   observation.body = CorticalSurface{};
-  const auto surface = pipeline(inversion).run(observation, {});
+  const auto surface = run(observation);
   ASSERT_FALSE(surface.has_value());
   EXPECT_EQ(surface.error().code, ErrorCode::kEmptySet);
   EXPECT_THAT(surface.error().message, HasSubstr("craniotomy of the model has no triangle"));
-  CaseConfig without_surface;
-  without_surface.scene.surface = Carry::kOff;
-  const auto off = pipeline(inversion, Boundary::kContact, without_surface).run(observation, {});
+  config_.scene.surface = Carry::kOff;
+  const auto off = run(observation);
   ASSERT_FALSE(off.has_value());
   EXPECT_EQ(off.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(off.error().message, HasSubstr("scene.surface = off"));
   observation.body = PatientPose{};
-  const auto pose = pipeline(inversion).run(observation, {});
+  const auto pose = run(observation);
   ASSERT_FALSE(pose.has_value());
   EXPECT_THAT(pose.error().message, HasSubstr("patient_pose is not assimilated"));
-  EXPECT_FALSE(inversion.seen->has_value());
+  EXPECT_FALSE(seen_.has_value());
 }
 
-TEST(Pipeline, RefusesLandmarksThatDoNotPairUpOrAreTooFew) {
-  const FakeEstimator inversion;
+TEST_F(PipelineTest, RefusesLandmarksThatDoNotPairUpOrAreTooFew) {
   Observation observation = landmarks(1);
   auto& pairs = std::get<LandmarkPairs>(observation.body);
   pairs.deformed.conservativeResize(3, 3);
-  const auto unpaired = pipeline(inversion).run(observation, {});
+  const auto unpaired = run(observation);
   ASSERT_FALSE(unpaired.has_value());
   EXPECT_THAT(unpaired.error().message, HasSubstr("4 undeformed but 3 deformed"));
 
   pairs.undeformed.conservativeResize(3, 2);
   pairs.deformed.conservativeResize(3, 2);
-  const auto few = pipeline(inversion).run(observation, {});
+  const auto few = run(observation);
   ASSERT_FALSE(few.has_value());
   EXPECT_EQ(few.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_FALSE(inversion.seen->has_value());
+  EXPECT_FALSE(seen_.has_value());
 }
 
-TEST(Pipeline, AnErrorOfTheInversionPassesThroughUnchanged) {
-  auto failing =
-      std::make_unique<FakeInverter>([](int, const SparseData&, const auto&, Estimate&) -> Status {
-        return fail(ErrorCode::kNotConverged, "the reason");
-      });
-  const auto update = pipeline_on(model(), {}, std::move(failing)).run(landmarks(1));
+TEST_F(PipelineTest, AnErrorOfTheInversionPassesThroughUnchanged) {
+  const auto update = run_with([](int, const SparseData&, const auto&, auto&) -> Status {
+    return fail(ErrorCode::kNotConverged, "the reason");
+  });
   ASSERT_FALSE(update.has_value());
   EXPECT_EQ(update.error().code, ErrorCode::kNotConverged);
   EXPECT_EQ(update.error().message, "the reason");
 }
 
-TEST(Pipeline, IteratesAreMarkedAndTheStopTokenReachesTheInversion) {
+TEST_F(PipelineTest, IteratesAreMarkedAndTheStopTokenReachesTheInversion) {
   std::stop_source stop;
   bool stoppable = false;
-  auto iterating = std::make_unique<FakeInverter>(
-      [&](int, const SparseData&, const auto& options, Estimate& estimate) -> Status {
-        stoppable = options.stop.stop_possible();
-        Estimate iterate;
-        iterate.status = EstimateStatus::kIterating;
-        iterate.displacement = Points::Ones(3, 8);
-        options.on_iterate(iterate);
-        estimate.status = EstimateStatus::kConverged;
-        estimate.displacement = Points::Zero(3, 8);
-        return {};
-      });
   std::vector<Update> iterates;
   RunOptions options;
   options.stop = stop.get_token();
   options.on_iterate = [&](Update update) { iterates.push_back(std::move(update)); };
-  const auto update = pipeline_on(model(), {}, std::move(iterating)).run(landmarks(1), options);
+  const auto update = run_with(
+      [&](int, const SparseData&, const auto& asked, Estimate& estimate) -> Status {
+        stoppable = asked.stop.stop_possible();
+        Estimate iterate;
+        iterate.status = EstimateStatus::kIterating;
+        iterate.displacement = Points::Ones(3, 8);
+        asked.on_iterate(iterate);
+        estimate.status = EstimateStatus::kConverged;
+        estimate.displacement = Points::Zero(3, 8);
+        return {};
+      },
+      options);
   ASSERT_TRUE(update.has_value());
   ASSERT_EQ(iterates.size(), 1u);
   EXPECT_FALSE(iterates[0].final);
@@ -254,178 +243,116 @@ TEST(Pipeline, IteratesAreMarkedAndTheStopTokenReachesTheInversion) {
 }
 
 // The inverter writes where the update is read: no copy between them.
-TEST(Pipeline, TheInverterWritesIntoTheUpdateItself) {
+TEST_F(PipelineTest, TheInverterWritesIntoTheUpdateItself) {
   const double* written = nullptr;
-  auto inverter = std::make_unique<FakeInverter>(
-      [&](int, const SparseData&, const auto&, Estimate& estimate) -> Status {
-        estimate.displacement = Points::Zero(3, 8);
-        written = estimate.displacement.data();
-        return {};
-      });
-  const auto update = pipeline_on(model(), {}, std::move(inverter)).run(landmarks(1));
+  const auto update = run_with([&](int, const SparseData&, const auto&, auto& estimate) -> Status {
+    estimate.displacement = Points::Zero(3, 8);
+    written = estimate.displacement.data();
+    return {};
+  });
   ASSERT_TRUE(update.has_value());
   EXPECT_EQ(update->estimate.displacement.data(), written);
 }
 
-TEST(Pipeline, ResetForgetsEvidenceAndTheInvertersState) {
-  const FakeEstimator inversion;
-  auto inverter = inversion.make();
+TEST_F(PipelineTest, ResetForgetsEvidenceAndTheInvertersState) {
+  auto inverter = remembering();
   const FakeInverter& watched = *inverter;
-  Pipeline two = pipeline_on(model(), {}, std::move(inverter));
+  Pipeline two = pipeline(model(), std::move(inverter));
   ASSERT_TRUE(two.run(landmarks(1, "ius")).has_value());
   ASSERT_TRUE(two.run(landmarks(2, "pointer")).has_value());
-  EXPECT_EQ(inversion.seen->value().sources.size(), 2u);
+  EXPECT_EQ(seen_->sources.size(), 2u);
   two.reset();
   EXPECT_EQ(watched.resets, 1);
   ASSERT_TRUE(two.run(landmarks(1, "pointer")).has_value());
-  EXPECT_EQ(inversion.seen->value().sources.size(), 1u);
+  EXPECT_EQ(seen_->sources.size(), 1u);
 }
 
-TEST(Pipeline, SaysWhatItLeavesOut) {
-  const auto contact = pipeline(FakeEstimator{}, Boundary::kContact).run(landmarks(1), {});
+// ---------- what an update says it leaves out ----------
+
+TEST_F(PipelineTest, SaysWhatItLeavesOut) {
+  const auto contact = run(landmarks(1));
   ASSERT_TRUE(contact.has_value());
-  EXPECT_TRUE(leaves_out(*contact, "pressure"));
-  EXPECT_TRUE(leaves_out(*contact, "uncertainty"));
-  EXPECT_FALSE(leaves_out(*contact, "contact"));
-  const auto fixed = pipeline(FakeEstimator{}, Boundary::kFixed).run(landmarks(1), {});
+  EXPECT_NE(left_out(*contact, "pressure"), nullptr);
+  EXPECT_NE(left_out(*contact, "uncertainty"), nullptr);
+  EXPECT_EQ(left_out(*contact, "contact"), nullptr);
+  boundary_ = Boundary::kFixed;
+  const auto fixed = run(landmarks(1));
   ASSERT_TRUE(fixed.has_value());
-  EXPECT_TRUE(leaves_out(*fixed, "contact"));
-  for (const Omission& omission : fixed->left_out) {
-    if (omission.part != "contact") continue;
-    // The paper's Table: 3.4 mm at the craniotomy without contact, 1.6 mm with it.
-    EXPECT_THAT(omission.estimated_error, HasSubstr("3.4 mm of error remain"));
-  }
+  ASSERT_NE(left_out(*fixed, "contact"), nullptr);
+  // The paper's Table: 3.4 mm at the craniotomy without contact, 1.6 mm with it.
+  EXPECT_THAT(left_out(*fixed, "contact")->estimated_error, HasSubstr("3.4 mm of error remain"));
   for (const Omission& omission : fixed->left_out) {
     EXPECT_FALSE(omission.reason.empty()) << omission.part;
     EXPECT_FALSE(omission.estimated_error.empty()) << omission.part;
   }
 }
 
-TEST(Pipeline, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
-  PriorConfig prior;
-  prior.force_density_sd_n_m3 = prior.medium_density_sd_n_m3;
-  prior.gravity_direction_sd_deg = 10.0;
-  prior.resection_weight_sd = 1.0;
-  prior.resection_stress_sd_pa = 300.0;
-  EXPECT_TRUE(prior_omissions(prior).empty());
-  prior.tumour_volume_strain_sd = 0.0;
-  prior.gravity_levels_mm.clear();
-  prior.resection_weight_sd = 0.0;  // its stress stays
-  const auto left_out = prior_omissions(prior);
-  ASSERT_EQ(left_out.size(), 2u);
-  EXPECT_EQ(left_out[0].part, "gravity modes");
-  EXPECT_EQ(left_out[1].part, "swelling of the tumour");
-  EXPECT_THAT(left_out[1].reason, HasSubstr("prior.tumour_volume_strain_sd"));
-  EXPECT_THAT(left_out[1].estimated_error, HasSubstr("1.7 mm at the cortex"));
-  prior.resection_stress_sd_pa = 0.0;
-  EXPECT_EQ(prior_omissions(prior).size(), 3u);
-}
-
-// By default other parts stand for three; without those these are missing.
-TEST(Pipeline, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
-  PriorConfig prior;
-  const auto by_default = prior_omissions(prior);
-  ASSERT_EQ(by_default.size(), 3u);
-  EXPECT_EQ(by_default[0].part, "buoyancy across gravity");
-  EXPECT_THAT(by_default[0].estimated_error,
-              HasSubstr("the coarse residual field takes its place"));
-  EXPECT_EQ(by_default[1].part, "resection");
-  EXPECT_THAT(by_default[1].estimated_error, HasSubstr("swelling of the tumour takes its place"));
-  EXPECT_EQ(by_default[2].part, "fine residual field");
-  EXPECT_THAT(by_default[2].estimated_error,
-              HasSubstr("the medium residual field takes its place"));
-  prior.medium_density_sd_n_m3 = 0.0;
-  const auto none = prior_omissions(prior);
-  ASSERT_EQ(none.size(), 4u);
-  EXPECT_EQ(none[2].part, "fine residual field");
-  EXPECT_THAT(none[2].estimated_error, HasSubstr("0.1 mm at the cortex"));
-}
-
-TEST(Pipeline, ReportsRotationThatASphereCannotShow) {
-  auto sphere = std::make_shared<BrainModel>(*model());
-  sphere->tumour = ellipsoid({10, 10, 10});
-  Pipeline built = pipeline_on(sphere);
-  Observation observation = landmarks(1);
-  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
-  const auto update = built.run(observation);
-  ASSERT_TRUE(update.has_value());
-  EXPECT_TRUE(leaves_out(*update, "rotation"));
-  for (const Omission& omission : update->left_out) {
-    if (omission.part != "rotation") continue;
-    EXPECT_THAT(omission.reason, HasSubstr("no rotation is shown by the points"));
-  }
-}
-
-TEST(Pipeline, MethodsOtherThanCondensedLeaveUncertaintyOut) {
+TEST_F(PipelineTest, MethodsOtherThanCondensedLeaveUncertaintyOut) {
   for (const Method method : kAllMethods) {
-    const auto update = pipeline(FakeEstimator{}, Boundary::kContact, {}, method).run(landmarks(1));
+    method_ = method;
+    const auto update = run(landmarks(1));
     ASSERT_TRUE(update.has_value());
-    EXPECT_EQ(leaves_out(*update, "uncertainty"), method != Method::kCondensed)
+    EXPECT_EQ(left_out(*update, "uncertainty") != nullptr, method != Method::kCondensed)
         << to_string(method);
   }
-  CaseConfig off;
-  off.scene.uncertainty = Carry::kOff;
-  const auto update =
-      pipeline(FakeEstimator{}, Boundary::kContact, off, Method::kCondensed).run(landmarks(1));
+  method_ = Method::kCondensed;
+  config_.scene.uncertainty = Carry::kOff;
+  const auto update = run(landmarks(1));
   ASSERT_TRUE(update.has_value());
-  EXPECT_TRUE(leaves_out(*update, "uncertainty"));
+  EXPECT_NE(left_out(*update, "uncertainty"), nullptr);
 }
 
-TEST(Pipeline, ListsWhatTheInversionLeftOut) {
-  CaseConfig config;
-  config.scene.far_field = Carry::kOff;
-  auto inverter = FakeEstimator{}.make();
+TEST_F(PipelineTest, ListsWhatTheInversionLeftOut) {
+  config_.scene.far_field = Carry::kOff;
+  method_ = Method::kCondensed;
+  auto inverter = remembering();
   FakeInverter& leaving_out = *inverter;
-  Pipeline built =
-      pipeline_on(model(), config, std::move(inverter), Method::kCondensed, Boundary::kContact);
+  Pipeline built = pipeline(model(), std::move(inverter));
   const auto without_errors = built.run(landmarks(1));
   ASSERT_TRUE(without_errors.has_value());
-  EXPECT_FALSE(leaves_out(*without_errors, "far field"));
+  EXPECT_EQ(left_out(*without_errors, "far field"), nullptr);
   leaving_out.errors = inversion::OmissionErrors{};
   leaving_out.errors->far_field_mm = 0.25;
   const auto update = built.run(landmarks(2));
   ASSERT_TRUE(update.has_value());
-  EXPECT_TRUE(leaves_out(*update, "far field"));
+  EXPECT_NE(left_out(*update, "far field"), nullptr);
 }
 
-TEST(Pipeline, RotationForcedOffAlignsATranslationAndSaysSo) {
-  auto long_tumour = std::make_shared<BrainModel>(*model());
-  long_tumour->tumour = ellipsoid({20, 10, 15});
+// A sphere shows no rotation: it is left out, unless it is forced on.
+TEST_F(PipelineTest, ReportsRotationThatASphereCannotShowUnlessItIsForcedOn) {
+  const BrainModel sphere = model({10, 10, 10});
+  Observation observation = landmarks(1);
+  observation.body = TumourBoundary{sphere.tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
+  const auto update = run(observation, sphere);
+  ASSERT_TRUE(update.has_value());
+  ASSERT_NE(left_out(*update, "rotation"), nullptr);
+  EXPECT_THAT(left_out(*update, "rotation")->reason,
+              HasSubstr("no rotation is shown by the points"));
+  config_.scene.rotation = Carry::kOn;
+  const auto forced = run(observation, sphere);
+  ASSERT_TRUE(forced.has_value());
+  EXPECT_EQ(left_out(*forced, "rotation"), nullptr);
+}
+
+TEST_F(PipelineTest, RotationForcedOffAlignsATranslationAndSaysSo) {
+  const BrainModel brain = model({20, 10, 15});
   Observation observation = landmarks(1);
   observation.body = TumourBoundary{
-      Eigen::AngleAxisd(0.05, Vec3::UnitZ()).toRotationMatrix() * long_tumour->tumour.vertices,
-      0.5};
-  const auto run = [&](Carry rotation) {
-    CaseConfig config;
-    config.scene.rotation = rotation;
-    return pipeline_on(long_tumour, config).run(observation);
-  };
-  const auto with = run(Carry::kAuto), without = run(Carry::kOff);
+      Eigen::AngleAxisd(0.05, Vec3::UnitZ()).toRotationMatrix() * brain.tumour.vertices, 0.5};
+  const auto with = run(observation, brain);
+  config_.scene.rotation = Carry::kOff;
+  const auto without = run(observation, brain);
   ASSERT_TRUE(with && without);
-  EXPECT_FALSE(leaves_out(*with, "rotation"));
+  EXPECT_EQ(left_out(*with, "rotation"), nullptr);
   EXPECT_GT((with->T_undeformed_deformed.linear() - Mat3::Identity()).norm(), 0.03);
-  EXPECT_TRUE(leaves_out(*without, "rotation"));
+  EXPECT_NE(left_out(*without, "rotation"), nullptr);
   EXPECT_TRUE(without->T_undeformed_deformed.linear().isIdentity(1e-12));
 }
 
-TEST(Pipeline, RotationForcedOnIsNotLeftOutWhereASphereCannotShowIt) {
-  auto sphere = std::make_shared<BrainModel>(*model());
-  sphere->tumour = ellipsoid({10, 10, 10});
-  CaseConfig on;
-  on.scene.rotation = Carry::kOn;
-  Pipeline built = pipeline_on(sphere, on);
-  Observation observation = landmarks(1);
-  observation.body = TumourBoundary{sphere->tumour.vertices.colwise() + Vec3(1, 0, 0), 0.5};
-  const auto update = built.run(observation);
-  ASSERT_TRUE(update.has_value());
-  EXPECT_FALSE(leaves_out(*update, "rotation"));
-}
-
-TEST(Pipeline, NeedsATumourSurface) {
-  auto without = std::make_shared<BrainModel>(*model());
-  without->tumour = {};
-  const auto built =
-      Pipeline::build(without, {}, Method::kPaper, Boundary::kContact, FakeEstimator{}.make());
+TEST_F(PipelineTest, NeedsATumourSurface) {
+  BrainModel without = model();
+  without.tumour = {};
+  const auto built = Pipeline::build(without, {}, method_, boundary_, remembering());
   ASSERT_FALSE(built.has_value());
   EXPECT_EQ(built.error().code, ErrorCode::kEmptySet);
 }

@@ -12,7 +12,7 @@ namespace brainshift::server {
 
 inline Result<std::unique_ptr<SessionModel>> fake_session(
     std::unique_ptr<inversion::Inverter> inverter, const SessionRequest& request = {}) {
-  auto pipeline = pipeline::Pipeline::build(small_model(), {}, request.method, request.boundary,
+  auto pipeline = pipeline::Pipeline::build(*small_model(), {}, request.method, request.boundary,
                                             std::move(inverter));
   if (!pipeline) return tl::unexpected(pipeline.error());
   SessionInfo info;

@@ -8,8 +8,11 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -70,6 +73,16 @@ class RawPeer {
     request(type, payload, id);
     return receive();
   }
+  void observe(const Observation& observation) {
+    request(MessageType::kObservation, wire::encode(observation));
+  }
+  Received hand_in(const Observation& observation, std::uint64_t id = 1) {
+    return ask(MessageType::kObservation, wire::encode(observation), id);
+  }
+  Received start(const SessionRequest& request, std::uint64_t id = 1) {
+    return ask(MessageType::kStartSessionRequest, wire::encode(request), id);
+  }
+  bool is_served() { return ask(MessageType::kStatusRequest).type == MessageType::kStatusReply; }
   // Asks again every 100 ms; false after 10 s.
   bool keeps_asking_until_answered() {
     for (int attempt = 0; attempt < 100; ++attempt) {
@@ -88,6 +101,25 @@ class RawPeer {
 inline Error error_of(const Received& received) {
   EXPECT_EQ(received.type, MessageType::kErrorReply);
   return wire::decode_error(received.payload);
+}
+
+// A session of method paper under the boundary with contact.
+inline SessionRequest session_of(const std::string& case_id = kCase, bool takeover = false) {
+  SessionRequest request;
+  request.case_id = case_id;
+  request.method = Method::kPaper;
+  request.takeover = takeover;
+  return request;
+}
+
+// Waits for a condition for at most 10 s.
+template <typename Condition>
+bool eventually(const Condition& holds) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+  }
+  return true;
 }
 
 class TransportTest : public testing::Test {
@@ -125,6 +157,39 @@ class TransportTest : public testing::Test {
     };
     return options;
   }
+  // Sessions whose inversion is this.
+  static ServiceOptions with_inverter(FakeInverter::Update update) {
+    ServiceOptions options = with_model();
+    options.make_model = [update](const SessionRequest& request, const auto&) {
+      return fake_session(std::make_unique<FakeInverter>(update), request);
+    };
+    return options;
+  }
+  // One whose second inversion fails.
+  static ServiceOptions with_a_failure() {
+    return with_inverter([](int call, const SparseData& data, const auto&, auto& out) -> Status {
+      if (call == 2) return fail(ErrorCode::kNotConverged, "no luck");
+      return follow_the_data(data, out, 4);
+    });
+  }
+  // An inversion that ends when it is told to, and not before.
+  static Status wait_for_stop(const std::stop_token& stop) {
+    std::promise<void> stopped;
+    const std::stop_callback wake(stop, [&] { stopped.set_value(); });
+    stopped.get_future().wait();
+    return fail(ErrorCode::kNotConverged, "stopped");
+  }
+  // With a journal in that folder, opened by `open`.
+  static ServiceOptions with_journal(const std::filesystem::path& folder, OpenSink open) {
+    ServiceOptions options = with_model();
+    options.journal_dir = folder;
+    options.open_journal = std::move(open);
+    return options;
+  }
+  static Result<std::unique_ptr<RecordSink>> disk_full(const std::filesystem::path&,
+                                                       const JournalMeta&) {
+    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
+  }
 
   static ServiceOptions without_model() {
     ServiceOptions options;
@@ -133,9 +198,7 @@ class TransportTest : public testing::Test {
   }
 
   static void start_session(RawPeer& peer) {
-    peer.request(MessageType::kStartSessionRequest,
-                 wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
-    Received reply = peer.receive();
+    Received reply = peer.start(session_of());
     while (reply.type == MessageType::kSessionState) reply = peer.receive();
     ASSERT_EQ(reply.type, MessageType::kStartSessionReply);
   }
@@ -157,26 +220,34 @@ class TransportTest : public testing::Test {
     return state ? *state : SessionState{};
   }
 
-  // A session of which `peer` has received the update of one observation.
-  static void begin_with_update(RawPeer& peer, std::uint64_t sequence) {
+  // A session whose updates `peer` receives.
+  static void begin(RawPeer& peer) {
     start_session(peer);
     subscribe(peer);
-    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
-    ASSERT_EQ(next_update(peer).update.observation_sequence, sequence);
+  }
+  // The same, with the update of one observation.
+  static void begin_with_update(RawPeer& peer, std::uint64_t sequence) {
+    begin(peer);
+    ASSERT_EQ(answer(peer, landmarks(sequence)).update.observation_sequence, sequence);
   }
 
-  static UpdateMessage next_update(RawPeer& peer) {
+  static Received next(RawPeer& peer, MessageType type) {
     Received received = peer.receive();
-    while (received.type != MessageType::kUpdate) received = peer.receive();
-    auto message = wire::decode_update(received.payload);
+    while (received.type != type) received = peer.receive();
+    return received;
+  }
+  static UpdateMessage next_update(RawPeer& peer) {
+    auto message = wire::decode_update(next(peer, MessageType::kUpdate).payload);
     EXPECT_TRUE(message.has_value());
     return message ? *message : UpdateMessage{};
   }
-
-  void expect_alive() {
-    RawPeer peer(endpoint_);
-    EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  // What the peer receives for its observation.
+  static UpdateMessage answer(RawPeer& peer, const Observation& observation) {
+    peer.observe(observation);
+    return next_update(peer);
   }
+
+  void expect_alive() { EXPECT_TRUE(RawPeer(endpoint_).is_served()); }
 
   std::string endpoint_;
   std::shared_ptr<Router> router_;

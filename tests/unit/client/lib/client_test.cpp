@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
+#include "client/lib/client_keys.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 
@@ -15,16 +16,11 @@ using wire::encode;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;
-using Answers = FakeDaemon::Answers;
 
-// Long enough for a loaded machine; a test that waits for it has failed.
-constexpr milliseconds kPatient(20000);
 constexpr milliseconds kShort(150);
 
-Client connect(const std::string& endpoint, milliseconds timeout = kPatient) {
-  auto client = Client::connect(endpoint, {.request_timeout = timeout, .session_timeout = timeout});
-  EXPECT_TRUE(client) << client.error().message;
-  return std::move(*client);
+Client connect(const std::string& endpoint, milliseconds timeout = kPatience) {
+  return connect_to(endpoint, {.request_timeout = timeout, .session_timeout = timeout});
 }
 
 std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3") {
@@ -35,14 +31,11 @@ std::string status_reply(std::uint64_t id, const std::string& version = "1.2.3")
 
 std::string update_frame(std::uint64_t sequence, bool final = true,
                          Quality quality = Quality::kNotJudged) {
-  UpdateMessage message;
-  message.update.estimate.quality.quality = quality;
+  UpdateMessage message = small_update(sequence, quality);
   if (quality == Quality::kUnusable) {
     message.update.estimate.quality.flags.set(QualityFlag::kInvertedElements);
   }
-  message.update.sequence = sequence;
   message.update.final = final;
-  message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
   return encode_frame(MessageType::kUpdate, 0, encode(message));
 }
 
@@ -202,7 +195,7 @@ TEST(Client, UpdatesBetweenRepliesAreKeptInOrder) {
   ASSERT_TRUE(client.status());
   ASSERT_TRUE(client.status());
   for (const std::uint64_t expected : {11, 12, 13, 21, 22, 23}) {
-    const auto message = client.next_update(kPatient);
+    const auto message = client.next_update(kPatience);
     ASSERT_TRUE(message) << message.error().message;
     EXPECT_EQ(message->update.sequence, expected);
     EXPECT_EQ(message->update.final, expected % 10 != 1);
@@ -225,7 +218,7 @@ TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
   ASSERT_TRUE(client.status());
   EXPECT_FALSE(client.latest_usable()) << "queued, not handed out yet";
   for (const std::uint64_t sequence : {1, 2, 3}) {
-    const auto message = client.next_update(kPatient);
+    const auto message = client.next_update(kPatience);
     ASSERT_TRUE(message) << message.error().message;
     EXPECT_EQ(message->update.sequence, sequence);
     EXPECT_EQ(message->update.usable(), sequence == 1);
@@ -245,8 +238,8 @@ TEST(Client, ABadUpdateIsReportedByNextUpdateAndNotByTheRequestItMet) {
   });
   Client client = connect(daemon.endpoint());
   ASSERT_TRUE(client.status());
-  expect_error(client.next_update(kPatient), ErrorCode::kProtocol, "Update");
-  EXPECT_EQ(client.next_update(kPatient).value().update.sequence, 2u);
+  expect_error(client.next_update(kPatience), ErrorCode::kProtocol, "Update");
+  EXPECT_EQ(client.next_update(kPatience).value().update.sequence, 2u);
 }
 
 TEST(Client, ADaemonThatDiesWhileACallWaitsIsNoticedBeforeTheTimeout) {
@@ -255,7 +248,7 @@ TEST(Client, ADaemonThatDiesWhileACallWaitsIsNoticedBeforeTheTimeout) {
   const auto start = std::chrono::steady_clock::now();
   expect_error(client.start_session({.case_id = "c"}), ErrorCode::kUnavailable,
                "lost the connection");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, kPatient / 4);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, kPatience / 4);
 }
 
 TEST(Client, WorksAgainAfterTheDaemonRestarted) {
@@ -269,7 +262,7 @@ TEST(Client, WorksAgainAfterTheDaemonRestarted) {
   Client client = connect(endpoint);
   ASSERT_TRUE(client.status());
   daemon.reset();
-  expect_error(client.next_update(kPatient), ErrorCode::kUnavailable, "lost the connection");
+  expect_error(client.next_update(kPatience), ErrorCode::kUnavailable, "lost the connection");
   daemon = std::make_unique<FakeDaemon>(handler, endpoint);
   const auto status = client.status();
   ASSERT_TRUE(status) << status.error().message;
@@ -281,6 +274,25 @@ TEST(Client, ARequestAboveThePayloadCapIsRefusedHere) {
   Observation observation;
   observation.body = TumourBoundary{Points::Constant(3, 3'000'000, 1.0), 0.5};
   expect_error(client.submit(observation), ErrorCode::kInvalidArgument, "must be at most 67108864");
+}
+
+// ---------- keys ----------
+
+TEST(ClientKeys, ANewPairBelongsTogetherAndIsAnotherEachTime) {
+  const auto one = new_keys();
+  const auto other = new_keys();
+  ASSERT_TRUE(one && other);
+  EXPECT_NE(one->secret_key, other->secret_key);
+  EXPECT_EQ(public_key_of(one->secret_key).value(), one->public_key);
+  EXPECT_EQ(public_key_of(other->secret_key).value(), other->public_key);
+}
+
+TEST(ClientKeys, ATextThatIsNoKeyHasNoPublicKey) {
+  for (const std::string& none : {std::string(), std::string(39, '0'), std::string(40, '"')}) {
+    const auto key = public_key_of(none);
+    ASSERT_FALSE(key);
+    EXPECT_EQ(key.error().code, ErrorCode::kInvalidArgument);
+  }
 }
 
 }  // namespace

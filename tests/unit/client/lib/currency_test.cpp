@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -22,27 +21,18 @@ using wire::encode;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;
-using CurrencyAnswers = FakeDaemon::Answers;
 
-constexpr milliseconds kCurrencyPatient(20000);
-
-Client connect_to(const std::string& endpoint) {
-  auto client = Client::connect(endpoint, {.request_timeout = kCurrencyPatient,
-                                           .session_timeout = kCurrencyPatient,
-                                           .renewal_interval = milliseconds(20)});
-  EXPECT_TRUE(client) << client.error().message;
-  return std::move(*client);
+Client viewer_of(const std::string& endpoint) {
+  return connect_to(endpoint, {.request_timeout = kPatience,
+                               .session_timeout = kPatience,
+                               .renewal_interval = milliseconds(20)});
 }
 
 std::string current_frame(const SessionKey& key, std::uint64_t sequence) {
-  UpdateMessage message;
+  UpdateMessage message = small_update(sequence, Quality::kGood);
   message.session_id = key.session_id;
   message.boot_id = key.boot_id;
   message.update.model_id = key.model_id;
-  message.update.sequence = sequence;
-  message.update.final = true;
-  message.update.estimate.quality.quality = Quality::kGood;
-  message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
   return encode_frame(MessageType::kUpdate, 0, encode(message));
 }
 
@@ -51,7 +41,7 @@ class Simulated {
  public:
   explicit Simulated(SessionKey key) : key_(std::move(key)) {}
 
-  CurrencyAnswers operator()(const Frame& request) {
+  Answers operator()(const Frame& request) {
     const std::lock_guard lock(mutex_);
     const std::uint64_t id = request.request_id;
     switch (request.type) {
@@ -60,14 +50,13 @@ class Simulated {
         subscriptions_.push_back(wanted);
         if (wanted.id != subscription_) sent_ = told_ = 0;
         subscription_ = wanted.id;
-        CurrencyAnswers answers = {
-            encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
+        Answers answers = {encode_frame(MessageType::kSessionState, id, wire::encode(state()))};
         push(wanted.received, answers);
         return answers;
       }
       case MessageType::kStatusRequest: {
         ++newest_;
-        CurrencyAnswers answers;
+        Answers answers;
         push(sent_, answers, /*credit=*/subscription_ != 0 && sent_ == acknowledged_);
         answers.push_back(encode_frame(MessageType::kStatusReply, id, encode(DaemonStatus{})));
         return answers;
@@ -90,7 +79,7 @@ class Simulated {
     state.valid_ms = 1000;
     return state;
   }
-  void push(std::uint64_t received, CurrencyAnswers& answers, bool credit = true) {
+  void push(std::uint64_t received, Answers& answers, bool credit = true) {
     acknowledged_ = received;
     if (!credit || sent_ != received || newest_ == told_) return;
     answers.push_back(current_frame(key_, newest_));
@@ -109,10 +98,10 @@ const SessionKey kKey{11, 1, "model"};
 TEST(Currency, AViewerThatHasNotReadGetsTheNewestUpdateFirst) {
   auto daemon = std::make_shared<Simulated>(kKey);
   FakeDaemon server([daemon](const Frame& request) { return (*daemon)(request); });
-  Client viewer = connect_to(server.endpoint());
+  Client viewer = viewer_of(server.endpoint());
   ASSERT_TRUE(viewer.subscribe());
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(viewer.status());  // 30 updates, none read
-  const auto first = viewer.next_update(kCurrencyPatient);
+  const auto first = viewer.next_update(kPatience);
   ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(first->update.sequence, 30u);
   EXPECT_EQ(viewer.field_status().currency, Currency::kCurrent);
@@ -122,17 +111,16 @@ TEST(Currency, AViewerThatHasNotReadGetsTheNewestUpdateFirst) {
 TEST(Currency, RenewsWhileItWaitsAndSoStaysCurrent) {
   auto daemon = std::make_shared<Simulated>(kKey);
   FakeDaemon server([daemon](const Frame& request) { return (*daemon)(request); });
-  Client viewer = connect_to(server.endpoint());
+  Client viewer = viewer_of(server.endpoint());
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
+  ASSERT_TRUE(viewer.next_update(kPatience));
   EXPECT_FALSE(viewer.next_update(milliseconds(300)));
   EXPECT_GT(daemon->subscriptions().size(), 3u);
   EXPECT_EQ(daemon->subscriptions().back().received, 1u);
   EXPECT_EQ(viewer.field_status().currency, Currency::kCurrent);
   server.stop();
-  EXPECT_THAT(viewer.next_update(kCurrencyPatient).error().message,
-              HasSubstr("lost the connection"));
+  EXPECT_THAT(viewer.next_update(kPatience).error().message, HasSubstr("lost the connection"));
   EXPECT_FALSE(viewer.next_update(milliseconds(1200)));  // longer than an answer holds
   const FieldStatus status = viewer.field_status();
   EXPECT_EQ(status.currency, Currency::kStale);
@@ -146,10 +134,10 @@ TEST(Currency, SubscribesAgainAfterARestartThatAnotherCallNoticed) {
   auto first = std::make_shared<Simulated>(kKey);
   auto server = std::make_unique<FakeDaemon>(
       [first](const Frame& request) { return (*first)(request); }, endpoint);
-  Client viewer = connect_to(endpoint);
+  Client viewer = viewer_of(endpoint);
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
+  ASSERT_TRUE(viewer.next_update(kPatience));
   ASSERT_TRUE(viewer.latest_usable());
   server.reset();
   auto second = std::make_shared<Simulated>(SessionKey{12, 1, "model"});
@@ -158,8 +146,8 @@ TEST(Currency, SubscribesAgainAfterARestartThatAnotherCallNoticed) {
   auto status = viewer.status();
   if (!status) status = viewer.status();
   ASSERT_TRUE(status) << status.error().message;
-  auto update = viewer.next_update(kCurrencyPatient);
-  if (!update) update = viewer.next_update(kCurrencyPatient);
+  auto update = viewer.next_update(kPatience);
+  if (!update) update = viewer.next_update(kPatience);
   ASSERT_TRUE(update) << update.error().message;
   EXPECT_EQ(update->boot_id, 12u);
   EXPECT_EQ(viewer.latest_usable()->boot_id, 12u);
@@ -171,7 +159,7 @@ TEST(Currency, AnotherPatientsModelIsShownByNoViewerAndEachSaysWhy) {
   const std::string endpoint = "ipc://" + (folder / "daemon").string();
   auto first = std::make_shared<Simulated>(kKey);
   const auto with_model = [](const std::shared_ptr<Simulated>& daemon) {
-    return [daemon](const Frame& request) -> CurrencyAnswers {
+    return [daemon](const Frame& request) -> Answers {
       if (request.type != MessageType::kModelRequest) return (*daemon)(request);
       BrainModel model;
       model.model_id = "model";
@@ -180,11 +168,11 @@ TEST(Currency, AnotherPatientsModelIsShownByNoViewerAndEachSaysWhy) {
     };
   };
   auto server = std::make_unique<FakeDaemon>(with_model(first), endpoint);
-  Client viewer = connect_to(endpoint);
+  Client viewer = viewer_of(endpoint);
   ASSERT_TRUE(viewer.model());
   ASSERT_TRUE(viewer.subscribe());
   ASSERT_TRUE(viewer.status());
-  ASSERT_TRUE(viewer.next_update(kCurrencyPatient));
+  ASSERT_TRUE(viewer.next_update(kPatience));
   server.reset();
   auto second = std::make_shared<Simulated>(SessionKey{12, 1, "another"});
   server = std::make_unique<FakeDaemon>(with_model(second), endpoint);
@@ -205,7 +193,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
     const std::lock_guard lock(mutex);
     return last;
   };
-  FakeDaemon server([&](const Frame& request) -> CurrencyAnswers {
+  FakeDaemon server([&](const Frame& request) -> Answers {
     if (request.type != MessageType::kObservation) return (*daemon)(request);
     const auto observation = wire::decode_observation(request.payload).value();
     {
@@ -215,7 +203,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
     return {encode_frame(MessageType::kObservationReply, request.request_id,
                          encode(ObservationReceipt{observation.sequence, false}))};
   });
-  Client source = connect_to(server.endpoint());
+  Client source = viewer_of(server.endpoint());
   Observation observation;
   observation.sequence = 1;
   observation.body = TumourBoundary{Points::Random(3, 4), 0.5};
@@ -228,7 +216,7 @@ TEST(Currency, AnObservationIsForTheSessionThatItsSourceKnows) {
 }
 
 TEST(Currency, AWindowOutsideItsRangeIsRefused) {
-  Client viewer = connect_to("tcp://127.0.0.1:1");
+  Client viewer = viewer_of("tcp://127.0.0.1:1");
   for (const std::uint32_t window : {0u, Subscription::kMaxWindow + 1}) {
     const auto refused = viewer.subscribe(window);
     ASSERT_FALSE(refused);

@@ -20,9 +20,7 @@ using wire::encode;
 using wire::encode_frame;
 using wire::Frame;
 using wire::MessageType;
-using DeliveryAnswers = FakeDaemon::Answers;
 
-constexpr milliseconds kDeliveryPatient(20000);
 const FieldChoice kChoice{.region = BallRegion{Vec3(1, 2, 3), 4.0}, .tolerance_mm = 0.5};
 
 // Nodes 2 and 5 of ten, both at `value`; or node 5 alone as a change of `base`.
@@ -45,10 +43,10 @@ std::string part_frame(std::uint64_t sequence, double value, std::uint64_t base 
 // update with the frames that the script gives.
 class Scripted {
  public:
-  using Script = std::function<DeliveryAnswers(std::size_t subscription, std::uint64_t received)>;
+  using Script = std::function<Answers(std::size_t subscription, std::uint64_t received)>;
   explicit Scripted(Script script) : script_(std::move(script)) {}
 
-  DeliveryAnswers operator()(const Frame& request) {
+  Answers operator()(const Frame& request) {
     if (request.type != MessageType::kSubscribeRequest) return {};
     const std::lock_guard lock(mutex_);
     const auto wanted = wire::decode_subscription(request.payload).value();
@@ -61,7 +59,7 @@ class Scripted {
     state.phase = SessionPhase::kTracking;
     state.newest_update = state.newest_usable = 1;
     state.valid_ms = 60000;
-    DeliveryAnswers answers = {
+    Answers answers = {
         encode_frame(MessageType::kSessionState, request.request_id, wire::encode(state))};
     if (news) {
       for (std::string& frame : script_(subscriptions_ - 1, wanted.received)) {
@@ -86,8 +84,8 @@ struct Viewing {
   explicit Viewing(Scripted::Script script, std::uint32_t window = 8)
       : scripted(std::move(script)),
         daemon([this](const Frame& request) { return scripted(request); }),
-        client(Client::connect(daemon.endpoint(), {.request_timeout = kDeliveryPatient,
-                                                   .renewal_interval = milliseconds(20)})
+        client(Client::connect(daemon.endpoint(),
+                               {.request_timeout = kPatience, .renewal_interval = milliseconds(20)})
                    .value()) {
     const Status subscribed = client.subscribe(window, kChoice);
     EXPECT_TRUE(subscribed) << subscribed.error().message;
@@ -105,12 +103,12 @@ Eigen::RowVectorXd x_of(const Result<UpdateMessage>& message) {
 }
 
 TEST(ClientDelivery, ChangesComeOutAsTheWholeChoiceAndSayWhatTravelled) {
-  Viewing viewing([](std::size_t, std::uint64_t received) -> DeliveryAnswers {
+  Viewing viewing([](std::size_t, std::uint64_t received) -> Answers {
     if (received == 0) return {part_frame(1, 1.0), part_frame(2, 2.0, 1)};
     return {};
   });
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(1, 1));
-  const auto second = viewing.client.next_update(kDeliveryPatient);
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(1, 1));
+  const auto second = viewing.client.next_update(kPatience);
   EXPECT_EQ(x_of(second), Eigen::RowVector2d(1, 2));
   EXPECT_EQ(second->update.part, (FieldPart{10, {2, 5}, 0}));
   EXPECT_EQ(second->received_nodes, 1);
@@ -121,35 +119,35 @@ TEST(ClientDelivery, ChangesComeOutAsTheWholeChoiceAndSayWhatTravelled) {
 // Update 2 never came, so update 3 cannot be applied. Nothing of it is shown: the viewer asks anew
 // and goes on from the whole choice.
 TEST(ClientDelivery, ALostBaseIsAskedForAnewByItself) {
-  Viewing viewing([](std::size_t subscription, std::uint64_t received) -> DeliveryAnswers {
+  Viewing viewing([](std::size_t subscription, std::uint64_t received) -> Answers {
     if (received != 0) return {};
     if (subscription == 0) return {part_frame(1, 1.0), part_frame(3, 3.0, 2)};
     return {part_frame(3, 3.0), part_frame(4, 4.0, 3)};
   });
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(1, 1));
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(3, 3));
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(3, 4));
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(1, 1));
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(3, 3));
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(3, 4));
   EXPECT_GT(viewing.scripted.asked().back().id, viewing.scripted.asked().front().id);
 }
 
 TEST(ClientDelivery, AMalformedUpdateIsReportedAndAskedForAnew) {
-  Viewing viewing([](std::size_t subscription, std::uint64_t received) -> DeliveryAnswers {
+  Viewing viewing([](std::size_t subscription, std::uint64_t received) -> Answers {
     if (received != 0) return {};
     if (subscription == 1) return {part_frame(2, 2.0)};
     return {part_frame(1, 1.0), encode_frame(MessageType::kUpdate, 0, "\xff"),
             part_frame(3, 3.0, 2)};
   });
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(1, 1));
-  const auto malformed = viewing.client.next_update(kDeliveryPatient);
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(1, 1));
+  const auto malformed = viewing.client.next_update(kPatience);
   ASSERT_FALSE(malformed);
   EXPECT_EQ(malformed.error().code, ErrorCode::kProtocol);
-  EXPECT_EQ(x_of(viewing.client.next_update(kDeliveryPatient)), Eigen::RowVector2d(2, 2));
+  EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(2, 2));
 }
 
 // The daemon was restarted with another patient's model, of which no node lies in the region.
 TEST(ClientDelivery, AChoiceThatIsRefusedLaterIsReported) {
   std::atomic<int> asked = 0;
-  FakeDaemon daemon([&](const Frame& request) -> DeliveryAnswers {
+  FakeDaemon daemon([&](const Frame& request) -> Answers {
     if (asked++ == 0) {
       SessionState state;
       state.phase = SessionPhase::kEmpty;
@@ -161,7 +159,7 @@ TEST(ClientDelivery, AChoiceThatIsRefusedLaterIsReported) {
   auto client = Client::connect(daemon.endpoint(), {.renewal_interval = milliseconds(20)});
   ASSERT_TRUE(client);
   ASSERT_TRUE(client->subscribe(1, kChoice));
-  const auto update = client->next_update(kDeliveryPatient);
+  const auto update = client->next_update(kPatience);
   ASSERT_FALSE(update);
   EXPECT_EQ(update.error().code, ErrorCode::kEmptySet);
   EXPECT_EQ(update.error().message, "choice: no node lies in the ball");

@@ -5,16 +5,20 @@
 #include <gtest/gtest.h>
 #include <zmq.h>
 
-#include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "client/lib/client.hpp"
 #include "common/wire/frame.hpp"
 
 namespace brainshift::client {
+
+// Long enough for a loaded machine; a test that waits for it has failed.
+inline constexpr std::chrono::milliseconds kPatience(20000);
 
 class FakeDaemon {
  public:
@@ -86,5 +90,22 @@ class FakeDaemon {
   std::string endpoint_;
   std::jthread thread_;
 };
+using Answers = FakeDaemon::Answers;
+
+inline Client connect_to(const std::string& endpoint, const ClientOptions& options) {
+  auto client = Client::connect(endpoint, options);
+  EXPECT_TRUE(client) << client.error().message;
+  return std::move(*client);
+}
+
+// A field of two nodes, all of whose displacements are the update's number.
+inline UpdateMessage small_update(std::uint64_t sequence, Quality quality) {
+  UpdateMessage message;
+  message.update.sequence = sequence;
+  message.update.final = true;
+  message.update.estimate.quality.quality = quality;
+  message.update.estimate.displacement = Points::Constant(3, 2, static_cast<double>(sequence));
+  return message;
+}
 
 }  // namespace brainshift::client

@@ -13,7 +13,7 @@
 #include <optional>
 #include <vector>
 
-#include "client/lib/field_assembly.hpp"
+#include "client/lib/received_updates.hpp"
 #include "common/core/random.hpp"
 #include "server/delivery/viewer.hpp"
 #include "tests/unit/server/delivery/small_updates.hpp"

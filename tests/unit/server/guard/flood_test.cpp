@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Peers that flood, stall or crowd: what the daemon keeps stays bounded, and others are served.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/wire/report.hpp"
-#include "server/guard/memory.hpp"
+#include "server/guard/process_limits.hpp"
+#include "tests/support/zmtp_peer.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
 namespace brainshift::server {
 namespace {
 
+using test_support::port_of;
+using test_support::ZmtpPeer;
 using Clock = std::chrono::steady_clock;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -39,72 +38,6 @@ double resident_mib() {
   return static_cast<double>(resident * sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
-// A peer that speaks ZMTP byte by byte, without keys.
-class Socket {
- public:
-  explicit Socket(const std::string& endpoint) : fd_(socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port =
-        htons(static_cast<std::uint16_t>(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    connected_ = connect(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
-  }
-  ~Socket() { close(fd_); }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-
-  bool connected() const { return connected_; }
-  bool send_now(const std::string& bytes, int flags = 0) {
-    return send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | flags) >= 0;
-  }
-  // The handshake; libzmq refuses messages that come before it has answered.
-  void greet() {
-    std::string greeting(64, '\0');
-    greeting[0] = '\xff';
-    greeting[9] = '\x7f';
-    greeting[10] = 3;
-    greeting.replace(12, 4, "NULL");
-    const std::string body =
-        "\5READY" + std::string("\x0bSocket-Type") + std::string("\0\0\0\6", 4) + "DEALER";
-    send_now(greeting + '\4' + static_cast<char>(body.size()) + body);
-    std::string answer;
-    char bytes[256];
-    while (answer.find("READY") == std::string::npos) {
-      const auto got = recv(fd_, bytes, sizeof bytes, 0);
-      if (got <= 0) return;
-      answer.append(bytes, static_cast<std::size_t>(got));
-    }
-  }
-  // Reads what comes until the daemon closes; false after 10 s.
-  bool sees_the_end() const {
-    const timeval limit{10, 0};
-    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-    char bytes[4096];
-    while (true) {
-      const auto got = recv(fd_, bytes, sizeof bytes, 0);
-      if (got == 0 || (got < 0 && errno == ECONNRESET)) return true;
-      if (got < 0) return false;
-    }
-  }
-
- private:
-  int fd_;
-  bool connected_ = false;
-};
-
-std::string repeated(const std::string& frame, int times) {
-  std::string bytes;
-  for (int i = 0; i < times; ++i) bytes += frame;
-  return bytes;
-}
-
-std::string flood_head(std::uint64_t size) {
-  std::string bytes("\2", 1);
-  for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(static_cast<char>(size >> shift));
-  return bytes;
-}
-
 class Flood : public TransportTest {
  protected:
   Flood() { return_large_blocks(); }
@@ -112,7 +45,7 @@ class Flood : public TransportTest {
   void served_within_two_seconds() {
     RawPeer peer(endpoint_);
     const auto begin = Clock::now();
-    EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+    EXPECT_TRUE(peer.is_served());
     EXPECT_LT(Clock::now() - begin, std::chrono::seconds(2));
   }
   void bounded_since(double idle_mib, const char* what) {
@@ -125,12 +58,13 @@ class Flood : public TransportTest {
 TEST_F(Flood, EndlessPartsOfOneMessageEndTheConnection) {
   serve(with_model());
   served_within_two_seconds();
-  const std::string parts = repeated(std::string("\1\0", 2), 500'000);
+  std::string parts;  // without a byte, and more to follow
+  for (int i = 0; i < 500'000; ++i) parts += std::string("\1\0", 2);
   const double idle = resident_mib();
   for (int i = 0; i < 20; ++i) {
-    Socket peer(endpoint_);
-    peer.greet();
-    peer.send_now(parts);  // may end early
+    ZmtpPeer peer(port_of(endpoint_));
+    peer.shake_hands();
+    peer.send_bytes(parts);  // may end early
     EXPECT_TRUE(peer.sees_the_end());
   }
   bounded_since(idle, "ten million empty parts");
@@ -145,34 +79,36 @@ TEST_F(Flood, EndlessPartsOfOneMessageEndTheConnection) {
 TEST_F(Flood, UnfinishedMessagesOfManyPeersHoldABoundedAmount) {
   serve(with_model());
   RawPeer viewer(endpoint_);
-  EXPECT_EQ(viewer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
-  const std::string most = flood_head(16u << 20) + std::string(15u << 20, 'x');
+  EXPECT_TRUE(viewer.is_served());
+  const std::string most(15u << 20, 'x');
   const double idle = resident_mib();
-  std::vector<std::unique_ptr<Socket>> peers;
+  std::vector<ZmtpPeer> peers;
   for (int i = 0; i < 32; ++i) {
-    peers.push_back(std::make_unique<Socket>(endpoint_));
-    peers.back()->greet();
-    peers.back()->send_now(most);
+    peers.emplace_back(port_of(endpoint_));
+    peers.back().shake_hands();
+    peers.back().claim_part(16u << 20);
+    peers.back().send_bytes(most);
     if (i % 8 == 7) {
       served_within_two_seconds();
       bounded_since(idle, "unfinished messages of 15 MiB");
     }
   }
   EXPECT_GE(router_->guard_counts().closed_for_memory, 28u);
-  EXPECT_EQ(viewer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(viewer.is_served());
 }
 
 TEST_F(Flood, AMessageThatNeverEndsEndsWithPatience) {
   RouterOptions options;
   options.patience = std::chrono::milliseconds(200);
   serve(with_model(), options);
-  Socket peer(endpoint_);
-  peer.greet();
-  peer.send_now(flood_head(1000) + "begun");
+  ZmtpPeer peer(port_of(endpoint_));
+  peer.shake_hands();
+  peer.claim_part(1000);
+  peer.send_bytes("begun");
   EXPECT_TRUE(peer.sees_the_end());
   EXPECT_EQ(router_->guard_counts().closed_for_silence, 1u);
   RawPeer idle(endpoint_);
-  EXPECT_EQ(idle.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(idle.is_served());
 }
 
 TEST_F(Flood, WithKeysAMessageOfManyPartsIsNoWayRoundTheBound) {
@@ -192,15 +128,14 @@ TEST_F(Flood, WithKeysAMessageOfManyPartsIsNoWayRoundTheBound) {
     socket.set(zmq::sockopt::curve_secretkey, std::string(own_secret));
   };
   RawPeer other(endpoint_, 1000, with_keys);
-  EXPECT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(other.is_served());
   const double idle = resident_mib();
   RawPeer many(endpoint_, 1000, with_keys);
   many.send_parts(200'000);
-  const auto deadline = Clock::now() + std::chrono::seconds(10);
-  while (router_->guard_counts().closed_for_silence == 0 && Clock::now() < deadline) {
-    EXPECT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
-  }
-  EXPECT_GE(router_->guard_counts().closed_for_silence, 1u);
+  EXPECT_TRUE(eventually([&] {
+    EXPECT_TRUE(other.is_served());
+    return router_->guard_counts().closed_for_silence >= 1;
+  }));
   bounded_since(idle, "200,000 encrypted parts, with those that the sender keeps");
 }
 
@@ -209,25 +144,25 @@ TEST_F(Flood, ManyConnectionsThatSayNothingMakeRoomForOneThatDoes) {
   options.max_connections = 20;
   serve(with_model(), options);
   RawPeer known(endpoint_);
-  EXPECT_EQ(known.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
-  std::vector<std::unique_ptr<Socket>> silent;
-  for (int i = 0; i < 100; ++i) silent.push_back(std::make_unique<Socket>(endpoint_));
+  EXPECT_TRUE(known.is_served());
+  std::vector<ZmtpPeer> silent;
+  for (int i = 0; i < 100; ++i) silent.emplace_back(port_of(endpoint_));
   served_within_two_seconds();
-  EXPECT_EQ(known.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(known.is_served());
   EXPECT_GE(router_->guard_counts().closed_for_room, 80u);
 }
 
 TEST_F(Flood, ThirtyTwoPeersWithABadByteEachLockNobodyOut) {
   serve(with_model());
-  std::vector<std::unique_ptr<Socket>> bad;
+  std::vector<ZmtpPeer> bad;
   for (int i = 0; i < 32; ++i) {
-    bad.push_back(std::make_unique<Socket>(endpoint_));
-    bad.back()->send_now("x");
+    bad.emplace_back(port_of(endpoint_));
+    bad.back().send_bytes("x");
   }
   for (int i = 0; i < 32; ++i) {
-    bad.push_back(std::make_unique<Socket>(endpoint_));
-    bad.back()->greet();
-    bad.back()->send_now(std::string("\0\1x", 3));  // a message of one byte
+    bad.emplace_back(port_of(endpoint_));
+    bad.back().shake_hands();
+    bad.back().send_part("x", false);  // a message of one byte
   }
   served_within_two_seconds();
   EXPECT_EQ(router_->guard_counts().closed_for_breach, 32u);
@@ -239,17 +174,16 @@ TEST_F(Flood, TheFirstOfTwoPeersWithOneRoutingIdStaysAndTheSecondIsClosed) {
     socket.set(zmq::sockopt::routing_id, std::string("console"));
   };
   RawPeer first(endpoint_, 1000, named);
-  EXPECT_EQ(first.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(first.is_served());
   {
     RawPeer second(endpoint_, 1000, named);
     second.request(MessageType::kStatusRequest);
-    const auto deadline = Clock::now() + std::chrono::seconds(10);
-    while (router_->guard_counts().closed_for_breach == 0 && Clock::now() < deadline) {
-      EXPECT_EQ(first.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
-    }
+    EXPECT_TRUE(eventually([&] {
+      EXPECT_TRUE(first.is_served());
+      return router_->guard_counts().closed_for_breach >= 1;
+    }));
   }
-  EXPECT_GE(router_->guard_counts().closed_for_breach, 1u);
-  EXPECT_EQ(first.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(first.is_served());
 }
 
 TEST_F(Flood, LargeMessagesOfAGoodClientArePassedOnWhole) {

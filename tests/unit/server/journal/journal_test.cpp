@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
 #include <future>
 #include <limits>
 #include <stdexcept>
@@ -12,29 +13,60 @@
 #include <utility>
 #include <vector>
 
+#include "server/journal/record_sink.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/journal/journal_fakes.hpp"
 
 namespace brainshift::server {
 namespace {
 
+using io::RecordKind;
+using test_support::TemporaryFolder;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-using test_support::TemporaryFolder;
-
-// Whether the journal comes to count an observation as lost. Nothing tells of it.
-bool lost(const Journal& journal, const std::string& source, std::uint64_t sequence) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (std::chrono::steady_clock::now() < deadline) {
-    const RecordRanges missing = journal.recorded().missing;
-    const auto found = missing.observations.find(source);
-    if (found != missing.observations.end() && found->second.last >= sequence) return true;
-    std::this_thread::yield();
+// A journal that has begun a file.
+struct Begun : Journal {
+  explicit Begun(const Options& options, const std::filesystem::path& path = "x.surgery",
+                 const JournalMeta& meta = {}, std::uint64_t session_id = 0)
+      : Journal(options) {
+    begin(path, meta, session_id);
   }
-  return false;
-}
+};
+
+class JournalTest : public testing::Test {
+ protected:
+  // An observation of "ius" that is on the disk in the end.
+  void records(std::uint64_t sequence, Journal& journal) {
+    journal.append(record(sequence), "ius");
+    ASSERT_TRUE(
+        witness.sees([=](const Recorded& recorded) { return recorded.holds("ius", sequence); }));
+  }
+  // Whether the journal comes to count an observation as lost. Nothing tells of it.
+  static bool loses(const std::string& source, std::uint64_t sequence, const Journal& journal) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (std::chrono::steady_clock::now() < deadline) {
+      const RecordRanges missing = journal.recorded().missing;
+      const auto found = missing.observations.find(source);
+      if (found != missing.observations.end() && found->second.last >= sequence) return true;
+      std::this_thread::yield();
+    }
+    return false;
+  }
+  // The first file opens when it is let go.
+  void stall() {
+    storage.on_open = [this](int attempt) {
+      if (attempt == 1) opening_.set_value(), let_go_.get_future().wait();
+      return Status();
+    };
+  }
+
+  FakeStorage storage;
+  Witness witness;
+  Journal::Options options = quick_options(storage, witness);
+  std::promise<void> opening_, let_go_;
+};
 
 TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   const TemporaryFolder folder;
@@ -61,10 +93,8 @@ TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 20u);
 }
 
-TEST(Journal, IgnoresRecordsBeforeTheFirstFile) {
-  FakeStorage storage;
-  Witness witness;
-  Journal journal(quick_options(storage, witness));
+TEST_F(JournalTest, IgnoresRecordsBeforeTheFirstFile) {
+  Journal journal(options);
   journal.append(record(1));
   journal.stop();
   EXPECT_THAT(storage.files(), IsEmpty());
@@ -74,16 +104,13 @@ TEST(Journal, IgnoresRecordsBeforeTheFirstFile) {
 
 // ---------- groups, and what is recorded ----------
 
-TEST(Journal, WhatWaitsIsCommittedTogether) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, WhatWaitsIsCommittedTogether) {
   std::promise<void> go;
   storage.on_open = [&](int) {
     go.get_future().wait();
     return Status();
   };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {});
+  Begun journal(options);
   for (std::uint64_t i = 1; i <= 20; ++i) journal.append(record(i), "ius");
   go.set_value();
   journal.stop();
@@ -92,27 +119,19 @@ TEST(Journal, WhatWaitsIsCommittedTogether) {
   EXPECT_EQ(storage.files()[0].groups[0].size(), 20u);
 }
 
-TEST(Journal, AGroupIsCommittedWhenItsTimeIsUp) {
-  FakeStorage storage;
-  Witness witness;
-  Journal::Options options = quick_options(storage, witness);
+TEST_F(JournalTest, AGroupIsCommittedWhenItsTimeIsUp) {
   options.commit_interval = std::chrono::milliseconds(5);
-  Journal journal(options);
-  journal.begin("x.surgery", {});
-  journal.append(record(1), "ius");
-  EXPECT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  Begun journal(options);
+  records(1, journal);
 }
 
-TEST(Journal, WhatIsRecordedIsOnTheDiskAndNothingElse) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, WhatIsRecordedIsOnTheDiskAndNothingElse) {
   std::promise<void> reached, go;
   storage.on_append = [&](int attempt) {
     if (attempt == 1) reached.set_value(), go.get_future().wait();
     return Status();
   };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {}, 7);
+  Begun journal(options, "x.surgery", {}, 7);
   journal.append(record(3), "ius");
   reached.get_future().wait();
   journal.append(record(50), "camera");  // never waits for the disk
@@ -133,13 +152,9 @@ TEST(Journal, WhatIsRecordedIsOnTheDiskAndNothingElse) {
   EXPECT_TRUE(recorded.missing.empty());
 }
 
-TEST(Journal, ANewSessionStartsItsOwnCount) {
-  FakeStorage storage;
-  Witness witness;
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {}, 1);
-  journal.append(record(3), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 3); }));
+TEST_F(JournalTest, ANewSessionStartsItsOwnCount) {
+  Begun journal(options, "x.surgery", {}, 1);
+  records(3, journal);
   journal.begin("y.surgery", {}, 2);
   EXPECT_EQ(journal.recorded().session_id, 2u);
   EXPECT_FALSE(journal.recorded().holds("ius", 3));
@@ -149,16 +164,11 @@ TEST(Journal, ANewSessionStartsItsOwnCount) {
 
 // ---------- failures ----------
 
-TEST(Journal, AFailedTransactionGoesToANewFileAsAWhole) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, AFailedTransactionGoesToANewFileAsAWhole) {
   storage.on_append = [](int attempt) { return attempt == 2 ? disk_full() : Status(); };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {.case_id = "c"});
-  journal.append(record(1), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
-  journal.append(record(2), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 2); }));
+  Begun journal(options, "x.surgery", {.case_id = "c"});
+  records(1, journal);
+  records(2, journal);
   journal.append(record(3), "ius");
   journal.stop();
   EXPECT_TRUE(journal.status().has_value());
@@ -175,16 +185,12 @@ TEST(Journal, AFailedTransactionGoesToANewFileAsAWhole) {
   EXPECT_TRUE(journal.recorded().missing.empty());
 }
 
-TEST(Journal, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
   std::atomic<bool> broken{true};
   storage.on_append = [&](int attempt) { return attempt == 2 ? disk_full() : Status(); };
   storage.on_open = [&](int attempt) { return attempt > 1 && broken ? disk_full() : Status(); };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {});
-  journal.append(record(1), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  Begun journal(options);
+  records(1, journal);
   journal.append(record(2), "ius");
   ASSERT_TRUE(witness.sees([](const Recorded& r) { return !r.recording; }));
   ASSERT_FALSE(journal.status().has_value());
@@ -192,16 +198,15 @@ TEST(Journal, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
   EXPECT_EQ(journal.status().error().message, "x: disk full");
   EXPECT_EQ(journal.recorded().reason, "x: disk full");
   // Until the failed transaction is given up, these may still be queued for the next try.
-  ASSERT_TRUE(lost(journal, "ius", 2));
+  ASSERT_TRUE(loses("ius", 2, journal));
   journal.append(record(3), "ius");
   journal.append(record(4), "camera");
   journal.append(record(5, io::RecordKind::kUpdate));
-  ASSERT_TRUE(lost(journal, "camera", 4));
+  ASSERT_TRUE(loses("camera", 4, journal));
   broken = false;
   ASSERT_TRUE(witness.sees_resumption());
   EXPECT_TRUE(journal.status().has_value());
-  journal.append(record(6), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 6); }));
+  records(6, journal);
   journal.stop();
   const auto files = storage.files();
   ASSERT_EQ(files.size(), 2u);
@@ -215,46 +220,35 @@ TEST(Journal, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
   EXPECT_THAT(witness.errors(), ElementsAre("x: disk full"));
 }
 
-TEST(Journal, RecordingWaitsForEnoughSpace) {
+TEST_F(JournalTest, RecordingWaitsForEnoughSpace) {
   const TemporaryFolder folder;
-  FakeStorage storage;
-  Witness witness;
   storage.on_append = [](int attempt) { return attempt == 1 ? disk_full() : Status(); };
-  Journal::Options options = quick_options(storage, witness);
   options.resume_free_bytes = std::numeric_limits<std::uintmax_t>::max();
-  Journal journal(options);
-  journal.begin(folder / "x.surgery", {});
+  Begun journal(options, folder / "x.surgery");
   journal.append(record(1), "ius");
-  ASSERT_TRUE(lost(journal, "ius", 1));
+  ASSERT_TRUE(loses("ius", 1, journal));
   journal.stop();
   EXPECT_EQ(storage.files().size(), 1u);
   EXPECT_FALSE(journal.status().has_value());
 }
 
-TEST(Journal, AFileThatIsGoneIsNoticedWithoutAnyRecordAndWhatItHeldIsLost) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, AFileThatIsGoneIsNoticedWithoutAnyRecordAndWhatItHeldIsLost) {
   std::atomic<bool> gone{false};
   storage.on_check = [&] {
     return gone.exchange(false) ? Status(fail(ErrorCode::kWriteFailed, "x: was deleted"))
                                 : Status();
   };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {});
-  journal.append(record(1), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  Begun journal(options);
+  records(1, journal);
   gone = true;
   ASSERT_TRUE(witness.sees_resumption());
   EXPECT_FALSE(journal.recorded().holds("ius", 1));
-  journal.append(record(2), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 2); }));
+  records(2, journal);
   journal.stop();
   EXPECT_EQ(storage.files()[1].meta.gap, "x: was deleted; not recorded: observations 1 of ius (1)");
 }
 
-TEST(Journal, ACommitToAFileThatIsGoneIsDoneAgain) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, ACommitToAFileThatIsGoneIsDoneAgain) {
   std::atomic<bool> gone{false};
   storage.on_append = [&](int attempt) {
     if (attempt == 1) gone = true;
@@ -267,41 +261,31 @@ TEST(Journal, ACommitToAFileThatIsGoneIsDoneAgain) {
     gone = false;
     return Status();
   };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {});
-  journal.append(record(1), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  Begun journal(options);
+  records(1, journal);
   journal.stop();
   ASSERT_EQ(storage.files().size(), 2u);
   EXPECT_THAT(storage.files()[1].groups, ElementsAre(ElementsAre(1)));
 }
 
-TEST(Journal, AThrowingSinkIsAFailureToo) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, AThrowingSinkIsAFailureToo) {
   storage.on_append = [](int attempt) -> Status {
     if (attempt == 1) throw std::runtime_error("thrown");
     return {};
   };
-  Journal journal(quick_options(storage, witness));
-  journal.begin("x.surgery", {});
-  journal.append(record(1), "ius");
-  ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.holds("ius", 1); }));
+  Begun journal(options);
+  records(1, journal);
   journal.stop();
   EXPECT_THAT(witness.errors(), ElementsAre(HasSubstr("thrown")));
 }
 
-TEST(Journal, ANewFileForgetsTheFailureOfTheOldOne) {
-  FakeStorage storage;
-  Witness witness;
+TEST_F(JournalTest, ANewFileForgetsTheFailureOfTheOldOne) {
   storage.on_open = [](int attempt) { return attempt == 1 ? disk_full() : Status(); };
-  Journal::Options options = quick_options(storage, witness);
   options.retry_interval = std::chrono::hours(1);
-  Journal journal(options);
-  journal.begin("x.surgery", {});
+  Begun journal(options);
   ASSERT_TRUE(witness.sees([](const Recorded& r) { return !r.reason.empty(); }));
   journal.append(record(1), "ius");
-  ASSERT_TRUE(lost(journal, "ius", 1));
+  ASSERT_TRUE(loses("ius", 1, journal));
   journal.begin("y.surgery", {});
   EXPECT_TRUE(journal.status().has_value());
   journal.append(record(2), "ius");
@@ -328,32 +312,18 @@ TEST(Journal, AFolderThatDoesNotExistIsAnError) {
 
 // ---------- slow storage ----------
 
-// The first file opens when it is let go.
-struct StallingStorage : FakeStorage {
-  StallingStorage() {
-    on_open = [this](int attempt) {
-      if (attempt == 1) opening.set_value(), go.get_future().wait();
-      return Status();
-    };
-  }
-  std::promise<void> opening, go;
-};
-
-TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
-  StallingStorage storage;
-  Witness witness;
-  Journal::Options options = quick_options(storage, witness);
+TEST_F(JournalTest, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
+  stall();
   options.max_queued = 3;
-  Journal journal(options);
-  journal.begin("x.surgery", {});
-  storage.opening.get_future().wait();
+  Begun journal(options);
+  opening_.get_future().wait();
   for (std::uint64_t i = 1; i <= 3; ++i) journal.append(record(i), "ius");
   EXPECT_TRUE(journal.status().has_value());
   journal.append(record(4), "ius");
   ASSERT_FALSE(journal.status().has_value()) << "at once, while the storage still stalls";
   EXPECT_THAT(journal.status().error().message, HasSubstr("3 records are waiting"));
   EXPECT_FALSE(journal.recorded().recording);
-  storage.go.set_value();
+  let_go_.set_value();
   ASSERT_TRUE(witness.sees_resumption());
   journal.append(record(5), "ius");
   journal.stop();
@@ -366,19 +336,89 @@ TEST(Journal, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
   EXPECT_TRUE(journal.recorded().holds("ius", 5));
 }
 
-TEST(Journal, BytesInTheQueueAreBoundedToo) {
-  StallingStorage storage;
-  Witness witness;
-  Journal::Options options = quick_options(storage, witness);
+TEST_F(JournalTest, BytesInTheQueueAreBoundedToo) {
+  stall();
   options.max_queued_bytes = 100;
-  Journal journal(options);
-  journal.begin("x.surgery", {});
-  storage.opening.get_future().wait();
+  Begun journal(options);
+  opening_.get_future().wait();
   journal.append({io::RecordKind::kUpdate, 1, 0, std::string(60, 'a')});
   EXPECT_TRUE(journal.status().has_value());
   journal.append({io::RecordKind::kUpdate, 2, 0, std::string(60, 'a')});
   EXPECT_FALSE(journal.status().has_value());
-  storage.go.set_value();
+  let_go_.set_value();
+}
+
+// ---------- what a set of records holds ----------
+
+TEST(RecordRanges, SourcesAndUpdatesAreCountedApart) {
+  RecordRanges ranges;
+  EXPECT_TRUE(ranges.empty());
+  EXPECT_EQ(describe(ranges), "nothing");
+  for (const std::uint64_t i : {5u, 6u, 9u}) ranges.add(RecordKind::kObservation, "ius", i);
+  ranges.add(RecordKind::kObservation, "camera", 50);
+  ranges.add(RecordKind::kUpdate, "", 3);
+  ranges.add(RecordKind::kDecision, "", 7);
+  EXPECT_FALSE(ranges.empty());
+  EXPECT_EQ(ranges.observations.at("ius"), (SequenceRange{5, 9, 3}));
+  EXPECT_EQ(ranges.updates, (SequenceRange{3, 3, 1}));
+  EXPECT_EQ(describe(ranges),
+            "observations 50 of camera (1), observations 5 to 9 of ius (3), updates 3 (1)");
+}
+
+TEST(RecordRanges, TheUnionSpansBoth) {
+  RecordRanges a, b;
+  a.add(RecordKind::kObservation, "ius", 7);
+  b.add(RecordKind::kObservation, "ius", 4);
+  b.add(RecordKind::kObservation, "camera", 1);
+  b.add(RecordKind::kUpdate, "", 2);
+  a.add(b);
+  EXPECT_EQ(a.observations.at("ius"), (SequenceRange{4, 7, 2}));
+  EXPECT_EQ(a.observations.at("camera"), (SequenceRange{1, 1, 1}));
+  EXPECT_EQ(a.updates, (SequenceRange{2, 2, 1}));
+  a.add(RecordRanges{});
+  EXPECT_EQ(a.updates, (SequenceRange{2, 2, 1}));
+}
+
+// ---------- the file ----------
+
+namespace fs = std::filesystem;
+
+TEST(JournalPath, KeepsTheCaseIdInsideTheFolder) {
+  EXPECT_EQ(journal_path("/j", "../a b/c", "1"), "/j/.._a_b_c-1.surgery");
+}
+
+TEST(JournalPath, NeverNamesAFileThatExists) {
+  const TemporaryFolder folder;
+  const auto first = journal_path(folder.path(), "c", "1");
+  ASSERT_TRUE(io::SurgeryFile::create(first, {}).has_value());
+  const auto second = journal_path(folder.path(), "c", "1");
+  EXPECT_EQ(second.filename(), "c-1-2.surgery");
+}
+
+TEST(JournalPath, NeverNamesAFileWhoseLogIsLeft) {
+  const TemporaryFolder folder;
+  folder.write("a.surgery-wal", "left behind");
+  EXPECT_EQ(free_path(folder / "a.surgery"), folder / "a-2.surgery");
+  folder.write("a-2.surgery", "");
+  EXPECT_EQ(free_path(folder / "a.surgery"), folder / "a-3.surgery");
+  EXPECT_EQ(free_path(folder / "a.surgery", folder / "a-3.surgery"), folder / "a-4.surgery");
+  fs::create_symlink("nowhere", folder / "b.surgery");
+  EXPECT_EQ(free_path(folder / "b.surgery"), folder / "b-2.surgery");
+}
+
+TEST(SurgeryFileSink, NoticesThatItsFileIsGone) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.surgery";
+  auto sink = open_surgery_file(path, {});
+  ASSERT_TRUE(sink) << sink.error().message;
+  const std::vector<io::SurgeryRecord> records = {{io::RecordKind::kUpdate, 1, 0, "x"}};
+  ASSERT_TRUE((*sink)->append(records));
+  EXPECT_TRUE((*sink)->check());
+  fs::remove(path);
+  const Status status = (*sink)->check();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().message,
+            path.string() + ": was deleted or replaced while it was recorded");
 }
 
 }  // namespace

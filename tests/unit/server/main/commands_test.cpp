@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/main/commands.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/main/exit_status.hpp"
 #include "server/main/progress_bar.hpp"
 
 namespace brainshift::server {
@@ -52,6 +53,26 @@ TEST(ProgressBar, LeavesACleanLineOnATerminal) {
   EXPECT_THAT(drawn, testing::HasSubstr("[###############...............]  50 %  mesh"));
   EXPECT_THAT(drawn, testing::EndsWith("\r\033[K"));
   EXPECT_THAT(drawn, testing::Not(testing::HasSubstr("\n")));
+}
+
+TEST(EndpointToAsk, IsOnThisMachineWhereTheDaemonListensOnAllInterfaces) {
+  EXPECT_EQ(*endpoint_to_ask("tcp://0.0.0.0:5555"), "tcp://127.0.0.1:5555");
+  EXPECT_EQ(*endpoint_to_ask("tcp://*:5555"), "tcp://127.0.0.1:5555");
+  EXPECT_EQ(*endpoint_to_ask("tcp://[::]:5555"), "tcp://[::1]:5555");
+}
+
+TEST(EndpointToAsk, IsTheDaemonsOwnOtherwise) {
+  for (const char* endpoint :
+       {"tcp://127.0.0.1:5555", "tcp://10.0.0.0:5555", "tcp://[::1]:80", "ipc:///run/a.sock"}) {
+    EXPECT_EQ(*endpoint_to_ask(endpoint), endpoint);
+  }
+}
+
+TEST(EndpointToAsk, NeedsAPortThatIsKnown) {
+  const auto endpoint = endpoint_to_ask("tcp://127.0.0.1:*");
+  ASSERT_FALSE(endpoint);
+  EXPECT_EQ(endpoint.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(endpoint.error().message, testing::HasSubstr("tcp://127.0.0.1:*"));
 }
 
 }  // namespace

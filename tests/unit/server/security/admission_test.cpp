@@ -98,21 +98,16 @@ TEST_F(Admission, ARoleThatDoesNotIncludeARequestIsToldSoAndStaysConnected) {
   RawPeer owner = peer(Role::kOwner);
   start_session(owner);
   RawPeer viewer = peer(Role::kViewer);
-  const Error refused =
-      error_of(viewer.ask(MessageType::kObservation, wire::encode(landmarks(1)), 9));
+  const Error refused = error_of(viewer.hand_in(landmarks(1), 9));
   EXPECT_EQ(refused.code, ErrorCode::kNotAllowed);
   EXPECT_THAT(refused.message, HasSubstr("the key viewer has the role viewer"));
-  EXPECT_EQ(viewer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(viewer.is_served());
   RawPeer source = peer(Role::kSource);
-  EXPECT_EQ(source.ask(MessageType::kObservation, wire::encode(landmarks(1))).type,
-            MessageType::kObservationReply);
-  SessionRequest takeover{kCase, Method::kPaper, Boundary::kContact, false};
-  takeover.takeover = true;
-  EXPECT_EQ(error_of(owner.ask(MessageType::kStartSessionRequest, wire::encode(takeover))).code,
-            ErrorCode::kNotAllowed);
+  EXPECT_EQ(source.hand_in(landmarks(1)).type, MessageType::kObservationReply);
+  const SessionRequest takeover = session_of(kCase, true);
+  EXPECT_EQ(error_of(owner.start(takeover)).code, ErrorCode::kNotAllowed);
   RawPeer admin = peer(Role::kAdmin);
-  EXPECT_EQ(admin.ask(MessageType::kStartSessionRequest, wire::encode(takeover)).type,
-            MessageType::kStartSessionReply);
+  EXPECT_EQ(admin.start(takeover).type, MessageType::kStartSessionReply);
 }
 
 // ---------- ten peers times five messages ----------
@@ -132,7 +127,7 @@ std::vector<Attempt> attempts() {
   other_model.session.model_id = "another-model";
   Observation other_session = landmarks(1);
   other_session.session.session_id += 7;
-  const SessionRequest start{"someone-else", Method::kPaper, Boundary::kContact, false};
+  const SessionRequest start = session_of("someone-else");
   return {{"other case", MessageType::kObservation, wire::encode(other_case)},
           {"other frame", MessageType::kObservation, wire::encode(other_frame)},
           {"other model", MessageType::kObservation, wire::encode(other_model)},
@@ -223,32 +218,25 @@ TEST_F(Admission, NoneOfFiftyPairsIsAdmittedOrAccepted) {
 
 // ---------- what a client is told ----------
 
-TEST_F(Admission, AClientWithAnotherDaemonsKeyIsToldThatKeysMayBeTheReason) {
+TEST_F(Admission, AClientThatIsNotAdmittedIsToldWhatMayBeTheReason) {
   serve_with_keys();
-  auto client = Client::connect(endpoint_, options(new_pair().public_key, pairs_[Role::kSource]));
-  ASSERT_TRUE(client);
-  const auto status = client->status();
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kUnavailable);
-  EXPECT_THAT(status.error().message, HasSubstr("key"));
-}
-
-TEST_F(Admission, AClientWithAnUnknownKeyIsToldThatItIsNotAdmitted) {
-  serve_with_keys();
-  auto client = Client::connect(endpoint_, options(own_.public_key, new_pair()));
-  ASSERT_TRUE(client);
-  const auto status = client->status();
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, HasSubstr("allow-list"));
-}
-
-TEST_F(Admission, AClientWithoutKeysIsToldThatTheDaemonMayAskForThem) {
-  serve_with_keys();
-  auto client = Client::connect(endpoint_, {.request_timeout = milliseconds(1500)});
-  ASSERT_TRUE(client);
-  const auto status = client->status();
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, HasSubstr("keys"));
+  const struct {
+    const char* who;
+    ClientOptions options;
+    const char* says;
+  } rows[] = {
+      {"another daemon's key", options(new_pair().public_key, pairs_[Role::kSource]), "key"},
+      {"an unknown key", options(own_.public_key, new_pair()), "allow-list"},
+      {"no keys", {.request_timeout = milliseconds(1500)}, "keys"}};
+  for (const auto& row : rows) {
+    SCOPED_TRACE(row.who);
+    auto client = Client::connect(endpoint_, row.options);
+    ASSERT_TRUE(client);
+    const auto status = client->status();
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::kUnavailable);
+    EXPECT_THAT(status.error().message, HasSubstr(row.says));
+  }
 }
 
 TEST_F(Admission, AClientRefusesATextThatIsNoKey) {
@@ -269,21 +257,16 @@ TEST_F(Admission, ConnectionsOfAKeyBeyondItsLimitAreToldSoUntilOneLeaves) {
   limits.connections = 2;
   serve_with_keys(limits);
   RawPeer first = peer(Role::kViewer);
-  EXPECT_EQ(first.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(first.is_served());
   RawPeer third = peer(Role::kViewer);
   {
     RawPeer second = peer(Role::kViewer);
-    EXPECT_EQ(second.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+    EXPECT_TRUE(second.is_served());
     EXPECT_EQ(error_of(third.ask(MessageType::kStatusRequest)).code, ErrorCode::kUnavailable);
     RawPeer other = peer(Role::kSource);
-    EXPECT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+    EXPECT_TRUE(other.is_served());
   }
-  bool served = false;
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (!served && std::chrono::steady_clock::now() < deadline) {
-    served = third.ask(MessageType::kStatusRequest).type == MessageType::kStatusReply;
-  }
-  EXPECT_TRUE(served);
+  EXPECT_TRUE(eventually([&] { return third.is_served(); }));
 }
 
 TEST_F(Admission, ObservationsBeyondTheLimitAreRefusedAndTheConnectionStays) {
@@ -292,9 +275,8 @@ TEST_F(Admission, ObservationsBeyondTheLimitAreRefusedAndTheConnectionStays) {
   serve_with_keys(limits);
   RawPeer owner = peer(Role::kOwner);
   start_session(owner);
-  EXPECT_EQ(owner.ask(MessageType::kObservation, wire::encode(landmarks(1))).type,
-            MessageType::kObservationReply);
-  const Error error = error_of(owner.ask(MessageType::kObservation, wire::encode(landmarks(2))));
+  EXPECT_EQ(owner.hand_in(landmarks(1)).type, MessageType::kObservationReply);
+  const Error error = error_of(owner.hand_in(landmarks(2)));
   EXPECT_EQ(error.code, ErrorCode::kUnavailable);
   EXPECT_THAT(error.message, HasSubstr("more than 1 observations a second"));
 }

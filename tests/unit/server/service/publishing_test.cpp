@@ -18,7 +18,7 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/wire/decision.hpp"
-#include "server/operations/usual_time.hpp"
+#include "server/operations/latency_record.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -27,74 +27,45 @@ namespace {
 
 using testing::HasSubstr;
 
-MakeSessionModel second_update_fails() {
-  return [](const SessionRequest& request, const std::stop_token&) {
-    return fake_session(
-        std::make_unique<FakeInverter>(
-            [](int call, const SparseData& data, const auto&, Estimate& estimate) -> Status {
-              if (call == 2) return fail(ErrorCode::kNotConverged, "no luck");
-              return follow_the_data(data, estimate, 4);
-            }),
-        request);
-  };
-}
-
-// An inversion that lasts for at least as long as `at_least` says.
-MakeSessionModel lasting(const std::shared_ptr<std::atomic<double>>& at_least_ms) {
-  return [at_least_ms](const SessionRequest& request, const std::stop_token&) {
-    return fake_session(
-        std::make_unique<FakeInverter>(
-            [at_least_ms](int, const SparseData& data, const auto&, Estimate& estimate) -> Status {
-              const Stopwatch watch;
-              while (watch.milliseconds() < *at_least_ms) std::this_thread::yield();
-              return follow_the_data(data, estimate, 4);
-            }),
-        request);
-  };
-}
-
 TEST_F(TransportTest, AnAnswerThatTookTwiceAsLongAsUsualIsMarkedLate) {
-  const auto at_least_ms = std::make_shared<std::atomic<double>>(0.0);
-  ServiceOptions options = with_model();
-  options.make_model = lasting(at_least_ms);
-  serve(std::move(options));
+  std::atomic<double> at_least_ms = 0.0;
+  serve(with_inverter([&](int, const SparseData& data, const auto&, auto& out) {
+    const Stopwatch watch;
+    while (watch.milliseconds() < at_least_ms) std::this_thread::yield();
+    return follow_the_data(data, out, 4);
+  }));
   RawPeer peer(endpoint_);
-  start_session(peer);
-  subscribe(peer);
-  const auto answer = [&](std::uint64_t sequence) {
-    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
-    return next_update(peer).update.answer_time;
+  begin(peer);
+  const auto time_of = [&](const Observation& observation) {
+    return answer(peer, observation).update.answer_time;
   };
   double longest_ms = 0.0;
   for (std::uint64_t sequence = 1; sequence <= UsualTime::kFew; ++sequence) {
-    const AnswerTime time = answer(sequence);
+    const AnswerTime time = time_of(landmarks(sequence));
     EXPECT_GT(time.ms, 0.0);
     EXPECT_EQ(time.usual_ms, 0.0);
     EXPECT_FALSE(time.late()) << "nothing is usual yet";
     longest_ms = std::max(longest_ms, time.ms);
   }
-  *at_least_ms = 2.1 * longest_ms;
-  const AnswerTime late = answer(UsualTime::kFew + 1);
+  at_least_ms = 2.1 * longest_ms;
+  const AnswerTime late = time_of(landmarks(UsualTime::kFew + 1));
   EXPECT_GT(late.ms, 2.1 * longest_ms);
   EXPECT_GT(late.usual_ms, 0.0);
   EXPECT_LE(late.usual_ms, 1.01 * longest_ms);
   EXPECT_TRUE(late.late());
   // Another session begins with nothing usual, whatever the one before took.
   start_session(peer);
-  peer.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
-  EXPECT_EQ(next_update(peer).update.answer_time.usual_ms, 0.0);
+  EXPECT_EQ(time_of(in_session(2, landmarks(1))).usual_ms, 0.0);
 }
 
 TEST_F(TransportTest, TwoClientsReceiveEveryUpdate) {
   serve(with_model());
   RawPeer sender(endpoint_);
   RawPeer watcher(endpoint_);
-  start_session(sender);
-  subscribe(sender);
+  begin(sender);
   subscribe(watcher);
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
-    sender.request(MessageType::kObservation,
-                   wire::encode(landmarks(sequence, "pointer", static_cast<double>(sequence))));
+    sender.observe(landmarks(sequence, "pointer", static_cast<double>(sequence)));
     for (RawPeer* peer : {&sender, &watcher}) {
       const auto message = next_update(*peer);
       EXPECT_EQ(message.update.observation_sequence, sequence);
@@ -121,7 +92,7 @@ TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
   start_session(sender);
   RawPeer late(endpoint_);
   subscribe(late);
-  sender.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
+  sender.observe(in_session(2, landmarks(1)));
   for (RawPeer* peer : {&late, &sender}) {
     const auto message = next_update(*peer);
     EXPECT_EQ(message.session_id, 2u);
@@ -134,16 +105,11 @@ TEST_F(TransportTest, ALateSubscriberReceivesNothingOfASessionThatHasEnded) {
 }
 
 TEST_F(TransportTest, AFailedObservationIsToldAndTheLastUpdateStays) {
-  ServiceOptions options = with_model();
-  options.make_model = second_update_fails();
-  serve(std::move(options));
+  serve(with_a_failure());
   RawPeer peer(endpoint_);
-  start_session(peer);
-  subscribe(peer);
-  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
-  EXPECT_FALSE(next_update(peer).error.has_value());
-  peer.request(MessageType::kObservation, wire::encode(landmarks(2)));
-  const auto failed = next_update(peer);
+  begin(peer);
+  EXPECT_FALSE(answer(peer, landmarks(1)).error.has_value());
+  const auto failed = answer(peer, landmarks(2));
   ASSERT_TRUE(failed.error.has_value());
   EXPECT_EQ(failed.error->code, ErrorCode::kNotConverged);
   EXPECT_EQ(failed.update.observation_sequence, 2u);
@@ -167,45 +133,35 @@ TEST_F(TransportTest, AnExceptionCostsOneStartOrOneObservation) {
   };
   serve(std::move(options));
   RawPeer peer(endpoint_);
-  const Error refused =
-      error_of(peer.ask(MessageType::kStartSessionRequest, wire::encode(SessionRequest{kCase})));
+  const Error refused = error_of(peer.start(SessionRequest{kCase}));
   EXPECT_EQ(refused.code, ErrorCode::kInternal);
-  start_session(peer);
-  subscribe(peer);
-  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
-  const auto failed = next_update(peer);
+  begin(peer);
+  const auto failed = answer(peer, landmarks(1));
   ASSERT_TRUE(failed.error.has_value());
   EXPECT_EQ(failed.error->code, ErrorCode::kInternal);
-  peer.request(MessageType::kObservation, wire::encode(landmarks(2)));
-  EXPECT_FALSE(next_update(peer).error.has_value());
+  EXPECT_FALSE(answer(peer, landmarks(2)).error.has_value());
 }
 
 TEST_F(TransportTest, IteratesAreStreamedOnlyWhenAskedForAndCarryTheirUpdatesNumber) {
-  ServiceOptions options = with_model();
-  options.make_model = [](const SessionRequest& request, const auto&) {
-    return fake_session(std::make_unique<FakeInverter>(
-                            [](int, const SparseData& data, const auto& asked, auto& out) {
-                              Estimate iterate;
-                              (void)follow_the_data(data, iterate, 4);
-                              iterate.status = EstimateStatus::kIterating;
-                              if (asked.on_iterate) asked.on_iterate(iterate);
-                              return follow_the_data(data, out, 4);
-                            }),
-                        request);
-  };
-  serve(std::move(options));
+  serve(with_inverter([](int, const SparseData& data, const auto& asked, auto& out) {
+    Estimate iterate;
+    (void)follow_the_data(data, iterate, 4);
+    iterate.status = EstimateStatus::kIterating;
+    if (asked.on_iterate) asked.on_iterate(iterate);
+    return follow_the_data(data, out, 4);
+  }));
   RawPeer peer(endpoint_);
   begin_with_update(peer, 1);
-  SessionRequest iterating{kCase, Method::kPaper};
+  SessionRequest iterating = session_of();
   iterating.publish_iterates = true;
   peer.request(MessageType::kStartSessionRequest, wire::encode(iterating));
-  while (peer.receive().type != MessageType::kStartSessionReply) continue;
-  peer.request(MessageType::kObservation, wire::encode(in_session(2, landmarks(1))));
-  const auto iterate = next_update(peer);
+  next(peer, MessageType::kStartSessionReply);
+  const auto iterate = answer(peer, in_session(2, landmarks(1)));
   EXPECT_FALSE(iterate.update.final);
   const auto last = next_update(peer);
   EXPECT_TRUE(last.update.final);
   EXPECT_EQ(iterate.update.sequence, last.update.sequence);
+  EXPECT_EQ(iterate.key(), last.key());
   EXPECT_EQ(iterate.session_id, 2u);
 }
 
@@ -213,14 +169,12 @@ TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {
   serve(with_model());
   RawPeer sender(endpoint_);
   RawPeer watcher(endpoint_);
-  start_session(sender);
-  subscribe(sender);
+  begin(sender);
   subscribe(watcher);
-  sender.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  sender.observe(landmarks(1));
   for (RawPeer* peer : {&sender, &watcher}) EXPECT_TRUE(next_update(*peer).update.usable());
   for (std::uint64_t sequence = 2; sequence <= 7; ++sequence) {
-    sender.request(MessageType::kObservation,
-                   wire::encode(landmarks(sequence, "pointer", kMostMotion_mm + 1.0)));
+    sender.observe(landmarks(sequence, "pointer", kMostMotion_mm + 1.0));
     for (RawPeer* peer : {&sender, &watcher}) {
       const auto message = next_update(*peer);
       EXPECT_EQ(message.update.observation_sequence, sequence);
@@ -238,7 +192,7 @@ TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {
   EXPECT_EQ(snapshot.update.observation_sequence, 1u);
   EXPECT_TRUE(snapshot.update.usable());
   EXPECT_EQ(next_update(late).update.observation_sequence, 7u);
-  sender.request(MessageType::kObservation, wire::encode(landmarks(8)));
+  sender.observe(landmarks(8));
   EXPECT_EQ(next_update(late).update.observation_sequence, 8u);
   RawPeer later(endpoint_);
   subscribe(later);
@@ -256,12 +210,10 @@ TEST_F(TransportTest, AViewerThatDoesNotReadDelaysNobodyAndGetsTheNewestUpdate) 
   serve(with_model(40'000));  // 0.5 MB per update
   RawPeer sender(endpoint_);
   RawPeer slow(endpoint_);
-  start_session(sender);
-  subscribe(sender);
+  begin(sender);
   subscribe(slow, 1);
   for (std::uint64_t sequence = 1; sequence <= kUpdates; ++sequence) {
-    sender.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
-    ASSERT_EQ(next_update(sender).update.observation_sequence, sequence);
+    ASSERT_EQ(answer(sender, landmarks(sequence)).update.observation_sequence, sequence);
   }
   EXPECT_EQ(next_update(slow).update.observation_sequence, 1u);
   slow.request(MessageType::kSubscribeRequest, wire::encode(Subscription{1, 1, 1}));
@@ -269,9 +221,7 @@ TEST_F(TransportTest, AViewerThatDoesNotReadDelaysNobodyAndGetsTheNewestUpdate) 
 }
 
 TEST_F(TransportTest, TheStateSaysWhatIsNewestAndHowOldItIs) {
-  ServiceOptions options = with_model();
-  options.make_model = second_update_fails();
-  serve(std::move(options));
+  serve(with_a_failure());
   RawPeer peer(endpoint_);
   EXPECT_EQ(renew(peer, {1, 8, 0}).phase, SessionPhase::kEmpty);
   begin_with_update(peer, 5);
@@ -280,7 +230,7 @@ TEST_F(TransportTest, TheStateSaysWhatIsNewestAndHowOldItIs) {
   EXPECT_EQ(tracking.newest_update, 1u);
   EXPECT_EQ(tracking.newest_usable, 1u);
   EXPECT_GT(tracking.age_ms, 0.0);
-  peer.request(MessageType::kObservation, wire::encode(landmarks(6)));
+  peer.observe(landmarks(6));
   ASSERT_TRUE(next_update(peer).error.has_value());
   const SessionState degraded = renew(peer, {1, 8, 2});
   EXPECT_EQ(degraded.phase, SessionPhase::kDegraded);
@@ -296,8 +246,7 @@ TEST_F(TransportTest, EverySubscriberIsToldWhenTheSessionOrItsPhaseChanges) {
   RawPeer watcher(endpoint_);
   subscribe(watcher);
   const auto next_phase = [&] {
-    Received received = watcher.receive();
-    while (received.type != MessageType::kSessionState) received = watcher.receive();
+    const Received received = next(watcher, MessageType::kSessionState);
     EXPECT_EQ(received.request_id, 0u);
     return wire::decode_session_state(received.payload)->phase;
   };
@@ -310,7 +259,7 @@ TEST_F(TransportTest, EverySubscriberIsToldWhenTheSessionOrItsPhaseChanges) {
   start_session(owner);
   EXPECT_EQ(next_phase(), SessionPhase::kPreparing);
   EXPECT_EQ(next_but(SessionPhase::kPreparing), SessionPhase::kReady);
-  owner.request(MessageType::kObservation, wire::encode(landmarks(1)));
+  owner.observe(landmarks(1));
   EXPECT_EQ(next_but(SessionPhase::kReady), SessionPhase::kTracking);
 }
 
@@ -319,10 +268,8 @@ TEST_F(TransportTest, ASessionOfAnotherClientEndsOnlyByTakeoverOrWhenThatClientH
   auto owner = std::make_unique<RawPeer>(endpoint_);
   RawPeer other(endpoint_);
   start_session(*owner);
-  SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
-  const auto ask = [&] {
-    return other.ask(MessageType::kStartSessionRequest, wire::encode(request));
-  };
+  SessionRequest request = session_of();
+  const auto ask = [&] { return other.start(request); };
   const Error refused = error_of(ask());
   EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
   EXPECT_THAT(refused.message, HasSubstr("belongs to another client"));
@@ -330,76 +277,13 @@ TEST_F(TransportTest, ASessionOfAnotherClientEndsOnlyByTakeoverOrWhenThatClientH
   EXPECT_EQ(ask().type, MessageType::kStartSessionReply);
   request.takeover = false;
   EXPECT_EQ(ask().type, MessageType::kStartSessionReply) << "its own";
-  const auto mine = owner->ask(MessageType::kStartSessionRequest, wire::encode(request));
+  const auto mine = owner->start(request);
   EXPECT_EQ(error_of(mine).code, ErrorCode::kUnavailable);
   request.takeover = true;
-  ASSERT_EQ(owner->ask(MessageType::kStartSessionRequest, wire::encode(request)).type,
-            MessageType::kStartSessionReply);
+  ASSERT_EQ(owner->start(request).type, MessageType::kStartSessionReply);
   owner.reset();
   request.takeover = false;
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  MessageType answered = MessageType::kErrorReply;
-  while (answered == MessageType::kErrorReply && std::chrono::steady_clock::now() < deadline) {
-    answered = ask().type;
-  }
-  EXPECT_EQ(answered, MessageType::kStartSessionReply);
-}
-
-TEST_F(TransportTest, BadPeersTakeNobodysPlace) {
-  RouterOptions options;
-  options.max_clients = 2;
-  serve(with_model(), options);
-  std::vector<std::unique_ptr<RawPeer>> bad;
-  for (int i = 0; i < 8; ++i) {
-    bad.push_back(std::make_unique<RawPeer>(endpoint_));
-    bad.back()->send("x");
-    EXPECT_EQ(error_of(bad.back()->receive()).code, ErrorCode::kProtocol);
-  }
-  expect_alive();
-}
-
-// More requests than the queue of a connection holds: every one is answered, in order.
-TEST_F(TransportTest, ManyRequestsInFlightAreAllAnswered) {
-  RouterOptions options;
-  options.send_queue = 2;
-  serve(with_model(), options);
-  RawPeer peer(endpoint_, 1);
-  constexpr std::uint64_t kRequests = 200;
-  for (std::uint64_t id = 1; id <= kRequests; ++id) {
-    peer.request(MessageType::kStatusRequest, {}, id);
-  }
-  for (std::uint64_t id = 1; id <= kRequests; ++id) ASSERT_EQ(peer.receive().request_id, id);
-}
-
-TEST_F(TransportTest, ARequestThatCarriesNothingMustBeEmpty) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  for (const MessageType type : {MessageType::kStatusRequest, MessageType::kModelRequest}) {
-    const Error error = error_of(peer.ask(type, "rubbish"));
-    EXPECT_EQ(error.code, ErrorCode::kProtocol);
-    EXPECT_THAT(error.message, HasSubstr("must be empty"));
-  }
-}
-
-TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
-  RouterOptions options;
-  options.max_clients = 2;
-  serve(with_model(), options);
-  RawPeer first(endpoint_);
-  auto second = std::make_unique<RawPeer>(endpoint_);
-  subscribe(first);
-  subscribe(*second);
-  RawPeer third(endpoint_);
-  const Error refused = error_of(third.ask(MessageType::kStatusRequest));
-  EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
-  EXPECT_THAT(refused.message, HasSubstr("2 clients"));
-  second.reset();
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  MessageType answered = MessageType::kErrorReply;
-  while (answered == MessageType::kErrorReply && std::chrono::steady_clock::now() < deadline) {
-    answered = third.ask(MessageType::kStatusRequest).type;
-  }
-  EXPECT_EQ(answered, MessageType::kStatusReply);
+  EXPECT_TRUE(eventually([&] { return ask().type == MessageType::kStartSessionReply; }));
 }
 
 // Keeps what would be written.
@@ -426,23 +310,19 @@ class KeepingSink final : public RecordSink {
 };
 
 TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
-  ServiceOptions options = with_model();
   const test_support::TemporaryFolder folder;
   const auto kept = std::make_shared<KeptRecords>();
-  options.journal_dir = folder.path();
-  options.open_journal = [kept](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
-    return std::make_unique<KeepingSink>(kept);
-  };
-  serve(std::move(options));
+  serve(with_journal(folder.path(),
+                     [kept](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
+                       return std::make_unique<KeepingSink>(kept);
+                     }));
   RawPeer peer(endpoint_);
-  start_session(peer);
-  subscribe(peer);
+  begin(peer);
   std::vector<std::string> published;
   for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
     const std::string observation = wire::encode(landmarks(sequence));
     peer.request(MessageType::kObservation, observation);
-    Received received = peer.receive();
-    while (received.type != MessageType::kUpdate) received = peer.receive();
+    const Received received = next(peer, MessageType::kUpdate);
     published.push_back(observation);
     published.push_back(received.payload);
     const auto message = wire::decode_update(received.payload);
@@ -476,20 +356,14 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
 }
 
 TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
-  ServiceOptions options = with_model();
   const test_support::TemporaryFolder folder;
-  options.journal_dir = folder.path();
-  options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
-    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
-  };
-  serve(std::move(options));
+  serve(with_journal(folder.path(), disk_full));
   RawPeer peer(endpoint_);
-  start_session(peer);
-  subscribe(peer);
+  begin(peer);
   // The journal fails on its own thread: the first updates may come before it has.
   std::string told;
   for (std::uint64_t sequence = 1; told.empty() && sequence <= 1000; ++sequence) {
-    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    peer.observe(landmarks(sequence));
     for (const Omission& omission : next_update(peer).update.left_out) {
       if (omission.part == "journal") told = omission.reason;
     }
@@ -500,9 +374,7 @@ TEST_F(TransportTest, AFailureOfTheJournalReachesTheClients) {
 // Accepted is one thing, recorded another: the state says which observations are on the disk.
 TEST_F(TransportTest, TheStateSaysWhatIsRecordedAndWhyNothingIs) {
   const test_support::TemporaryFolder folder;
-  ServiceOptions options = with_model();
-  options.journal_dir = folder.path();
-  serve(std::move(options));
+  serve(with_journal(folder.path(), open_surgery_file));
   RawPeer peer(endpoint_);
   begin_with_update(peer, 3);
   const auto recorded = [&] {
@@ -517,44 +389,29 @@ TEST_F(TransportTest, TheStateSaysWhatIsRecordedAndWhyNothingIs) {
 
 TEST_F(TransportTest, EverySubscriberIsToldWhenTheDaemonDoesNotRecord) {
   const test_support::TemporaryFolder folder;
-  ServiceOptions options = with_model();
-  options.journal_dir = folder.path();
-  options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
-    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
-  };
-  serve(std::move(options));
+  serve(with_journal(folder.path(), disk_full));
   RawPeer watcher(endpoint_);
   subscribe(watcher);
   RawPeer owner(endpoint_);
   start_session(owner);
   std::string reason;
   while (reason.find("disk full") == std::string::npos) {
-    const Received received = watcher.receive();
-    if (received.type != MessageType::kSessionState) continue;
-    const auto state = wire::decode_session_state(received.payload);
+    const auto state =
+        wire::decode_session_state(next(watcher, MessageType::kSessionState).payload);
     if (!state->recording->recording) reason = state->recording->reason;
   }
 }
 
 TEST_F(TransportTest, StopsWhenAskedWhileAnInversionRuns) {
-  ServiceOptions options = with_model();
-  auto entered = std::make_shared<std::promise<void>>();
-  options.make_model = [entered](const SessionRequest& request, const auto&) {
-    return fake_session(std::make_unique<FakeInverter>([entered](int, const SparseData&,
-                                                                 const auto& asked, Estimate&) {
-                          std::promise<void> stopped;
-                          const std::stop_callback wake(asked.stop, [&] { stopped.set_value(); });
-                          entered->set_value();
-                          stopped.get_future().wait();
-                          return Status(fail(ErrorCode::kNotConverged, "stopped"));
-                        }),
-                        request);
-  };
-  serve(std::move(options));
+  std::promise<void> entered;
+  serve(with_inverter([&](int, const SparseData&, const auto& asked, auto&) -> Status {
+    entered.set_value();
+    return wait_for_stop(asked.stop);
+  }));
   RawPeer peer(endpoint_);
   start_session(peer);
-  peer.request(MessageType::kObservation, wire::encode(landmarks(1)));
-  entered->get_future().wait();
+  peer.observe(landmarks(1));
+  entered.get_future().wait();
   expect_alive();  // the transport answers while the worker is busy
   stop();
 }

@@ -25,29 +25,17 @@ using wire::SourceCounts;
 class ReportTest : public TransportTest {
  protected:
   static DaemonReport report_of(RawPeer& peer) {
-    peer.request(MessageType::kReportRequest, {}, 99);
-    Received received = peer.receive();
-    while (received.request_id != 99) received = peer.receive();
-    EXPECT_EQ(received.type, MessageType::kReportReply);
-    const auto report = wire::decode_report(received.payload);
+    peer.request(MessageType::kReportRequest);
+    const auto report = wire::decode_report(next(peer, MessageType::kReportReply).payload);
     EXPECT_TRUE(report) << report.error().message;
     return report ? *report : DaemonReport{};
   }
   // Asks until it holds, for at most 10 s.
   template <typename Condition>
   static DaemonReport report_when(RawPeer& peer, const Condition& holds) {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-    DaemonReport report = report_of(peer);
-    while (!holds(report) && std::chrono::steady_clock::now() < deadline) report = report_of(peer);
-    EXPECT_TRUE(holds(report));
+    DaemonReport report;
+    EXPECT_TRUE(eventually([&] { return holds(report = report_of(peer)); }));
     return report;
-  }
-  static ServiceOptions with_inverter(FakeInverter::Update update) {
-    ServiceOptions options = with_model();
-    options.make_model = [update](const SessionRequest& request, const auto&) {
-      return fake_session(std::make_unique<FakeInverter>(update), request);
-    };
-    return options;
   }
   static std::uint64_t sum(const SourceCounts& counts) {
     return counts.answered + counts.failed + counts.replaced + counts.skipped + counts.refused +
@@ -64,7 +52,7 @@ class ReportTest : public TransportTest {
 TEST_F(ReportTest, ADaemonWithoutAModelReportsToo) {
   serve(without_model());
   RawPeer peer(endpoint_);
-  peer.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  peer.hand_in(landmarks(1));
   const DaemonReport report = report_of(peer);
   EXPECT_EQ(report.version, "1.2.3");
   EXPECT_FALSE(report.model_ready);
@@ -85,9 +73,9 @@ TEST_F(ReportTest, NamesSessionOwnerViewersAndTheirCredit) {
   start_session(owner);
   subscribe(viewer, 1);
   // The first goes out on the viewer's credit; the second has to wait for it.
-  owner.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  owner.hand_in(landmarks(1));
   report_when(owner, [](const DaemonReport& told) { return told.usable == 1; });
-  owner.ask(MessageType::kObservation, wire::encode(landmarks(2)));
+  owner.hand_in(landmarks(2));
   const DaemonReport report = report_when(owner, [](const DaemonReport& told) {
     return told.usable == 2 && nothing_waits(told) && told.viewers.at(0).owed == 1;
   });
@@ -112,10 +100,10 @@ TEST_F(ReportTest, TellsWhatTheDoorTurnedAway) {
   RawPeer peer(endpoint_);
   start_session(peer);
   for (int i = 0; i < 2; ++i) {
-    peer.ask(MessageType::kStartSessionRequest, wire::encode(SessionRequest{kCase}));
+    peer.start(SessionRequest{kCase});
   }
   for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
-    peer.ask(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    peer.hand_in(landmarks(sequence));
   }
   const wire::DoorFigures door = report_of(peer).door;
   EXPECT_EQ(door.accepted, 1u);
@@ -130,8 +118,7 @@ TEST_F(ReportTest, EveryUpdateIsTimedStageByStage) {
   RawPeer peer(endpoint_);
   begin_with_update(peer, 1);
   for (std::uint64_t sequence = 2; sequence <= 20; ++sequence) {
-    peer.request(MessageType::kObservation, wire::encode(landmarks(sequence)));
-    ASSERT_EQ(next_update(peer).update.observation_sequence, sequence);
+    ASSERT_EQ(answer(peer, landmarks(sequence)).update.observation_sequence, sequence);
   }
   const DaemonReport report =
       report_when(peer, [](const DaemonReport& told) { return told.usable == 20; });
@@ -154,9 +141,7 @@ TEST_F(ReportTest, EveryUpdateIsTimedStageByStage) {
 
 TEST_F(ReportTest, JournalIsNamedWithWhatItHoldsAndWhyItDoesNotRecord) {
   const test_support::TemporaryFolder folder;
-  ServiceOptions options = with_model();
-  options.journal_dir = folder.path();
-  serve(std::move(options));
+  serve(with_journal(folder.path(), open_surgery_file));
   RawPeer peer(endpoint_);
   begin_with_update(peer, 1);
   // An observation, its decision, its update.
@@ -170,12 +155,7 @@ TEST_F(ReportTest, JournalIsNamedWithWhatItHoldsAndWhyItDoesNotRecord) {
 
 TEST_F(ReportTest, WhatTheJournalLosesIsCounted) {
   const test_support::TemporaryFolder folder;
-  ServiceOptions options = with_model();
-  options.journal_dir = folder.path();
-  options.open_journal = [](const auto&, const auto&) -> Result<std::unique_ptr<RecordSink>> {
-    return fail(ErrorCode::kWriteFailed, "j.surgery: disk full");
-  };
-  serve(std::move(options));
+  serve(with_journal(folder.path(), disk_full));
   RawPeer peer(endpoint_);
   begin_with_update(peer, 1);
   const DaemonReport report =
@@ -202,13 +182,12 @@ TEST_F(ReportTest, WhatTheWorkerIsAtIsSeenWhileItIsAtIt) {
   serve(std::move(options));
   RawPeer peer(endpoint_);
   RawPeer watcher(endpoint_);
-  peer.request(MessageType::kStartSessionRequest,
-               wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}));
+  peer.request(MessageType::kStartSessionRequest, wire::encode(session_of()));
   preparing.get_future().wait();
   EXPECT_EQ(report_of(watcher).working_ms, 0.0);
   prepared.set_value();
   ASSERT_EQ(peer.receive().type, MessageType::kStartSessionReply);
-  peer.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  peer.hand_in(landmarks(1));
   entered.get_future().wait();
   const DaemonReport busy = report_of(watcher);
   EXPECT_GT(busy.working_ms, 0.0);
@@ -237,7 +216,7 @@ TEST_F(ReportTest, AWorkerThatIsBusyForLongerThanItMayHangsUntilItIsDone) {
   RawPeer peer(endpoint_);
   start_session(peer);
   EXPECT_FALSE(report_of(peer).worker_hangs());
-  peer.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  peer.hand_in(landmarks(1));
   entered.get_future().wait();
   EXPECT_TRUE(report_of(peer).worker_hangs());
   leave.set_value();
@@ -280,7 +259,7 @@ class RandomRun : public ReportTest {
       std::get<LandmarkPairs>(observation.body).deformed(0, 0) =
           std::numeric_limits<double>::quiet_NaN();
     }
-    const Received reply = peer.ask(MessageType::kObservation, wire::encode(observation));
+    const Received reply = peer.hand_in(observation);
     // One that cannot be read has no source; a source that nothing was accepted of has no row.
     const bool accepted = reply.type == MessageType::kObservationReply;
     if (accepted) known_.insert(source);
@@ -347,18 +326,15 @@ TEST_F(RandomRun, ReplacedAndSkippedAreCounted) {
   serve(
       with_inverter([&](int call, const SparseData& data, const auto& asked, auto& out) -> Status {
         if (call > 1) return follow_the_data(data, out, 4);
-        std::promise<void> stopped;
-        const std::stop_callback wake(asked.stop, [&] { stopped.set_value(); });
         entered.set_value();
-        stopped.get_future().wait();
-        return fail(ErrorCode::kNotConverged, "stopped");
+        return wait_for_stop(asked.stop);
       }));
   RawPeer peer(endpoint_);
   start_session(peer);
-  peer.ask(MessageType::kObservation, wire::encode(landmarks(1)));
+  peer.hand_in(landmarks(1));
   entered.get_future().wait();
   for (const std::uint64_t sequence : {2u, 3u}) {
-    peer.ask(MessageType::kObservation, wire::encode(landmarks(sequence)));
+    peer.hand_in(landmarks(sequence));
   }
   EXPECT_EQ(report_of(peer).sources.at(0).waiting, 2u) << "one at work, one in its box";
   start_session(peer);

@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "server/session/observation_rules.hpp"
 #include "tests/unit/server/fake_session.hpp"
 
 namespace brainshift::server {
@@ -37,10 +36,9 @@ class SessionTest : public testing::Test {
     }
     if (events.begun) told_.push_back("begun " + std::to_string(events.begun->info.session_id));
     if (events.changed) {
-      const SessionState state = session_.state(now_).shared;
-      told_.push_back("changed " + std::string(to_string(state.phase)) + " " +
-                      std::to_string(state.session.session_id) +
-                      (state.preparing ? " preparing" : ""));
+      const SessionState now = state().shared;
+      told_.push_back("changed " + std::string(to_string(now.phase)) + " " +
+                      std::to_string(now.session.session_id) + (now.preparing ? " preparing" : ""));
     }
     for (const SessionEvents::Answer& answer : events.answers) {
       told_.push_back("answer " + answer.ticket.client + ": " +
@@ -70,7 +68,10 @@ class SessionTest : public testing::Test {
     return preparation;
   }
   void prepare(const Preparation& preparation) {
-    auto inverter = std::make_unique<FakeInverter>(update_);
+    auto inverter = std::make_unique<FakeInverter>(
+        [this](int call, const SparseData& data, const auto& options, Estimate& estimate) {
+          return update_(call, data, options, estimate);
+        });
     inverter_ = inverter.get();
     session_.prepared(fake_session(std::move(inverter), preparation.request));
     act();
@@ -100,6 +101,12 @@ class SessionTest : public testing::Test {
     if (!job) return {};
     return finish(*job, run(*job)).value_or(UpdateMessage{});
   }
+  // That of this one, when nothing else waits.
+  UpdateMessage answer(const Observation& observation) {
+    EXPECT_TRUE(submit(observation).has_value());
+    return answer();
+  }
+  Session::State state() const { return session_.state(now_); }
   // A session that is asked for, made ready and begun.
   Result<SessionInfo> start(Boundary boundary = Boundary::kContact) {
     ask(request(boundary));
@@ -118,27 +125,33 @@ class SessionTest : public testing::Test {
 
   Session session_{kCase, kBootId, kModelId};
   Session::TimePoint now_{1h};
-  FakeInverter::Update update_ = echo;  // of the sessions that are made ready from now on
-  FakeInverter* inverter_ = nullptr;    // of the newest model
+  FakeInverter::Update update_ = echo;
+  FakeInverter* inverter_ = nullptr;  // of the newest model
   std::vector<Boundary> prepared_boundaries_;
   std::vector<std::string> told_;
   std::vector<Decision> decisions_;
   std::vector<Result<SessionInfo>> answers_;
 };
 
+class RunningSession : public SessionTest {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(start().has_value());
+    told();
+  }
+};
+
 TEST_F(SessionTest, RefusesObservationsBeforeASessionRuns) {
   EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(session_.state(now_).shared.session.session_id, 0u);
+  EXPECT_EQ(state().shared.session.session_id, 0u);
   EXPECT_FALSE(next_preparation());
   EXPECT_FALSE(next_job());
-  EXPECT_FALSE(session_.state(now_).busy);
+  EXPECT_FALSE(state().busy);
   EXPECT_THAT(told(), IsEmpty());
 }
 
-TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
-  const auto info = start();
-  ASSERT_TRUE(info.has_value());
-  EXPECT_EQ(info->key(), (SessionKey{kBootId, 1, kModelId}));
+TEST_F(RunningSession, AnswersAnObservationWithItsUpdate) {
+  EXPECT_EQ(answers_.back()->key(), (SessionKey{kBootId, 1, kModelId}));
   const auto admission = submit(landmarks(5));
   ASSERT_TRUE(admission.has_value());
   EXPECT_EQ(admission->receipt.observation_sequence, 5u);
@@ -149,7 +162,7 @@ TEST_F(SessionTest, AnswersAnObservationWithItsUpdate) {
   EXPECT_EQ(message.boot_id, kBootId);
   EXPECT_EQ(message.update.sequence, 1u);
   EXPECT_EQ(message.update.observation_sequence, 5u);
-  EXPECT_EQ(session_.state(now_).updates, 1u);
+  EXPECT_EQ(state().updates, 1u);
 }
 
 // The journal begins before the state is told, and the state is told before the answer.
@@ -161,15 +174,13 @@ TEST_F(SessionTest, SaysWhatHappensInItsOrder) {
   EXPECT_FALSE(next_preparation()) << "it is handed out once";
   prepare(*preparation);
   EXPECT_THAT(told(), ElementsAre("begun 1", "changed ready 1", "answer viewer: session 1"));
-  ASSERT_TRUE(submit(landmarks(1)));
-  EXPECT_EQ(answer().update.sequence, 1u);
+  EXPECT_EQ(answer(landmarks(1)).update.sequence, 1u);
   EXPECT_THAT(told(), ElementsAre("used pointer 1", "update 1"));
   EXPECT_FALSE(next_job());
   EXPECT_THAT(told(), ElementsAre("changed tracking 1")) << "after the update that changed it";
 }
 
-TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
-  ASSERT_TRUE(start().has_value());
+TEST_F(RunningSession, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
   SessionRequest other = request();
   other.case_id = "someone-else";
   ask(other);
@@ -179,104 +190,53 @@ TEST_F(SessionTest, AStartForAnotherCaseIsRefusedAndTheRunningSessionGoesOn) {
   EXPECT_TRUE(submit(landmarks(1)).has_value());
 }
 
-// ---------- the owner ----------
-
-TEST_F(SessionTest, AnotherClientEndsASessionOnlyByTakeoverOrWhenItsOwnerHasLeft) {
-  ASSERT_TRUE(start().has_value());
+TEST_F(RunningSession, AnotherClientEndsASessionOnlyByTakeoverOrWhenItsOwnerHasLeft) {
   SessionRequest again = request();
   ask(again, "another");
   EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
   EXPECT_THAT(answers_.back().error().message, HasSubstr("belongs to another client"));
-  EXPECT_EQ(session_.state(now_).owner, "viewer");
+  EXPECT_EQ(state().owner, "viewer");
   again.takeover = true;
   ask(again, "another");
   EXPECT_FALSE(next_preparation()) << "its model is at hand";
-  EXPECT_EQ(session_.state(now_).owner, "another");
+  EXPECT_EQ(state().owner, "another");
   again.takeover = false;
   ask(again, "viewer");
   EXPECT_EQ(answers_.back().error().code, ErrorCode::kUnavailable);
   session_.leave("another");
-  EXPECT_EQ(session_.state(now_).owner, "");
+  EXPECT_EQ(state().owner, "");
   ask(again, "viewer");
   EXPECT_FALSE(next_preparation());
-  EXPECT_EQ(session_.state(now_).owner, "viewer");
-  EXPECT_EQ(session_.state(now_).shared.session.session_id, 3u);
+  EXPECT_EQ(state().owner, "viewer");
+  EXPECT_EQ(state().shared.session.session_id, 3u);
 }
 
 // ---------- what is accepted ----------
 
-TEST_F(SessionTest, SequenceNumbersMustGrow) {
-  ASSERT_TRUE(start().has_value());
-  EXPECT_FALSE(submit(landmarks(0)).has_value());
-  EXPECT_TRUE(submit(landmarks(4)).has_value());
-  const auto late = submit(landmarks(3));
-  ASSERT_FALSE(late.has_value());
-  EXPECT_THAT(late.error().message, HasSubstr("observation.sequence = 3: must be above 4"));
-  EXPECT_TRUE(submit(landmarks(9)).has_value());
-}
-
-// A camera that counts fast does not shut out the ultrasound.
-TEST_F(SessionTest, EverySourceCountsForItself) {
-  ASSERT_TRUE(start().has_value());
-  EXPECT_TRUE(submit(landmarks(50, "camera")).has_value());
-  EXPECT_TRUE(submit(landmarks(6, "ius")).has_value());
-  EXPECT_FALSE(submit(landmarks(49, "camera")).has_value());
-  EXPECT_TRUE(submit(landmarks(7, "ius")).has_value());
-}
-
-TEST_F(SessionTest, ASequenceThatTheJournalCannotHoldIsRefusedAndLocksNothing) {
-  ASSERT_TRUE(start().has_value());
-  for (const std::uint64_t sequence : {Sources::kMaxSequence + 1, ~std::uint64_t{0}}) {
-    const auto refused = submit(landmarks(sequence));
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(refused.error().message, HasSubstr("must be at most 9223372036854775807"));
-  }
-  EXPECT_TRUE(submit(landmarks(1)).has_value());
-  EXPECT_TRUE(submit(landmarks(Sources::kMaxSequence)).has_value());
-}
-
-TEST_F(SessionTest, TheNumberOfSourcesIsBounded) {
-  ASSERT_TRUE(start().has_value());
-  for (std::size_t i = 0; i < Sources::kMaxSources; ++i) {
-    EXPECT_TRUE(submit(landmarks(1, "source " + std::to_string(i))).has_value());
-  }
-  const auto refused = submit(landmarks(1, "one too many"));
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
-}
-
-TEST_F(SessionTest, AnImplausibleClockIsRefusedAndAgesNobodyOut) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1, "camera")).has_value());
-  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
-  Observation ahead = landmarks(2, "ius");
-  ahead.acquired_ns = 3'600'000'000'000;
-  const auto refused = submit(ahead);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_THAT(refused.error().message, HasSubstr("jumped ahead"));
-  EXPECT_TRUE(submit(landmarks(2, "ius")).has_value()) << "its number is still free";
+// The rules are those of sources.hpp.
+TEST_F(RunningSession, WhatIsRefusedIsNotDecidedAndItsNumberIsStillFree) {
+  Observation wrong = landmarks(1, "ius");
+  wrong.acquired_ns = SourceClock::kMaxStamp_ns + 1;
+  for (const Observation& refused : {landmarks(0, "ius"), wrong}) EXPECT_FALSE(submit(refused));
+  EXPECT_FALSE(next_job());
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_TRUE(submit(landmarks(1, "ius")));
 }
 
 // The clock of one source an hour ahead of the other's: both are as young as they are.
-TEST_F(SessionTest, SourcesNeedNotShareAClock) {
-  ASSERT_TRUE(start().has_value());
+TEST_F(RunningSession, SourcesNeedNotShareAClock) {
   Observation camera = landmarks(1, "camera");
   camera.acquired_ns = 3'600'000'000'000;
-  ASSERT_TRUE(submit(camera).has_value());
-  answer();
+  answer(camera);
   now_ += 1s;
-  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
-  const UpdateMessage message = answer();
-  for (const Omission& omission : message.update.left_out) {
+  for (const Omission& omission : answer(landmarks(1, "ius")).update.left_out) {
     EXPECT_EQ(omission.part.find("source"), std::string::npos) << omission.reason;
   }
 }
 
 // A client that has lost the first answer asks again: nothing is estimated or decided twice.
-TEST_F(SessionTest, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(3)).has_value());
+TEST_F(RunningSession, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
+  ASSERT_TRUE(submit(landmarks(3)));
   const auto first = submit(landmarks(4));
   ASSERT_TRUE(first.has_value());
   EXPECT_TRUE(first->receipt.replaced_pending);
@@ -296,16 +256,15 @@ TEST_F(SessionTest, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
 
 // ---------- boxes and decisions ----------
 
-TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
+TEST_F(RunningSession, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
+  ASSERT_TRUE(submit(landmarks(1, "ius")));
   const auto first = next_job();
   told();
   EXPECT_FALSE(submit(landmarks(2, "ius"))->receipt.replaced_pending);
   EXPECT_TRUE(submit(landmarks(3, "ius"))->receipt.replaced_pending);
   EXPECT_FALSE(submit(landmarks(4, "pointer"))->receipt.replaced_pending);
   EXPECT_TRUE(submit(landmarks(5, "ius"))->receipt.replaced_pending);
-  EXPECT_TRUE(session_.state(now_).busy);
+  EXPECT_TRUE(state().busy);
   finish(*first, run(*first));
   answer();
   answer();
@@ -320,15 +279,12 @@ TEST_F(SessionTest, TheLatestObservationOfASourceReplacesOneThatHasNotStarted) {
   EXPECT_TRUE(decisions_[2].reason.empty());
 }
 
-TEST_F(SessionTest, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAnswered) {
+TEST_F(RunningSession, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAnswered) {
   update_ = [](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
     if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
     return follow_the_data(data, out, 4);
   };
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1, "ius")).has_value());
-  told();
-  const UpdateMessage failed = answer();
+  const UpdateMessage failed = answer(landmarks(1, "ius"));
   ASSERT_TRUE(failed.error.has_value());
   EXPECT_EQ(failed.error->message, "no luck");
   EXPECT_EQ(failed.update.observation_sequence, 1u);
@@ -337,35 +293,30 @@ TEST_F(SessionTest, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAnswer
   EXPECT_TRUE(failed.update.final);
   EXPECT_THAT(told(), ElementsAre("failed ius 1", "update 1"));
   EXPECT_THAT(decisions_[0].reason, HasSubstr("no luck"));
-  EXPECT_EQ(session_.state(now_).updates, 0u);
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kDegraded);
-  ASSERT_TRUE(submit(landmarks(2, "ius")).has_value());
-  EXPECT_FALSE(answer().error.has_value());
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kTracking);
+  EXPECT_EQ(state().updates, 0u);
+  EXPECT_EQ(state().shared.phase, SessionPhase::kDegraded);
+  EXPECT_FALSE(answer(landmarks(2, "ius")).error.has_value());
+  EXPECT_EQ(state().shared.phase, SessionPhase::kTracking);
 }
 
-TEST_F(SessionTest, AnUnusableFieldIsUsedUpAndTheOneBeforeItStays) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1)).has_value());
-  answer();
-  ASSERT_TRUE(submit(landmarks(2, "pointer", kMostMotion_mm + 1.0)).has_value());
-  EXPECT_FALSE(answer().update.usable());
-  const SessionState state = session_.state(now_).shared;
-  EXPECT_EQ(state.phase, SessionPhase::kDegraded);
-  EXPECT_THAT(state.reason, HasSubstr("motion 51 mm"));
-  EXPECT_EQ(state.newest_update, 2u);
-  EXPECT_EQ(state.newest_usable, 1u);
+TEST_F(RunningSession, AnUnusableFieldIsUsedUpAndTheOneBeforeItStays) {
+  answer(landmarks(1));
+  EXPECT_FALSE(answer(landmarks(2, "pointer", kMostMotion_mm + 1.0)).update.usable());
+  const SessionState now = state().shared;
+  EXPECT_EQ(now.phase, SessionPhase::kDegraded);
+  EXPECT_THAT(now.reason, HasSubstr("motion 51 mm"));
+  EXPECT_EQ(now.newest_update, 2u);
+  EXPECT_EQ(now.newest_usable, 1u);
   EXPECT_EQ(decisions_.back().outcome, Outcome::kUsed);
-  EXPECT_EQ(decisions_.back().reason, state.reason);
-  EXPECT_EQ(session_.state(now_).updates, 2u);
+  EXPECT_EQ(decisions_.back().reason, now.reason);
+  EXPECT_EQ(state().updates, 2u);
 }
 
-class LeavingTest : public SessionTest {
+class LeavingTest : public RunningSession {
  protected:
   // One observation is at work and one waits while `end` ends the session.
   template <typename End>
   void skips_both(const End& end) {
-    ASSERT_TRUE(start().has_value());
     ASSERT_TRUE(submit(landmarks(1, "ius")));
     const auto job = next_job();
     ASSERT_TRUE(submit(landmarks(2, "ius")));
@@ -387,60 +338,45 @@ class LeavingTest : public SessionTest {
 
 TEST_F(LeavingTest, WhatANewSessionFindsIsSkippedAndNotPublished) {
   skips_both([&] { ask(request()), next_preparation(); });
-  EXPECT_EQ(session_.state(now_).shared.session.session_id, 2u);
+  EXPECT_EQ(state().shared.session.session_id, 2u);
 }
 
 TEST_F(LeavingTest, WhatStopFindsIsSkippedAndNotPublished) {
   skips_both([&] { session_.stop(), session_.stop(), act(); });
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kClosed);
-}
-
-TEST_F(SessionTest, WhatIsRefusedIsNotDecided) {
-  ASSERT_TRUE(start().has_value());
-  told();
-  EXPECT_FALSE(submit(landmarks(0, "ius")));
-  EXPECT_FALSE(next_job());
-  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(state().shared.phase, SessionPhase::kClosed);
 }
 
 // ---------- one session after the other ----------
 
-TEST_F(SessionTest, ANewSessionCountsFromTheStart) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(4)).has_value());
-  answer();
+TEST_F(RunningSession, ANewSessionCountsFromTheStart) {
+  answer(landmarks(4));
   ASSERT_TRUE(start().has_value());
   EXPECT_EQ(answers_.back()->session_id, 2u);
   EXPECT_FALSE(submit(landmarks(5)).has_value()) << "the first session has ended";
-  EXPECT_TRUE(submit(in_session(2, landmarks(1))).has_value());
-  const UpdateMessage message = answer();
+  const UpdateMessage message = answer(in_session(2, landmarks(1)));
   EXPECT_EQ(message.update.sequence, 1u);
   EXPECT_EQ(message.session_id, 2u);
 }
 
 // What an earlier session observed and estimated is not used in the next one.
-TEST_F(SessionTest, ANewSessionRemembersNothingOfAnEarlierOne) {
+TEST_F(RunningSession, ANewSessionRemembersNothingOfAnEarlierOne) {
   std::vector<std::size_t> sources;
   update_ = [&](int, const SparseData& data, const auto&, Estimate& out) {
     sources.push_back(data.sources.size());
     return follow_the_data(data, out, 4);
   };
+  answer(landmarks(1, "ius"));
+  answer(landmarks(2, "pointer"));
   ASSERT_TRUE(start().has_value());
-  for (const auto& observation : {landmarks(1, "ius"), landmarks(2, "pointer")}) {
-    ASSERT_TRUE(submit(observation).has_value());
-    answer();
-  }
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(in_session(2, landmarks(1, "pointer"))).has_value());
-  answer();
+  answer(in_session(2, landmarks(1, "pointer")));
   EXPECT_THAT(sources, ElementsAre(1u, 2u, 1u));
   EXPECT_EQ(inverter_->resets, 2);  // one model for both sessions
 }
 
 TEST_F(SessionTest, EachBoundaryIsPreparedOnce) {
-  ASSERT_TRUE(start(Boundary::kContact).has_value());
-  ASSERT_TRUE(start(Boundary::kFixed).has_value());
-  ASSERT_TRUE(start(Boundary::kContact).has_value());
+  for (const Boundary boundary : {Boundary::kContact, Boundary::kFixed, Boundary::kContact}) {
+    ASSERT_TRUE(start(boundary).has_value());
+  }
   EXPECT_THAT(prepared_boundaries_, ElementsAre(Boundary::kContact, Boundary::kFixed));
 }
 
@@ -449,7 +385,7 @@ TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
   ASSERT_TRUE(next_preparation());
   fail_to_prepare({ErrorCode::kFloatingBody, "free to float"});
   EXPECT_EQ(answers_.back().error().code, ErrorCode::kFloatingBody);
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kEmpty);
+  EXPECT_EQ(state().shared.phase, SessionPhase::kEmpty);
   EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
   EXPECT_TRUE(start().has_value());
 }
@@ -457,7 +393,7 @@ TEST_F(SessionTest, APreparationThatFailsIsReportedAndTriedAgain) {
 TEST_F(SessionTest, ALaterStartStopsAPreparationAndAnswersIt) {
   ask(request(Boundary::kContact));
   const auto first = next_preparation();
-  EXPECT_TRUE(session_.state(now_).busy);
+  EXPECT_TRUE(state().busy);
   ask(request(Boundary::kFixed));
   EXPECT_TRUE(first->stop.stop_requested());
   EXPECT_FALSE(next_preparation()) << "one at a time";
@@ -474,11 +410,8 @@ TEST_F(SessionTest, ALaterStartStopsAPreparationAndAnswersIt) {
 }
 
 // The update that is on its way to the viewers is told before the session that follows.
-TEST_F(SessionTest, AReadySessionWaitsForTheJobAndALaterOneOvertakesIt) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1)).has_value());
-  const auto job = next_job();
-  ASSERT_TRUE(finish(*job, run(*job)));
+TEST_F(RunningSession, AReadySessionWaitsForTheJobAndALaterOneOvertakesIt) {
+  answer(landmarks(1));
   ask(request());
   next_preparation();
   EXPECT_EQ(answers_.size(), 1u);
@@ -508,9 +441,8 @@ class PreparingTest : public SessionTest {
 };
 
 TEST_F(PreparingTest, TheRunningSessionGoesOnUntilTheNextIsReady) {
-  EXPECT_TRUE(session_.state(now_).shared.preparing);
-  ASSERT_TRUE(submit(landmarks(1)).has_value());
-  EXPECT_EQ(answer().session_id, 1u);
+  EXPECT_TRUE(state().shared.preparing);
+  EXPECT_EQ(answer(landmarks(1)).session_id, 1u);
   next_job();
   prepare(*preparation_);
   ASSERT_TRUE(answers_.at(0).has_value());
@@ -523,7 +455,7 @@ TEST_F(PreparingTest, StopEndsAPreparation) {
   session_.stop();
   act();
   EXPECT_TRUE(preparation_->stop.stop_requested());
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kClosed);
+  EXPECT_EQ(state().shared.phase, SessionPhase::kClosed);
   fail_to_prepare({ErrorCode::kUnavailable, "stopped"});
   EXPECT_EQ(answers_.at(0).error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(submit(landmarks(1)).error().code, ErrorCode::kModelNotReady);
@@ -554,14 +486,13 @@ TEST_F(PreparingTest, AStartThatWaitsForItIsAnsweredWhenItsOwnerLeaves) {
 }
 
 // Only the condensed method needs no factor: every other session ends before the next is prepared.
-TEST_F(SessionTest, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
-  ASSERT_TRUE(start().has_value());
+TEST_F(RunningSession, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
   ASSERT_TRUE(submit(landmarks(1)).has_value());
   const auto job = next_job();
   ask(request(Boundary::kFixed));
   EXPECT_FALSE(next_preparation()) << "the job still uses the factor";
   EXPECT_TRUE(job->stop.stop_requested());
-  EXPECT_EQ(session_.state(now_).shared.phase, SessionPhase::kPreparing);
+  EXPECT_EQ(state().shared.phase, SessionPhase::kPreparing);
   EXPECT_FALSE(finish(*job, run(*job)).has_value());
   EXPECT_TRUE(next_preparation().has_value());
   session_.stop();
@@ -571,34 +502,22 @@ TEST_F(SessionTest, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
 
 // ---------- what is told of it ----------
 
-TEST_F(SessionTest, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
-  ASSERT_TRUE(start().has_value());
-  EXPECT_EQ(session_.state(now_).working_s, 0.0);
-  EXPECT_GT(session_.state(now_).max_age_s, 0.0);
+TEST_F(RunningSession, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
+  EXPECT_EQ(state().working_s, 0.0);
+  EXPECT_GT(state().max_age_s, 0.0);
   ASSERT_TRUE(submit(landmarks(1)).has_value());
   now_ += 2s;
   const auto job = next_job();
   EXPECT_EQ(job->begun - job->arrived, 2s);
   now_ += 3s;
-  EXPECT_EQ(session_.state(now_).working_s, 3.0);
-  EXPECT_EQ(session_.state(now_).deadline_s, kNoDeadline_s);
+  EXPECT_EQ(state().working_s, 3.0);
+  EXPECT_EQ(state().deadline_s, kNoDeadline_s);
   finish(*job, run(*job));
-  EXPECT_EQ(session_.state(now_).working_s, 3.0) << "it is being published";
+  EXPECT_EQ(state().working_s, 3.0) << "it is being published";
   next_job();
-  EXPECT_EQ(session_.state(now_).working_s, 0.0);
-  EXPECT_EQ(session_.state(now_).deadline_s, 0.0);
-  EXPECT_EQ(session_.state(now_).shared.age_ms, 5000.0) << "since the observation arrived";
-}
-
-TEST_F(SessionTest, IteratesCarryTheirUpdatesNumberAndSession) {
-  ASSERT_TRUE(start().has_value());
-  ASSERT_TRUE(submit(landmarks(1)).has_value());
-  const auto job = next_job();
-  const UpdateMessage iterate = job->message({});
-  const auto last = finish(*job, run(*job));
-  EXPECT_EQ(iterate.update.sequence, last->update.sequence);
-  EXPECT_EQ(iterate.session_id, last->session_id);
-  EXPECT_EQ(iterate.boot_id, kBootId);
+  EXPECT_EQ(state().working_s, 0.0);
+  EXPECT_EQ(state().deadline_s, 0.0);
+  EXPECT_EQ(state().shared.age_ms, 5000.0) << "since the observation arrived";
 }
 
 }  // namespace

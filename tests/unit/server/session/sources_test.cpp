@@ -14,7 +14,120 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr std::int64_t kSourceHour = 3'600'000'000'000;
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kHour = 3600 * kSecond;
+constexpr double kMaxAge_s = 120.0;
+
+// ---------- what is well-formed ----------
+
+TEST(CheckObservation, NamesTheRuleThatIsBroken) {
+  const struct {
+    void (*spoil)(Observation&);
+    const char* says;
+  } rows[] = {{[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
+              {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
+              {[](Observation& o) { o.source.clear(); }, "source"},
+              {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
+              {[](Observation& o) { o.session = {}; }, "session is absent"},
+              {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
+              {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
+              {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
+              {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
+  const SessionKey running{kBootId, 1, kModelId};
+  ASSERT_TRUE(check_observation(landmarks(2), kCase, running));
+  for (const auto& row : rows) {
+    SCOPED_TRACE(row.says);
+    Observation observation = landmarks(2);
+    row.spoil(observation);
+    const auto status = check_observation(observation, kCase, running);
+    ASSERT_FALSE(status.has_value());
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(status.error().message, HasSubstr(row.says));
+    EXPECT_THAT(status.error().message, testing::Not(HasSubstr("\n")));
+  }
+}
+
+TEST(InQuotes, IsOneShortLineWhateverItHolds) {
+  EXPECT_EQ(in_quotes("plain"), "\"plain\"");
+  EXPECT_EQ(in_quotes("a\nb\x1b"), "\"a?b?\"");
+  EXPECT_EQ(in_quotes(std::string(200, 'x')), "\"" + std::string(64, 'x') + "...\"");
+}
+
+// ---------- clocks ----------
+
+Observation seen(std::int64_t acquired_ns, std::int64_t sent_ns = 0) {
+  Observation observation = landmarks(1, "ius");
+  observation.acquired_ns = acquired_ns;
+  observation.sent_ns = sent_ns;
+  return observation;
+}
+
+void expect_refused(const Result<std::int64_t>& time, const std::string& why) {
+  ASSERT_FALSE(time);
+  EXPECT_EQ(time.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(time.error().message, HasSubstr(why));
+}
+
+// Whatever the source's clock shows, only differences count.
+TEST(SourceClock, TheFastestMessageSetsTheOffset) {
+  for (const std::int64_t zero : {std::int64_t{0}, kHour, -kHour, 100'000 * kHour}) {
+    SourceClock clock(kMaxAge_s);
+    EXPECT_EQ(clock.to_daemon(seen(zero), 500 * kSecond).value(), 500 * kSecond);
+    EXPECT_EQ(clock.to_daemon(seen(zero + 10 * kSecond), 512 * kSecond).value(), 510 * kSecond)
+        << "2 s under way";
+    EXPECT_EQ(clock.to_daemon(seen(zero + 20 * kSecond), 519 * kSecond).value(), 519 * kSecond)
+        << "the first one took 1 s more";
+    EXPECT_EQ(clock.to_daemon(seen(zero + 30 * kSecond), 530 * kSecond).value(), 529 * kSecond);
+  }
+}
+
+TEST(SourceClock, AnOldDatumIsRefusedAndTheNextFreshOneIsTaken) {
+  SourceClock clock(kMaxAge_s);
+  ASSERT_TRUE(clock.to_daemon(seen(0), 0));
+  expect_refused(clock.to_daemon(seen(kSecond), kHour), "3599 s old when it arrived");
+  EXPECT_EQ(clock.to_daemon(seen(kHour), kHour + kSecond).value(), kHour);
+}
+
+TEST(SourceClock, WithTheTimeOfHandOverTheFirstOneCanBeRefusedToo) {
+  SourceClock clock(kMaxAge_s);
+  expect_refused(clock.to_daemon(seen(0, kHour), 5 * kSecond), "3600 s old when it arrived");
+  expect_refused(clock.to_daemon(seen(kSecond, 0 - kSecond), 5 * kSecond), "2 s after it was sent");
+  EXPECT_EQ(clock.to_daemon(seen(kHour, kHour + kSecond), 7 * kSecond).value(), 6 * kSecond);
+}
+
+TEST(SourceClock, OneStampThatIsAheadChangesNothing) {
+  SourceClock clock(kMaxAge_s);
+  ASSERT_TRUE(clock.to_daemon(seen(0), 0));
+  expect_refused(clock.to_daemon(seen(kHour), kSecond), "jumped ahead by 3599 s");
+  EXPECT_EQ(clock.to_daemon(seen(2 * kSecond), 2 * kSecond).value(), 2 * kSecond);
+}
+
+TEST(SourceClock, ASourceThatHasSetItsClockIsFollowed) {
+  SourceClock clock(kMaxAge_s);
+  ASSERT_TRUE(clock.to_daemon(seen(0), 0));
+  EXPECT_FALSE(clock.to_daemon(seen(kHour), kSecond));
+  EXPECT_EQ(clock.to_daemon(seen(kHour + kSecond), 2 * kSecond).value(), 2 * kSecond);
+}
+
+TEST(SourceClock, WhatWasAcquiredBeforeTheLastOneIsRefused) {
+  SourceClock clock(kMaxAge_s);
+  ASSERT_TRUE(clock.to_daemon(seen(10 * kSecond), 10 * kSecond));
+  expect_refused(clock.to_daemon(seen(8 * kSecond), 11 * kSecond), "2 s before the one before it");
+  EXPECT_TRUE(clock.to_daemon(seen(10 * kSecond), 12 * kSecond)) << "the same instant is no error";
+}
+
+TEST(SourceClock, StampsThatNoClockShowsAreRefused) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  for (const std::int64_t stamp : {Limits::min(), Limits::max(), SourceClock::kMaxStamp_ns + 1}) {
+    SourceClock clock(kMaxAge_s);
+    expect_refused(clock.to_daemon(seen(stamp), 0), "acquired_ns");
+    expect_refused(clock.to_daemon(seen(0, stamp), 0), "sent_ns");
+    expect_refused(recorded_time(seen(stamp)), "acquired_ns");
+  }
+  EXPECT_EQ(recorded_time(seen(-kHour)).value(), -kHour);
+}
+
+// ---------- sources ----------
 
 Observation with_stamp(Observation observation, std::int64_t acquired_ns) {
   observation.acquired_ns = acquired_ns;
@@ -39,10 +152,37 @@ TEST(Sources, WhatIsRefusedTakesNoPlaceAndNoNumber) {
   EXPECT_TRUE(sources.admit(landmarks(2, "source 0"), 0, false)) << "those known go on";
 }
 
+// Each source counts for itself: a camera that counts fast does not shut out the ultrasound. The
+// journal cannot hold numbers above kMaxSequence; one of those locks nothing.
+TEST(Sources, ASequenceNumberMustBeAboveTheLastOneOfItsSource) {
+  Sources sources(kMaxAge_s, false);
+  const auto refused = [&](std::uint64_t sequence, const char* source, const char* says) {
+    const auto admission = sources.admit(landmarks(sequence, source), 0, false);
+    ASSERT_FALSE(admission) << sequence;
+    EXPECT_EQ(admission.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(admission.error().message, HasSubstr(says));
+  };
+  const auto taken = [&](std::uint64_t sequence, const char* source) {
+    return sources.admit(landmarks(sequence, source), 0, false).has_value();
+  };
+  refused(0, "ius", "observation.sequence = 0: must be above 0");
+  EXPECT_TRUE(taken(4, "ius"));
+  refused(3, "ius", "observation.sequence = 3: must be above 4");
+  EXPECT_TRUE(taken(9, "ius"));
+  EXPECT_TRUE(taken(50, "camera"));
+  EXPECT_TRUE(taken(10, "ius"));
+  refused(49, "camera", "must be above 50");
+  for (const std::uint64_t beyond : {Sources::kMaxSequence + 1, ~std::uint64_t{0}}) {
+    refused(beyond, "ius", "must be at most 9223372036854775807");
+  }
+  EXPECT_TRUE(taken(11, "ius"));
+  EXPECT_TRUE(taken(Sources::kMaxSequence, "ius"));
+}
+
 TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
   Sources sources(120.0, false);
   ASSERT_TRUE(sources.admit(landmarks(4), 0, true));
-  const auto again = sources.admit(landmarks(4), kSourceHour, false);
+  const auto again = sources.admit(landmarks(4), kHour, false);
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->repeated);
   EXPECT_EQ(again->receipt.observation_sequence, 4u);
@@ -53,17 +193,15 @@ TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
 
 TEST(Sources, EachHasAClockOfItsOwnAndFollowsOneThatWasSet) {
   Sources sources(120.0, false);
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kSourceHour), 7, false)->daemon_ns, 7);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, 7);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "camera"), 0), 9, false)->daemon_ns, 9);
-  EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kSourceHour), 10, false));
-  EXPECT_EQ(
-      sources.admit(with_stamp(landmarks(2, "camera"), kSourceHour + 1), 11, false)->daemon_ns, 11);
+  EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kHour), 10, false));
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
 }
 
 TEST(Sources, OfARecordingShareItsClock) {
   Sources sources(120.0, true);
-  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kSourceHour), 7, false)->daemon_ns,
-            kSourceHour);
+  EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, kHour);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "ius"), 3), 8, false)->daemon_ns, 3)
       << "a replay that begins again";
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,11 +26,8 @@ TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
   EXPECT_FALSE(status->model_ready);
   EXPECT_EQ(status->version, "1.2.3");
   EXPECT_EQ(error_of(peer.ask(MessageType::kModelRequest)).code, ErrorCode::kModelNotReady);
-  EXPECT_EQ(error_of(peer.ask(MessageType::kObservation, wire::encode(landmarks(1)))).code,
-            ErrorCode::kModelNotReady);
-  const auto start =
-      peer.ask(MessageType::kStartSessionRequest,
-               wire::encode(SessionRequest{kCase, Method::kPaper, Boundary::kContact, false}), 77);
+  EXPECT_EQ(error_of(peer.hand_in(landmarks(1))).code, ErrorCode::kModelNotReady);
+  const auto start = peer.start(session_of(), 77);
   EXPECT_EQ(start.request_id, 77u);
   EXPECT_EQ(error_of(start).code, ErrorCode::kModelNotReady);
   EXPECT_EQ(error_of(start).message, "no model is loaded");
@@ -53,43 +51,25 @@ TEST_F(TransportTest, AnswersStatusModelAndSession) {
   EXPECT_EQ(state.valid_ms, 1000u);
 }
 
-TEST_F(TransportTest, RefusesAnObservationOfAnotherCase) {
+TEST_F(TransportTest, WhatIsRefusedIsToldWithItsReason) {
   serve(with_model());
   RawPeer peer(endpoint_);
+  const Error early = error_of(peer.hand_in(landmarks(1)));
+  EXPECT_EQ(early.code, ErrorCode::kModelNotReady);
+  EXPECT_THAT(early.message, HasSubstr("no session"));
   start_session(peer);
-  Observation observation = landmarks(1);
-  observation.case_id = "someone-else";
-  const Error error = error_of(peer.ask(MessageType::kObservation, wire::encode(observation)));
-  EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(error.message, HasSubstr("someone-else"));
-}
-
-TEST_F(TransportTest, RefusesAnObservationThatIsNotFinite) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  start_session(peer);
-  Observation observation = landmarks(1);
-  std::get<LandmarkPairs>(observation.body).deformed(0, 0) =
+  Observation other_case = landmarks(1);
+  other_case.case_id = "someone-else";
+  const Error other = error_of(peer.hand_in(other_case));
+  EXPECT_EQ(other.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(other.message, HasSubstr("someone-else"));
+  Observation not_finite = landmarks(1);
+  std::get<LandmarkPairs>(not_finite.body).deformed(0, 0) =
       std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(error_of(peer.ask(MessageType::kObservation, wire::encode(observation))).code,
-            ErrorCode::kNotFinite);
-}
-
-TEST_F(TransportTest, RefusesASessionForAnotherCase) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  const SessionRequest request{"someone-else", Method::kPaper, Boundary::kContact, false};
-  const auto reply = peer.ask(MessageType::kStartSessionRequest, wire::encode(request), 5);
-  EXPECT_EQ(reply.request_id, 5u);
-  EXPECT_EQ(error_of(reply).code, ErrorCode::kInvalidArgument);
-}
-
-TEST_F(TransportTest, AnObservationWithoutASessionIsRefused) {
-  serve(with_model());
-  RawPeer peer(endpoint_);
-  const Error error = error_of(peer.ask(MessageType::kObservation, wire::encode(landmarks(1))));
-  EXPECT_EQ(error.code, ErrorCode::kModelNotReady);
-  EXPECT_THAT(error.message, HasSubstr("no session"));
+  EXPECT_EQ(error_of(peer.hand_in(not_finite)).code, ErrorCode::kNotFinite);
+  const auto start = peer.start(session_of("someone-else"), 5);
+  EXPECT_EQ(start.request_id, 5u);
+  EXPECT_EQ(error_of(start).code, ErrorCode::kInvalidArgument);
 }
 
 // ---------- malformed messages ----------
@@ -103,15 +83,14 @@ TEST_F(TransportTest, AnswersGarbageWithAProtocolError) {
     peer.send(garbage);
     EXPECT_EQ(error_of(peer.receive()).code, ErrorCode::kProtocol);
   }
-  EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(peer.is_served());
 }
 
 TEST_F(TransportTest, AnyDamagedByteOfARequestIsNoticed) {
   serve(with_model());
   RawPeer peer(endpoint_);
-  const SessionRequest request{kCase, Method::kPaper, Boundary::kContact, false};
   const std::string good =
-      wire::encode_frame(MessageType::kStartSessionRequest, 3, wire::encode(request));
+      wire::encode_frame(MessageType::kStartSessionRequest, 3, wire::encode(session_of()));
   for (std::size_t i = 0; i < good.size(); ++i) {
     std::string damaged = good;
     damaged[i] = static_cast<char>(damaged[i] ^ 0x55);
@@ -149,7 +128,7 @@ TEST_F(TransportTest, AMessageOfSeveralPartsIsAProtocolError) {
   const Error error = error_of(peer.receive());
   EXPECT_EQ(error.code, ErrorCode::kProtocol);
   EXPECT_THAT(error.message, HasSubstr("500"));
-  EXPECT_EQ(peer.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(peer.is_served());
 }
 
 TEST_F(TransportTest, AnOversizedMessageEndsItsConnectionOnly) {
@@ -157,12 +136,66 @@ TEST_F(TransportTest, AnOversizedMessageEndsItsConnectionOnly) {
   options.max_message_mib = 1;
   serve(with_model(), options);
   RawPeer other(endpoint_);
-  ASSERT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  ASSERT_TRUE(other.is_served());
   RawPeer large(endpoint_);
   large.send(std::string(2 << 20, 'x'));
   // Its connection is closed, and what was under way on it is lost; it is served on the next one.
   EXPECT_TRUE(large.keeps_asking_until_answered());
-  EXPECT_EQ(other.ask(MessageType::kStatusRequest).type, MessageType::kStatusReply);
+  EXPECT_TRUE(other.is_served());
+}
+
+// ---------- many peers, many requests ----------
+
+TEST_F(TransportTest, BadPeersTakeNobodysPlace) {
+  RouterOptions options;
+  options.max_clients = 2;
+  serve(with_model(), options);
+  std::vector<std::unique_ptr<RawPeer>> bad;
+  for (int i = 0; i < 8; ++i) {
+    bad.push_back(std::make_unique<RawPeer>(endpoint_));
+    bad.back()->send("x");
+    EXPECT_EQ(error_of(bad.back()->receive()).code, ErrorCode::kProtocol);
+  }
+  expect_alive();
+}
+
+// More requests than the queue of a connection holds: every one is answered, in order.
+TEST_F(TransportTest, ManyRequestsInFlightAreAllAnswered) {
+  RouterOptions options;
+  options.send_queue = 2;
+  serve(with_model(), options);
+  RawPeer peer(endpoint_, 1);
+  constexpr std::uint64_t kRequests = 200;
+  for (std::uint64_t id = 1; id <= kRequests; ++id) {
+    peer.request(MessageType::kStatusRequest, {}, id);
+  }
+  for (std::uint64_t id = 1; id <= kRequests; ++id) ASSERT_EQ(peer.receive().request_id, id);
+}
+
+TEST_F(TransportTest, ARequestThatCarriesNothingMustBeEmpty) {
+  serve(with_model());
+  RawPeer peer(endpoint_);
+  for (const MessageType type : {MessageType::kStatusRequest, MessageType::kModelRequest}) {
+    const Error error = error_of(peer.ask(type, "rubbish"));
+    EXPECT_EQ(error.code, ErrorCode::kProtocol);
+    EXPECT_THAT(error.message, HasSubstr("must be empty"));
+  }
+}
+
+TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
+  RouterOptions options;
+  options.max_clients = 2;
+  serve(with_model(), options);
+  RawPeer first(endpoint_);
+  auto second = std::make_unique<RawPeer>(endpoint_);
+  subscribe(first);
+  subscribe(*second);
+  RawPeer third(endpoint_);
+  const Error refused = error_of(third.ask(MessageType::kStatusRequest));
+  EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
+  EXPECT_THAT(refused.message, HasSubstr("2 clients"));
+  second.reset();
+  EXPECT_TRUE(eventually([&] { return third.is_served(); }));
 }
 
 // ---------- binding ----------

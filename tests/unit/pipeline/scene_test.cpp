@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/pipeline/scene_plan.hpp"
+#include "common/pipeline/scene.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -97,6 +97,46 @@ TEST(PlanScene, RefusesPartsForcedOffThatTheMethodAlwaysCarries) {
   config = {};
   config.scene.gravity_modes = Carry::kOff;
   expect_refused(config, Method::kPaper, Boundary::kContact, "scene.gravity_modes = off");
+}
+
+TEST(PriorOmissions, ListsThePartsOfThePriorThatTheCaseSwitchesOff) {
+  PriorConfig prior;
+  prior.force_density_sd_n_m3 = prior.medium_density_sd_n_m3;
+  prior.gravity_direction_sd_deg = 10.0;
+  prior.resection_weight_sd = 1.0;
+  prior.resection_stress_sd_pa = 300.0;
+  EXPECT_TRUE(prior_omissions(prior).empty());
+  prior.tumour_volume_strain_sd = 0.0;
+  prior.gravity_levels_mm.clear();
+  prior.resection_weight_sd = 0.0;  // its stress stays
+  const auto left_out = prior_omissions(prior);
+  ASSERT_EQ(left_out.size(), 2u);
+  EXPECT_EQ(left_out[0].part, "gravity modes");
+  EXPECT_EQ(left_out[1].part, "swelling of the tumour");
+  EXPECT_THAT(left_out[1].reason, HasSubstr("prior.tumour_volume_strain_sd"));
+  EXPECT_THAT(left_out[1].estimated_error, HasSubstr("1.7 mm at the cortex"));
+  prior.resection_stress_sd_pa = 0.0;
+  EXPECT_EQ(prior_omissions(prior).size(), 3u);
+}
+
+// By default other parts stand for three; without those these are missing.
+TEST(PriorOmissions, SaysThatAnotherPartTakesThePlaceOfOneThatIsOff) {
+  PriorConfig prior;
+  const auto by_default = prior_omissions(prior);
+  ASSERT_EQ(by_default.size(), 3u);
+  EXPECT_EQ(by_default[0].part, "buoyancy across gravity");
+  EXPECT_THAT(by_default[0].estimated_error,
+              HasSubstr("the coarse residual field takes its place"));
+  EXPECT_EQ(by_default[1].part, "resection");
+  EXPECT_THAT(by_default[1].estimated_error, HasSubstr("swelling of the tumour takes its place"));
+  EXPECT_EQ(by_default[2].part, "fine residual field");
+  EXPECT_THAT(by_default[2].estimated_error,
+              HasSubstr("the medium residual field takes its place"));
+  prior.medium_density_sd_n_m3 = 0.0;
+  const auto none = prior_omissions(prior);
+  ASSERT_EQ(none.size(), 4u);
+  EXPECT_EQ(none[2].part, "fine residual field");
+  EXPECT_THAT(none[2].estimated_error, HasSubstr("0.1 mm at the cortex"));
 }
 
 TEST(RegionOfInterest, IsTheNodesNoFartherFromTheTumourThanAsked) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/faults/raw_peer.hpp"
+#include "tests/support/zmtp_peer.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace brainshift::faults {
+namespace brainshift::test_support {
 namespace {
 
 constexpr int kPatience_ms = 5000;
@@ -48,7 +49,7 @@ std::uint16_t port_of(const std::string& endpoint) {
   return static_cast<std::uint16_t>(std::stoi(endpoint.substr(colon + 1)));
 }
 
-RawPeer::RawPeer(std::uint16_t port) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+ZmtpPeer::ZmtpPeer(std::uint16_t port) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
@@ -59,18 +60,18 @@ RawPeer::RawPeer(std::uint16_t port) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CL
   fd_ = -1;
 }
 
-RawPeer::~RawPeer() {
+ZmtpPeer::~ZmtpPeer() {
   if (fd_ >= 0) close(fd_);
 }
 
-RawPeer::RawPeer(RawPeer&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+ZmtpPeer::ZmtpPeer(ZmtpPeer&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
 
-RawPeer& RawPeer::operator=(RawPeer&& other) noexcept {
+ZmtpPeer& ZmtpPeer::operator=(ZmtpPeer&& other) noexcept {
   std::swap(fd_, other.fd_);
   return *this;
 }
 
-bool RawPeer::send_bytes(std::string_view bytes) {
+bool ZmtpPeer::send_bytes(std::string_view bytes) {
   while (!bytes.empty()) {
     pollfd writable{fd_, POLLOUT, 0};
     if (fd_ < 0 || poll(&writable, 1, kPatience_ms) != 1) return false;
@@ -81,7 +82,7 @@ bool RawPeer::send_bytes(std::string_view bytes) {
   return true;
 }
 
-bool RawPeer::receive_bytes(std::size_t count) {
+bool ZmtpPeer::receive_bytes(std::size_t count) {
   std::array<char, 256> buffer{};
   while (count > 0) {
     pollfd readable{fd_, POLLIN, 0};
@@ -93,22 +94,33 @@ bool RawPeer::receive_bytes(std::size_t count) {
   return true;
 }
 
-bool RawPeer::shake_hands() {
+bool ZmtpPeer::sees_the_end() const {
+  const timeval limit{10, 0};
+  setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  std::array<char, 4096> buffer{};
+  while (true) {
+    const ssize_t got = recv(fd_, buffer.data(), buffer.size(), 0);
+    if (got == 0 || (got < 0 && errno == ECONNRESET)) return true;
+    if (got < 0) return false;
+  }
+}
+
+bool ZmtpPeer::shake_hands() {
   return send_bytes(greeting()) && receive_bytes(64) && send_bytes(ready_command()) &&
          receive_bytes(2);
 }
 
-bool RawPeer::greet() { return send_bytes(greeting() + ready_command()); }
+bool ZmtpPeer::greet() { return send_bytes(greeting() + ready_command()); }
 
-bool RawPeer::send_part(std::string_view body, bool more) {
+bool ZmtpPeer::send_part(std::string_view body, bool more) {
   std::string bytes(1, static_cast<char>((more ? kMore : 0) | (body.size() > 255 ? kLong : 0)));
   bytes += big_endian(body.size(), body.size() > 255 ? 8 : 1);
   bytes += body;
   return send_bytes(bytes);
 }
 
-bool RawPeer::claim_part(std::uint64_t size) {
+bool ZmtpPeer::claim_part(std::uint64_t size) {
   return send_bytes(std::string(1, kLong) + big_endian(size, 8));
 }
 
-}  // namespace brainshift::faults
+}  // namespace brainshift::test_support

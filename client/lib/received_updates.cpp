@@ -1,11 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client/lib/field_assembly.hpp"
+#include "client/lib/received_updates.hpp"
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace brainshift::client {
+
+void UpdateQueue::push(Result<UpdateMessage> update) {
+  updates_.push_back(std::move(update));
+  if (updates_.size() <= capacity_) return;
+  const auto iterate = std::find_if(updates_.begin(), updates_.end(), [](const auto& entry) {
+    return entry && !entry->error && !entry->update.final;
+  });
+  if (iterate != updates_.end()) updates_.erase(iterate);
+}
+
+void UpdateQueue::drop_older_than(const SessionState& state) {
+  std::erase_if(updates_, [&](const Result<UpdateMessage>& entry) {
+    if (!entry) return false;
+    if (entry->key() != state.session) return true;
+    const bool usable = !entry->error && entry->update.usable();
+    return entry->update.sequence < (usable ? state.newest_usable : state.newest_update);
+  });
+}
+
+std::optional<Result<UpdateMessage>> UpdateQueue::pop() {
+  if (updates_.empty()) return std::nullopt;
+  std::optional<Result<UpdateMessage>> front(std::move(updates_.front()));
+  updates_.pop_front();
+  return front;
+}
 
 void FieldAssembly::begin(const FieldChoice& choice) {
   holds_ = choice.tolerance_mm > 0.0;
@@ -69,6 +95,27 @@ bool FieldAssembly::apply(const UpdateMessage& message) {
     if (has_sd) held_->sd_mm[columns[i]] = changes.sd_mm[from];
   }
   return true;
+}
+
+void LatestUsable::begin(const SessionKey& session) {
+  session_ = session;
+  latest_.reset();
+}
+
+void LatestUsable::follow(const SessionKey& session) {
+  if (session != session_) begin(session);
+}
+
+bool LatestUsable::belongs(const SessionKey& session) const {
+  if (session_ == SessionKey{} || session == session_) return true;
+  return session.boot_id == session_.boot_id && session.session_id > session_.session_id;
+}
+
+void LatestUsable::take(const UpdateMessage& message) {
+  if (!belongs(message.key())) return;
+  follow(message.key());
+  if (message.error || !message.update.usable()) return;
+  latest_ = message;
 }
 
 }  // namespace brainshift::client

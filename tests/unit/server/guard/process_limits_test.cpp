@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/guard/file_limit.hpp"
+#include "server/guard/process_limits.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/main/health_command.hpp"
+#include "server/main/commands.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <string_view>
 #include <utility>
 
 #include "client/lib/client.hpp"
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/config/key_file.hpp"
-#include "server/main/exit_status.hpp"
 
 namespace brainshift::server {
 namespace {
+
+// A daemon that fails must end, also when nobody reads its stderr.
+constexpr int kReaderLimitMs = 500;
 
 Result<DaemonStatus> ask(const HealthArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
@@ -34,6 +40,16 @@ Result<DaemonStatus> ask(const HealthArguments& arguments) {
 }
 
 }  // namespace
+
+int print_error(const Error& error) {
+  std::string line = error.message;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  pollfd writable{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&writable, 1, kReaderLimitMs) != 0) {
+    std::fprintf(stderr, "brainshiftd: %s\n", line.c_str());
+  }
+  return exit_status(error.code);
+}
 
 Result<std::string> endpoint_to_ask(const std::string& endpoint) {
   static constexpr std::string_view kTcp = "tcp://";

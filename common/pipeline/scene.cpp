@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/pipeline/left_out.hpp"
+#include "common/pipeline/scene.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +9,9 @@
 #include <string>
 
 #include "common/fem/biot_matrix.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/registration/icp.hpp"
 
 namespace brainshift::pipeline {
 namespace {
@@ -26,7 +29,63 @@ std::string at_most_mm(double error_mm) {
                                  : std::string("unknown");
 }
 
+tl::unexpected<Error> refused(const char* part, const char* value, const std::string& reason) {
+  return fail(ErrorCode::kInvalidArgument, fmt::format("scene.{} = {}: {}", part, value, reason));
+}
+
+bool has_gravity_modes(const PriorConfig& prior) {
+  return prior.gravity_mode_sd > 0.0 && !prior.gravity_levels_mm.empty();
+}
+
 }  // namespace
+
+Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary boundary) {
+  const SceneConfig& scene = config.scene;
+  const std::string name(to_string(method));
+  const bool condensed = method == Method::kCondensed;
+  if (scene.pressure == Carry::kOn && method == Method::kIterativeSolver) {
+    return refused("pressure", "on", "method " + name + " has no solver for pore pressure");
+  }
+  if (scene.contact == Carry::kOn && boundary == Boundary::kFixed) {
+    return refused("contact", "on", "the fixed boundary has no contact");
+  }
+  if (scene.uncertainty == Carry::kOn && !condensed) {
+    return refused("uncertainty", "on", "method " + name + " computes no standard deviation");
+  }
+  if (scene.gravity_modes == Carry::kOn && !has_gravity_modes(config.prior)) {
+    return refused("gravity_modes", "on",
+                   "prior.gravity_mode_sd and prior.gravity_levels_mm leave none");
+  }
+  if (scene.contact == Carry::kOff && !condensed && boundary == Boundary::kContact) {
+    return refused("contact", "off", "method " + name + " always carries contact");
+  }
+  if (scene.gravity_modes == Carry::kOff && !condensed && has_gravity_modes(config.prior)) {
+    return refused("gravity_modes", "off",
+                   "method " + name + " always carries them; set prior.gravity_mode_sd to 0");
+  }
+  ScenePlan plan;
+  plan.pressure = scene.pressure == Carry::kOn;
+  plan.contact = boundary == Boundary::kContact && scene.contact != Carry::kOff;
+  plan.uncertainty = condensed && scene.uncertainty != Carry::kOff;
+  plan.gravity_modes = has_gravity_modes(config.prior) && scene.gravity_modes != Carry::kOff;
+  plan.far_field = !condensed || scene.far_field != Carry::kOff;
+  return plan;
+}
+
+std::vector<NodeIndex> region_of_interest(const BrainModel& model, double margin_mm) {
+  std::vector<NodeIndex> region;
+  const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  if (!tumour) return region;
+  for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+    const Vec3 node = model.mesh.nodes.col(i);
+    const geometry::ClosestPoint closest = tumour->closest(node);
+    const bool inside = tumour->triangle_normal(closest.triangle).dot(node - closest.point) <= 0.0;
+    if (inside || closest.distance_mm <= margin_mm) region.push_back(i);
+  }
+  return region;
+}
+
+// ---------- what is left out ----------
 
 std::vector<Omission> prior_omissions(const PriorConfig& prior) {
   struct Part {
@@ -36,7 +95,7 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
     double cortex_mm, tumour_mm;
     const char* instead = nullptr;  // the part that takes its place
   };
-  const bool no_gravity = prior.gravity_mode_sd == 0.0 || prior.gravity_levels_mm.empty();
+  const bool no_gravity = !has_gravity_modes(prior);
   const bool swells = prior.tumour_volume_strain_sd > 0.0 && !prior.tumour_volume_radii_mm.empty();
   const auto where_on = [](bool on, const char* name) { return on ? name : nullptr; };
   const char* const medium =
@@ -154,9 +213,7 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
                                      std::max(0.0, errors.nearest_slave_mm)),
                          at_most_mm(errors.contact_mm)});
   }
-  const bool has_modes =
-      config.prior.gravity_mode_sd > 0.0 && !config.prior.gravity_levels_mm.empty();
-  if (has_modes && scene.gravity_modes == Carry::kOff) {
+  if (has_gravity_modes(config.prior) && scene.gravity_modes == Carry::kOff) {
     omissions.push_back(
         {"gravity modes", "scene.gravity_modes = off", at_most_mm(errors.gravity_modes_mm)});
   }
@@ -171,22 +228,19 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
 }
 
 std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
-                                             double rotation_prior_sd_deg, bool start_only) {
+                                             bool start_only) {
   std::vector<Omission> omissions;
   const std::string size = at_most_mm(icp.left_out_rotation_mm) + " at the tumour's surface";
   if (!start_only && rotation == Carry::kOff) {
     omissions.push_back({"rotation", "scene.rotation = off: only a translation is aligned", size});
   } else if (!start_only && rotation == Carry::kAuto && !icp.rotation_observable) {
-    const std::string held =
-        rotation_prior_sd_deg > 0.0
-            ? fmt::format("held by a prior of {:.1f} deg", rotation_prior_sd_deg)
-            : std::string("undetermined");
     std::string axes;
     for (const std::string& axis : registration::not_shown(icp.observability)) axes += "; " + axis;
     omissions.push_back(
         {"rotation",
-         fmt::format("the boundary shows {} of 6 rigid motions; the others are {}{}",
-                     icp.observable_axes, held, axes),
+         fmt::format("the boundary shows {} of 6 rigid motions; the others are held by a prior of "
+                     "{:.1f} deg{}",
+                     icp.observable_axes, registration::IcpOptions{}.rotation_sd_deg, axes),
          size});
   }
   if (!icp.converged) {

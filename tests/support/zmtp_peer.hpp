@@ -3,23 +3,22 @@
 // peer needs: libzmq itself sends no half of a message.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
 
-namespace brainshift::faults {
+namespace brainshift::test_support {
 
 // "tcp://127.0.0.1:5555" -> 5555; throws std::runtime_error for anything else.
 std::uint16_t port_of(const std::string& endpoint);
 
-class RawPeer {
+class ZmtpPeer {
  public:
   // Connects; connected() tells whether that went well. Does not wait for the daemon's bytes.
-  explicit RawPeer(std::uint16_t port);
-  ~RawPeer();
-  RawPeer(RawPeer&& other) noexcept;
-  RawPeer& operator=(RawPeer&& other) noexcept;
+  explicit ZmtpPeer(std::uint16_t port);
+  ~ZmtpPeer();
+  ZmtpPeer(ZmtpPeer&& other) noexcept;
+  ZmtpPeer& operator=(ZmtpPeer&& other) noexcept;
 
   bool connected() const { return fd_ >= 0; }
   // Greets as a DEALER without security, until the daemon has done the same.
@@ -32,6 +31,8 @@ class RawPeer {
   bool claim_part(std::uint64_t size);
   // False when the connection is lost or takes nothing for 5 s.
   bool send_bytes(std::string_view bytes);
+  // Reads what comes until the daemon closes; false after 10 s.
+  bool sees_the_end() const;
 
  private:
   bool receive_bytes(std::size_t count);
@@ -39,4 +40,4 @@ class RawPeer {
   int fd_ = -1;
 };
 
-}  // namespace brainshift::faults
+}  // namespace brainshift::test_support

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "server/guard/file_limit.hpp"
+#include "server/guard/process_limits.hpp"
 
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -10,6 +11,12 @@ namespace brainshift::server {
 namespace {
 
 constexpr long kMostConnections = 1024;
+// Above what an update allocates (an encoded field of 18 thousand nodes has 0.6 MiB), so that none
+// costs page faults.
+constexpr int kOwnPages = 4 << 20;
+// What may stay free at the end of the heap. The default, once a threshold is fixed, is 128 KiB,
+// and every update would give memory back and ask for it again.
+constexpr int kKeptFree = 64 << 20;
 
 }  // namespace
 
@@ -26,6 +33,11 @@ long raise_file_limit() {
 int connections_within(long file_limit) {
   return static_cast<int>(
       std::clamp((file_limit - kReservedFiles) / kFilesPerConnection, 1L, kMostConnections));
+}
+
+void return_large_blocks() {
+  mallopt(M_MMAP_THRESHOLD, kOwnPages);
+  mallopt(M_TRIM_THRESHOLD, kKeptFree);
 }
 
 }  // namespace brainshift::server

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Changes go into the update that they name, or nowhere.
-#include "client/lib/field_assembly.hpp"
+#include "client/lib/received_updates.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,85 @@ namespace brainshift::client {
 namespace {
 
 using Outcome = FieldAssembly::Outcome;
+
+// ---------- those that wait ----------
+
+UpdateMessage queued_update(std::uint64_t sequence, bool final) {
+  UpdateMessage message;
+  message.update.sequence = sequence;
+  message.update.final = final;
+  return message;
+}
+
+std::vector<std::uint64_t> drain(UpdateQueue& queue) {
+  std::vector<std::uint64_t> sequences;
+  while (auto entry = queue.pop()) sequences.push_back(*entry ? (*entry)->update.sequence : 0);
+  return sequences;
+}
+
+TEST(UpdateQueue, KeepsTheOrderOfArrival) {
+  UpdateQueue queue(10);
+  for (std::uint64_t i = 1; i <= 5; ++i) queue.push(queued_update(i, i % 2 == 0));
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 2, 3, 4, 5}));
+}
+
+TEST(UpdateQueue, WhenFullTheOldestIterateGivesWay) {
+  UpdateQueue queue(3);
+  queue.push(queued_update(1, true));
+  queue.push(queued_update(2, false));
+  queue.push(queued_update(3, false));
+  queue.push(queued_update(4, false));
+  EXPECT_EQ(queue.size(), 3u);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 3, 4}));
+}
+
+TEST(UpdateQueue, FinalUpdatesAndErrorsAreNeverDropped) {
+  UpdateQueue queue(2);
+  queue.push(queued_update(1, true));
+  queue.push(fail(ErrorCode::kProtocol, "bad"));
+  auto failed = queued_update(3, false);
+  failed.error = Error{ErrorCode::kEmptySet, "no point"};
+  queue.push(failed);
+  queue.push(queued_update(4, true));
+  queue.push(queued_update(5, false));  // the only one that may go
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{1, 0, 3, 4}));
+}
+
+TEST(UpdateQueue, WhatTheDaemonHasNewerIsDropped) {
+  UpdateQueue queue(10);
+  const auto usable = [](std::uint64_t sequence, std::uint64_t session) {
+    UpdateMessage message = queued_update(sequence, true);
+    message.session_id = session;
+    message.update.estimate.quality.quality = Quality::kGood;
+    return message;
+  };
+  UpdateMessage failure = queued_update(4, true);
+  failure.session_id = 2;
+  failure.error = Error{ErrorCode::kEmptySet, "no point"};
+  UpdateMessage last = failure;
+  last.update.sequence = 5;
+  for (const auto& message : {usable(9, 1), usable(2, 2), usable(3, 2), failure, last}) {
+    queue.push(message);
+  }
+  queue.push(fail(ErrorCode::kProtocol, "bad"));
+  SessionState state;
+  state.session = {0, 2, ""};
+  state.newest_usable = 3;
+  state.newest_update = 5;
+  queue.drop_older_than(state);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{3, 5, 0}));
+}
+
+TEST(UpdateQueue, IteratesAloneNeverExceedTheCapacity) {
+  UpdateQueue queue(4);
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    queue.push(queued_update(i, false));
+    EXPECT_LE(queue.size(), 4u);
+  }
+  EXPECT_EQ(drain(queue), (std::vector<std::uint64_t>{997, 998, 999, 1000}));
+}
+
+// ---------- changes go into the update that they name, or nowhere ----------
 
 const SessionKey kSession{7, 1, "model"};
 
@@ -142,6 +220,92 @@ TEST(FieldAssembly, AnotherChoiceForgetsAndWithoutAToleranceNothingIsHeld) {
   EXPECT_EQ(held.complete(whole), Outcome::kWhole);
   auto unasked = changes(2, 2.0, {3}, 1);
   EXPECT_EQ(held.complete(unasked), Outcome::kLost);
+}
+
+// ---------- the one to show ----------
+
+SessionKey key(std::uint64_t session, std::uint64_t boot = 1) { return {boot, session, "m"}; }
+
+UpdateMessage update(std::uint64_t session, std::uint64_t sequence,
+                     Quality quality = Quality::kGood, bool final = true) {
+  UpdateMessage message;
+  message.session_id = session;
+  message.boot_id = 1;
+  message.update.model_id = "m";
+  message.update.sequence = sequence;
+  message.update.final = final;
+  message.update.estimate.quality.quality = quality;
+  return message;
+}
+
+std::uint64_t sequence_of(const LatestUsable& latest) {
+  return latest.get() ? latest.get()->update.sequence : 0;
+}
+
+TEST(LatestUsable, IsEmptyUntilAUsableUpdateComes) {
+  LatestUsable latest;
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 1, Quality::kUnusable));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 2, Quality::kCaution));
+  EXPECT_EQ(sequence_of(latest), 2u);
+}
+
+TEST(LatestUsable, OnlyAnotherUsableUpdateReplacesIt) {
+  LatestUsable latest;
+  latest.take(update(1, 1));
+  latest.take(update(1, 2, Quality::kUnusable));
+  latest.take(update(1, 3, Quality::kNotJudged));
+  latest.take(update(1, 4, Quality::kGood, false));
+  auto failed = update(1, 5);
+  failed.error = Error{ErrorCode::kEmptySet, "no point"};
+  latest.take(failed);
+  EXPECT_EQ(sequence_of(latest), 1u);
+  latest.take(update(1, 6));
+  EXPECT_EQ(sequence_of(latest), 6u);
+}
+
+TEST(LatestUsable, OfAnotherSessionIsForgottenAndDoesNotComeBack) {
+  LatestUsable latest;
+  latest.begin(key(4));
+  latest.take(update(4, 9));
+  latest.take(update(5, 1, Quality::kUnusable));  // another client has started session 5
+  EXPECT_FALSE(latest.get());
+  latest.take(update(4, 10));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(5, 2));
+  EXPECT_EQ(sequence_of(latest), 2u);
+}
+
+// Session numbers of a restarted daemon begin again.
+TEST(LatestUsable, BeginForgetsWhateverTheNumber) {
+  LatestUsable latest;
+  latest.begin(key(7));
+  latest.take(update(7, 3));
+  latest.follow(key(7));  // subscribed again
+  EXPECT_EQ(sequence_of(latest), 3u);
+  latest.begin(key(7));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(7, 4));
+  latest.follow(key(1));
+  EXPECT_FALSE(latest.get());
+  latest.take(update(1, 1));
+  EXPECT_EQ(sequence_of(latest), 1u);
+}
+
+TEST(LatestUsable, OfAnotherDaemonIsNotTakenUntilThatOneIsFollowed) {
+  LatestUsable latest;
+  latest.begin(key(1));
+  latest.take(update(1, 1));
+  auto foreign = update(9, 1);
+  foreign.boot_id = 2;
+  EXPECT_FALSE(latest.belongs(foreign.key()));
+  latest.take(foreign);
+  EXPECT_EQ(latest.get()->boot_id, 1u);
+  latest.follow(key(9, 2));
+  EXPECT_FALSE(latest.get());
+  latest.take(foreign);
+  EXPECT_EQ(latest.get()->boot_id, 2u);
 }
 
 }  // namespace

@@ -1,16 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What an update leaves out of the physics, why, and how much that costs.
+// The scene: which parts of the work a session carries, from the case, the method and the boundary,
+// and what an update leaves out of the physics, why, and how much that costs.
+//
+// What depends on an observation is decided with it: contact (carried when a slave would penetrate)
+// and rotation (about the axes that the points show). Every Update lists what is left out.
 #pragma once
 
 #include <vector>
 
 #include "common/configuration/case_config.hpp"
+#include "common/core/error.hpp"
 #include "common/inversion/contract/omission_errors.hpp"
-#include "common/registration/icp.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 
+namespace brainshift::registration {
+struct IcpResult;
+}
+
 namespace brainshift::pipeline {
+
+struct ScenePlan {
+  bool pressure = false;
+  bool contact = true;  // searched for; an update without any leaves it out by itself
+  bool uncertainty = true;
+  bool gravity_modes = true;
+  bool far_field = true;
+};
+
+// kInvalidArgument for a part that is forced on but not available (scene.pressure with method pcg;
+// scene.contact under the fixed boundary; scene.uncertainty with a method without covariance;
+// scene.gravity_modes without modes in the prior), and for a part that is forced off but that the
+// method always carries. The sentence names the key.
+Result<ScenePlan> plan_scene(const CaseConfig& config, Method method, Boundary boundary);
+
+// The nodes where an answer is wanted when the far field is left out: inside the tumour or within
+// margin_mm of its surface; sorted. Empty without a usable surface.
+std::vector<NodeIndex> region_of_interest(const BrainModel& model, double margin_mm);
+
+// ---------- what is left out ----------
 
 // Time after which pore pressure has drained: R^2 / c_v with c_v = k / (S + alpha^2 / (lambda + 2
 // G)), Biot's theory in one dimension. R: radius of the ball with the mesh's volume. Seconds.
@@ -44,6 +72,6 @@ std::vector<Omission> inversion_omissions(const CaseConfig& config, Boundary bou
 // observable). start_only: the alignment is where distances start and says nothing else; the
 // inversion estimates what they show of a rotation. It is named too when it did not converge.
 std::vector<Omission> registration_omissions(const registration::IcpResult& icp, Carry rotation,
-                                             double rotation_prior_sd_deg, bool start_only);
+                                             bool start_only);
 
 }  // namespace brainshift::pipeline
