@@ -87,12 +87,12 @@ if(BRAINSHIFT_SANITIZE)
   set(BRAINSHIFT_TIMEOUT_FACTOR 10)
 endif()
 
-# brainshift_test(<name> SOURCES ... LINKS ... [LABEL unit] [TIMEOUT 600] [SHARDS 1] [KERNELS])
+# brainshift_test(<name> SOURCES ... LINKS ... [LABEL unit] [TIMEOUT 600] [SHARDS 1])
 # A GoogleTest program; a CTest test of its name, or SHARDS of them that share its cases.
-# TIMEOUT: seconds for the program, without sanitizers. KERNELS: its results depend on the BLAS kernel although it links no
-# BLAS itself; cmake/scripts/test-kernels.sh runs what has the label blas.
+# TIMEOUT: seconds for the program, without sanitizers. What links BLAS has the label blas too, and
+# cmake/scripts/test-kernels.sh runs it.
 function(brainshift_test name)
-  cmake_parse_arguments(ARG "KERNELS" "LABEL;TIMEOUT;SHARDS" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;SHARDS" "SOURCES;LINKS" ${ARGN})
   foreach(option LABEL=unit TIMEOUT=600 SHARDS=1)
     string(REPLACE "=" ";" option ${option})
     list(GET option 0 key)
@@ -102,7 +102,7 @@ function(brainshift_test name)
   endforeach()
   math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * ${BRAINSHIFT_TIMEOUT_FACTOR}")
   brainshift_links(blas brainshift_linalg ${ARG_LINKS})
-  if(blas OR ARG_KERNELS)
+  if(blas)
     list(APPEND ARG_LABEL blas)
   endif()
   list(APPEND ARG_LABEL ${BRAINSHIFT_STUDY_LABEL})

@@ -42,7 +42,7 @@ untested() {
     echo "neither $tests/$2_test.cpp nor a line \"# $2: tested in ...\" in $tests/CMakeLists.txt"
     return
   fi
-  for file in $(grep -oE '[A-Za-z0-9_./-]+\.(cpp|sh)' <<<"$place"); do
+  for file in $(grep -oE '[A-Za-z0-9_./-]+\.(cpp|py|sh)' <<<"$place"); do
     [ -e "$tests/$file" ] || [ -e "tests/unit/$file" ] || [ -e "tests/$file" ] ||
       echo "$tests/CMakeLists.txt names $file, which does not exist"
   done

@@ -19,8 +19,8 @@
 #include <system_error>
 
 #include "common/io/config/key_file.hpp"
+#include "tests/faults/process.hpp"
 #include "tests/faults/settings.hpp"
-#include "tests/integration/workspace.hpp"
 
 extern char** environ;
 
@@ -106,8 +106,8 @@ std::string first_line(int fd) {
 DaemonProcess::DaemonProcess(const DaemonOptions& options) : options_(options) {
   if (options.keys) keys_ = make_keys(options.folder / "keys");
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<std::string> arguments = {integration::brainshiftd(),   "serve",   "--config",
-                                        write_configuration(options), "--model", options.model};
+  std::vector<std::string> arguments = {
+      brainshiftd(), "serve", "--config", write_configuration(options), "--model", options.model};
   std::vector<std::string> environment;
   for (char** each = environ; *each != nullptr; ++each) environment.emplace_back(*each);
   environment.insert(environment.end(), options.environment.begin(), options.environment.end());

@@ -13,9 +13,8 @@
 
 #include "common/io/recording/surgery_file.hpp"
 #include "tests/faults/feed.hpp"
+#include "tests/faults/process.hpp"
 #include "tests/faults/settings.hpp"
-#include "tests/integration/process.hpp"
-#include "tests/integration/workspace.hpp"
 
 namespace brainshift::faults {
 namespace {
@@ -104,7 +103,7 @@ Counts damage_surgery(const fs::path& path, int count, std::mt19937& random) {
     } else {
       file.flip(at, static_cast<int>(random() % 8));
     }
-    const auto checked = integration::run({integration::brainshift(), "journal", "check", path});
+    const auto checked = run({brainshift(), "journal", "check", path});
     const Visited visited = visit(path);
     file.mend(at, cut);
     const bool unchanged = visited.whole && visited.records.size() == all.size();
@@ -139,8 +138,7 @@ Counts damage_model(const fs::path& path, int count, std::mt19937& random) {
       file.flip(at, static_cast<int>(random() % 8));
     }
     // A daemon that serves it does not end by itself, and is killed: status -1.
-    const auto served = integration::run(
-        {integration::brainshiftd(), "serve", "--config", config, "--model", path}, 10.0);
+    const auto served = run({brainshiftd(), "serve", "--config", config, "--model", path}, 10.0);
     file.mend(at, cut);
     const bool serves = served.out.rfind("listening on ", 0) == 0;
     counts.taken_for_good += serves ? 1 : 0;

@@ -18,9 +18,8 @@
 #include "common/wire/convert.hpp"
 #include "tests/faults/daemon_process.hpp"
 #include "tests/faults/feed.hpp"
+#include "tests/faults/process.hpp"
 #include "tests/faults/settings.hpp"
-#include "tests/integration/process.hpp"
-#include "tests/integration/workspace.hpp"
 
 namespace brainshift::faults {
 namespace {
@@ -56,17 +55,10 @@ class Replay {
 
   std::string final_field(const std::string& endpoint, const fs::path& resume) const {
     fs::remove(field());
-    std::vector<std::string> command = {integration::brainshift(),
-                                        "replay",
-                                        surgery_,
-                                        "--endpoint",
-                                        endpoint,
-                                        "--boundary",
-                                        "contact",
-                                        "--report",
-                                        report_};
+    std::vector<std::string> command = {brainshift(), "replay",  surgery_,   "--endpoint", endpoint,
+                                        "--boundary", "contact", "--report", report_};
     if (!resume.empty()) command.insert(command.end(), {"--resume", resume});
-    const auto done = integration::run(command);
+    const auto done = run(command);
     if (done.exit_status != 0) throw std::runtime_error("brainshift replay: " + done.err);
     return content_of(field());
   }

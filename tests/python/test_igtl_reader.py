@@ -13,6 +13,18 @@ def test_the_checksum_is_that_of_the_standard():
     assert crc64(b"") == 0
 
 
+@pytest.mark.parametrize("size", [4095, 4096, 4097, 100_001])
+def test_the_checksum_of_megabytes_is_that_of_their_bits(size):
+    """Long division by the polynomial, bit after bit."""
+    data = bytes(np.random.default_rng(size).integers(0, 256, size, dtype=np.uint8))
+    crc = 0
+    for byte in data:
+        crc ^= byte << 56
+        for _ in range(8):
+            crc = ((crc << 1) & 0xFFFFFFFFFFFFFFFF) ^ (0x42F0E1EBA9EA3693 if crc >> 63 else 0)
+    assert crc64(data) == crc
+
+
 def test_a_string_has_the_bytes_that_the_protocol_lays_down():
     """58 bytes of header: version, type, name, time, size, checksum; all big-endian."""
     message = encode(1, "STRING", "name", b"\0\3\0\2ab")

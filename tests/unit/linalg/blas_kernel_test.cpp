@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// That programs start themselves again is tested in tests/integration/blas_kernel_test.cpp.
+// That programs start themselves again is tested in tests/integration/test_blas_kernel.py.
 #include "common/linalg/blas_kernel.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole of it runs in tests/integration/bridge_test.cpp.
+// The whole of it runs in tests/integration/test_bridge.py.
 #include "client/tools/bridge/bridge.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Submitting to a daemon: tests/integration/bridge_test.cpp.
+// Submitting to a daemon: tests/integration/test_bridge.py.
 #include "client/tools/bridge/inbound_worker.hpp"
 
 #include <gmock/gmock.h>

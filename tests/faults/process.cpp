@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/integration/process.hpp"
+#include "tests/faults/process.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -11,13 +11,11 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <sstream>
-#include <stdexcept>
 #include <system_error>
 
 extern char** environ;
 
-namespace brainshift::integration {
+namespace brainshift::faults {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -63,6 +61,9 @@ bool read_some(int fd, std::string& text) {
 
 }  // namespace
 
+std::string brainshiftd() { return BRAINSHIFTD; }
+std::string brainshift() { return BRAINSHIFT; }
+
 Finished run(const std::vector<std::string>& argv, double limit_s) {
   const Pipe out = make_pipe();
   const Pipe err = make_pipe();
@@ -95,38 +96,4 @@ Finished run(const std::vector<std::string>& argv, double limit_s) {
   return finished;
 }
 
-Background::Background(const std::vector<std::string>& argv, const std::string& stderr_file) {
-  const Pipe out = make_pipe();
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, out.write_end, STDOUT_FILENO);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, stderr_file.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  pid_ = spawn(argv, actions);
-  close(out.write_end);
-  stdout_fd_ = out.read_end;
-  while (first_line_.find('\n') == std::string::npos && read_some(stdout_fd_, first_line_)) {
-  }
-  first_line_ = first_line_.substr(0, first_line_.find('\n'));
-}
-
-Background::~Background() {
-  if (pid_ > 0) end(SIGKILL);
-  close(stdout_fd_);
-}
-
-int Background::end(int signal) {
-  kill(pid_, signal);
-  const int status = wait_for(pid_);
-  pid_ = -1;
-  return status;
-}
-
-std::vector<std::string> lines(const std::string& text) {
-  std::vector<std::string> result;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) result.push_back(line);
-  return result;
-}
-
-}  // namespace brainshift::integration
+}  // namespace brainshift::faults
