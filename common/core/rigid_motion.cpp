@@ -2,9 +2,10 @@
 #include "common/core/rigid_motion.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <sstream>
 #include <string>
+
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift {
 namespace {
@@ -47,7 +48,7 @@ Status check_rigid(const Eigen::Matrix4d& matrix, double tolerance) {
 Status check_affine(const Eigen::Matrix4d& matrix) {
   if (Status finite = check_finite(matrix); !finite) return finite;
   const Mat3 linear = matrix.topLeftCorner<3, 3>();
-  const Vec3 stretch = Eigen::JacobiSVD<Mat3>(linear).singularValues();
+  const Vec3 stretch = singular_values(linear).values;
   if (!(stretch[2] > 0.0) || stretch[0] > kLargestCondition * stretch[2]) {
     return fail(ErrorCode::kInvalidArgument, "cannot be inverted: it stretches by " +
                                                  digits(stretch[0]) + " and by " +
@@ -57,10 +58,9 @@ Status check_affine(const Eigen::Matrix4d& matrix) {
 }
 
 RigidTransform nearest_rigid(const Eigen::Matrix4d& matrix) {
-  const Mat3 linear = matrix.topLeftCorner<3, 3>();
-  const Eigen::JacobiSVD<Mat3> svd(linear, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const SingularValues svd = singular_values(matrix.topLeftCorner<3, 3>());
   RigidTransform T = RigidTransform::Identity();
-  T.linear() = svd.matrixU() * svd.matrixV().transpose();
+  T.linear() = svd.U * svd.V.transpose();
   T.translation() = matrix.topRightCorner<3, 1>();
   return T;
 }

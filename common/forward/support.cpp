@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::forward {
 namespace {
@@ -15,16 +15,15 @@ constexpr double kHeld = 1e-10;
 }  // namespace
 
 Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm) {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  Matrix6 gram = Matrix6::Zero();
+  Mat6 gram = Mat6::Zero();
   for (const HeldDirection& h : held) {
-    Eigen::Matrix<double, 6, 1> row;
+    Vec6 row;
     row << h.direction, ((h.place - centre) / size_mm).cross(h.direction);
     gram += row * row.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(gram, Eigen::EigenvaluesOnly);
-  const double largest = std::max(solver.eigenvalues()[5], 1.0);
-  const auto free = (solver.eigenvalues().array() < kHeld * largest).count();
+  const Vec6 eigenvalues = symmetric_eigenvalues(gram);
+  const double largest = std::max(eigenvalues[5], 1.0);
+  const auto free = (eigenvalues.array() < kHeld * largest).count();
   if (free == 0) return {};
   return fail(ErrorCode::kFloatingBody,
               fmt::format("conditions: the body is not held: {} of its 6 rigid motions {} free",

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "common/core/point_columns.hpp"
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -91,9 +91,9 @@ void OrientedCloud::Impl::estimate_normals(int neighbours) {
       const Vec3 arm = points.col(id) - mean;
       spread += arm * arm.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Mat3> principal(spread);
-    if (principal.eigenvalues()[1] > kOnALine * kOnALine * principal.eigenvalues()[2])
-      normals.col(i) = principal.eigenvectors().col(0);
+    const SymmetricEigen<3> principal = symmetric_eigen(spread);
+    if (principal.values[1] > kOnALine * kOnALine * principal.values[2])
+      normals.col(i) = principal.vectors.col(0);
   }
 }
 

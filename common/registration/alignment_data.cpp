@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/registration/alignment_data.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -32,11 +31,11 @@ void add_pose(const IcpResult& icp, double rotation_sd_deg, std::vector<LinearFi
     covariance.topRightCorner<3, 3>().setZero();
     covariance.bottomLeftCorner<3, 3>().setZero();
   }
-  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(covariance);
+  const SymmetricEigen<6> eigen = symmetric_eigen(covariance);
   for (int k = 0; k < 6; ++k) {
-    const double sd = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+    const double sd = std::sqrt(std::max(0.0, eigen.values[k]));
     if (sd == 0.0) continue;
-    const Vec6 axis = sd * eigen.eigenvectors().col(k);
+    const Vec6 axis = sd * eigen.vectors.col(k);
     fields.push_back({turning(axis.head<3>()), axis.tail<3>()});
   }
 }

@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
+
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::registration {
 namespace {
@@ -33,8 +33,7 @@ double extent_mm(const Points& points) {
 
 Vec3 principal_spread(const Points& points) {
   const Points centred = points.colwise() - Vec3(points.rowwise().mean());
-  return Eigen::SelfAdjointEigenSolver<Mat3>(centred * centred.transpose(), Eigen::EigenvaluesOnly)
-      .eigenvalues();
+  return symmetric_eigenvalues(Mat3(centred * centred.transpose()));
 }
 
 Status check_set(const char* name, const Points& points) {
@@ -77,13 +76,13 @@ Status check_extents(double measured_mm, double image_mm) {
 RigidTransform least_squares(const Points& measured, const Points& image) {
   const Vec3 from = measured.rowwise().mean(), to = image.rowwise().mean();
   const Mat3 covariance = (image.colwise() - to) * (measured.colwise() - from).transpose();
-  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const SingularValues svd = singular_values(covariance);
   // The best orthogonal matrix may be a reflection: for fiducials in a plane, a reflection fits as
   // well as a rotation. The weakest direction is then turned round.
-  const double handedness = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  const double handedness = (svd.U * svd.V.transpose()).determinant();
   const Vec3 signs(1.0, 1.0, handedness < 0.0 ? -1.0 : 1.0);
   RigidTransform T = RigidTransform::Identity();
-  T.linear() = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  T.linear() = svd.U * signs.asDiagonal() * svd.V.transpose();
   T.translation() = to - T.linear() * from;
   return T;
 }
@@ -229,9 +228,9 @@ double expected_tre_mm(const Points& image_fiducials, double fle_mm, const Vec3&
   const Vec3 centre = image_fiducials.rowwise().mean();
   const Points arms = image_fiducials.colwise() - centre;
   const auto count = static_cast<double>(arms.cols());
-  const Eigen::SelfAdjointEigenSolver<Mat3> principal(arms * arms.transpose());
-  const Vec3 spread = principal.eigenvalues().cwiseMax(0.0) / count;
-  const Vec3 along = principal.eigenvectors().transpose() * (target - centre);
+  const SymmetricEigen<3> principal = symmetric_eigen(Mat3(arms * arms.transpose()));
+  const Vec3 spread = principal.values.cwiseMax(0.0) / count;
+  const Vec3 along = principal.vectors.transpose() * (target - centre);
   double sum = 0.0;
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;

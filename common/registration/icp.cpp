@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/registration/icp.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -127,19 +126,19 @@ void Icp::weigh(double scale_mm, Fit& fit) const {
 Vec6 Icp::step(const Fit& fit, const PoseInformation& points, double threshold,
                bool rotates) const {
   Mat6 keep = Mat6::Identity();
-  const Eigen::SelfAdjointEigenSolver<Mat3> rotation(rotation_information(points.hessian));
+  const SymmetricEigen<3> rotation = symmetric_eigen(rotation_information(points.hessian));
   for (int k = 0; k < 3; ++k) {
-    const Vec3 axis = rotation.eigenvectors().col(k);
-    if (!rotates || rotation.eigenvalues()[k] < threshold)
+    const Vec3 axis = rotation.vectors.col(k);
+    if (!rotates || rotation.values[k] < threshold)
       keep.topLeftCorner<3, 3>() -= axis * axis.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Mat6> data(keep * points.hessian * keep);
+  const SymmetricEigen<6> data = symmetric_eigen(Mat6(keep * points.hessian * keep));
   Mat6 hessian = Mat6::Zero();
   Vec6 gradient = Vec6::Zero();
   for (int k = 0; k < 6; ++k) {
-    if (data.eigenvalues()[k] < threshold) continue;
-    const Vec6 axis = data.eigenvectors().col(k);
-    hessian += data.eigenvalues()[k] * axis * axis.transpose();
+    if (data.values[k] < threshold) continue;
+    const Vec6 axis = data.vectors.col(k);
+    hessian += data.values[k] * axis * axis.transpose();
     gradient += axis * axis.dot(points.gradient);
   }
   const double information = prior_information_ / (points.radius_mm * points.radius_mm);
@@ -147,12 +146,12 @@ Vec6 Icp::step(const Fit& fit, const PoseInformation& points, double threshold,
   hessian.diagonal().head<3>().array() += information;
   gradient.head<3>() += information * points.radius_mm * fit.rotation;
 
-  const Eigen::SelfAdjointEigenSolver<Mat6> all(hessian);
+  const SymmetricEigen<6> all = symmetric_eigen(hessian);
   Vec6 xi = Vec6::Zero();
   for (int k = 0; k < 6; ++k) {
-    if (all.eigenvalues()[k] <= kNullCurvature * all.eigenvalues()[5]) continue;
-    const Vec6 axis = all.eigenvectors().col(k);
-    xi -= axis * (axis.dot(gradient) / all.eigenvalues()[k]);
+    if (all.values[k] <= kNullCurvature * all.values[5]) continue;
+    const Vec6 axis = all.vectors.col(k);
+    xi -= axis * (axis.dot(gradient) / all.values[k]);
   }
   xi.head<3>() /= points.radius_mm;
   return xi;
@@ -190,8 +189,7 @@ IcpResult Icp::run() {
     ++result.iterations;
     weigh(scale, current_);
     const PoseInformation data = information(current_);
-    const double largest =
-        Eigen::SelfAdjointEigenSolver<Mat6>(data.hessian, Eigen::EigenvaluesOnly).eigenvalues()[5];
+    const double largest = symmetric_eigenvalues(data.hessian)[5];
     const Vec6 xi = step(current_, data, options_.observability_ratio * largest, options_.rotation);
     result.converged = descend(data, xi) && scale <= options_.welsch_scale_mm;
     scale = std::max(options_.welsch_scale_mm, kScaleFactor * scale);
@@ -213,8 +211,7 @@ void Icp::summarise(IcpResult& result) {
       pose_covariance(data, result.observability, options_.rotation, prior_information_);
   result.weights = current_.weights;
 
-  const Vec6 eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Mat6>(data.hessian, Eigen::EigenvaluesOnly).eigenvalues();
+  const Vec6 eigenvalues = symmetric_eigenvalues(data.hessian);
   double threshold = options_.observability_ratio * eigenvalues[5];
   if (eigenvalues[5] > 0.0) {
     for (const double value : eigenvalues) result.observable_axes += value >= threshold ? 1 : 0;
@@ -226,9 +223,7 @@ void Icp::summarise(IcpResult& result) {
 }
 
 double Icp::left_out_rotation(const Fit& fit, const PoseInformation& data, double threshold) const {
-  const VecX known = Eigen::SelfAdjointEigenSolver<Mat3>(rotation_information(data.hessian),
-                                                         Eigen::EigenvaluesOnly)
-                         .eigenvalues();
+  const Vec3 known = symmetric_eigenvalues(rotation_information(data.hessian));
   if (options_.rotation && known[0] >= threshold) return 0.0;
   const Vec6 missed = step(fit, data, 0.0, true);
   double greatest = 0.0, longest = 0.0;

@@ -3,9 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <utility>
+
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::registration {
 namespace {
@@ -44,9 +45,7 @@ Status check_points(const Points& points, const RigidTransform& T) {
       return fail(ErrorCode::kNotFinite,
                   fmt::format("boundary points: point {} of {} is not finite", i, points.cols()));
   const Points centred = points.colwise() - points.rowwise().mean();
-  const Vec3 spread =
-      Eigen::SelfAdjointEigenSolver<Mat3>(centred * centred.transpose(), Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Vec3 spread = symmetric_eigenvalues(Mat3(centred * centred.transpose()));
   if (!(spread[1] > kThinnestCloud * kThinnestCloud * spread[2]))
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("boundary points: all {} lie on one line", points.cols()));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/registration/pose_information.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 
@@ -72,28 +71,25 @@ PoseInformation pose_information(const geometry::PointRows& points,
 Mat3 rotation_information(const Mat6& hessian) {
   const Mat3 coupling = hessian.bottomLeftCorner<3, 3>();
   const Mat3 translation = hessian.bottomRightCorner<3, 3>();
-  const Mat3 explained =
-      coupling.transpose() * translation.completeOrthogonalDecomposition().solve(coupling);
+  const Mat3 explained = coupling.transpose() * least_norm_solution(translation, coupling);
   return hessian.topLeftCorner<3, 3>() - 0.5 * (explained + explained.transpose());
 }
 
 Observability observability(const PoseInformation& information, double ratio) {
   Observability seen;
   seen.threshold = ratio;
-  const double largest =
-      Eigen::SelfAdjointEigenSolver<Mat6>(information.hessian, Eigen::EigenvaluesOnly)
-          .eigenvalues()[5];
+  const double largest = symmetric_eigenvalues(information.hessian)[5];
   if (!(largest > 0.0)) {  // every point is an outlier and shows nothing
     seen.threshold = std::max(ratio, 1e-300);
     return seen;
   }
-  const Eigen::SelfAdjointEigenSolver<Mat3> rotation(rotation_information(information.hessian));
-  seen.rotation_ratios = rotation.eigenvalues() / largest;
-  seen.rotation_axes = rotation.eigenvectors();
-  const Eigen::SelfAdjointEigenSolver<Mat3> translation(
-      Mat3(information.hessian.bottomRightCorner<3, 3>()));
-  seen.translation_ratios = translation.eigenvalues() / largest;
-  seen.translation_axes = translation.eigenvectors();
+  const SymmetricEigen<3> rotation = symmetric_eigen(rotation_information(information.hessian));
+  seen.rotation_ratios = rotation.values / largest;
+  seen.rotation_axes = rotation.vectors;
+  const SymmetricEigen<3> translation =
+      symmetric_eigen(Mat3(information.hessian.bottomRightCorner<3, 3>()));
+  seen.translation_ratios = translation.values / largest;
+  seen.translation_axes = translation.vectors;
   return seen;
 }
 
@@ -120,7 +116,7 @@ Mat6 pose_covariance(const PoseInformation& information, const Observability& se
   const double unknown_translation = 1.0 / (kUnknownTranslationSd_mm * kUnknownTranslationSd_mm);
   known.diagonal().head<3>().array() += std::max(rotation_prior, unknown_rotation) / (r * r);
   known.diagonal().tail<3>().array() += unknown_translation;
-  Mat6 covariance = known.ldlt().solve(Mat6::Identity());
+  Mat6 covariance = symmetric_inverse(known);
   covariance.topRows<3>() /= r;
   covariance.leftCols<3>() /= r;
   return 0.5 * (covariance + covariance.transpose());

@@ -5,12 +5,9 @@
 //   d/dxi  n . T(xi) x  at xi = 0   =   ((x - c) x n,  n)
 #pragma once
 
-#include "common/core/types.hpp"
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::registration {
-
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 // T(xi), mm.
 RigidTransform rigid_increment(const Vec6& xi, const Vec3& centre);

@@ -51,7 +51,8 @@ VecX without_trend(const SparseData& data) {
     Eigen::Matrix<double, kTrend, kTrend> normal = rows * weights.asDiagonal() * rows.transpose();
     normal.diagonal().array() += kRidge * std::max(1e-300, normal.trace() / kTrend);
     const Eigen::Matrix<double, kTrend, 1> right = rows * weights.cwiseProduct(distances);
-    left = distances - rows.transpose() * normal.ldlt().solve(right);
+    const Eigen::Matrix<double, kTrend, 1> trend = normal.ldlt().solve(right);
+    left = distances - rows.transpose() * trend;
     const VecX sizes = left.cwiseAbs();
     const double sd = 1.4826 * percentile({sizes.data(), static_cast<std::size_t>(count)}, 50.0);
     if (!(sd > 0.0)) break;

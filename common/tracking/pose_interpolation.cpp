@@ -2,9 +2,10 @@
 #include "common/tracking/pose_interpolation.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::tracking {
 namespace {
@@ -18,8 +19,8 @@ struct Polar {
 };
 
 Polar polar_decomposition(const Mat3& linear) {
-  const Eigen::JacobiSVD<Mat3> svd(linear, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 Q = svd.matrixU() * svd.matrixV().transpose();
+  const SingularValues svd = singular_values(linear);
+  Mat3 Q = svd.U * svd.V.transpose();
   if (Q.determinant() < 0.0) Q = -Q;  // a mirrored image: the sign goes to the stretch
   return {Eigen::Quaterniond(Q), Q.transpose() * linear};
 }

@@ -79,7 +79,7 @@ ultrasound::ImagePoses measured_poses(const Patient& patient) {
   };
   ultrasound::ImagePoses poses = patient.poses;
   for (auto& pose : poses) {
-    registration::Vec6 xi;
+    Vec6 xi;
     xi << draw(0.3 * 0.0174533), draw(0.3);
     const Vec3 middle =
         *pose * Vec3(0.5 * patient.recording.width, 0.5 * patient.recording.height, 0.0);

@@ -27,7 +27,7 @@ RigidTransform random_start(double error_mm, const TriangleSurface& tumour, Rand
   const Vec3 centre = tumour.vertices.rowwise().mean();
   const double turn = kMostTurn_deg * std::numbers::pi / 180.0 * random.uniform() *
                       std::min(1.0, error_mm / kFullTurnFrom_mm);
-  registration::Vec6 xi;
+  Vec6 xi;
   xi << turn * random.direction(), Vec3::Zero();
   const Vec3 direction = random.direction();
   double low = 0.0, high = 2.0 * error_mm;

@@ -62,7 +62,7 @@ inline Points section_points(const TriangleSurface& surface, int count, Random& 
 }
 
 inline RigidTransform random_motion(double translation_mm, double rotation_deg, Random& random) {
-  registration::Vec6 xi;
+  Vec6 xi;
   xi << rotation_deg * std::numbers::pi / 180.0 * random.direction(),
       translation_mm * random.direction();
   return registration::rigid_increment(xi, kTumourCentre);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/replay/score.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 #include <span>
 #include <string>
 
+#include "common/core/small_matrices.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/cppd.hpp"
@@ -205,8 +205,8 @@ Vec3 principal_direction(const Points& displacements) {
   const Mat3 covariance = centred * centred.transpose() / static_cast<double>(centred.cols());
   // Rounding alone spreads equal vectors by about (1e-16 |mean|)^2.
   if (!(covariance.trace() > 1e-24 * mean.squaredNorm())) return Vec3::Zero();
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(covariance);
-  const Vec3 direction = eigen.eigenvectors().col(2);  // eigenvalues ascend
+  const SymmetricEigen<3> eigen = symmetric_eigen(covariance);
+  const Vec3 direction = eigen.vectors.col(2);  // eigenvalues ascend
   return direction.dot(mean) < 0.0 ? Vec3(-direction) : direction;
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/contract/data_check.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <sstream>
 #include <string>
+
+#include "common/core/small_matrices.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -17,7 +18,7 @@ Status check_spread(const Points& positions) {
     const Vec3 arm = positions.col(i) - centre;
     scatter += arm * arm.transpose();
   }
-  const Vec3 variances = Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvalues();  // ascending
+  const Vec3 variances = symmetric_eigen(scatter).values;  // ascending
   const double limit = kCollinearRatio * kCollinearRatio * variances[2];
   if (variances[1] > limit && variances[0] > limit) return {};
   return fail(ErrorCode::kInvalidArgument,
