@@ -38,6 +38,12 @@ if(BRAINSHIFT_UNITY)
   target_compile_options(brainshift_warnings INTERFACE -Wno-subobject-linkage)
 endif()
 
+# GCC looks for memory to free whenever its heap has doubled, from 128 MiB on, which precompiled headers alone fill. From
+# 512 MiB on it is a tenth faster, and uses no more than the largest files need anyway.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  add_compile_options("SHELL:--param ggc-min-heapsize=524288")
+endif()
+
 if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
   # GCC is the compiler whose warnings are errors.
   target_compile_options(brainshift_warnings INTERFACE -Wno-error -Wno-unknown-warning-option)

@@ -22,7 +22,7 @@ function(brainshift_library)
   brainshift_archives(private ${ARG_PRIVATE})
   target_link_libraries(brainshift_${folder} PUBLIC ${public}
     PRIVATE $<BUILD_INTERFACE:brainshift_warnings> ${private})
-  brainshift_precompile(brainshift_${folder} brainshift_headers)
+  brainshift_optimise(brainshift_${folder})
   brainshift_record_links(brainshift_${folder} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   if(BRAINSHIFT_TEST_LIBRARY AND BRAINSHIFT_BUILD_TESTS)
     add_library(brainshift_${folder}_tested INTERFACE)
@@ -78,7 +78,19 @@ function(brainshift_program name)
     brainshift_archives(ARG_LINKS ${ARG_LINKS})
   endif()
   target_link_libraries(${name} PRIVATE brainshift_warnings ${ARG_LINKS})
-  brainshift_precompile(${name} brainshift_headers)
+  brainshift_optimise(${name})
+endfunction()
+
+# Folders that read, write and talk are compiled with -O1 in a release: a sixth faster than with -O3, and nothing waits for
+# them. A folder says so with set(BRAINSHIFT_LIGHT ON), for itself and those below it. The results are the same to the bit.
+function(brainshift_optimise target)
+  if(BRAINSHIFT_LIGHT AND CMAKE_BUILD_TYPE STREQUAL Release)
+    # GCC 12 takes elements of initializer lists for uninitialised with -O1.
+    target_compile_options(${target} PRIVATE -O1 -Wno-maybe-uninitialized)
+    brainshift_precompile(${target} brainshift_light_headers)
+  else()
+    brainshift_precompile(${target} brainshift_headers)
+  endif()
 endfunction()
 
 # How many times longer a test may take: sanitizers slow programs down.
