@@ -78,8 +78,7 @@ struct IcpResult {
   VecX weights;                 // w of each point at the end: near 0 for outliers
 };
 
-// points: 3 x m, mm, m >= 3, finite and not collinear. surface: triangles, a distance volume or an
-// oriented cloud.
+// points: 3 x m, mm, m >= 3, finite and not collinear. surface: triangles or a distance volume.
 // kInvalidArgument: fewer than 3 points (with the count) or collinear ones, an option out of range
 // (named), an initial pose that is not a rigid motion. kNotFinite: names the point, or the pose.
 // An alignment that uses up its iterations is a result with converged == false.

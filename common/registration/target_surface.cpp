@@ -31,13 +31,4 @@ TargetSurface::TargetSurface(const geometry::DistanceVolume& volume)
         volume.at(points, distances_mm, gradients);
       }) {}
 
-TargetSurface::TargetSurface(const geometry::OrientedCloud& cloud)
-    : measure_([&cloud](const PointRows& points, VecX& distances_mm, PointRows& gradients) {
-        for (Eigen::Index i = 0; i < points.rows(); ++i) {
-          const geometry::DistanceSample sample = cloud.at(points.row(i));
-          distances_mm[i] = sample.distance_mm;
-          gradients.row(i) = sample.gradient;
-        }
-      }) {}
-
 }  // namespace brainshift::registration

@@ -8,7 +8,6 @@
 //              exact, about 1 us a point
 //   volume     interpolated (geometry/distance_volume.hpp): wrong by hundredths of a millimetre,
 //              some 10 ns a point
-//   cloud      blended planes of the closest measured points (geometry/oriented_cloud.hpp)
 //
 // A view: it refers to the surface, which must outlive it. Calls from several threads are safe.
 #pragma once
@@ -18,16 +17,14 @@
 #include "common/core/types.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
-#include "common/geometry/oriented_cloud.hpp"
 
 namespace brainshift::registration {
 
 class TargetSurface {
  public:
-  // Implicit: align(points, surface, ...) takes any of the three.
+  // Implicit: align(points, surface, ...) takes either.
   TargetSurface(const geometry::ClosestPointIndex& triangles);
   TargetSurface(const geometry::DistanceVolume& volume);
-  TargetSurface(const geometry::OrientedCloud& cloud);
 
   // points: m x 3, finite, mm. distances_mm and gradients must have m rows.
   void measure(const geometry::PointRows& points, VecX& distances_mm,

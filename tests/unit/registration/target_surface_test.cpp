@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface as ICP sees it: triangles, a distance volume and a cloud of one ellipsoid measure
-// alike.
+// A surface as ICP sees it: triangles and a distance volume of one sphere measure alike.
 #include "common/registration/target_surface.hpp"
 
 #include <gtest/gtest.h>
@@ -21,8 +20,8 @@ const TriangleSurface& sphere() {
   return surface;
 }
 constexpr double kTargetRadius_mm = 12.0;
-// Facets with edges of 0.6 mm lie 0.6^2 / (8 R) = 0.004 mm inside the sphere; the volume and the
-// cloud add hundredths of a millimetre.
+// Facets with edges of 0.6 mm lie 0.6^2 / (8 R) = 0.004 mm inside the sphere; the volume
+// adds hundredths of a millimetre.
 constexpr double kTolerance_mm = 0.05;
 
 PointRows points_around() {
@@ -69,10 +68,6 @@ TEST(TargetSurface, AVolumeMeasuresTheDistance) {
   const auto index = geometry::ClosestPointIndex::build(sphere()).value();
   expect_sphere(
       geometry::DistanceVolume::create(geometry::signed_distance_grid(index).value()).value());
-}
-
-TEST(TargetSurface, ACloudMeasuresTheDistance) {
-  expect_sphere(geometry::OrientedCloud::build(sphere().vertices).value());
 }
 
 // On the surface the direction to the closest point is rounding, and the triangle's normal
