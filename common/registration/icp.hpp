@@ -25,14 +25,13 @@
 
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
-#include "common/registration/observability.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/registration/rigid_increment.hpp"
 #include "common/registration/target_surface.hpp"
 
 namespace brainshift::registration {
 
-// The options of align() (icp.hpp), and the checks of its input.
-
+// The options of align(), and the checks of its input.
 struct IcpOptions {
   int max_iterations = 50;
   double sd_mm = 0.5;            // of a boundary point along the normal

@@ -22,16 +22,38 @@
 // surface, closest points would lie on its wrong side. Of that motion nothing else enters the data.
 #pragma once
 
+#include <Eigen/SparseCore>
+
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/geometry/moving_surface.hpp"
-#include "common/registration/surface_patch.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::registration {
+
+// SurfacePatch: a surface that moves with the mesh, as an instrument sees it: the cortex under the
+// craniotomy, or the boundary of the tumour.
+//
+//   vertex v moves by  sum_i weights(i, v) u(nodes[i])
+struct SurfacePatch {
+  std::vector<NodeIndex> nodes;  // of the mesh that move the surface, ascending
+  TriangleSurface surface;       // undeformed, outward
+  // nodes x vertices, columns of sum 1: 3 x nodes displacements times it are those of the vertices.
+  Eigen::SparseMatrix<double> weights;
+};
+
+// Boundary triangles between three craniotomy nodes; no triangle when there are none. Vertex i is
+// nodes[i].
+SurfacePatch craniotomy_patch(const BrainModel& model);
+
+// The tumour's surface, whose vertices are points inside tetrahedra. A vertex outside the mesh
+// moves as the closest point of the mesh does. Precondition: the mesh has a tetrahedron.
+SurfacePatch tumour_patch(const BrainModel& model);
 
 // A patch with its index: what observations of one surgery share.
 class IndexedPatch {
