@@ -11,7 +11,7 @@
 #include "common/anatomy/node_sets.hpp"
 #include "common/anatomy/tumour_surface.hpp"
 #include "common/geometry/closest_point.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/values/model_id.hpp"
 

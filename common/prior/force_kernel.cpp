@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/core/point_columns.hpp"
-#include "common/geometry/spread_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/linalg/blas.hpp"
 
 namespace brainshift::prior {

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "common/geometry/region_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "server/delivery/thin_nodes.hpp"
 
 namespace brainshift::server {

@@ -11,7 +11,6 @@
 #include "common/core/types.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/rigid_increment.hpp"
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "common/core/random.hpp"
-#include "common/geometry/spread_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/inversion/prepared/block_runner.hpp"
 #include "common/inversion/prepared/contact_columns.hpp"
 #include "common/inversion/prepared/data_region.hpp"

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "common/fem/elasticity.hpp"
-#include "common/geometry/spread_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::prior {

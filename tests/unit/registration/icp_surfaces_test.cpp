@@ -8,7 +8,7 @@
 #include <string>
 
 #include "common/core/random.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/icp.hpp"
 #include "tests/unit/registration/known_motion.hpp"

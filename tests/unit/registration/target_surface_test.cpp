@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/core/random.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::registration {

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "common/geometry/surface.hpp"
-#include "common/geometry/surface_rims.hpp"
+#include "common/geometry/surface_check.hpp"
 #include "tests/support/stereo_scene.hpp"
 
 namespace brainshift::stereo {
