@@ -12,7 +12,7 @@
 //
 // K is the stiffness of drained elasticity. With scene.pressure = on it is that of one
 // backward-Euler step of consolidation of length scene.pressure_step_s from rest, with the
-// pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
+// pressure eliminated (fem/stiffness_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
 // fluid or air surrounds it.
 //
 // Each tissue has its own stiffness (tissues.hpp).
@@ -25,7 +25,7 @@
 #include "common/core/progress.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/dof_map.hpp"
-#include "common/fem/poro_material.hpp"
+#include "common/fem/elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"

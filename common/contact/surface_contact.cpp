@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "common/fem/assembly.hpp"
+#include "common/fem/elasticity.hpp"
 
 namespace brainshift::contact {
 

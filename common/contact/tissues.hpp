@@ -10,7 +10,7 @@
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/fem/poro_material.hpp"
+#include "common/fem/elasticity.hpp"
 #include "common/values/brain_model.hpp"
 
 namespace brainshift::contact {

@@ -11,7 +11,7 @@
 
 #include "common/contact/surface_contact.hpp"
 #include "common/core/progress.hpp"
-#include "common/fem/displacement_constraints.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/linalg/cholesky.hpp"
 
 namespace brainshift::contact {

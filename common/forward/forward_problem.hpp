@@ -20,7 +20,7 @@
 
 #include "common/contact/obstacle.hpp"
 #include "common/core/progress.hpp"
-#include "common/fem/displacement_constraints.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/fem/space_elasticity.hpp"
 
 namespace brainshift::forward {

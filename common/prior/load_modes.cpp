@@ -11,8 +11,7 @@
 
 #include "common/contact/tissues.hpp"
 #include "common/core/units.hpp"
-#include "common/fem/gravity.hpp"
-#include "common/fem/swelling.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::prior {

@@ -6,7 +6,7 @@
 //                          level: along gravity (drainage is unknown), and along the two directions
 //                          across it (pose is unknown)
 //   tumour volume          tissue that changes its volume by the strain theta near the tumour with
-//                          centre c (fem/swelling.hpp): oedema lies beside a tumour and differs
+//                          centre c (fem/body_loads.hpp): oedema lies beside a tumour and differs
 //                          from place to place. For each radius s of the case bumps
 //                            theta = h exp(-|x - c_n|^2 / 2 s^2),  c_n = c + sqrt(2) s (i, j, k)
 //                          with i, j, k in {-1, 0, 1} and c_n at most kTumourVolumeReach_mm from c.

@@ -20,8 +20,8 @@
 
 #include "client/tools/twin/surgery.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/fem/block_solver.hpp"
 #include "common/fem/sampling.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/prepared/condense.hpp"

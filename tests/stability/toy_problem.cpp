@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/fem/deformation.hpp"
-#include "common/fem/gravity.hpp"
 #include "common/inversion/invert.hpp"
 #include "common/inversion/prepared/data_region.hpp"
 #include "tests/stability/linear_body.hpp"

@@ -9,8 +9,8 @@
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/units.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/fem/elasticity.hpp"
-#include "common/fem/gravity.hpp"
 #include "common/linalg/cholesky.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"

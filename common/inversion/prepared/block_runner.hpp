@@ -14,7 +14,7 @@
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/fem/block_solver.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 
 namespace brainshift::inversion {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "common/contact/forward_model.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::contact {

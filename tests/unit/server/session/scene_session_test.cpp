@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/pipeline/left_out.hpp"
 #include "server/session/model_store.hpp"
