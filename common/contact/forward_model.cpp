@@ -1,15 +1,53 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/forward_model.hpp"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "common/contact/tissues.hpp"
+#include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/fem/space_elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
+
+Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
+                                           const fem::StiffnessFactor& factor,
+                                           const fem::DofMap& dofs, const PenaltyContact& contact,
+                                           const Points& load,
+                                           const ContactSolverOptions& options) {
+  ContactSolution solution;
+  solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
+  fem::StiffnessFactor penalised = factor.clone_analysis();
+  while (solution.iterations < options.max_iterations && !solution.converged) {
+    VecX unknowns;
+    Result<linalg::SolveQuality> quality;
+    if (count(solution.active) == 0) {
+      quality = fem::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
+                                   dofs.restrict_to(load), unknowns);
+    } else {
+      linalg::SymmetricMatrix k_p = stiffness;
+      contact.add_stiffness(k_p, dofs, solution.active);
+      Points b_p = load;
+      contact.add_load(b_p, solution.active);
+      if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
+      quality = fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p),
+                                   unknowns);
+    }
+    if (!quality) return tl::unexpected(quality.error());
+    solution.backward_error = std::max(solution.backward_error, quality->backward_error);
+    dofs.expand(unknowns, solution.displacement);
+    ++solution.iterations;
+    ActiveSet next = contact.penetrating(solution.displacement);
+    solution.converged = next == solution.active;
+    solution.active = std::move(next);
+  }
+  return solution;
+}
+
 namespace {
 
 // Average nodal normals of the boundary, 3 x n; zero at interior nodes.
@@ -120,6 +158,19 @@ Points ForwardModel::solve(const Points& load) const {
 
 Result<ContactSolution> ForwardModel::solve_with_contact(const Points& load) const {
   return contact::solve_with_contact(stiffness_, factor_, dofs_, contact_, load);
+}
+
+double measure_full_solve_ms(const ForwardModel& forward) {
+  constexpr int kRepetitions = 9;
+  const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
+  VecX x = forward.factor().solve(b);  // allocates the workspace
+  std::vector<double> times_ms;
+  for (int i = 0; i < kRepetitions; ++i) {
+    const Stopwatch watch;
+    forward.factor().solve(b, x);
+    times_ms.push_back(watch.milliseconds());
+  }
+  return percentile(times_ms, 50.0);
 }
 
 }  // namespace brainshift::contact

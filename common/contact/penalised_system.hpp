@@ -13,6 +13,7 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
+#include "common/fem/stiffness_factor.hpp"
 
 namespace brainshift::contact {
 
@@ -51,6 +52,21 @@ class PenalisedSystem {
   const ForwardModel& forward_;
   ActiveSet active_;
   int changes_ = 0;
+};
+
+// RefactorisedSystem: a new Cholesky factor of K_p for every active set, as in the paper.
+// Ordering and symbolic analysis are those of K.
+class RefactorisedSystem final : public PenalisedSystem {
+ public:
+  explicit RefactorisedSystem(const ForwardModel& forward);
+  // Errors as fem::checked_solve.
+  Status solve(const Points& f, Points& u) const override;
+
+ private:
+  Status refresh() override;
+  linalg::SymmetricMatrix matrix_;  // K_p, lower; empty while no slave is active
+  double norm_ = 0.0;
+  fem::StiffnessFactor penalised_;
 };
 
 }  // namespace brainshift::contact

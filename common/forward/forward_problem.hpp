@@ -18,7 +18,7 @@
 #include <variant>
 #include <vector>
 
-#include "common/contact/obstacle.hpp"
+#include "common/contact/surface_contact.hpp"
 #include "common/core/progress.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/space_elasticity.hpp"

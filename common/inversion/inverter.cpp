@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "common/contact/iterative_system.hpp"
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"

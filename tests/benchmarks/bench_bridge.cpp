@@ -36,7 +36,7 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/bridge/bridge.hpp"
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/igtl/message.hpp"
 #include "common/igtl/stream_reader.hpp"

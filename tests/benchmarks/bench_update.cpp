@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/inverter.hpp"

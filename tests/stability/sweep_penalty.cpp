@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "common/contact/iterative_system.hpp"
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "tests/stability/toy_problem.hpp"
 

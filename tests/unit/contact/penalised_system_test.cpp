@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/contact/penalised_system.hpp"
-
 #include <Eigen/Cholesky>
 
+#include "common/contact/forward_model.hpp"
 #include "common/contact/iterative_system.hpp"
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
+#include "common/core/stopwatch.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::contact {
@@ -115,6 +115,14 @@ TEST_P(PenalisedSystems, SolveWithoutSlaves) {
   const auto changed = system->follow_contact(load(), u);
   ASSERT_TRUE(changed.has_value());
   EXPECT_FALSE(*changed);
+}
+
+TEST(FullSolve, IsPositiveAndShorterThanAllItsSolvesTogether) {
+  const auto model = inversion::prepare(Boundary::kContact);
+  const Stopwatch watch;
+  const double solve_ms = measure_full_solve_ms(model.forward());
+  EXPECT_GT(solve_ms, 0.0);
+  EXPECT_LT(5.0 * solve_ms, watch.milliseconds());  // 5 of its 9 solves take the median or more
 }
 
 }  // namespace

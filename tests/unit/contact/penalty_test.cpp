@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "common/contact/contact_solver.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"

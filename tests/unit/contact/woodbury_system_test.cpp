@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/woodbury_system.hpp"
 
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/inversion/invert.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"

@@ -3,7 +3,7 @@
 // 2 to 5 of steepest_descent.hpp compute, for comparison with finite differences.
 #pragma once
 
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/inversion/descent/misfit.hpp"
 #include "common/inversion/descent/objective.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "common/inversion/descent/misfit.hpp"
 #include "common/inversion/invert.hpp"

@@ -5,7 +5,7 @@
 
 #include <Eigen/LU>
 
-#include "common/contact/refactorised_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/contact/woodbury_system.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/invert.hpp"
