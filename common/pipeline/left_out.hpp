@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/configuration/case_config.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
+#include "common/inversion/contract/inversion_options.hpp"
 #include "common/registration/icp.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"

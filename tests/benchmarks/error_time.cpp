@@ -18,7 +18,7 @@
 #include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/inverter.hpp"
 
 namespace brainshift::bench {
 namespace {

@@ -14,7 +14,6 @@
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/settled_loads.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/inversion/contract/penetration.hpp"
 #include "common/linalg/blas_threads.hpp"
 
 namespace brainshift::inversion {

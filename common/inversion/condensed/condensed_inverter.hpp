@@ -40,7 +40,6 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"

@@ -18,7 +18,7 @@
 //          falls. The pieces that the trials meet are gathered, and the next step is to the minimum
 //          of their maximum (newton_steps.hpp).
 //
-// A rough step is shortened where contact would change in many slaves (contact_reach.hpp); how many
+// A rough step is shortened where contact would change in many slaves (contact_reduction.hpp); how many
 // are allowed grows with steps that fall and shrinks with others. A search for contact begins with
 // the forces that the linear model predicts.
 //
@@ -41,7 +41,6 @@
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
-#include "common/inversion/skull/contact_reach.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/inversion/skull/contact_system.hpp"
 #include "common/inversion/strengths/prior_strengths.hpp"

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/inversion/contract/penetration.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
 
 namespace brainshift::inversion {
 namespace {

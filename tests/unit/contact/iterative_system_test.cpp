@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "common/contact/woodbury_system.hpp"
-#include "common/inversion/descent/conjugate_gradients.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/descent/descents.hpp"
+#include "common/inversion/inverter.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::contact {

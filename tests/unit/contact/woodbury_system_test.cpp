@@ -2,7 +2,7 @@
 #include "common/contact/woodbury_system.hpp"
 
 #include "common/contact/penalised_system.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/inverter.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/inversion/invert.hpp"
+#include "common/inversion/inverter.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/descent/misfit.hpp"
+#include "common/inversion/descent/objective.hpp"
 
 #include <cmath>
 #include <limits>
 
-#include "common/inversion/descent/objective.hpp"
 #include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
