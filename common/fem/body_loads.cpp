@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/fem/body_loads.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>

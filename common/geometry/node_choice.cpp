@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/geometry/node_choice.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "common/linalg/blas.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift {
 namespace {

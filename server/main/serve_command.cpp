@@ -14,7 +14,7 @@
 #include "common/io/config/key_file.hpp"
 #include "common/io/files/stop_signals.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "server/guard/file_limit.hpp"
 #include "server/guard/memory.hpp"
 #include "server/main/exit_status.hpp"

@@ -41,7 +41,7 @@
 #include "common/igtl/message.hpp"
 #include "common/igtl/stream_reader.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/made_up_daemon.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"

@@ -28,8 +28,7 @@
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 

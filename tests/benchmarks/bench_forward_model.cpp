@@ -10,8 +10,7 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/operators/spatial_blocks.hpp"
 #include "common/patient/read_patient.hpp"
 

@@ -17,7 +17,7 @@
 #include "common/core/statistics.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/pipeline/scene_plan.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"

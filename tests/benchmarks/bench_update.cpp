@@ -16,7 +16,7 @@
 #include "common/inversion/inverter.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/benchmarks/value_or_exit.hpp"

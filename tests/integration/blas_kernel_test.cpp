@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Programs take a kernel of OpenBLAS that suits the processor, also where OpenBLAS does not know
-// the processor and takes its oldest (common/linalg/blas_kernel.hpp).
+// the processor and takes its oldest (common/linalg/openblas.hpp).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -26,7 +26,7 @@
 #include "common/core/statistics.hpp"
 #include "common/fem/body_loads.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/benchmarks/csv_table.hpp"

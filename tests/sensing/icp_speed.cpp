@@ -8,7 +8,7 @@
 #include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/registration/icp.hpp"
 #include "tests/sensing/icp_study.hpp"

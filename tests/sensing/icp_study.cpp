@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/sensing/icp_study.hpp"
 
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 
 int main() {
   brainshift::linalg::choose_blas_kernel();

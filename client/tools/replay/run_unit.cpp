@@ -5,8 +5,7 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -14,7 +14,7 @@
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/settled_loads.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::inversion {
 namespace {

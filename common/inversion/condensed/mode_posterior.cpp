@@ -63,8 +63,6 @@ bool SourceCheck::run(const blas::In<double>& gram, const Eigen::Ref<const VecX>
   return true;
 }
 
-namespace blas = linalg::blas;
-
 ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
   const Eigen::Index most = SparseData::kMaxCommonErrors + window.count;
   gram_storage_.resize(most * most);

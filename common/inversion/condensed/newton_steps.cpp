@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/condensed/newton_steps.hpp"
+
 #include <algorithm>
 
 namespace brainshift::inversion {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/inversion/descent/descents.hpp"
+
 #include <algorithm>
 #include <utility>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // G = K^-1 N, the responses to unit forces along the slaves' normals, and Phi = N^T G.
 //
-// Slaves that are neighbours are solved together (linalg/block_substitution.hpp). A block of
+// Slaves that are neighbours are solved together (linalg/cholesky.hpp). A block of
 // columns goes to a BlockStore as soon as it is finished, and comes back by rows when all of G is
 // made compact: with a store on disk G is never in memory as a whole.
 #pragma once

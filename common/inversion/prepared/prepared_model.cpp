@@ -10,7 +10,7 @@
 #include "common/core/units.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/tet_locator.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::inversion {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "common/linalg/team_cholesky.hpp"
+#include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -157,8 +157,6 @@ void ReleasedSlaves::solve(blas::Out<double> b) {
   blas::multiply(-1.0, inverse(), given, 1.0, solved);
   b = solved(pressing_, Eigen::all);
 }
-
-namespace blas = linalg::blas;
 
 void subtract_penetration(const CondensedOperators& operators, const std::vector<int>& slaves,
                           const Eigen::Ref<const VecX>& change, ThreadTeam& team,

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // That programs start themselves again is tested in tests/integration/blas_kernel_test.cpp.
-#include "common/linalg/blas_kernel.hpp"
-
 #include <gtest/gtest.h>
 
+#include <dlfcn.h>
+
 #include <cstdlib>
+
+#include "common/linalg/blas.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::linalg {
 namespace {
@@ -15,6 +18,18 @@ TEST(BlasKernel, AKernelThatTheUserNamesIsKept) {
   choose_blas_kernel();  // returns
   EXPECT_EQ(blas_kernel(), before);
   EXPECT_STREQ(std::getenv("OPENBLAS_CORETYPE"), "Prescott");
+}
+
+TEST(BlasThreads, OneThreadWhereTheBlasHasThreads) {
+  // A call into BLAS, so that the library is loaded.
+  const double x = 1.0;
+  double y = 2.0;
+  blas::add_scaled(1, 1.0, &x, &y);
+  EXPECT_EQ(y, 3.0);
+  use_single_threaded_blas();
+  void* symbol = dlsym(RTLD_DEFAULT, "openblas_get_num_threads");
+  if (symbol == nullptr) GTEST_SKIP() << "the loaded BLAS is not OpenBLAS";
+  EXPECT_EQ(reinterpret_cast<int (*)()>(symbol)(), 1);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 
 #include <dlfcn.h>
 #include <unistd.h>
@@ -43,6 +43,23 @@ void choose_blas_kernel() {
   arguments.push_back(nullptr);
   execv("/proc/self/exe", arguments.data());
   unsetenv(kVariable);  // it could not be started again, and goes on as it is
+}
+
+namespace {
+
+void set_one_thread() {
+  // Looked up at run time, because which BLAS is loaded is the system's choice, not the linker's.
+  using SetThreads = void (*)(int);
+  if (void* symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
+    reinterpret_cast<SetThreads>(symbol)(1);
+  }
+}
+
+}  // namespace
+
+void use_single_threaded_blas() {
+  static const bool once = (set_one_thread(), true);
+  (void)once;
 }
 
 }  // namespace brainshift::linalg

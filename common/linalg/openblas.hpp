@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which instructions OpenBLAS uses.
+// What a program asks of OpenBLAS: a kernel for its processor, and one thread.
 #pragma once
 
 #include <string>
@@ -16,5 +16,10 @@ std::string blas_kernel();
 // OPENBLAS_CORETYPE is the user's choice where it is set. Call it first in main(): nothing may be
 // open, running or written yet.
 void choose_blas_kernel();
+
+// Limits a threaded OpenBLAS to one thread. Its own threads make supernodal factorisation 3-30
+// times slower on small or busy machines, and break bit-identical results. Does nothing with a
+// serial BLAS. Factorisations and inverters call it themselves; a program may call it earlier.
+void use_single_threaded_blas();
 
 }  // namespace brainshift::linalg
