@@ -11,7 +11,7 @@
 #include "common/contact/forward_model.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/openblas.hpp"
-#include "common/operators/spatial_blocks.hpp"
+#include "common/operators/encode_columns.hpp"
 #include "common/patient/read_patient.hpp"
 
 namespace brainshift {

@@ -21,7 +21,6 @@
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/operators/encode_columns.hpp"
-#include "common/operators/spatial_blocks.hpp"
 
 namespace brainshift::inversion {
 
