@@ -28,7 +28,7 @@ constexpr double kLargestExtent_mm = 400.0;
 // this.
 constexpr double kGrading = 1.0 / 3.0;
 constexpr int kRimSamples = 96;
-// As far from the tangent plane as a craniotomy node may lie (node_sets.cpp).
+// As far from the tangent plane as a craniotomy node may lie (brain_model_builder.cpp).
 constexpr double kRimSearch_mm = 15.0;
 
 Status check_extent(const Vec3& size, const std::string& what) {
