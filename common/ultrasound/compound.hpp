@@ -18,6 +18,7 @@
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/tracking/recording.hpp"
+#include "common/values/intensity_samples.hpp"
 
 namespace brainshift::ultrasound {
 
@@ -55,5 +56,19 @@ struct CompoundedVolume {
 Result<CompoundedVolume> compound(const tracking::Recording& recording, const ImagePoses& poses,
                                   const PixelWindow& window, const VolumeGrid& grid,
                                   Paste paste = Paste::kLinear);
+
+// Tracked frames as places with intensities, for registration to another image.
+//
+// Pixels are averaged in square blocks, which evens out speckle. A block becomes one sample at the
+// mean of its pixels' places. Only blocks that lie wholly in the scanned sector are taken: pixels
+// outside of the sector are 0 in every frame of a recording, pixels inside hardly ever.
+
+// Places in the poses' target frame, mm; intensities in the recording's grey levels. Frames
+// without a pose or without a valid image are left out.
+// kInvalidArgument: poses and frames differ in number, block_px outside 1 to 100. kEmptySet: no
+// frame to use, no block in the sector.
+Result<IntensitySamples> frame_samples(const tracking::Recording& recording,
+                                       const ImagePoses& poses, const PixelWindow& window,
+                                       int block_px);
 
 }  // namespace brainshift::ultrasound

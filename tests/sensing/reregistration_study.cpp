@@ -11,7 +11,7 @@
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
 #include "common/registration/rigid_increment.hpp"
-#include "common/ultrasound/frame_samples.hpp"
+#include "common/ultrasound/compound.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
 #include "tests/support/study_record.hpp"
 #ifdef BRAINSHIFT_WITH_ITK
