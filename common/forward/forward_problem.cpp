@@ -2,6 +2,7 @@
 #include "common/forward/forward_problem.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,31 @@
 #include "common/geometry/tet_locator.hpp"
 
 namespace brainshift::forward {
+namespace {
+
+// Squared sine-like measure of how well a rigid motion is held. Below it the motion counts as
+// free.
+constexpr double kHeld = 1e-10;
+
+}  // namespace
+
+Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  Matrix6 gram = Matrix6::Zero();
+  for (const HeldDirection& h : held) {
+    Eigen::Matrix<double, 6, 1> row;
+    row << h.direction, ((h.place - centre) / size_mm).cross(h.direction);
+    gram += row * row.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(gram, Eigen::EigenvaluesOnly);
+  const double largest = std::max(solver.eigenvalues()[5], 1.0);
+  const auto free = (solver.eigenvalues().array() < kHeld * largest).count();
+  if (free == 0) return {};
+  return fail(ErrorCode::kFloatingBody,
+              fmt::format("conditions: the body is not held: {} of its 6 rigid motions {} free",
+                          free, free == 1 ? "is" : "are"));
+}
+
 namespace {
 
 constexpr double kMaxPoissonRatio = 0.4999;

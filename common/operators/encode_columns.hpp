@@ -6,11 +6,10 @@
 // number are finer than sums in single precision: the limit is then that of kFinest.
 // docs/decisions/0028 says what that does to fields.
 //
-// Blocks: neighbours, kBlockNodes at most (encode_columns.hpp). With M_b
-// the rows of a block in steps, W = M_b M_b^T is factorised by Cholesky with pivoting until the
-// rows that are left are below kLeft in the root mean square, W ~ L L^T (Harbrecht, Peters and
-// Schneider 2012, Appl. Numer. Math. 62:428); the basis is that of L's columns (Householder), and
-// the coefficients are Q^T M_b, rounded. Where a number is still off by more than kMostErrorSteps,
+// Blocks: neighbours, kBlockNodes at most (SpatialBlocks). With M_b the rows of a block in steps, W
+// = M_b M_b^T is factorised by Cholesky with pivoting until the rows that are left are below kLeft
+// in the root mean square, W ~ L L^T (Harbrecht, Peters and Schneider 2012, Appl. Numer. Math.
+// 62:428); the basis is that of L's columns (Householder), and the coefficients are Q^T M_b, rounded. Where a number is still off by more than kMostErrorSteps,
 // the block is done again with more columns.
 #pragma once
 

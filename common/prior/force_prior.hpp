@@ -4,7 +4,7 @@
 //
 //   Sigma = Sigma_fine + Sigma_medium + Sigma_coarse + M M^T
 //
-// The first three are smooth residual fields of three correlation lengths (force_prior.hpp): fine
+// The first three are smooth residual fields of three correlation lengths (ForceKernel): fine
 // is the paper's, compact; medium and coarse have a basis. M: load modes, one nodal force field per
 // column, each times its standard deviation (load_modes.hpp).
 // Assumption: forces in different directions and of different parts are independent.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points that stand apart from the others (Rusu, Marton, Blodow, Dolha & Beetz 2008). The mean
-// distance of a point to its nearest neighbours is compared with the mean of that figure over all
-// points.
+// What is dropped of a measured surface: points that stand apart, and small parts of a disparity
+// map.
 #pragma once
 
 #include <vector>
@@ -11,6 +10,10 @@
 
 namespace brainshift::stereo {
 
+// Points that stand apart from the others (Rusu, Marton, Blodow, Dolha & Beetz 2008). The mean
+// distance of a point to its nearest neighbours is compared with the mean of that figure over all
+// points.
+//
 // points: 3 x n, any unit of length. True where the mean distance to the `neighbours` nearest
 // points exceeds its mean by `sds` standard deviations and is more than twice the mean, so that
 // the rim of a regular grid is not an outlier. With n <= neighbours, no point is an outlier.

@@ -7,7 +7,7 @@
 //   - both matchings agree:   |d_left(x, y) - d_right(x - d_left, y)| <= max_left_right_px,
 //   - the picture has texture there: its noise alone moves the match by at most kMaxTextureSd_px,
 //   - it comes from inside both original pictures, and
-//   - it is connected (parts.hpp, steps of 1 px) to min_part_fraction of the picture: matches by
+//   - it is connected (cleaning.hpp, steps of 1 px) to min_part_fraction of the picture: matches by
 //     chance are specks.
 // Standard deviation of a valid disparity, px:
 //   sd^2 = kFloor_px^2 + 2 s^2 / E + (difference of the two matchings)^2 / 2

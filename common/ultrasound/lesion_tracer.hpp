@@ -36,8 +36,8 @@
 
 namespace brainshift::ultrasound {
 
-// An image seen along rays from a point, and the best closed path through it (lesion_tracer.hpp).
-// Amini, Weymouth & Jain 1990.
+// An image seen along rays from a point, and the best closed path through it (Amini,
+// Weymouth & Jain 1990).
 
 // rays x radii: one sample per pixel along each ray, the column is the radius in pixels. NaN
 // outside of the image.
