@@ -9,8 +9,9 @@
 // Blocks: neighbours, kBlockNodes at most (SpatialBlocks). With M_b the rows of a block in steps, W
 // = M_b M_b^T is factorised by Cholesky with pivoting until the rows that are left are below kLeft
 // in the root mean square, W ~ L L^T (Harbrecht, Peters and Schneider 2012, Appl. Numer. Math.
-// 62:428); the basis is that of L's columns (Householder), and the coefficients are Q^T M_b, rounded. Where a number is still off by more than kMostErrorSteps,
-// the block is done again with more columns.
+// 62:428); the basis is that of L's columns (Householder), and the coefficients are Q^T M_b,
+// rounded. Where a number is still off by more than kMostErrorSteps, the block is done again with
+// more columns.
 #pragma once
 
 #include <functional>
