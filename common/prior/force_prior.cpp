@@ -170,15 +170,6 @@ Points ForcePrior::apply(const Points& w) const {
   return f;
 }
 
-void ForcePrior::apply_remainders(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const {
-  Eigen::MatrixXd one;
-  f.setZero(w.rows(), w.cols());
-  for (const ForceKernel& kernel : kernels_) {
-    kernel.apply(w, one);
-    f += one;
-  }
-}
-
 std::uint64_t ForcePrior::bytes() const {
   std::uint64_t sum = static_cast<std::uint64_t>(modes().size()) * sizeof(double);
   for (const ForceKernel& kernel : kernels_) sum += kernel.bytes();

@@ -89,10 +89,6 @@ class ForcePrior {
   void apply(const Points& w, Points& f) const;
   Points apply(const Points& w) const;
 
-  // f = (Sigma_fine + Sigma_medium + Sigma_coarse) w for several nodal fields at once, one per row:
-  // k x 3n, node-major. Thread-safe.
-  void apply_remainders(const Eigen::MatrixXd& w, Eigen::MatrixXd& f) const;
-
   // field: 0 fine, 1 medium, 2 coarse.
   const ForceKernel& kernel(int field) const { return kernels_[static_cast<std::size_t>(field)]; }
   int num_modes() const { return modes_.size(); }

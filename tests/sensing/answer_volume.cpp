@@ -42,7 +42,7 @@ Result<AnswerVolume> read_answer(const std::filesystem::path& path) {
   return volume;
 }
 
-Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& answer,
+Agreement compare(const CompoundedVolume& ours, const AnswerVolume& answer,
                   const std::array<int, 3>& shift, Voxels voxels) {
   const std::array<int, 3>& dims = answer.grid.dims;
   double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, difference = 0, bright = 0;

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/ultrasound/compound.hpp"
+#include "tests/support/compound.hpp"
 
 namespace brainshift::test_support {
 
 // MetaImage of unsigned char whose Offset and ElementSpacing are in the Reference frame, mm.
 struct AnswerVolume {
-  ultrasound::VolumeGrid grid;
+  VolumeGrid grid;
   std::vector<float> values;
 };
 Result<AnswerVolume> read_answer(const std::filesystem::path& path);
@@ -31,7 +31,7 @@ struct Agreement {
   long voxels = 0;
 };
 
-Agreement compare(const ultrasound::CompoundedVolume& ours, const AnswerVolume& answer,
+Agreement compare(const CompoundedVolume& ours, const AnswerVolume& answer,
                   const std::array<int, 3>& shift = {0, 0, 0}, Voxels voxels = Voxels::kWeFilled);
 
 }  // namespace brainshift::test_support

@@ -11,8 +11,9 @@
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
 #include "common/registration/rigid_increment.hpp"
-#include "common/ultrasound/compound.hpp"
+#include "common/ultrasound/frame_samples.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
+#include "tests/support/compound.hpp"
 #include "tests/support/study_record.hpp"
 #ifdef BRAINSHIFT_WITH_ITK
 #include "tests/sensing/itk_registration.hpp"
@@ -198,7 +199,7 @@ RigidTransform from_itk(const ItkPose& pose) {
 Status compare_with_itk(const Patient& patient) {
   const auto window = whole_image(patient.recording);
   const auto grid =
-      ultrasound::enclosing_grid(patient.recording, patient.poses, window, Vec3::Constant(1.0));
+      test_support::enclosing_grid(patient.recording, patient.poses, window, Vec3::Constant(1.0));
   if (!grid) return tl::unexpected(grid.error());
   auto volume = ultrasound::compound(patient.recording, patient.poses, window, *grid);
   if (!volume) return tl::unexpected(volume.error());

@@ -17,9 +17,9 @@
 #include "common/io/config/plus_config.hpp"
 #include "common/io/recording/sequence_file.hpp"
 #include "common/tracking/chain.hpp"
-#include "common/ultrasound/compound.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/sensing/answer_volume.hpp"
+#include "tests/support/compound.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift {
@@ -52,7 +52,7 @@ bool check(const std::string& name, double value, const std::string& bound, bool
 
 // Records the correlation for moves along x. Returns the length of the best of the 27 moves by at
 // most one voxel along each axis.
-double best_move(const std::string& series, const ultrasound::CompoundedVolume& ours,
+double best_move(const std::string& series, const test_support::CompoundedVolume& ours,
                  const AnswerVolume& answer) {
   for (int move = -3; move <= 3; ++move) {
     record({kStudy, series, "move along x in voxels", "correlation with PLUS", double(move),
@@ -116,11 +116,11 @@ int fullest_slice(const std::vector<float>& weight, const std::array<int, 3>& di
 
 // A row per voxel of one slice of both volumes: slice_NAME.csv, which tests/studies/sensing.py
 // draws.
-void write_slices(const std::string& name, const ultrasound::CompoundedVolume& ours,
+void write_slices(const std::string& name, const test_support::CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
   if (folder == nullptr) return;
-  const ultrasound::VolumeGrid& grid = answer.grid;
+  const test_support::VolumeGrid& grid = answer.grid;
   const int k = fullest_slice(ours.weight, grid.dims);
   auto file = value_or_exit(bench::CsvWriter::create(fs::path(folder) / ("slice_" + name + ".csv"),
                                                      "x_mm,y_mm,brainshift,PLUS"));
@@ -140,7 +140,7 @@ void write_slices(const std::string& name, const ultrasound::CompoundedVolume& o
   }
 }
 
-void check_volume(const std::string& what, const ultrasound::CompoundedVolume& ours,
+void check_volume(const std::string& what, const test_support::CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const Agreement agreement = compare(ours, answer);
   fmt::print("{}: {} voxels filled, mean |difference| {:.2f} grey values\n", what, agreement.voxels,
@@ -170,7 +170,7 @@ void study_spine(const fs::path& folder) {
   const AnswerVolume answer =
       value_or_exit(test_support::read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
-  const auto grid = value_or_exit(ultrasound::enclosing_grid(
+  const auto grid = value_or_exit(test_support::enclosing_grid(
       sweep.recording, sweep.chain.T_target_source, window, *sweep.config.output_spacing_mm));
   const double origin_mm = (grid.origin_mm - answer.grid.origin_mm).cwiseAbs().maxCoeff();
   check("spine origin of the enclosing grid against PLUS's mm", origin_mm, "<= 0.001",
@@ -178,13 +178,13 @@ void study_spine(const fs::path& folder) {
   const bool same = grid.dims == answer.grid.dims;
   check("spine voxels along each axis as PLUS's", same ? 1 : 0, "= 1", same,
         "DimSize in PLUS's volume");
-  for (const auto& [paste, label] : {std::pair{ultrasound::Paste::kLinear, "linear"},
-                                     std::pair{ultrasound::Paste::kNearest, "nearest"}}) {
-    const auto ours = value_or_exit(ultrasound::compound(
+  for (const auto& [paste, label] : {std::pair{test_support::Paste::kLinear, "linear"},
+                                     std::pair{test_support::Paste::kNearest, "nearest"}}) {
+    const auto ours = value_or_exit(test_support::compound(
         sweep.recording, sweep.chain.T_target_source, window, answer.grid, paste));
     const std::string what = std::string("spine ") + label;
     check_volume(what, ours, answer);
-    if (paste == ultrasound::Paste::kLinear) write_slices("spine", ours, answer);
+    if (paste == test_support::Paste::kLinear) write_slices("spine", ours, answer);
   }
 }
 
@@ -200,7 +200,7 @@ void study_nwire(const fs::path& folder) {
       value_or_exit(test_support::read_answer(folder / "NwirePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
   const auto ours = value_or_exit(
-      ultrasound::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
+      test_support::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
   check_volume("nwire", ours, answer);
   write_slices("nwire", ours, answer);
 }

@@ -52,7 +52,7 @@ struct CondensedOptions {
   bool contact = true;
   bool uncertainty = true;
   bool gravity_modes = true;
-  // Nodes that are rebuilt, sorted; the others are interpolated (field_rebuild.hpp). Empty: every node.
+  // Nodes that are rebuilt, sorted; the others are interpolated (FarField). Empty: every node.
   std::vector<NodeIndex> region_of_interest;
   int rank = 0;     // use only so many modes; 0: all
   int threads = 0;  // 0: as many as cores

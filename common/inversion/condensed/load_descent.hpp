@@ -18,7 +18,7 @@
 //          falls. The pieces that the trials meet are gathered, and the next step is to the minimum
 //          of their maximum (newton_steps.hpp).
 //
-// A rough step is shortened where contact would change in many slaves (contact_reduction.hpp); how many
+// A rough step is shortened where contact would change in many slaves (ContactReach); how many
 // are allowed grows with steps that fall and shrinks with others. A search for contact begins with
 // the forces that the linear model predicts.
 //
