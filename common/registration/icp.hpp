@@ -5,10 +5,10 @@
 //
 //   min over T   sum_i rho(r_i) / sd^2  +  |rotation angle(T T_initial^-1)|^2 / rotation_sd^2
 //   rho(r) = 2 s^2 (1 - exp(-r^2 / 2 s^2)),  weight w(r) = rho'(r) / 2r = exp(-r^2 / 2 s^2)
-//   r_i = distance of T p_i from the surface, n_i its gradient (target_surface.hpp)
+//   r_i = distance of T p_i from the surface, n_i its gradient (TargetSurface)
 //
-// Its parts: distances from the surface (target_surface), normal equations of a pose
-// (pose_information), which axes they show (observability), small motions (rigid_increment).
+// Its parts: distances from the surface (TargetSurface); the normal equations of a pose, which axes
+// they show and small motions (pose_information.hpp).
 //
 // As n_i is the gradient of r_i, the objective itself checks each Gauss-Newton step: the step is
 // halved until the objective goes down. The scale s starts at twice the median distance and
@@ -23,13 +23,42 @@
 // Assumption: point errors are independent with standard deviation sd_mm along the surface normal.
 #pragma once
 
+#include <functional>
+
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/registration/pose_information.hpp"
-#include "common/registration/rigid_increment.hpp"
-#include "common/registration/target_surface.hpp"
 
 namespace brainshift::registration {
+
+// The surface that points are aligned to, as ICP sees it: distances of many points at once, and
+// their gradients.
+//
+//   r_i = distance of x_i from the surface, mm;   g_i = grad r_i at x_i, no unit
+//   triangles  q_i the closest surface point, g_i the direction from q_i to x_i: the triangle's
+//              normal (up to sign), at an edge or vertex the one of its normals that points there;
+//              exact, about 1 us a point
+//   volume     interpolated (geometry/distance_volume.hpp): wrong by hundredths of a millimetre,
+//              some 10 ns a point
+//
+// A view: it refers to the surface, which must outlive it. Calls from several threads are safe.
+class TargetSurface {
+ public:
+  // Implicit: align(points, surface, ...) takes either.
+  TargetSurface(const geometry::ClosestPointIndex& triangles);
+  TargetSurface(const geometry::DistanceVolume& volume);
+
+  // points: m x 3, finite, mm. distances_mm and gradients must have m rows.
+  void measure(const geometry::PointRows& points, VecX& distances_mm,
+               geometry::PointRows& gradients) const {
+    measure_(points, distances_mm, gradients);
+  }
+
+ private:
+  std::function<void(const geometry::PointRows&, VecX&, geometry::PointRows&)> measure_;
+};
 
 // The options of align(), and the checks of its input.
 struct IcpOptions {

@@ -5,8 +5,8 @@
 //
 //   T_ras_ras = argmax over T  NMI(M(T x_i), I_i)                       (image_similarity.hpp)
 //
-// The search (pose_ascent.hpp) goes from coarse to fine. On each level M is smoothed by a Gaussian
-// and every k-th sample is used. On the coarsest level the search begins at the given pose and at
+// The search (ascend) goes from coarse to fine. On each level M is smoothed by a Gaussian and every
+// k-th sample is used. On the coarsest level the search begins at the given pose and at
 // six others, `start_offset_mm` from it along each axis. They are followed to the second finest
 // level, and the best goes on to the finest.
 // Mutual information asks only that intensities go together, not how: sulci may be dark in one
@@ -20,15 +20,55 @@
 // dura is opened; Studholme et al. 1999.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {
+
+// The rigid motion near a first one at which a smooth function is greatest, by the quasi-Newton
+// method BFGS.
+//
+//   z = (radius w, t), xi = (w, t): all six in mm;  T <- rigid_increment(xi, c) T,  c = T centre
+//   step p = H g, H the inverse-Hessian estimate (BFGS, H = scaled identity at first), halved
+//   until f(T(p)) >= f(T) + 1e-4 g . p                                                 (Armijo)
+// Gradients of successive poses are compared as if their tangent spaces were the same. They differ
+// by half a step's angle.
+// Source: Nocedal & Wright, Numerical Optimization (2006), algorithm 6.1.
+struct PoseValue {
+  // False outside of the function's domain. Such a pose is never taken.
+  bool valid = false;
+  double value = 0.0;
+  Vec6 gradient = Vec6::Zero();  // by xi about the given centre, per radian and per mm
+};
+using PoseFunction = std::function<PoseValue(const RigidTransform& T, const Vec3& centre)>;
+
+struct PoseAscentOptions {
+  int max_iterations = 60;
+  double first_step_mm = 1.0;
+  // About the size of what the function resolves, so that no step jumps over a hill.
+  double largest_step_mm = 3.0;
+  double tolerance_mm = 0.01;  // converged when a step is shorter
+};
+
+struct PoseAscent {
+  RigidTransform T = RigidTransform::Identity();
+  double value = 0.0;
+  int iterations = 0;
+  int evaluations = 0;
+  bool valid = false;      // the function is defined at the first pose
+  bool converged = false;  // a step was below the tolerance, or no step went up
+};
+
+// centre: of the moved points, in their own frame, mm. radius_mm > 0: their rms distance from it.
+PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial, const Vec3& centre,
+                  double radius_mm, const PoseAscentOptions& options = {});
 
 // The options of ImageRegistrar, and the checks of its input. Every error names the value.
 struct ImageLevel {

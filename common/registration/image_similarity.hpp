@@ -14,7 +14,7 @@
 
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {

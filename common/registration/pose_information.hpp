@@ -12,9 +12,24 @@
 
 #include "common/core/types.hpp"
 #include "common/geometry/distance_volume.hpp"
-#include "common/registration/rigid_increment.hpp"
 
 namespace brainshift::registration {
+
+// Small rigid motions about a centre c, and how a distance changes with them.
+//
+//   T(xi) x = c + exp([w]x) (x - c) + t,      xi = (w, t): rotation vector (rad), translation (mm)
+//   d/dxi  n . T(xi) x  at xi = 0   =   ((x - c) x n,  n)
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+// T(xi), mm.
+RigidTransform rigid_increment(const Vec6& xi, const Vec3& centre);
+
+// Rotation vector w with exp([w]x) = rotation, |w| <= pi.
+Vec3 rotation_vector(const Mat3& rotation);
+
+// Gradient of n . T(xi) x at xi = 0, for a fixed direction n: mm per radian, and no unit.
+Vec6 direction_gradient(const Vec3& x, const Vec3& n, const Vec3& centre);
 
 // Which rotations and translations of a pose the points show, in numbers and in words.
 //

@@ -10,7 +10,7 @@
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/ultrasound/frame_samples.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
 #include "tests/support/compound.hpp"

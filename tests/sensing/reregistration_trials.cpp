@@ -6,7 +6,7 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 
 namespace brainshift::sensing {
 namespace {

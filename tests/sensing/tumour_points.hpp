@@ -12,7 +12,7 @@
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 
 namespace brainshift::sensing {
 
