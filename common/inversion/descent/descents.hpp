@@ -22,6 +22,7 @@
 #include "common/core/error.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
@@ -45,6 +46,7 @@ Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& 
 //   step          w += alpha dw,  b += alpha s,  u += alpha z       (u = K_p^-1 b_p still holds)
 //   contact       one contact iteration; where the active set changed, Omega did, so gamma = 0 next
 // Two solves per iteration, and a third when the set changes.
+//
 // As steepest_descent(); the solutions before are the first guesses of an iterative system.
 Result<Estimate> conjugate_gradients(const PreparedModel& model, const SparseData& data,
                                      const InversionOptions& options,

@@ -14,10 +14,9 @@
 #include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {
+namespace {
 
 // A surface as ICP sees it: triangles and a distance volume of one sphere measure alike.
-
-namespace {
 
 using geometry::PointRows;
 

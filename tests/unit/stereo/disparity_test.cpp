@@ -9,11 +9,10 @@
 #include "tests/support/stereo_scene.hpp"
 
 namespace brainshift::stereo {
+namespace {
 
 // After rectification a point lies in the same row of both pictures, and its disparity gives its
 // depth.
-
-namespace {
 
 using test_support::Eye;
 using test_support::operating_rig;
