@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "common/contact/unilateral_solver.hpp"
+#include "common/contact/surface_contact.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/fem/biot.hpp"
 #include "common/forward/forward_problem.hpp"

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -37,7 +38,10 @@ struct InversionOptions {
 
 // The error of an inversion that ended because its caller asked for it: kNotConverged, "inversion
 // was stopped at iteration K". iteration: the one that was not begun, from 1.
-tl::unexpected<Error> stopped(int iteration);
+inline tl::unexpected<Error> stopped(int iteration) {
+  return fail(ErrorCode::kNotConverged,
+              "inversion was stopped at iteration " + std::to_string(iteration));
+}
 
 // OmissionErrors: what an update may have lost by the parts that its scene leaves out.
 // Upper estimates of the greatest move of any node, mm; 0 for a part that was carried.
