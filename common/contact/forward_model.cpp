@@ -17,12 +17,11 @@ namespace brainshift::contact {
 Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
-                                           const Points& load,
-                                           const ContactSolverOptions& options) {
+                                           const Points& load) {
   ContactSolution solution;
   solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
   fem::StiffnessFactor penalised = factor.clone_analysis();
-  while (solution.iterations < options.max_iterations && !solution.converged) {
+  while (solution.iterations < kMostContactIterations && !solution.converged) {
     VecX unknowns;
     Result<linalg::SolveQuality> quality;
     if (count(solution.active) == 0) {

@@ -48,18 +48,15 @@ struct ContactSolution {
   double backward_error = 0.0;  // the largest of all solves
 };
 
-struct ContactSolverOptions {
-  int max_iterations = 40;
-};
+inline constexpr int kMostContactIterations = 40;
 
 // stiffness: K (lower), with its factor, dofs and contact; load: 3 x n, N.
-// Errors as StiffnessFactor and fem::checked_solve. At max_iterations there is no error: the
+// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error: the
 // result holds the last iterate, and `converged` is false.
 Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,
-                                           const Points& load,
-                                           const ContactSolverOptions& options = {});
+                                           const Points& load);
 
 class ForwardModel {
  public:

@@ -92,15 +92,12 @@ Status check_points(const Points& points, const RigidTransform& T) {
   return {};
 }
 
-}  // namespace
-
+// Ok, or the error that align() returns.
 Status check_alignment(const Points& points, const RigidTransform& T_surface_points_initial,
                        const IcpOptions& options) {
   if (Status status = check_options(options); !status) return status;
   return check_points(points, T_surface_points_initial);
 }
-
-namespace {
 
 using geometry::PointRows;
 

@@ -77,10 +77,6 @@ struct IcpOptions {
   double observability_ratio = 1e-2;
 };
 
-// Ok, or the error that align() returns.
-Status check_alignment(const Points& points, const RigidTransform& T_surface_points_initial,
-                       const IcpOptions& options);
-
 struct IcpResult {
   RigidTransform T_surface_points = RigidTransform::Identity();  // x_surface = T x_points
   bool converged = false;

@@ -86,9 +86,7 @@ constexpr Eigen::Index kLeastSamples = 500;  // some thirty in each of half the 
 
 Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
 
-}  // namespace
-
-Status check_options(const ImageRegistrationOptions& options) {
+Status check_registrar(const ImageRegistrationOptions& options) {
   if (options.levels.empty()) return refuse("image registration: levels: none given");
   for (const ImageLevel& level : options.levels)
     if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kLeastSamples)
@@ -120,6 +118,7 @@ Status check_options(const ImageRegistrationOptions& options) {
   return {};
 }
 
+// what: "MRI" or "region", for the sentence.
 Status check_image(const char* what, const VoxelImage& image) {
   for (int length : image.dims)
     if (length < 2)
@@ -155,8 +154,6 @@ Status check_samples(const IntensitySamples& samples) {
                   fmt::format("image registration: sample {} is not finite", i));
   return {};
 }
-
-namespace {
 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
 // A pose beyond this fraction of the search's reach lies at its edge.
@@ -335,7 +332,7 @@ Status check_end(const Task& task, const ImageRegistration& result) {
 
 Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region,
                                               const ImageRegistrationOptions& options) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_registrar(options); !ok) return tl::unexpected(ok.error());
   if (Status ok = check_image("MRI", mri); !ok) return tl::unexpected(ok.error());
   if (region)
     if (Status ok = check_image("region", *region); !ok) return tl::unexpected(ok.error());

@@ -70,7 +70,7 @@ struct PoseAscent {
 PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial, const Vec3& centre,
                   double radius_mm, const PoseAscentOptions& options = {});
 
-// The options of ImageRegistrar, and the checks of its input. Every error names the value.
+// The options of ImageRegistrar. Every error about them or the images names the value.
 struct ImageLevel {
   double smoothing_mm = 0.0;  // standard deviation, of M
   int samples = 0;            // about this many are used
@@ -95,13 +95,6 @@ struct ImageRegistrationOptions {
   // level.
   double same_pose_mm = 2.0;
 };
-
-Status check_options(const ImageRegistrationOptions& options);
-
-// what: "MRI" or "region", for the sentence.
-Status check_image(const char* what, const VoxelImage& image);
-
-Status check_samples(const IntensitySamples& samples);
 
 struct ImageRegistration {
   // The correction: x_ras (of the MRI) = T_ras_ras x_ras (as the samples are placed now).

@@ -38,8 +38,7 @@ bool same_neighbours(const CondensedOperators& operators, NodeIndex a, NodeIndex
   return operators.control_neighbours.col(a) == operators.control_neighbours.col(b);
 }
 
-}  // namespace
-
+// region: sorted nodes that must be exact; empty: every node, and the result is empty.
 FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
                         const std::vector<NodeIndex>& region, ThreadTeam& team) {
   FarField plan;
@@ -78,8 +77,6 @@ FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
   }
   return plan;
 }
-
-namespace {
 
 // out += sum over j of factor[j] column[j], for `rows` numbers from `first` on. Plain loops in the
 // place of BLAS: its kernels round the last numbers of an array otherwise than the others, so that

@@ -55,10 +55,6 @@ struct FarField {
   bool empty() const { return rebuilt.empty(); }
 };
 
-// region: sorted nodes that must be exact; empty: every node, and the result is empty.
-FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
-                        const std::vector<NodeIndex>& region, ThreadTeam& team);
-
 class FieldRebuild {
  public:
   // Keeps a reference to the operators. region: sorted nodes that are rebuilt; empty: all. team:

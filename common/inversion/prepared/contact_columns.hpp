@@ -112,9 +112,6 @@ struct BlockStore {
 
   bool keeps() const { return static_cast<bool>(save); }
 };
-// Keeps the rows of `blocks` blocks in memory for as long as the store or a copy of it lives.
-BlockStore memory_store(int blocks);
-
 struct ContactColumns {
   std::vector<int> order;  // of the slaves, block after block of BlockRunner::block_size()
   BlockStore store;
