@@ -16,8 +16,7 @@
 #include "common/linalg/openblas.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
 #include "common/patient/read_patient.hpp"
-#include "tests/benchmarks/median_time.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

@@ -44,7 +44,7 @@
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/made_up_daemon.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

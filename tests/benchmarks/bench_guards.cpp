@@ -13,8 +13,7 @@
 #include "common/inversion/prepared/condense.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
-#include "tests/benchmarks/median_time.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

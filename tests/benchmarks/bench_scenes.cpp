@@ -20,7 +20,7 @@
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/pipeline/scene_plan.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

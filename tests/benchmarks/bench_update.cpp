@@ -19,7 +19,7 @@
 #include "common/linalg/openblas.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/wire/convert.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

@@ -1,13 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The time of a piece of work, repeated.
+// For benchmarks that end at the first error.
 #pragma once
 
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
 #include <vector>
 
+#include "common/core/error.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 
 namespace brainshift::bench {
+
+// The value. On an error: prints its sentence to stderr and exits with status 2.
+template <typename T>
+T value_or_exit(Result<T> result) {
+  if (result) return std::move(*result);
+  std::fprintf(stderr, "benchmark: %s\n", result.error().message.c_str());
+  std::exit(2);
+}
+
+// The time of a piece of work, repeated.
 
 // Median time of one call of `work`, ms, over `repetitions` calls. `warm_up` uncounted calls come
 // first.
