@@ -51,8 +51,8 @@ struct ContactSolution {
 inline constexpr int kMostContactIterations = 40;
 
 // stiffness: K (lower), with its factor, dofs and contact; load: 3 x n, N.
-// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error: the
-// result holds the last iterate, and `converged` is false.
+// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error:
+// the result holds the last iterate, and `converged` is false.
 Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                            const fem::StiffnessFactor& factor,
                                            const fem::DofMap& dofs, const PenaltyContact& contact,

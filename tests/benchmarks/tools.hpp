@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For benchmarks that end at the first error.
+// What benchmarks share: they end at the first error, and time pieces of work.
 #pragma once
 
 #include <cstdio>
@@ -20,8 +20,6 @@ T value_or_exit(Result<T> result) {
   std::fprintf(stderr, "benchmark: %s\n", result.error().message.c_str());
   std::exit(2);
 }
-
-// The time of a piece of work, repeated.
 
 // Median time of one call of `work`, ms, over `repetitions` calls. `warm_up` uncounted calls come
 // first.

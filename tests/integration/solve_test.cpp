@@ -99,7 +99,7 @@ TEST(SolveExamples, LayeredColumnSagsAsTheOneDimensionalSolution) {
 }
 
 // p = q sum 4 / ((2m+1) pi) sin(...) exp(...) and its settlement at T = 0.5
-// (tests/verification/terzaghi_test.cpp); 8 elements over the height.
+// (tests/verification/consolidation_test.cpp); 8 elements over the height.
 TEST(SolveExamples, ConsolidatingColumnFollowsTerzaghi) {
   const Solved solved = solve(example("consolidating_column.yaml"));
   constexpr std::size_t kRow = 9, kSteps = 40;
