@@ -99,8 +99,6 @@ Status check_alignment(const Points& points, const RigidTransform& T_surface_poi
   return check_points(points, T_surface_points_initial);
 }
 
-using geometry::PointRows;
-
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 // The Welsch scale starts at this multiple of the median residual: half of the points then pull
 // with at least 0.88 of their weight. It shrinks by the factor per step until it is the one asked

@@ -15,7 +15,7 @@ namespace brainshift::fem {
 namespace {
 
 using test_support::record_check;
-constexpr double kPiCryer = std::numbers::pi;
+constexpr double kPi = std::numbers::pi;
 constexpr double kRadius = 10.0, kLoad = 1e-4;
 constexpr const char* kCryerSource = "Cryer 1963; Verruijt 2016 section 4.3";
 
@@ -23,7 +23,7 @@ double cryer_series(double poisson_ratio, double time) {
   const double e = (1.0 - poisson_ratio) / (1.0 - 2.0 * poisson_ratio);
   double sum = 0.0;
   for (int j = 0; j < 200; ++j) {
-    double low = j * kPiCryer + 1e-3, high = (j + 1) * kPiCryer;
+    double low = j * kPi + 1e-3, high = (j + 1) * kPi;
     const auto f = [&](double x) {
       return (1.0 - e * x * x / 2.0) * std::sin(x) - x * std::cos(x);
     };
@@ -116,8 +116,6 @@ TEST(Cryer, CentrePressureFollowsTheSeriesAndRisesFirst) {
 // The plate is tied by superposition: each step is solved for two displacements of the plate, and
 // the combination whose reaction is F is the answer; no series enters.
 
-using test_support::record_check;
-constexpr double kPiMandel = std::numbers::pi;
 constexpr double kHalfWidth = 10.0, kHeight = 1.0, kDepth = 1.0;  // mm
 constexpr double kPlateForce = 1e-3;                              // N, on the half slab
 constexpr const char* kMandelSource = "Mandel 1953; Cheng and Detournay 1988";
@@ -126,7 +124,7 @@ std::vector<double> roots(double poisson_ratio) {
   const double slope = (1.0 - poisson_ratio) / (0.5 - poisson_ratio);
   std::vector<double> list;
   for (int i = 0; i < 200; ++i) {
-    double low = i * kPiMandel + 1e-9, high = i * kPiMandel + kPiMandel / 2.0;
+    double low = i * kPi + 1e-9, high = i * kPi + kPi / 2.0;
     for (int k = 0; k < 100; ++k) {
       const double w = 0.5 * (low + high);
       // sin w - slope w cos w is negative left of the root, positive right of it; its sign
@@ -155,7 +153,7 @@ class Slab {
     // Finer towards the drained side.
     for (int n = 0; n < mesh_.num_nodes(); ++n) {
       const double s = mesh_.nodes(0, n) / kHalfWidth;
-      mesh_.nodes(0, n) = kHalfWidth * std::sin(0.5 * kPiMandel * s);
+      mesh_.nodes(0, n) = kHalfWidth * std::sin(0.5 * kPi * s);
     }
     DofMap dofs(mesh_.num_nodes());
     std::vector<NodeIndex> drained;
@@ -251,8 +249,6 @@ TEST(Mandel, PressureFollowsTheSeriesAndRisesFirst) {
 //   p = q sum_m 4 / ((2m+1) pi) sin((2m+1) pi y / 2H) exp(-(2m+1)^2 pi^2 T / 4)
 //   settlement = q H / (lambda + 2 G) (1 - sum_m 8 / ((2m+1)^2 pi^2) exp(-(2m+1)^2 pi^2 T / 4))
 
-using test_support::record_check;
-constexpr double kPiTerzaghi = std::numbers::pi;
 constexpr double kPressedLoad = 1e-4;  // N/mm^2
 constexpr const char* kTerzaghiSource = "Terzaghi 1923; Verruijt 2016 section 2.2";
 
@@ -260,8 +256,8 @@ double series_pressure(double depth, double time) {
   double sum = 0.0;
   for (int m = 0; m < 400; ++m) {
     const double k = 2 * m + 1;
-    sum += 4.0 / (k * kPiTerzaghi) * std::sin(k * kPiTerzaghi * depth / (2.0 * Column::kHeight)) *
-           std::exp(-k * k * kPiTerzaghi * kPiTerzaghi * time / 4.0);
+    sum += 4.0 / (k * kPi) * std::sin(k * kPi * depth / (2.0 * Column::kHeight)) *
+           std::exp(-k * k * kPi * kPi * time / 4.0);
   }
   return sum;
 }
@@ -270,8 +266,7 @@ double series_settlement(double time) {
   double sum = 0.0;
   for (int m = 0; m < 400; ++m) {
     const double k = 2 * m + 1;
-    sum += 8.0 / (k * k * kPiTerzaghi * kPiTerzaghi) *
-           std::exp(-k * k * kPiTerzaghi * kPiTerzaghi * time / 4.0);
+    sum += 8.0 / (k * k * kPi * kPi) * std::exp(-k * k * kPi * kPi * time / 4.0);
   }
   return 1.0 - sum;
 }
@@ -327,7 +322,7 @@ double ramped_settlement_mm(int steps) {
   const double dt = 0.2 * time_scale_s(material) / steps;
   for (int i = 1; i <= steps; ++i) {
     BiotLoad load;
-    load.force = column.load.force * std::pow(std::sin(0.5 * kPiTerzaghi * i / steps), 2);
+    load.force = column.load.force * std::pow(std::sin(0.5 * kPi * i / steps), 2);
     advance(stepper, state, load, dt, 1);
   }
   return -state.displacement(2, column.top[0]);

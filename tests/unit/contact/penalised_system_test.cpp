@@ -130,7 +130,6 @@ TEST(FullSolve, IsPositiveAndShorterThanAllItsSolvesTogether) {
   EXPECT_LT(5.0 * solve_ms, watch.milliseconds());  // 5 of its 9 solves take the median or more
 }
 
-using inversion::prepare;
 using inversion::sagging_data;
 
 TEST(Woodbury, SolvesForAColumnOnce) {
@@ -232,10 +231,6 @@ TEST(Woodbury, GapsOfStiffSpringsLeaveTheContactForcesTheirDigits) {
   // 1e-4 N; the forces are of some newtons.
   EXPECT_LT(apart, 1e-4 * largest);
 }
-
-using inversion::patient;
-using inversion::prepare;
-using inversion::sagging_data;
 
 Points load() {
   std::srand(3);

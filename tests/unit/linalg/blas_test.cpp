@@ -136,7 +136,6 @@ TEST(Blas, AddsScaledVectors) {
 }
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 
 // Well conditioned, and not of a size that the blocks divide.
 MatrixXd positive_definite(Index size) {

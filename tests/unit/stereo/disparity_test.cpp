@@ -132,10 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
                        "left and right are swapped"}),
     [](const auto& row) { return std::string(row.param.name); });
 
-using test_support::Eye;
-using test_support::operating_rig;
 using test_support::Patch;
-using testing::HasSubstr;
 
 // Random dots, blurred along the row so that they can be shifted by parts of a pixel.
 GrayImage dots(int width, int height, double shift, std::uint64_t seed) {

@@ -103,8 +103,6 @@ TEST(PrincipalFactor, AnIndefiniteMatrixIsRejectedAndLeavesNoSet) {
   expect_solves(brain, factor, set);
 }
 
-using Eigen::MatrixXd;
-
 // The set's own compliance, factorised on its own.
 struct Reference {
   Reference(const CondensedOperators& brain, const contact::ActiveSet& set) {
