@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "common/anatomy/brain_mesh.hpp"
-#include "common/anatomy/tumour_surface.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
@@ -109,6 +108,43 @@ Result<std::vector<Role>> place_roles(const BrainSurface& brain, const CaseConfi
   return roles;
 }
 
+// Turns a given skull so that its normals agree with the brain's. The skull may be open (with its
+// craniotomy), so the sign of its volume cannot decide; the brain beneath it can.
+Result<TriangleSurface> oriented_skull(TriangleSurface skull, const BrainSurface& brain,
+                                       const std::string& file) {
+  const auto index = geometry::ClosestPointIndex::build(skull);
+  if (!index)
+    return fail(index.error().code,
+                fmt::format("contact.skull_file = '{}': {}", file, index.error().message));
+  double agreement = 0.0;
+  for (int v = 0; v < brain.surface.num_vertices(); ++v) {
+    const auto nearest = index->closest(brain.surface.vertices.col(v));
+    agreement += index->triangle_normal(nearest.triangle).dot(brain.normals.col(v));
+  }
+  if (agreement < 0.0) skull.triangles.row(1).swap(skull.triangles.row(2));
+  return skull;
+}
+
+// The patient's own inner skull surface, or the brain's surface moved outwards by the gap.
+Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface& brain) {
+  const ContactConfig& contact = inputs.config.contact;
+  if (!contact.skull_file) return geometry::offset_surface(brain.surface, contact.gap_mm);
+  if (!inputs.skull)
+    return fail(ErrorCode::kInvalidArgument, fmt::format("contact.skull_file = '{}': was not read",
+                                                         contact.skull_file->string()));
+  return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
+}
+
+// Distance grid of the tumour, for fast alignment. It is empty for a segmentation whose parts
+// touch along an edge: such a surface is not closed in the strict sense, and alignment then
+// searches its triangles.
+Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
+  if (!geometry::is_closed(tumour)) return DistanceGrid{};
+  const auto index = geometry::ClosestPointIndex::build(tumour);
+  if (!index) return tl::unexpected(index.error());
+  return geometry::signed_distance_grid(*index);
+}
+
 }  // namespace
 
 BrainSurface brain_surface_of(const TetMesh& mesh) {
@@ -153,47 +189,6 @@ Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& c
                             config.contact.slave_depth_mm));
   return sets;
 }
-
-namespace {
-
-// Turns a given skull so that its normals agree with the brain's. The skull may be open (with its
-// craniotomy), so the sign of its volume cannot decide; the brain beneath it can.
-Result<TriangleSurface> oriented_skull(TriangleSurface skull, const BrainSurface& brain,
-                                       const std::string& file) {
-  const auto index = geometry::ClosestPointIndex::build(skull);
-  if (!index)
-    return fail(index.error().code,
-                fmt::format("contact.skull_file = '{}': {}", file, index.error().message));
-  double agreement = 0.0;
-  for (int v = 0; v < brain.surface.num_vertices(); ++v) {
-    const auto nearest = index->closest(brain.surface.vertices.col(v));
-    agreement += index->triangle_normal(nearest.triangle).dot(brain.normals.col(v));
-  }
-  if (agreement < 0.0) skull.triangles.row(1).swap(skull.triangles.row(2));
-  return skull;
-}
-
-// The patient's own inner skull surface, or the brain's surface moved outwards by the gap.
-Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface& brain) {
-  const ContactConfig& contact = inputs.config.contact;
-  if (!contact.skull_file) return geometry::offset_surface(brain.surface, contact.gap_mm);
-  if (!inputs.skull)
-    return fail(ErrorCode::kInvalidArgument, fmt::format("contact.skull_file = '{}': was not read",
-                                                         contact.skull_file->string()));
-  return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
-}
-
-// Distance grid of the tumour, for fast alignment. It is empty for a segmentation whose parts
-// touch along an edge: such a surface is not closed in the strict sense, and alignment then
-// searches its triangles.
-Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
-  if (!geometry::is_closed(tumour)) return DistanceGrid{};
-  const auto index = geometry::ClosestPointIndex::build(tumour);
-  if (!index) return tl::unexpected(index.error());
-  return geometry::signed_distance_grid(*index);
-}
-
-}  // namespace
 
 Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress,
                                      std::vector<std::string>* notes) {

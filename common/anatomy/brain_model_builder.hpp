@@ -53,7 +53,7 @@ Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& c
 // Deterministic. An error is one sentence that names key and value.
 //   kEmptySet         mask without component, a craniotomy that selects no node, no slave, no
 //                     tumour voxel
-//   kInvalidArgument  tumour outside the brain by more than kLargestCut_mm (tumour_surface.hpp);
+//   kInvalidArgument  tumour outside the brain by more than kLargestCut_mm (brain_mesh.hpp);
 //                     metres and millimetres mixed up in a given mesh (by its extent)
 //   kDegenerateMesh   as make_brain_mesh
 // notes (optional) receives what was made of the inputs that the user should know, a sentence each.

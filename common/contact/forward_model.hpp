@@ -15,7 +15,7 @@
 // pressure eliminated (fem/stiffness_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
 // fluid or air surrounds it.
 //
-// Each tissue has its own stiffness (tissues.hpp).
+// Each tissue has its own stiffness (tissue_map).
 #pragma once
 
 #include <vector>
@@ -32,6 +32,18 @@
 #include "common/values/estimate.hpp"
 
 namespace brainshift::contact {
+
+// The tissue of each tetrahedron of a patient's brain, by the case's material section.
+//
+//   material.tumour    tetrahedra whose centre lies inside the tumour's surface
+//   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium)
+//   the rest           material itself
+// The tumour has precedence over the regions. Density, permeability and storage are the same
+// everywhere.
+
+// kInvalidArgument: a label that the mesh does not have; the sentence names the labels it has.
+// kEmptySet: no tetrahedron has its centre in the tumour.
+Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
 
 // Forward problem with contact: K u = b subject to penalty contact, iterated until the active set
 // repeats (paper section 2.4: trial and error from an empty set; Le Tallec 1994).

@@ -18,27 +18,6 @@ namespace {
 // free.
 constexpr double kHeld = 1e-10;
 
-}  // namespace
-
-Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm) {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  Matrix6 gram = Matrix6::Zero();
-  for (const HeldDirection& h : held) {
-    Eigen::Matrix<double, 6, 1> row;
-    row << h.direction, ((h.place - centre) / size_mm).cross(h.direction);
-    gram += row * row.transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(gram, Eigen::EigenvaluesOnly);
-  const double largest = std::max(solver.eigenvalues()[5], 1.0);
-  const auto free = (solver.eigenvalues().array() < kHeld * largest).count();
-  if (free == 0) return {};
-  return fail(ErrorCode::kFloatingBody,
-              fmt::format("conditions: the body is not held: {} of its 6 rigid motions {} free",
-                          free, free == 1 ? "is" : "are"));
-}
-
-namespace {
-
 constexpr double kMaxPoissonRatio = 0.4999;
 
 double poisson_ratio(const fem::Elasticity& e) { return e.lambda / (2.0 * (e.lambda + e.shear)); }
@@ -87,7 +66,55 @@ Status check_group(const ForwardProblem& problem, const std::string& key, const 
   return {};
 }
 
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& displacement,
+                                      const VecX& pore_pressure, const Points& points,
+                                      double tolerance_mm) {
+  const geometry::TetLocator locator(solution.space.mesh);
+  std::vector<ProbeValue> values;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const geometry::TetLocation at = locator.locate(points.col(i));
+    if (!(at.distance_mm <= tolerance_mm)) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
+    }
+    ProbeValue value;
+    // The locator's weights belong to its own order of the vertices.
+    Eigen::Vector4d l = Eigen::Vector4d::Zero();
+    for (int k = 0; k < 4; ++k) {
+      for (int a = 0; a < 4; ++a) {
+        if (solution.space.mesh.tets(a, at.tet) == at.nodes[k]) l[a] += at.weights[k];
+      }
+      if (solution.contact_pressure.size() > 0) {
+        value.contact_pressure += at.weights[k] * solution.contact_pressure[at.nodes[k]];
+      }
+      if (pore_pressure.size() > 0) {
+        value.pore_pressure += at.weights[k] * pore_pressure[at.nodes[k]];
+      }
+    }
+    value.displacement = fem::displacement_at(solution.space, displacement, at.tet, l);
+    values.push_back(value);
+  }
+  return values;
+}
+
 }  // namespace
+
+Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  Matrix6 gram = Matrix6::Zero();
+  for (const HeldDirection& h : held) {
+    Eigen::Matrix<double, 6, 1> row;
+    row << h.direction, ((h.place - centre) / size_mm).cross(h.direction);
+    gram += row * row.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(gram, Eigen::EigenvaluesOnly);
+  const double largest = std::max(solver.eigenvalues()[5], 1.0);
+  const auto free = (solver.eigenvalues().array() < kHeld * largest).count();
+  if (free == 0) return {};
+  return fail(ErrorCode::kFloatingBody,
+              fmt::format("conditions: the body is not held: {} of its 6 rigid motions {} free",
+                          free, free == 1 ? "is" : "are"));
+}
 
 Status validate(const ForwardProblem& problem) {
   if (Status ok = geometry::check_mesh(problem.mesh); !ok) {
@@ -152,41 +179,6 @@ double default_penalty(const ForwardProblem& problem, const FaceGroup& group) {
   }
   return 100.0 * stiffest / (edges / static_cast<double>(3 * group.faces.cols()));
 }
-
-namespace {
-
-Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& displacement,
-                                      const VecX& pore_pressure, const Points& points,
-                                      double tolerance_mm) {
-  const geometry::TetLocator locator(solution.space.mesh);
-  std::vector<ProbeValue> values;
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const geometry::TetLocation at = locator.locate(points.col(i));
-    if (!(at.distance_mm <= tolerance_mm)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
-    }
-    ProbeValue value;
-    // The locator's weights belong to its own order of the vertices.
-    Eigen::Vector4d l = Eigen::Vector4d::Zero();
-    for (int k = 0; k < 4; ++k) {
-      for (int a = 0; a < 4; ++a) {
-        if (solution.space.mesh.tets(a, at.tet) == at.nodes[k]) l[a] += at.weights[k];
-      }
-      if (solution.contact_pressure.size() > 0) {
-        value.contact_pressure += at.weights[k] * solution.contact_pressure[at.nodes[k]];
-      }
-      if (pore_pressure.size() > 0) {
-        value.pore_pressure += at.weights[k] * pore_pressure[at.nodes[k]];
-      }
-    }
-    value.displacement = fem::displacement_at(solution.space, displacement, at.tet, l);
-    values.push_back(value);
-  }
-  return values;
-}
-
-}  // namespace
 
 Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
                                       double tolerance_mm) {

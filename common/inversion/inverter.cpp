@@ -6,7 +6,6 @@
 
 #include "common/contact/iterative_system.hpp"
 #include "common/contact/penalised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/descent/descents.hpp"

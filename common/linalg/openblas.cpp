@@ -20,6 +20,14 @@ const char* newest_kernel() {
   return avx512 ? "SkylakeX" : "Haswell";
 }
 
+void set_one_thread() {
+  // Looked up at run time, because which BLAS is loaded is the system's choice, not the linker's.
+  using SetThreads = void (*)(int);
+  if (void* symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
+    reinterpret_cast<SetThreads>(symbol)(1);
+  }
+}
+
 }  // namespace
 
 std::string blas_kernel() {
@@ -44,18 +52,6 @@ void choose_blas_kernel() {
   execv("/proc/self/exe", arguments.data());
   unsetenv(kVariable);  // it could not be started again, and goes on as it is
 }
-
-namespace {
-
-void set_one_thread() {
-  // Looked up at run time, because which BLAS is loaded is the system's choice, not the linker's.
-  using SetThreads = void (*)(int);
-  if (void* symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
-    reinterpret_cast<SetThreads>(symbol)(1);
-  }
-}
-
-}  // namespace
 
 void use_single_threaded_blas() {
   static const bool once = (set_one_thread(), true);

@@ -21,7 +21,7 @@
 #include "client/tools/twin/stiffness.hpp"
 #include "client/tools/twin/truth.hpp"
 #include "client/tools/twin/variation.hpp"
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"
 #include "common/fem/body_loads.hpp"

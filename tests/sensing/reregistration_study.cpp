@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "client/tools/twin/ultrasound.hpp"
-#include "common/anatomy/tumour_surface.hpp"
+#include "common/anatomy/brain_mesh.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/random.hpp"
 #include "common/core/stopwatch.hpp"

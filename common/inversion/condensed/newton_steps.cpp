@@ -10,6 +10,9 @@ constexpr int kMaxIterations = 20000;
 // Of the fall that is promised.
 constexpr double kTolerance = 1e-6;
 
+// Of |s| |y|.
+constexpr double kLeastCurvature = 1e-8;
+
 }  // namespace
 
 NewtonBundle::NewtonBundle(Eigen::Index size) : steps_(size, kMost), step_(size) {}
@@ -88,13 +91,6 @@ void NewtonBundle::solve() {
   }
   step_.noalias() = steps * weights;
 }
-
-namespace {
-
-// Of |s| |y|.
-constexpr double kLeastCurvature = 1e-8;
-
-}  // namespace
 
 QuasiNewton::QuasiNewton(Eigen::Index size)
     : inverse_(Eigen::MatrixXd::Identity(size, size)), product_(size) {}

@@ -6,7 +6,6 @@
 #include "common/contact/forward_model.hpp"
 #include "common/contact/iterative_system.hpp"
 #include "common/contact/penalised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/descent/descents.hpp"
 #include "common/inversion/inverter.hpp"

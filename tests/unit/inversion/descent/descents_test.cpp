@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "common/contact/penalised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
 #include "common/inversion/descent/descents.hpp"
 #include "common/inversion/descent/objective.hpp"
 #include "common/inversion/inverter.hpp"

@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 
 #include "common/contact/penalised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
