@@ -24,8 +24,8 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
-// Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have zero
-// mean and their columns are independent.
+// Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have
+// zero mean and their columns are independent.
 #pragma once
 
 #include "common/configuration/case_config.hpp"
