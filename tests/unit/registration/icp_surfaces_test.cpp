@@ -20,10 +20,10 @@ namespace {
 
 using geometry::PointRows;
 
-const Vec3 kCentre(5, -3, 8);
+const Vec3 kSphereCentre(5, -3, 8);
 const TriangleSurface& sphere() {
   static const TriangleSurface surface =
-      geometry::ellipsoid_surface(kCentre, Vec3(12, 12, 12), 0.6);
+      geometry::ellipsoid_surface(kSphereCentre, Vec3(12, 12, 12), 0.6);
   return surface;
 }
 constexpr double kTargetRadius_mm = 12.0;
@@ -36,7 +36,7 @@ PointRows points_around() {
   PointRows points(200, 3);
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const double radius = kTargetRadius_mm + 4.0 * random.uniform() - 2.0;
-    points.row(i) = kCentre + radius * random.direction();
+    points.row(i) = kSphereCentre + radius * random.direction();
   }
   return points;
 }
@@ -58,7 +58,7 @@ void expect_sphere(const TargetSurface& surface) {
   const PointRows points = points_around();
   const Measured measured = measure(surface, points);
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const Vec3 arm = points.row(i).transpose() - kCentre;
+    const Vec3 arm = points.row(i).transpose() - kSphereCentre;
     const double outside_mm = arm.norm() - kTargetRadius_mm;
     EXPECT_NEAR(std::abs(measured.distances_mm[i]), std::abs(outside_mm), kTolerance_mm);
     if (std::abs(outside_mm) < 2.0 * kTolerance_mm) continue;  // the sign is rounding there
@@ -85,7 +85,7 @@ TEST(TargetSurface, AVertexOfTheTrianglesHasAUnitGradient) {
   const Measured measured = measure(index, vertices);
   EXPECT_LT(measured.distances_mm.cwiseAbs().maxCoeff(), 1e-9);
   for (Eigen::Index i = 0; i < vertices.rows(); ++i) {
-    const Vec3 outwards = (vertices.row(i).transpose() - kCentre).normalized();
+    const Vec3 outwards = (vertices.row(i).transpose() - kSphereCentre).normalized();
     // Normals of neighbouring facets differ by about the edge over the radius, 0.05.
     EXPECT_GT(measured.gradients.row(i).dot(outwards), 0.99);
   }
