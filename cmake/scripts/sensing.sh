@@ -18,7 +18,7 @@ BRAINSHIFT_STUDY_DIR=$(realpath "$out")
 export BRAINSHIFT_STUDY_DIR
 status=0
 study() { step "$1" "$bin/sensing_$1" || status=1; }
-for one in icp cars estimates reregistration ultrasound tracing stereo; do
+for one in icp estimates reregistration ultrasound tracing stereo; do
   study "$one"
 done
 

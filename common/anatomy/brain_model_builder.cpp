@@ -2,21 +2,111 @@
 #include "common/anatomy/brain_model_builder.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
+#include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/anatomy/brain_mesh.hpp"
-#include "common/anatomy/node_sets.hpp"
-#include "common/anatomy/tumour_surface.hpp"
 #include "common/geometry/closest_point.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/values/model_id.hpp"
 
 namespace brainshift::anatomy {
 namespace {
+
+// Deep enough for the curvature of a head under a large opening (45 mm across: 4 mm), shallow
+// enough not to reach another gyrus' inner wall or the far side.
+constexpr double kLargestHeight_mm = 15.0;
+// cos 60 degrees. A node whose normal turns further belongs to the wall of a sulcus or the far
+// side.
+constexpr double kLeastCosine = 0.5;
+
+enum class Role { kNone, kCraniotomy, kBrainstem };
+
+// The frame of the opening: origin on the surface, along and across in the tangent plane.
+struct Opening {
+  Vec3 origin = Vec3::Zero();
+  Vec3 along = Vec3::Zero();
+  Vec3 across = Vec3::Zero();
+  Vec3 normal = Vec3::Zero();
+};
+
+std::string text(const Vec3& x) { return fmt::format("[{:g}, {:g}, {:g}]", x[0], x[1], x[2]); }
+
+Result<Opening> place_opening(const BrainSurface& brain, const Craniotomy& craniotomy) {
+  const auto index = geometry::ClosestPointIndex::build(brain.surface);
+  if (!index) return tl::unexpected(index.error());
+  const geometry::ClosestPoint nearest = index->closest(craniotomy.centre_mm);
+  if (nearest.distance_mm > 0.5 * craniotomy.long_axis_mm)
+    return fail(ErrorCode::kEmptySet,
+                fmt::format("craniotomy.centre_mm = {} selects no boundary node; the nearest "
+                            "boundary point is {:.1f} mm away",
+                            text(craniotomy.centre_mm), nearest.distance_mm));
+  Opening opening;
+  opening.origin = nearest.point;
+  const Vec3 facing = index->triangle_normal(nearest.triangle);
+  Vec3 sum = Vec3::Zero();
+  for (int v = 0; v < brain.surface.num_vertices(); ++v) {
+    const Vec3 normal = brain.normals.col(v);
+    const double distance = (brain.surface.vertices.col(v) - opening.origin).norm();
+    // Walls that face away belong to another part of the surface.
+    if (distance <= 0.5 * craniotomy.short_axis_mm && normal.dot(facing) > 0.0) sum += normal;
+  }
+  opening.normal = sum.norm() > 0.0 ? Vec3(sum.normalized()) : facing;
+  const Vec3 wanted = craniotomy.long_axis_direction.normalized();
+  const Vec3 along = wanted - opening.normal * opening.normal.dot(wanted);
+  if (!(along.norm() > 1e-3))
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("craniotomy.long_axis_direction = {}: is perpendicular to the brain "
+                            "surface at craniotomy.centre_mm",
+                            text(craniotomy.long_axis_direction)));
+  opening.along = along.normalized();
+  opening.across = opening.normal.cross(opening.along);
+  return opening;
+}
+
+bool in_opening(const Opening& opening, const Craniotomy& craniotomy, const Vec3& x,
+                const Vec3& normal) {
+  const Vec3 offset = x - opening.origin;
+  const double u = offset.dot(opening.along) / (0.5 * craniotomy.long_axis_mm);
+  const double v = offset.dot(opening.across) / (0.5 * craniotomy.short_axis_mm);
+  return u * u + v * v <= 1.0 && std::abs(offset.dot(opening.normal)) <= kLargestHeight_mm &&
+         normal.dot(opening.normal) >= kLeastCosine;
+}
+
+// Roles of the surface vertices as far as their place decides them.
+Result<std::vector<Role>> place_roles(const BrainSurface& brain, const CaseConfig& config) {
+  const auto opening = place_opening(brain, config.craniotomy);
+  if (!opening) return tl::unexpected(opening.error());
+  std::vector<Role> roles(brain.node_of_vertex.size(), Role::kNone);
+  for (std::size_t v = 0; v < roles.size(); ++v) {
+    const Vec3 x = brain.surface.vertices.col(static_cast<Eigen::Index>(v));
+    const Vec3 normal = brain.normals.col(static_cast<Eigen::Index>(v));
+    if (in_opening(*opening, config.craniotomy, x, normal)) {
+      roles[v] = Role::kCraniotomy;
+    } else if ((x - config.brainstem.centre_mm).norm() <= config.brainstem.radius_mm) {
+      roles[v] = Role::kBrainstem;
+    }
+  }
+  if (std::find(roles.begin(), roles.end(), Role::kCraniotomy) == roles.end())
+    return fail(ErrorCode::kEmptySet,
+                fmt::format("craniotomy.centre_mm = {} with axes {:g} x {:g} mm selects no "
+                            "boundary node; the nearest boundary point is {:.1f} mm away",
+                            text(config.craniotomy.centre_mm), config.craniotomy.long_axis_mm,
+                            config.craniotomy.short_axis_mm,
+                            (opening->origin - config.craniotomy.centre_mm).norm()));
+  if (config.brainstem.radius_mm > 0.0 &&
+      std::find(roles.begin(), roles.end(), Role::kBrainstem) == roles.end())
+    return fail(ErrorCode::kEmptySet,
+                fmt::format("brainstem.centre_mm = {} with radius {:g} mm selects no boundary node",
+                            text(config.brainstem.centre_mm), config.brainstem.radius_mm));
+  return roles;
+}
 
 // Turns a given skull so that its normals agree with the brain's. The skull may be open (with its
 // craniotomy), so the sign of its volume cannot decide; the brain beneath it can.
@@ -56,6 +146,49 @@ Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
 }
 
 }  // namespace
+
+BrainSurface brain_surface_of(const TetMesh& mesh) {
+  BrainSurface brain;
+  brain.surface = geometry::boundary_surface(mesh, &brain.node_of_vertex);
+  brain.normals = geometry::vertex_normals(brain.surface);
+  return brain;
+}
+
+Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& config) {
+  const auto roles = place_roles(brain, config);
+  if (!roles) return tl::unexpected(roles.error());
+  const VecX depth = brain.surface.vertices.transpose() * config.gravity_direction.normalized();
+
+  NodeSets sets;
+  sets.fluid_plane_depth_mm = -std::numeric_limits<double>::infinity();
+  for (std::size_t v = 0; v < roles->size(); ++v)
+    if ((*roles)[v] == Role::kCraniotomy)
+      sets.fluid_plane_depth_mm =
+          std::max(sets.fluid_plane_depth_mm, depth[static_cast<Eigen::Index>(v)]);
+  sets.slave_plane_depth_mm = sets.fluid_plane_depth_mm + config.contact.slave_depth_mm;
+
+  for (std::size_t v = 0; v < roles->size(); ++v) {
+    const NodeIndex node = brain.node_of_vertex[v];
+    switch ((*roles)[v]) {
+      case Role::kCraniotomy: sets.craniotomy.push_back(node); break;
+      case Role::kBrainstem: sets.brainstem.push_back(node); break;
+      case Role::kNone:
+        (depth[static_cast<Eigen::Index>(v)] < sets.slave_plane_depth_mm ? sets.slaves : sets.fixed)
+            .push_back(node);
+    }
+  }
+  if (sets.slaves.empty())
+    return fail(ErrorCode::kEmptySet,
+                fmt::format("contact.slave_depth_mm = {:g}: no boundary node lies above the second "
+                            "plane, so there is no slave",
+                            config.contact.slave_depth_mm));
+  if (sets.fixed.empty())
+    return fail(ErrorCode::kEmptySet,
+                fmt::format("contact.slave_depth_mm = {:g}: no boundary node lies below the second "
+                            "plane, so nothing is fixed",
+                            config.contact.slave_depth_mm));
+  return sets;
+}
 
 Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress,
                                      std::vector<std::string>* notes) {

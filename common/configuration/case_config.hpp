@@ -78,7 +78,7 @@ struct Material {  // Table 1
   double permeability_m3_s_kg = 1e-7;  // k
   double biot_coefficient = 1.0;       // alpha
   double storage_per_pa = 0.0;         // 1/S
-  // Tissues of another stiffness (contact/tissues.hpp): the tumour, and labels of the mesh.
+  // Tissues of another stiffness (contact/forward_model.hpp): the tumour, and labels of the mesh.
   std::optional<TissueStiffness> tumour;
   std::map<int, TissueStiffness> regions;
 };

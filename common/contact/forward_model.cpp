@@ -1,16 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/forward_model.hpp"
 
+#include <algorithm>
+#include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "common/contact/tissues.hpp"
+#include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/fem/space_elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
+#include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::contact {
 namespace {
+
+fem::PoroMaterial with_stiffness(const Material& material, const TissueStiffness& tissue) {
+  Material changed = material;
+  changed.shear_modulus_pa = tissue.shear_modulus_pa;
+  changed.poisson_ratio = tissue.poisson_ratio;
+  return fem::poro_material_from(changed);
+}
+
+std::string listed(const std::set<int>& labels) {
+  std::string text;
+  for (const int label : labels) text += (text.empty() ? "" : ", ") + std::to_string(label);
+  return text.empty() ? "none" : text;
+}
 
 // Average nodal normals of the boundary, 3 x n; zero at interior nodes.
 Points boundary_normals(const BrainModel& model) {
@@ -46,6 +64,74 @@ Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig
 }
 
 }  // namespace
+
+Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material) {
+  const TetMesh& mesh = model.mesh;
+  auto map = fem::MaterialMap::uniform(fem::poro_material_from(material), mesh.num_tets());
+  const std::set<int> labels(mesh.labels.begin(), mesh.labels.end());
+  for (const auto& [label, tissue] : material.regions) {
+    if (labels.count(label) == 0) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "material.regions." + std::to_string(label) +
+                      ": the mesh has no such label (there: " + listed(labels) + ")");
+    }
+    const auto index = static_cast<int>(map.materials.size());
+    map.materials.push_back(with_stiffness(material, tissue));
+    for (std::size_t t = 0; t < mesh.labels.size(); ++t) {
+      if (mesh.labels[t] == label) map.of_tet[t] = index;
+    }
+  }
+  if (!material.tumour) return map;
+  const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
+  if (!tumour) return tl::unexpected(tumour.error());
+  const auto index = static_cast<int>(map.materials.size());
+  map.materials.push_back(with_stiffness(material, *material.tumour));
+  bool found = false;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    Vec3 centre = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) centre += 0.25 * mesh.nodes.col(mesh.tets(k, t));
+    if (!tumour->contains(centre)) continue;
+    map.of_tet[static_cast<std::size_t>(t)] = index;
+    found = true;
+  }
+  if (found) return map;
+  return fail(ErrorCode::kEmptySet,
+              "material.tumour: no tetrahedron has its centre inside the tumour; refine the mesh "
+              "there (mesh.generate.tumour_edge_mm)");
+}
+
+Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
+                                           const fem::StiffnessFactor& factor,
+                                           const fem::DofMap& dofs, const PenaltyContact& contact,
+                                           const Points& load) {
+  ContactSolution solution;
+  solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
+  fem::StiffnessFactor penalised = factor.clone_analysis();
+  while (solution.iterations < kMostContactIterations && !solution.converged) {
+    VecX unknowns;
+    Result<linalg::SolveQuality> quality;
+    if (count(solution.active) == 0) {
+      quality = fem::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
+                                   dofs.restrict_to(load), unknowns);
+    } else {
+      linalg::SymmetricMatrix k_p = stiffness;
+      contact.add_stiffness(k_p, dofs, solution.active);
+      Points b_p = load;
+      contact.add_load(b_p, solution.active);
+      if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
+      quality = fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p),
+                                   unknowns);
+    }
+    if (!quality) return tl::unexpected(quality.error());
+    solution.backward_error = std::max(solution.backward_error, quality->backward_error);
+    dofs.expand(unknowns, solution.displacement);
+    ++solution.iterations;
+    ActiveSet next = contact.penetrating(solution.displacement);
+    solution.converged = next == solution.active;
+    solution.active = std::move(next);
+  }
+  return solution;
+}
 
 ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs,
                            const linalg::SymmetricMatrix& stiffness, fem::StiffnessFactor factor,
@@ -120,6 +206,19 @@ Points ForwardModel::solve(const Points& load) const {
 
 Result<ContactSolution> ForwardModel::solve_with_contact(const Points& load) const {
   return contact::solve_with_contact(stiffness_, factor_, dofs_, contact_, load);
+}
+
+double measure_full_solve_ms(const ForwardModel& forward) {
+  constexpr int kRepetitions = 9;
+  const VecX b = VecX::LinSpaced(forward.dofs().num_unknowns(), -1.0, 1.0);
+  VecX x = forward.factor().solve(b);  // allocates the workspace
+  std::vector<double> times_ms;
+  for (int i = 0; i < kRepetitions; ++i) {
+    const Stopwatch watch;
+    forward.factor().solve(b, x);
+    times_ms.push_back(watch.milliseconds());
+  }
+  return percentile(times_ms, 50.0);
 }
 
 }  // namespace brainshift::contact

@@ -12,25 +12,63 @@
 //
 // K is the stiffness of drained elasticity. With scene.pressure = on it is that of one
 // backward-Euler step of consolidation of length scene.pressure_step_s from rest, with the
-// pressure eliminated (fem/biot_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
+// pressure eliminated (fem/stiffness_factor.hpp). The whole boundary drains (p = 0): cerebrospinal
 // fluid or air surrounds it.
 //
-// Each tissue has its own stiffness (tissues.hpp).
+// Each tissue has its own stiffness (tissue_map).
 #pragma once
 
+#include <vector>
+
 #include "common/configuration/case_config.hpp"
-#include "common/contact/contact_solver.hpp"
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/dof_map.hpp"
-#include "common/fem/poro_material.hpp"
+#include "common/fem/elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::contact {
+
+// The tissue of each tetrahedron of a patient's brain, by the case's material section.
+//
+//   material.tumour    tetrahedra whose centre lies inside the tumour's surface
+//   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium)
+//   the rest           material itself
+// The tumour has precedence over the regions. Density, permeability and storage are the same
+// everywhere.
+
+// kInvalidArgument: a label that the mesh does not have; the sentence names the labels it has.
+// kEmptySet: no tetrahedron has its centre in the tumour.
+Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
+
+// Forward problem with contact: K u = b subject to penalty contact, iterated until the active set
+// repeats (paper section 2.4: trial and error from an empty set; Le Tallec 1994).
+//
+// Each iteration refactorises K_p for the current active set, solves, and takes the slaves that
+// penetrate as the next set. For a fixed right-hand side this is a semi-smooth Newton method on
+// the penalty equations. So a set that repeats is a solution: every active slave is pressed,
+// every other one is open.
+struct ContactSolution {
+  Points displacement;  // 3 x n, mm
+  ActiveSet active;
+  int iterations = 0;  // linear solves
+  bool converged = false;
+  double backward_error = 0.0;  // the largest of all solves
+};
+
+inline constexpr int kMostContactIterations = 40;
+
+// stiffness: K (lower), with its factor, dofs and contact; load: 3 x n, N.
+// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error:
+// the result holds the last iterate, and `converged` is false.
+Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
+                                           const fem::StiffnessFactor& factor,
+                                           const fem::DofMap& dofs, const PenaltyContact& contact,
+                                           const Points& load);
 
 class ForwardModel {
  public:
@@ -77,5 +115,10 @@ class ForwardModel {
   PenaltyContact contact_;
   double assemble_s_;
 };
+
+// t_solve: the time of one full solve K x = b on this machine, the unit of every speed figure.
+// Median of 9 single solves after one that warms up, ms. Takes 10 solves of time: a third of a
+// second on the default head.
+double measure_full_solve_ms(const ForwardModel& forward);
 
 }  // namespace brainshift::contact

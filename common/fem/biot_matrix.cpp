@@ -60,15 +60,6 @@ PressureBlocks pressure_blocks(const TetMesh& mesh, const MaterialMap& materials
 
 }  // namespace
 
-PoroMaterial poro_material_from(const Material& material) {
-  PoroMaterial poro;
-  poro.elastic = elasticity_from(material);
-  poro.biot_coefficient = material.biot_coefficient;
-  poro.storage = units::storage_from_per_pa(material.storage_per_pa);
-  poro.permeability = units::permeability_from_m3_s_kg(material.permeability_m3_s_kg);
-  return poro;
-}
-
 PressureMap::PressureMap(int num_nodes, const std::vector<NodeIndex>& drained)
     : unknown(static_cast<std::size_t>(num_nodes), 0) {
   for (const NodeIndex node : drained) unknown[static_cast<std::size_t>(node)] = -1;

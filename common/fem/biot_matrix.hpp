@@ -26,7 +26,6 @@
 #include "common/core/mesh.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/elasticity.hpp"
-#include "common/fem/poro_material.hpp"
 
 namespace brainshift::fem {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/fem/assembly.hpp"
+#include "common/fem/elasticity.hpp"
 
 namespace brainshift::fem {
 namespace {

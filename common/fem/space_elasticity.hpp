@@ -10,7 +10,7 @@
 #include <functional>
 
 #include "common/fem/displacement_space.hpp"
-#include "common/fem/poro_material.hpp"
+#include "common/fem/elasticity.hpp"
 
 namespace brainshift::fem {
 

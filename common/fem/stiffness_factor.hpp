@@ -11,11 +11,48 @@
 #include <utility>
 #include <variant>
 
-#include "common/fem/biot_factor.hpp"
+#include "common/configuration/case_config.hpp"
+#include "common/core/error.hpp"
+#include "common/fem/biot_matrix.hpp"
+#include "common/fem/dof_map.hpp"
 #include "common/linalg/checked_solve.hpp"
 #include "common/linalg/cholesky.hpp"
+#include "common/linalg/symmetric_indefinite.hpp"
 
 namespace brainshift::fem {
+
+// BiotFactor: displacement after one backward-Euler step from rest, with the pressure eliminated:
+//
+//   u = K_b^-1 f,   K_b = K + G (dt H + M + P)^-1 G^T      symmetric positive definite
+//
+// with the blocks of biot_matrix.hpp. So whatever works with a factor of K (contact stiffness,
+// adjoints, covariances) works with this one too. K_b is dense and never formed: a solve is one
+// with the factor of the whole matrix.
+class BiotFactor {
+ public:
+  // Errors as SymmetricIndefinite::factorise.
+  static Result<BiotFactor> factorise(BiotMatrix matrix);
+
+  // Puts another stiffness of the same pattern (K_p) in the place of K. The pressure blocks stay.
+  Status refactorise(const linalg::SymmetricMatrix& stiffness);
+  BiotFactor clone_analysis() const;
+
+  // A solve that fails its checks (SymmetricIndefinite::solve) returns NaN everywhere.
+  void solve(const VecX& b, VecX& x) const;
+  void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) const;
+
+  int size() const { return matrix_.displacement_unknowns; }
+  double rcond() const { return factor_.rcond(); }
+  std::uint64_t nonzeros() const { return factor_.nonzeros(); }
+  std::uint64_t bytes() const;
+  double analyse_seconds() const { return factor_.analyse_seconds(); }
+  double factor_seconds() const { return factor_.factor_seconds(); }
+
+ private:
+  BiotFactor(BiotMatrix matrix, linalg::SymmetricIndefinite factor);
+  BiotMatrix matrix_;
+  linalg::SymmetricIndefinite factor_;
+};
 
 class StiffnessFactor {
  public:
@@ -92,5 +129,26 @@ Result<linalg::SolveQuality> checked_solve(const linalg::SymmetricMatrix& lower,
 Result<linalg::SolveQuality> check_rows(const linalg::SymmetricMatrix& lower, double norm,
                                         const StiffnessFactor& factor, const Eigen::MatrixXd& b,
                                         Eigen::MatrixXd& x, StiffnessFactor::Workspace& workspace);
+
+// BlockSolver: K^-1 applied to several nodal loads at once. One per thread; the threads
+// share the factor.
+class BlockSolver {
+ public:
+  // Keeps references to all three. stiffness: the matrix of the factor.
+  BlockSolver(const linalg::SymmetricMatrix& stiffness, const StiffnessFactor& factor,
+              const DofMap& dofs);
+
+  // U = T K^-1 T^T F, transposed: a field per row, k x 3n, node-major. F in N, U in mm; both may be
+  // the same matrix. Errors as check_rows.
+  Status solve(const Eigen::MatrixXd& loads, Eigen::MatrixXd& displacements);
+
+ private:
+  const linalg::SymmetricMatrix& stiffness_;
+  double norm_;
+  const StiffnessFactor& factor_;
+  const DofMap& dofs_;
+  StiffnessFactor::Workspace workspace_;
+  Eigen::MatrixXd rhs_, unknowns_;
+};
 
 }  // namespace brainshift::fem

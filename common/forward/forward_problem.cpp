@@ -7,11 +7,16 @@
 #include <cmath>
 #include <vector>
 
+#include "common/core/small_matrices.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/tet_locator.hpp"
 
 namespace brainshift::forward {
 namespace {
+
+// Squared sine-like measure of how well a rigid motion is held. Below it the motion counts as
+// free.
+constexpr double kHeld = 1e-10;
 
 constexpr double kMaxPoissonRatio = 0.4999;
 
@@ -61,7 +66,54 @@ Status check_group(const ForwardProblem& problem, const std::string& key, const 
   return {};
 }
 
+Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& displacement,
+                                      const VecX& pore_pressure, const Points& points,
+                                      double tolerance_mm) {
+  const geometry::TetLocator locator(solution.space.mesh);
+  std::vector<ProbeValue> values;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const geometry::TetLocation at = locator.locate(points.col(i));
+    if (!(at.distance_mm <= tolerance_mm)) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
+    }
+    ProbeValue value;
+    // The locator's weights belong to its own order of the vertices.
+    Eigen::Vector4d l = Eigen::Vector4d::Zero();
+    for (int k = 0; k < 4; ++k) {
+      for (int a = 0; a < 4; ++a) {
+        if (solution.space.mesh.tets(a, at.tet) == at.nodes[k]) l[a] += at.weights[k];
+      }
+      if (solution.contact_pressure.size() > 0) {
+        value.contact_pressure += at.weights[k] * solution.contact_pressure[at.nodes[k]];
+      }
+      if (pore_pressure.size() > 0) {
+        value.pore_pressure += at.weights[k] * pore_pressure[at.nodes[k]];
+      }
+    }
+    value.displacement = fem::displacement_at(solution.space, displacement, at.tet, l);
+    values.push_back(value);
+  }
+  return values;
+}
+
 }  // namespace
+
+Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm) {
+  Mat6 gram = Mat6::Zero();
+  for (const HeldDirection& h : held) {
+    Vec6 row;
+    row << h.direction, ((h.place - centre) / size_mm).cross(h.direction);
+    gram += row * row.transpose();
+  }
+  const Vec6 eigenvalues = symmetric_eigenvalues(gram);
+  const double largest = std::max(eigenvalues[5], 1.0);
+  const auto free = (eigenvalues.array() < kHeld * largest).count();
+  if (free == 0) return {};
+  return fail(ErrorCode::kFloatingBody,
+              fmt::format("conditions: the body is not held: {} of its 6 rigid motions {} free",
+                          free, free == 1 ? "is" : "are"));
+}
 
 Status validate(const ForwardProblem& problem) {
   if (Status ok = geometry::check_mesh(problem.mesh); !ok) {
@@ -126,41 +178,6 @@ double default_penalty(const ForwardProblem& problem, const FaceGroup& group) {
   }
   return 100.0 * stiffest / (edges / static_cast<double>(3 * group.faces.cols()));
 }
-
-namespace {
-
-Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& displacement,
-                                      const VecX& pore_pressure, const Points& points,
-                                      double tolerance_mm) {
-  const geometry::TetLocator locator(solution.space.mesh);
-  std::vector<ProbeValue> values;
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const geometry::TetLocation at = locator.locate(points.col(i));
-    if (!(at.distance_mm <= tolerance_mm)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
-    }
-    ProbeValue value;
-    // The locator's weights belong to its own order of the vertices.
-    Eigen::Vector4d l = Eigen::Vector4d::Zero();
-    for (int k = 0; k < 4; ++k) {
-      for (int a = 0; a < 4; ++a) {
-        if (solution.space.mesh.tets(a, at.tet) == at.nodes[k]) l[a] += at.weights[k];
-      }
-      if (solution.contact_pressure.size() > 0) {
-        value.contact_pressure += at.weights[k] * solution.contact_pressure[at.nodes[k]];
-      }
-      if (pore_pressure.size() > 0) {
-        value.pore_pressure += at.weights[k] * pore_pressure[at.nodes[k]];
-      }
-    }
-    value.displacement = fem::displacement_at(solution.space, displacement, at.tet, l);
-    values.push_back(value);
-  }
-  return values;
-}
-
-}  // namespace
 
 Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Points& points,
                                       double tolerance_mm) {

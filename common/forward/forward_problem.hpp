@@ -18,12 +18,28 @@
 #include <variant>
 #include <vector>
 
-#include "common/contact/obstacle.hpp"
+#include "common/contact/surface_contact.hpp"
+#include "common/core/error.hpp"
 #include "common/core/progress.hpp"
-#include "common/fem/displacement_constraints.hpp"
+#include "common/core/types.hpp"
+#include "common/fem/displacement_space.hpp"
 #include "common/fem/space_elasticity.hpp"
 
 namespace brainshift::forward {
+
+// Check that a body cannot move rigidly. It looks at the directions that are held, not at a
+// pivot.
+
+// The displacement of `place` along unit `direction` is held.
+struct HeldDirection {
+  Vec3 place;
+  Vec3 direction;
+};
+
+// Ok when the directions hold all six rigid motions; otherwise kFloatingBody, with the number of
+// motions that are free. Rotations are weighted by the size of the body (mm), so that the answer
+// does not depend on the unit of length.
+Status check_support(const std::vector<HeldDirection>& held, const Vec3& centre, double size_mm);
 
 // Part of the boundary. vertices: may hold some that belong to no face. faces: 3 x f vertices,
 // oriented outwards. inner: faces inside the body, which have no outward side; only displacements

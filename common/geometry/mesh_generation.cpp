@@ -24,7 +24,6 @@
 #include <vector>
 
 #include "common/geometry/mask.hpp"
-#include "common/geometry/mesh_components.hpp"
 #include "common/geometry/mesh_quality.hpp"
 
 namespace brainshift::geometry {

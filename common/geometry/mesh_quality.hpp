@@ -2,10 +2,24 @@
 // Quality figures of a tetrahedral mesh, and the check that it can carry a finite-element model.
 #pragma once
 
+#include <Eigen/Core>
+
+#include <vector>
+
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::geometry {
+
+// Components of a tetrahedral mesh that are connected by faces. Parts that share only a node or
+// an edge could turn about it like a hinge: for elasticity they are separate bodies.
+struct TetComponents {
+  std::vector<int> component_of_tet;  // numbered in order of their lowest tetrahedron
+  std::vector<int> sizes;             // tetrahedra per component
+};
+
+// Precondition: node indices are >= 0.
+TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets);
 
 struct MeshQuality {
   double volume_mm3 = 0.0;

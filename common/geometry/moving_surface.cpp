@@ -8,8 +8,8 @@
 #include <map>
 #include <utility>
 
+#include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/geometry/triangle_distance.hpp"
 
 namespace brainshift::geometry {
 namespace {

@@ -32,6 +32,18 @@
 
 namespace brainshift::geometry {
 
+// Edges of a triangle surface: shared edges, the rims of holes, the parts connected by edges.
+struct SurfaceRims {
+  int parts = 0;                 // components of triangles connected by edges
+  std::vector<int> part_of_rim;  // per closed rim
+  std::vector<double> rim_mm;    // its length
+};
+
+// kDegenerateMesh: a triangle with a repeated or unknown vertex, an edge of more than two
+// triangles, or an edge that two triangles pass in the same direction. The sentence names the
+// triangles or the vertices.
+Result<SurfaceRims> surface_rims(const TriangleSurface& surface);
+
 // Place where the cortex of a case is exposed.
 struct CorticalSite {
   Vec3 centre = Vec3::Zero();    // mm RAS

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/inverter.hpp"
 
+#include <memory>
 #include <utility>
 
 #include "common/contact/iterative_system.hpp"
-#include "common/contact/refactorised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/inversion/contract/quality_check.hpp"
-#include "common/inversion/descent/conjugate_gradients.hpp"
-#include "common/inversion/descent/steepest_descent.hpp"
+#include "common/inversion/descent/descents.hpp"
 #include "common/inversion/prepared/condense.hpp"
 
 namespace brainshift::inversion {
@@ -117,6 +115,20 @@ Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedMo
                                                 Method method, const std::stop_token& stop) {
   if (method == Method::kCondensed) return condense_and_build(*model, stop);
   return std::make_unique<Descent>(std::move(model), method);
+}
+
+Result<Estimate> invert(const PreparedModel& model, const SparseData& data, Method method,
+                        const InversionOptions& options) {
+  if (auto status = check_data(data); !status) return tl::unexpected(status.error());
+  // Shares nothing: the caller's model outlives the inverter, which ends with this function.
+  const std::shared_ptr<const PreparedModel> borrowed(std::shared_ptr<void>(), &model);
+  const auto inverter = make_inverter(borrowed, method, options.stop);
+  if (!inverter) return tl::unexpected(inverter.error());
+  Estimate estimate;
+  if (auto status = (*inverter)->update(data, options, estimate); !status) {
+    return tl::unexpected(status.error());
+  }
+  return estimate;
 }
 
 }  // namespace brainshift::inversion

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Inverter: SparseData -> Estimate, again and again for one patient under one boundary condition,
-// by one method. It holds what an update can reuse; invert.hpp is the one-shot beside it.
+// by one method. It holds what an update can reuse; invert() is the one-shot beside it.
 //
 // A session owns one and calls it from one thread. Not thread-safe, nor may two inverters over the
 // same PreparedModel run at once: their solves share the factor's workspace.
@@ -15,7 +15,6 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/estimate.hpp"
@@ -27,7 +26,7 @@ class Inverter {
  public:
   virtual ~Inverter() = default;
 
-  // Fills every member of `estimate`, its verdict too (contract/quality_check.hpp), into memory
+  // Fills every member of `estimate`, its verdict too (contract/estimate_check.hpp), into memory
   // that it has already where the method can. After an unusable estimate the inverter is reset, so
   // that the next update does not start from it.
   // Errors: as check_data; kInvalidArgument for data outside the brain, which names the datum, and,
@@ -63,5 +62,19 @@ Result<std::unique_ptr<Inverter>> condensed_inverter(
 // condense().
 Result<std::unique_ptr<Inverter>> make_inverter(std::shared_ptr<const PreparedModel> model,
                                                 Method method, const std::stop_token& stop = {});
+
+// invert(): SparseData -> Estimate once, by any method. Repeated inversions take an Inverter.
+
+// Prepares for this one inversion and makes it. The price is the preparation: method kCondensed
+// (the default) solves for every slave and many modes first, some thousand solves, which is seconds
+// on a toy and a minute on a head. The model's own preparation is not
+// repeated. options.stop ends the preparation too (kUnavailable).
+//
+// Errors as Inverter::update and make_inverter. The data are checked before anything is prepared
+// (check_data: kInvalidArgument for fewer than 3 data, sizes that differ, sd <= 0, collinear
+// positions; kNotFinite), their place afterwards: data outside the brain by more than 5 mm are
+// kInvalidArgument, and the sentence names the datum.
+Result<Estimate> invert(const PreparedModel& model, const SparseData& data,
+                        Method method = Method::kCondensed, const InversionOptions& options = {});
 
 }  // namespace brainshift::inversion

@@ -7,6 +7,10 @@
 
 #include <Eigen/Core>
 
+namespace brainshift {
+class ThreadTeam;
+}
+
 namespace brainshift::linalg::blas {
 
 template <typename T>
@@ -54,3 +58,14 @@ void add_scaled(long n, double alpha, const double* x, double* y);
 void add_scaled(long n, float alpha, const float* x, float* y);
 
 }  // namespace brainshift::linalg::blas
+
+namespace brainshift::linalg {
+
+// The Cholesky factor of a dense matrix, with the work shared by a ThreadTeam.
+// Lower triangle of A -> L with L L^T = A, in place; false when A is not positive definite. The
+// upper triangle may be overwritten. In blocks (Golub & Van Loan 2013, Matrix Computations, 4.2.9:
+// outer products), each computed by one member and the same whatever their number is, so that the
+// result does not depend on the team. Does not allocate.
+[[nodiscard]] bool cholesky(blas::Out<double> a, ThreadTeam& team);
+
+}  // namespace brainshift::linalg

@@ -7,13 +7,39 @@
 // reciprocal condition estimate above kMinRcond. checked_solve.hpp checks the solves.
 #pragma once
 
+#include <Eigen/Core>
+
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "common/core/error.hpp"
 #include "common/linalg/symmetric_matrix.hpp"
 
 namespace brainshift::linalg {
+
+// X = (L L^T)^-1 B for a block of right-hand sides, by the supernodes of L.
+//
+// The block lies with the numbers of one unknown side by side (k x n, k right-hand sides), so that
+// what is gathered and scattered at a supernode's rows are whole columns. A supernode whose
+// unknowns are all 0 in every right-hand side is passed over: a load at a few nodes reaches only
+// their ancestors in the elimination tree (Gilbert and Peierls 1988, SIAM J. Sci. Stat. Comput.
+// 9:862). Loads that are near each other have most ancestors in common, so it pays to solve such
+// loads together.
+
+// A view of L. Supernode s has the unknowns [first[s], first[s + 1]), and its columns are dense
+// below each other: rows row_of[rows[s] ... rows[s + 1]), the unknowns themselves first, numbers
+// from values[at[s]], column-major.
+struct SupernodalView {
+  std::span<const long> first;  // of s supernodes, s + 1 numbers; rows alike
+  std::span<const long> rows;
+  std::span<const long> at;
+  const long* row_of = nullptr;
+  const double* values = nullptr;
+};
+
+// In place. x: k x n, in the order of L's unknowns. scratch: keeps its memory between calls.
+void substitute(const SupernodalView& l, Eigen::MatrixXd& x, Eigen::MatrixXd& scratch);
 
 class SparseCholesky {
  public:
@@ -38,7 +64,7 @@ class SparseCholesky {
   void solve(const VecX& b, VecX& x) const;
   VecX solve(const VecX& b) const;
   // Several right-hand sides at once, one per row (k x n, also the solutions); cheaper per
-  // right-hand side than single solves (block_substitution.hpp).
+  // right-hand side than single solves (substitute).
   Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& b) const;
 
   // Scratch memory for one thread that solves with a factor shared by several threads.

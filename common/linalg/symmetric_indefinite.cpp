@@ -15,8 +15,8 @@
 
 #include "common/core/random.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/linalg/blas_threads.hpp"
 #include "common/linalg/checked_solve.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::linalg {
 namespace {

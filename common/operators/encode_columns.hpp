@@ -6,12 +6,12 @@
 // number are finer than sums in single precision: the limit is then that of kFinest.
 // docs/decisions/0028 says what that does to fields.
 //
-// Blocks: neighbours, kBlockNodes at most (spatial_blocks.hpp). With M_b
-// the rows of a block in steps, W = M_b M_b^T is factorised by Cholesky with pivoting until the
-// rows that are left are below kLeft in the root mean square, W ~ L L^T (Harbrecht, Peters and
-// Schneider 2012, Appl. Numer. Math. 62:428); the basis is that of L's columns (Householder), and
-// the coefficients are Q^T M_b, rounded. Where a number is still off by more than kMostErrorSteps,
-// the block is done again with more columns.
+// Blocks: neighbours, kBlockNodes at most (SpatialBlocks). With M_b the rows of a block in steps, W
+// = M_b M_b^T is factorised by Cholesky with pivoting until the rows that are left are below kLeft
+// in the root mean square, W ~ L L^T (Harbrecht, Peters and Schneider 2012, Appl. Numer. Math.
+// 62:428); the basis is that of L's columns (Householder), and the coefficients are Q^T M_b,
+// rounded. Where a number is still off by more than kMostErrorSteps, the block is done again with
+// more columns.
 #pragma once
 
 #include <functional>
@@ -24,9 +24,25 @@
 #include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
 #include "common/operators/compact_columns.hpp"
-#include "common/operators/spatial_blocks.hpp"
 
 namespace brainshift {
+
+// Points in blocks of neighbours.
+struct SpatialBlocks {
+  std::vector<int> order;     // every point once, block after block
+  std::vector<int> first{0};  // of each block its first place in `order`; at last their number
+
+  int size() const { return static_cast<int>(first.size()) - 1; }
+  std::span<const int> block(int b) const {
+    const auto at = static_cast<std::size_t>(b);
+    return std::span(order).subspan(static_cast<std::size_t>(first[at]),
+                                    static_cast<std::size_t>(first[at + 1] - first[at]));
+  }
+};
+
+// Halves the points across their longest extent until a part has `most` at most; parts are of about
+// the same size. The result depends on the points alone. points: 3 x n. most >= 1.
+SpatialBlocks spatial_blocks(const Points& points, int most);
 
 inline constexpr double kMostErrorSteps = 4.0;     // steps
 inline constexpr float kFinest = 1.0F / 16777216;  // 2^-24

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "common/inversion/contract/moving_data.hpp"
+#include "common/inversion/contract/inversion_options.hpp"
 #include "common/pipeline/registration_stage.hpp"
 #include "common/values/estimate.hpp"
 

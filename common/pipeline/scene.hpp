@@ -10,7 +10,8 @@
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
+#include "common/inversion/contract/inversion_options.hpp"
+#include "common/registration/icp.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 

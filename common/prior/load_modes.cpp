@@ -9,10 +9,9 @@
 #include <numbers>
 #include <vector>
 
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/units.hpp"
-#include "common/fem/gravity.hpp"
-#include "common/fem/swelling.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::prior {

@@ -6,7 +6,7 @@
 //                          level: along gravity (drainage is unknown), and along the two directions
 //                          across it (pose is unknown)
 //   tumour volume          tissue that changes its volume by the strain theta near the tumour with
-//                          centre c (fem/swelling.hpp): oedema lies beside a tumour and differs
+//                          centre c (fem/body_loads.hpp): oedema lies beside a tumour and differs
 //                          from place to place. For each radius s of the case bumps
 //                            theta = h exp(-|x - c_n|^2 / 2 s^2),  c_n = c + sqrt(2) s (i, j, k)
 //                          with i, j, k in {-1, 0, 1} and c_n at most kTumourVolumeReach_mm from c.
@@ -24,7 +24,7 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
-// Swelling honours the stiffness of tumour and regions (contact/tissues.hpp). All families have
+// Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have
 // zero mean and their columns are independent.
 #pragma once
 

@@ -1,19 +1,100 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/registration/icp.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
 
-#include "common/registration/icp_input.hpp"
 #include "common/registration/pose_information.hpp"
 
 namespace brainshift::registration {
 namespace {
 
 using geometry::PointRows;
+
+// Closer than this (mm), the direction from the surface to a point is rounding. The triangle's
+// normal is not.
+constexpr double kTouching = 1e-7;
+
+}  // namespace
+
+TargetSurface::TargetSurface(const geometry::ClosestPointIndex& triangles)
+    : measure_([&triangles](const PointRows& points, VecX& distances_mm, PointRows& gradients) {
+        for (Eigen::Index i = 0; i < points.rows(); ++i) {
+          const Vec3 x = points.row(i);
+          const geometry::ClosestPoint closest = triangles.closest(x);
+          const Vec3 away = x - closest.point;
+          const Vec3 n = closest.distance_mm > kTouching
+                             ? Vec3(away / closest.distance_mm)
+                             : triangles.triangle_normal(closest.triangle);
+          gradients.row(i) = n;
+          distances_mm[i] = n.dot(away);
+        }
+      }) {}
+
+TargetSurface::TargetSurface(const geometry::DistanceVolume& volume)
+    : measure_([&volume](const PointRows& points, VecX& distances_mm, PointRows& gradients) {
+        volume.at(points, distances_mm, gradients);
+      }) {}
+
+namespace {
+
+// Below this ratio of the second principal spread to the first, the points lie on a line up to the
+// rounding of their coordinates. align() accepts thinner shapes than register_fiducials(), because
+// it reports the axes that they do not show.
+constexpr double kThinnestCloud = 1e-5;
+
+Status check_options(const IcpOptions& options) {
+  const auto positive = [](const char* name, double value) -> Status {
+    if (std::isfinite(value) && value > 0.0) return {};
+    return fail(ErrorCode::kInvalidArgument, fmt::format("icp.{} = {}: must be > 0", name, value));
+  };
+  for (const auto& [name, value] :
+       {std::pair{"sd_mm", options.sd_mm}, std::pair{"welsch_scale_mm", options.welsch_scale_mm},
+        std::pair{"max_iterations", static_cast<double>(options.max_iterations)},
+        std::pair{"translation_tolerance_mm", options.translation_tolerance_mm},
+        std::pair{"rotation_tolerance_deg", options.rotation_tolerance_deg}})
+    if (auto status = positive(name, value); !status) return status;
+  if (std::isnan(options.rotation_sd_deg))
+    return fail(ErrorCode::kInvalidArgument, "icp.rotation_sd_deg = nan: must be a number");
+  if (!(options.observability_ratio >= 0.0 && options.observability_ratio < 1.0))
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("icp.observability_ratio = {}: must be in [0, 1)",
+                            options.observability_ratio));
+  return {};
+}
+
+Status check_points(const Points& points, const RigidTransform& T) {
+  if (points.cols() < 3)
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("boundary points: {} given, at least 3 needed", points.cols()));
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    if (!points.col(i).allFinite())
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("boundary points: point {} of {} is not finite", i, points.cols()));
+  const Points centred = points.colwise() - points.rowwise().mean();
+  const Vec3 spread = symmetric_eigenvalues(Mat3(centred * centred.transpose()));
+  if (!(spread[1] > kThinnestCloud * kThinnestCloud * spread[2]))
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("boundary points: all {} lie on one line", points.cols()));
+  if (!T.matrix().allFinite()) return fail(ErrorCode::kNotFinite, "initial pose: not finite");
+  const double skew = (T.linear().transpose() * T.linear() - Mat3::Identity()).norm();
+  if (skew > 1e-6 || T.linear().determinant() < 0.0)
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("initial pose: not a rotation (R^T R - I = {:.3g})", skew));
+  return {};
+}
+
+// Ok, or the error that align() returns.
+Status check_alignment(const Points& points, const RigidTransform& T_surface_points_initial,
+                       const IcpOptions& options) {
+  if (Status status = check_options(options); !status) return status;
+  return check_points(points, T_surface_points_initial);
+}
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 // The Welsch scale starts at this multiple of the median residual: half of the points then pull

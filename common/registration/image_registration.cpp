@@ -7,15 +7,153 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "common/geometry/mask.hpp"
-#include "common/registration/image_registration_input.hpp"
 #include "common/registration/image_similarity.hpp"
-#include "common/registration/pose_ascent.hpp"
 
 namespace brainshift::registration {
 namespace {
+
+constexpr double kArmijo = 1e-4;
+constexpr int kMostHalvings = 12;
+
+// Updates the inverse Hessian of -f: s the step taken, y the change of the gradient of -f.
+void bfgs_update(Mat6& H, const Vec6& s, const Vec6& y, bool first) {
+  const double sy = s.dot(y);
+  if (!(sy > 1e-10 * s.norm() * y.norm())) return;  // f is not concave along the step
+  if (first) H = (sy / y.squaredNorm()) * Mat6::Identity();
+  const Mat6 left = Mat6::Identity() - s * y.transpose() / sy;
+  H = (left * H * left.transpose() + s * s.transpose() / sy).eval();
+}
+
+}  // namespace
+
+PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial, const Vec3& centre,
+                  double radius_mm, const PoseAscentOptions& options) {
+  Vec6 scale;  // xi = scale * z
+  scale << Vec3::Constant(1.0 / radius_mm), Vec3::Ones();
+  PoseAscent result;
+  result.T = T_initial;
+  PoseValue here = function(result.T, result.T * centre);
+  result.evaluations = 1;
+  result.valid = here.valid;
+  result.value = here.value;
+  if (!here.valid) return result;
+
+  Vec6 g = scale.cwiseProduct(here.gradient);
+  bool fresh = true;  // H holds no curvature yet
+  Mat6 H = Mat6::Identity();
+  for (; result.iterations < options.max_iterations && !result.converged; ++result.iterations) {
+    if (!(g.norm() > 0.0)) {
+      result.converged = true;
+      break;
+    }
+    if (fresh) H = options.first_step_mm / g.norm() * Mat6::Identity();
+    Vec6 step = H * g;
+    step *= std::min(1.0, options.largest_step_mm / step.norm());
+    PoseValue next;
+    RigidTransform T_next;
+    bool uphill = false;
+    for (int halving = 0; halving < kMostHalvings && !uphill; ++halving) {
+      if (halving > 0) step *= 0.5;
+      T_next = rigid_increment(scale.cwiseProduct(step), result.T * centre) * result.T;
+      next = function(T_next, T_next * centre);
+      ++result.evaluations;
+      uphill = next.valid && next.value >= result.value + kArmijo * g.dot(step);
+      if (step.norm() < options.tolerance_mm) break;
+    }
+    if (!uphill) {
+      result.converged = fresh;  // not even along the gradient
+      fresh = true;
+      continue;
+    }
+    const Vec6 g_next = scale.cwiseProduct(next.gradient);
+    bfgs_update(H, step, g - g_next, fresh);
+    fresh = false;
+    result.T = T_next;
+    result.value = next.value;
+    g = g_next;
+    result.converged = step.norm() < options.tolerance_mm;
+  }
+  return result;
+}
+
+namespace {
+
+constexpr Eigen::Index kLeastSamples = 500;  // some thirty in each of half the bins
+
+Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
+
+Status check_registrar(const ImageRegistrationOptions& options) {
+  if (options.levels.empty()) return refuse("image registration: levels: none given");
+  for (const ImageLevel& level : options.levels)
+    if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kLeastSamples)
+      return refuse(
+          fmt::format("image registration: level of smoothing_mm = {:g} and samples = {}: must be "
+                      "0 to 20 and at least {}",
+                      level.smoothing_mm, level.samples, kLeastSamples));
+  if (options.bins < 8 || options.bins > 256)
+    return refuse(fmt::format("image registration: bins = {}: must be 8 to 256", options.bins));
+  if (!(options.low_quantile >= 0.0 && options.low_quantile < options.high_quantile &&
+        options.high_quantile <= 1.0))
+    return refuse(
+        fmt::format("image registration: quantiles {:g} and {:g}: must be 0 <= low < "
+                    "high <= 1",
+                    options.low_quantile, options.high_quantile));
+  struct Bound {
+    const char* name;
+    double value, low, high;
+  };
+  for (const Bound& bound : {Bound{"start_offset_mm", options.start_offset_mm, 0.0, 50.0},
+                             Bound{"max_iterations", 1.0 * options.max_iterations, 1.0, 1e4},
+                             Bound{"max_translation_mm", options.max_translation_mm, 0.1, 200.0},
+                             Bound{"max_rotation_deg", options.max_rotation_deg, 0.1, 90.0},
+                             Bound{"min_overlap", options.min_overlap, 0.05, 1.0},
+                             Bound{"same_pose_mm", options.same_pose_mm, 1e-3, 50.0}})
+    if (!(bound.value >= bound.low && bound.value <= bound.high))
+      return refuse(fmt::format("image registration: {} = {:g}: must be {:g} to {:g}", bound.name,
+                                bound.value, bound.low, bound.high));
+  return {};
+}
+
+// what: "MRI" or "region", for the sentence.
+Status check_image(const char* what, const VoxelImage& image) {
+  for (int length : image.dims)
+    if (length < 2)
+      return refuse(
+          fmt::format("image registration: {} of {} x {} x {} voxels: at least 2 needed "
+                      "along each axis",
+                      what, image.dims[0], image.dims[1], image.dims[2]));
+  if (image.values.size() != image.num_voxels())
+    return refuse(fmt::format("image registration: {} holds {} values for {} voxels", what,
+                              image.values.size(), image.num_voxels()));
+  const double volume = image.T_ras_voxel.linear().determinant();
+  if (!image.T_ras_voxel.matrix().allFinite() || !(std::abs(volume) > 1e-9))
+    return refuse(fmt::format("image registration: {} with voxels of {:g} mm3: no usable affine",
+                              what, volume));
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    if (!std::isfinite(image.values[i]))
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("image registration: {} voxel {} is not finite", what, i));
+  return {};
+}
+
+Status check_samples(const IntensitySamples& samples) {
+  const Eigen::Index count = samples.positions.cols();
+  if (samples.intensities.size() != count)
+    return refuse(fmt::format("image registration: {} positions and {} intensities", count,
+                              samples.intensities.size()));
+  if (count < kLeastSamples)
+    return refuse(
+        fmt::format("image registration: {} samples: at least {} needed", count, kLeastSamples));
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (!samples.positions.col(i).allFinite() || !std::isfinite(samples.intensities[i]))
+      return fail(ErrorCode::kNotFinite,
+                  fmt::format("image registration: sample {} is not finite", i));
+  return {};
+}
 
 constexpr double kPerDegree = std::numbers::pi / 180.0;
 // A pose beyond this fraction of the search's reach lies at its edge.
@@ -194,7 +332,7 @@ Status check_end(const Task& task, const ImageRegistration& result) {
 
 Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const VoxelImage* region,
                                               const ImageRegistrationOptions& options) {
-  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  if (Status ok = check_registrar(options); !ok) return tl::unexpected(ok.error());
   if (Status ok = check_image("MRI", mri); !ok) return tl::unexpected(ok.error());
   if (region)
     if (Status ok = check_image("region", *region); !ok) return tl::unexpected(ok.error());

@@ -5,8 +5,8 @@
 //
 //   T_ras_ras = argmax over T  NMI(M(T x_i), I_i)                       (image_similarity.hpp)
 //
-// The search (pose_ascent.hpp) goes from coarse to fine. On each level M is smoothed by a Gaussian
-// and every k-th sample is used. On the coarsest level the search begins at the given pose and at
+// The search (ascend) goes from coarse to fine. On each level M is smoothed by a Gaussian and every
+// k-th sample is used. On the coarsest level the search begins at the given pose and at
 // six others, `start_offset_mm` from it along each axis. They are followed to the second finest
 // level, and the best goes on to the finest.
 // Mutual information asks only that intensities go together, not how: sulci may be dark in one
@@ -20,16 +20,81 @@
 // dura is opened; Studholme et al. 1999.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
-#include "common/registration/image_registration_input.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/values/intensity_samples.hpp"
 
 namespace brainshift::registration {
+
+// The rigid motion near a first one at which a smooth function is greatest, by the quasi-Newton
+// method BFGS.
+//
+//   z = (radius w, t), xi = (w, t): all six in mm;  T <- rigid_increment(xi, c) T,  c = T centre
+//   step p = H g, H the inverse-Hessian estimate (BFGS, H = scaled identity at first), halved
+//   until f(T(p)) >= f(T) + 1e-4 g . p                                                 (Armijo)
+// Gradients of successive poses are compared as if their tangent spaces were the same. They differ
+// by half a step's angle.
+// Source: Nocedal & Wright, Numerical Optimization (2006), algorithm 6.1.
+struct PoseValue {
+  // False outside of the function's domain. Such a pose is never taken.
+  bool valid = false;
+  double value = 0.0;
+  Vec6 gradient = Vec6::Zero();  // by xi about the given centre, per radian and per mm
+};
+using PoseFunction = std::function<PoseValue(const RigidTransform& T, const Vec3& centre)>;
+
+struct PoseAscentOptions {
+  int max_iterations = 60;
+  double first_step_mm = 1.0;
+  // About the size of what the function resolves, so that no step jumps over a hill.
+  double largest_step_mm = 3.0;
+  double tolerance_mm = 0.01;  // converged when a step is shorter
+};
+
+struct PoseAscent {
+  RigidTransform T = RigidTransform::Identity();
+  double value = 0.0;
+  int iterations = 0;
+  int evaluations = 0;
+  bool valid = false;      // the function is defined at the first pose
+  bool converged = false;  // a step was below the tolerance, or no step went up
+};
+
+// centre: of the moved points, in their own frame, mm. radius_mm > 0: their rms distance from it.
+PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial, const Vec3& centre,
+                  double radius_mm, const PoseAscentOptions& options = {});
+
+// The options of ImageRegistrar. Every error about them or the images names the value.
+struct ImageLevel {
+  double smoothing_mm = 0.0;  // standard deviation, of M
+  int samples = 0;            // about this many are used
+};
+
+struct ImageRegistrationOptions {
+  // Coarse to fine. With 40000 ultrasound samples the pose differs by less than 0.1 mm from that
+  // with 20000.
+  std::vector<ImageLevel> levels = {{3.0, 4000}, {2.0, 8000}, {1.0, 20000}};
+  int bins = 32;  // of each intensity, 8 to 256
+  // Intensities below and above these quantiles count as equal to them.
+  double low_quantile = 0.005, high_quantile = 0.995;
+  // Of the six further starting poses; 0: only the given pose.
+  double start_offset_mm = 4.0;
+  int max_iterations = 60;  // per level and start
+  // A registration by fiducials errs by up to 5 mm (paper 2.7). A correction beyond these limits
+  // does not correct such an error.
+  double max_translation_mm = 15.0;  // of the samples' centroid
+  double max_rotation_deg = 15.0;
+  double min_overlap = 0.5;  // fraction of the samples inside the MRI
+  // Starts whose poses agree within this belong together: rms over the samples, before the finest
+  // level.
+  double same_pose_mm = 2.0;
+};
 
 struct ImageRegistration {
   // The correction: x_ras (of the MRI) = T_ras_ras x_ras (as the samples are placed now).

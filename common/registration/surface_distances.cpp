@@ -5,14 +5,56 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/geometry/tet_locator.hpp"
 #include "common/registration/alignment_data.hpp"
 
 namespace brainshift::registration {
+
+SurfacePatch craniotomy_patch(const BrainModel& model) {
+  SurfacePatch patch;
+  patch.nodes = model.craniotomy;
+  std::sort(patch.nodes.begin(), patch.nodes.end());
+  patch.surface =
+      geometry::surface_between(model.mesh.nodes, model.boundary_triangles, patch.nodes);
+  const auto count = static_cast<Eigen::Index>(patch.nodes.size());
+  patch.weights.resize(count, count);
+  patch.weights.setIdentity();
+  return patch;
+}
+
+SurfacePatch tumour_patch(const BrainModel& model) {
+  SurfacePatch patch;
+  patch.surface = model.tumour;
+  const geometry::TetLocator locator(model.mesh);
+  std::vector<geometry::TetLocation> carriers;
+  std::map<NodeIndex, int> rows;  // ascending
+  for (const auto vertex : model.tumour.vertices.colwise()) {
+    carriers.push_back(locator.locate(vertex));
+    for (const int node : carriers.back().nodes) rows[node] = 0;
+  }
+  for (auto& [node, row] : rows) {
+    row = static_cast<int>(patch.nodes.size());
+    patch.nodes.push_back(node);
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t v = 0; v < carriers.size(); ++v) {
+    for (int k = 0; k < 4; ++k) {
+      entries.emplace_back(rows[carriers[v].nodes[k]], static_cast<int>(v), carriers[v].weights[k]);
+    }
+  }
+  patch.weights.resize(static_cast<Eigen::Index>(patch.nodes.size()),
+                       static_cast<Eigen::Index>(carriers.size()));
+  patch.weights.setFromTriplets(entries.begin(), entries.end());
+  return patch;
+}
+
 namespace {
 
 // Any fixed number; it makes a replay repeatable.
@@ -196,6 +238,22 @@ bool SurfaceDistances::moved(const SparseData& before, const SparseData& now) co
     }
   }
   return false;
+}
+
+VecX signed_projection_distance(const Points& nodes, const geometry::ClosestPointIndex& surface) {
+  VecX distances(nodes.cols());
+  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+    const Vec3 node = nodes.col(i);
+    const geometry::ClosestPoint closest = surface.closest(node);
+    const double outwards = (node - closest.point).dot(surface.pseudo_normal(closest));
+    distances[i] = outwards > 0.0 ? -closest.distance_mm : closest.distance_mm;
+  }
+  return distances;
+}
+
+MeanStd mismatch(const VecX& signed_distances) {
+  const VecX magnitudes = signed_distances.cwiseAbs();
+  return mean_std({magnitudes.data(), static_cast<std::size_t>(magnitudes.size())});
 }
 
 }  // namespace brainshift::registration

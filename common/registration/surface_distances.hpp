@@ -22,16 +22,41 @@
 // surface, closest points would lie on its wrong side. Of that motion nothing else enters the data.
 #pragma once
 
+#include <Eigen/SparseCore>
+
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
+#include "common/core/statistics.hpp"
+#include "common/core/types.hpp"
+#include "common/geometry/closest_point.hpp"
 #include "common/geometry/moving_surface.hpp"
-#include "common/registration/surface_patch.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::registration {
+
+// SurfacePatch: a surface that moves with the mesh, as an instrument sees it: the cortex under the
+// craniotomy, or the boundary of the tumour.
+//
+//   vertex v moves by  sum_i weights(i, v) u(nodes[i])
+struct SurfacePatch {
+  std::vector<NodeIndex> nodes;  // of the mesh that move the surface, ascending
+  TriangleSurface surface;       // undeformed, outward
+  // nodes x vertices, columns of sum 1: 3 x nodes displacements times it are those of the vertices.
+  Eigen::SparseMatrix<double> weights;
+};
+
+// Boundary triangles between three craniotomy nodes; no triangle when there are none. Vertex i is
+// nodes[i].
+SurfacePatch craniotomy_patch(const BrainModel& model);
+
+// The tumour's surface, whose vertices are points inside tetrahedra. A vertex outside the mesh
+// moves as the closest point of the mesh does. Precondition: the mesh has a tetrahedron.
+SurfacePatch tumour_patch(const BrainModel& model);
 
 // A patch with its index: what observations of one surgery share.
 class IndexedPatch {
@@ -111,5 +136,21 @@ class SurfaceDistances {
   Points guiding_;  // the measured points in use
   VecX sd_mm_;      // of their distances
 };
+
+// Closest point projection distance (paper 2.7) from nodes to a measured surface of the brain.
+//
+//   |d_i| = |q_i - x_i|,   d_i > 0 when (q_i - x_i) . n(q_i) > 0
+//   q_i: closest surface point to node x_i;  n: outward pseudo-normal
+//
+// The sign is negative when node x_i lies on the outward side of the surface, positive on the
+// inner side, as in the paper. The pseudo-normal gives the right sign at edges and vertices too.
+// A node beside an open surface is measured to the surface's rim, so pass only nodes that face the
+// surface.
+
+// nodes: 3 x n, finite, mm, in the surface's frame. Returns n signed distances, mm.
+VecX signed_projection_distance(const Points& nodes, const geometry::ClosestPointIndex& surface);
+
+// Mean and standard deviation of |d_i|, mm.
+MeanStd mismatch(const VecX& signed_distances);
 
 }  // namespace brainshift::registration

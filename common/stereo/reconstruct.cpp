@@ -12,8 +12,7 @@
 #include <vector>
 
 #include "common/configuration/stereo_calibration.hpp"
-#include "common/stereo/outliers.hpp"
-#include "common/stereo/parts.hpp"
+#include "common/stereo/cleaning.hpp"
 
 namespace brainshift::stereo {
 namespace {

@@ -6,7 +6,7 @@
 // 2. A block of step x step pixels becomes one vertex where at least half of it is valid: the mean
 //    position and mean disparity of its pixels within kMaxPartStep_px of their median. spacing_mm
 //    and max_points decide step.
-// 3. Vertices far from their 8 nearest neighbours are dropped (outliers.hpp, kOutlierSds).
+// 3. Vertices far from their 8 nearest neighbours are dropped (cleaning.hpp, kOutlierSds).
 // 4. Blocks that are neighbours in the picture become triangles, counter-clockwise seen from the
 //    camera. Their normals point towards it: outwards, for a surgeon's camera. Triangles seen at
 //    more than kMaxViewAngle_deg span a jump in depth and are left out, as are vertices without a

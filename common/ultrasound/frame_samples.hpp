@@ -6,11 +6,22 @@
 // outside of the sector are 0 in every frame of a recording, pixels inside hardly ever.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "common/core/error.hpp"
-#include "common/ultrasound/compound.hpp"
+#include "common/tracking/recording.hpp"
 #include "common/values/intensity_samples.hpp"
 
 namespace brainshift::ultrasound {
+
+// Pixels u in [left, left + width), v alike. The part outside of the image is ignored.
+struct PixelWindow {
+  int left = 0, top = 0, width = 0, height = 0;
+};
+
+// T_target_image (pixels to mm) of every frame of the recording, nothing where it is not used.
+using ImagePoses = std::vector<std::optional<AffineTransform>>;
 
 // Places in the poses' target frame, mm; intensities in the recording's grey levels. Frames
 // without a pose or without a valid image are left out.

@@ -10,7 +10,7 @@
 //             reported with its reasons and replaces no usable field, neither in the daemon nor in
 //             the client library nor in a score.
 //
-// inversion/contract/quality_check.hpp sets the flags. Their bounds stand here, so that a client
+// inversion/contract/estimate_check.hpp sets the flags. Their bounds stand here, so that a client
 // can name them; docs/decisions/0019-what-makes-a-field-unusable.md has reasons and sources.
 #pragma once
 

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "common/geometry/region_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 
 namespace brainshift::server {
 namespace {

@@ -6,8 +6,7 @@
 #include <string>
 
 #include "common/io/files/stop_signals.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "server/main/commands.hpp"
 
 namespace {

@@ -14,7 +14,7 @@
 #include "common/io/config/key_file.hpp"
 #include "common/io/files/stop_signals.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "server/guard/process_limits.hpp"
 #include "server/main/ipc_socket.hpp"
 #include "server/main/logging.hpp"

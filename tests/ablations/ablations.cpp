@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/ablations/ablation_patient.hpp"
 #include "tests/surgeries/study_program.hpp"
 

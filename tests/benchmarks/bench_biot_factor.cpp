@@ -13,12 +13,10 @@
 #include "common/core/stopwatch.hpp"
 #include "common/fem/biot_matrix.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
 #include "common/patient/read_patient.hpp"
-#include "tests/benchmarks/median_time.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

@@ -36,15 +36,15 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/bridge/bridge.hpp"
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/igtl/message.hpp"
 #include "common/igtl/stream_reader.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/made_up_daemon.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

@@ -28,8 +28,7 @@
 #include "server/delivery/parcels.hpp"
 #include "server/delivery/selections.hpp"
 #include "tests/benchmarks/made_up_daemon.hpp"
-#include "tests/benchmarks/median_time.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

@@ -12,8 +12,7 @@
 #include <vector>
 
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/error_time.hpp"
 
 namespace brainshift::bench {

@@ -20,16 +20,15 @@
 
 #include "client/tools/twin/surgery.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/fem/block_solver.hpp"
 #include "common/fem/sampling.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/data_check.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/blas.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 

@@ -10,9 +10,8 @@
 
 #include "common/contact/forward_model.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
-#include "common/operators/spatial_blocks.hpp"
+#include "common/linalg/openblas.hpp"
+#include "common/operators/encode_columns.hpp"
 #include "common/patient/read_patient.hpp"
 
 namespace brainshift {

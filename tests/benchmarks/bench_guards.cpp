@@ -11,10 +11,9 @@
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
-#include "tests/benchmarks/median_time.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

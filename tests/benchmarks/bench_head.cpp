@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "common/anatomy/brain_model_builder.hpp"
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/io/config/case_inputs_file.hpp"
-#include "tests/benchmarks/median_time.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift::bench {
 namespace {

@@ -14,8 +14,7 @@
 #include "client/tools/twin/surgery.hpp"
 #include "client/tools/twin/truth_brain.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 

@@ -10,16 +10,16 @@
 #include <string>
 #include <vector>
 
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/wire/convert.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift {
 namespace {

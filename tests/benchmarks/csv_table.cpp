@@ -75,15 +75,6 @@ double CsvTable::number(std::size_t row, std::string_view column) const {
   return whole ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
-Status CsvTable::append(const CsvTable& other) {
-  if (columns_.empty()) columns_ = other.columns_;
-  if (columns_ != other.columns_) {
-    return fail(ErrorCode::kInvalidArgument, "tables with different headings cannot be joined");
-  }
-  cells_.insert(cells_.end(), other.cells_.begin(), other.cells_.end());
-  return {};
-}
-
 Result<CsvWriter> CsvWriter::create(const std::filesystem::path& path, std::string_view heading) {
   CsvWriter writer;
   writer.path_ = path;

@@ -26,8 +26,6 @@ class CsvTable {
   const std::string& text(std::size_t row, std::string_view column) const;
   // NaN where the cell is empty or no number.
   double number(std::size_t row, std::string_view column) const;
-  // Adds the rows of `other`; kInvalidArgument when its heading differs. An empty table takes any.
-  Status append(const CsvTable& other);
 
  private:
   std::vector<std::string> columns_;

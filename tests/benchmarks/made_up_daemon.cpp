@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "common/wire/convert.hpp"
-#include "tests/benchmarks/value_or_exit.hpp"
+#include "tests/benchmarks/tools.hpp"
 
 namespace brainshift::bench {
 

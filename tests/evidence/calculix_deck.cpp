@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::evidence {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/evidence/evidence_patient.hpp"
 #include "tests/surgeries/study_program.hpp"
 

@@ -15,7 +15,7 @@
 #include "client/tools/twin/truth_load.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/io/config/case_inputs_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/calculix_deck.hpp"
 #include "tests/evidence/calculix_truth.hpp"

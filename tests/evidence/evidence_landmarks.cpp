@@ -11,7 +11,7 @@
 #include "client/tools/import/import_landmarks.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/io/landmarks/pair_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/evidence/landmark_study.hpp"
 #include "tests/surgeries/study_program.hpp"

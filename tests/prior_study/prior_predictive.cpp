@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/prior_study/prior_draws.hpp"
 #include "tests/surgeries/study_program.hpp"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/core/stopwatch.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/replays/replay_player.hpp"
 #include "tests/surgeries/study_program.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "client/tools/twin/simulate.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/replays/corpus.hpp"
 #include "tests/replays/manifest.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "client/tools/twin/variation.hpp"
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/sensing/estimate_studies.hpp"

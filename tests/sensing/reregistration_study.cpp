@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Re-registration before the dura is opened, on simulated ultrasound of the default head: from
 // which errors it recovers, the error that it leaves, and its time.
+#include <algorithm>
 #include <cstdio>
+#include <functional>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include "client/tools/twin/ultrasound.hpp"
-#include "common/anatomy/tumour_surface.hpp"
+#include "common/anatomy/brain_mesh.hpp"
+#include "common/core/mesh.hpp"
+#include "common/core/random.hpp"
+#include "common/core/stopwatch.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 #include "common/ultrasound/frame_samples.hpp"
-#include "tests/sensing/reregistration_trials.hpp"
+#include "tests/support/compound.hpp"
 #include "tests/support/study_record.hpp"
 #ifdef BRAINSHIFT_WITH_ITK
 #include "tests/sensing/itk_registration.hpp"
@@ -24,6 +32,113 @@ namespace {
 using test_support::record;
 using test_support::record_check;
 using test_support::record_left_out;
+
+// Random starts of a registration, and the errors at the tumour that it leaves.
+struct Trial {
+  double before_mm = 0.0;
+  double after_mm = 0.0;  // as before where the registration was refused
+  bool refused = false;
+  double agreement = 0.0;
+  double seconds = 0.0;
+};
+
+constexpr double kFound_mm = 1.0;  // paper 2.7: what re-registration left
+
+struct TrialSummary {
+  int count = 0;
+  double found_percent = 0.0;  // error below kFound_mm
+  double refused_percent = 0.0;
+  double trusted_wrong_percent = 0.0;  // not refused, agreement at least one half, not found
+  double trusted_percent = 0.0;
+  double mean_before_mm = 0.0, mean_after_mm = 0.0, largest_after_mm = 0.0;  // of those not refused
+  double mean_seconds = 0.0;
+};
+
+// For one start: the correction found, to be applied after it, or a refusal.
+struct Answer {
+  bool refused = true;
+  RigidTransform T_correction = RigidTransform::Identity();
+  double agreement = 0.0;
+};
+using Method = std::function<Answer(const RigidTransform& T_start)>;
+
+constexpr double kMostTurn_deg = 8.0;
+constexpr double kFullTurnFrom_mm = 5.0;
+constexpr double kTrusted = 0.5;
+
+// Mean distance of the surface's vertices from where they belong.
+double target_error_mm(const RigidTransform& T, const TriangleSurface& tumour) {
+  const Points off =
+      ((T.linear() * tumour.vertices).colwise() + Vec3(T.translation())) - tumour.vertices;
+  return off.colwise().norm().mean();
+}
+
+// A motion with that target error: a turn about the tumour's centroid by up to 8 degrees (in
+// proportion less below 5 mm) and a shift, both in random directions.
+RigidTransform random_start(double error_mm, const TriangleSurface& tumour, Random& random) {
+  const Vec3 centre = tumour.vertices.rowwise().mean();
+  const double turn = kMostTurn_deg * std::numbers::pi / 180.0 * random.uniform() *
+                      std::min(1.0, error_mm / kFullTurnFrom_mm);
+  Vec6 xi;
+  xi << turn * random.direction(), Vec3::Zero();
+  const Vec3 direction = random.direction();
+  double low = 0.0, high = 2.0 * error_mm;
+  for (int halving = 0; halving < 40; ++halving) {
+    const double middle = 0.5 * (low + high);
+    xi.tail<3>() = middle * direction;
+    (target_error_mm(registration::rigid_increment(xi, centre), tumour) < error_mm ? low : high) =
+        middle;
+  }
+  return registration::rigid_increment(xi, centre);
+}
+
+TrialSummary summarise(const std::vector<Trial>& trials) {
+  TrialSummary summary;
+  summary.count = static_cast<int>(trials.size());
+  const double percent = 100.0 / summary.count;
+  int answered = 0;
+  for (const Trial& trial : trials) {
+    const bool found = !trial.refused && trial.after_mm < kFound_mm;
+    const bool trusted = !trial.refused && trial.agreement >= kTrusted;
+    summary.found_percent += found ? percent : 0.0;
+    summary.refused_percent += trial.refused ? percent : 0.0;
+    summary.trusted_percent += trusted ? percent : 0.0;
+    summary.trusted_wrong_percent += trusted && !found ? percent : 0.0;
+    summary.mean_before_mm += trial.before_mm / summary.count;
+    summary.mean_seconds += trial.seconds / summary.count;
+    if (trial.refused) continue;
+    ++answered;
+    summary.mean_after_mm += trial.after_mm;
+    summary.largest_after_mm = std::max(summary.largest_after_mm, trial.after_mm);
+  }
+  if (answered > 0) summary.mean_after_mm /= answered;
+  return summary;
+}
+
+// Runs the method on `threads` threads; the starts depend on the seed alone.
+std::vector<Trial> run_trials(const Method& method, double error_mm, int count, std::uint64_t seed,
+                              const TriangleSurface& tumour, int threads) {
+  Random random(seed);
+  std::vector<RigidTransform> starts;
+  for (int i = 0; i < count; ++i) starts.push_back(random_start(error_mm, tumour, random));
+  std::vector<Trial> trials(starts.size());
+  ThreadTeam team(threads);
+  team.split(count, [&](long begin, long end) {
+    for (long i = begin; i < end; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      Trial& trial = trials[at];
+      trial.before_mm = target_error_mm(starts[at], tumour);
+      const Stopwatch watch;
+      const Answer answer = method(starts[at]);
+      trial.seconds = watch.seconds();
+      trial.refused = answer.refused;
+      trial.agreement = answer.agreement;
+      trial.after_mm = answer.refused ? trial.before_mm
+                                      : target_error_mm(answer.T_correction * starts[at], tumour);
+    }
+  });
+  return trials;
+}
 
 constexpr const char* kStudy = "reregistration";
 constexpr const char* kX = "start error at the tumour mm";
@@ -198,9 +313,9 @@ RigidTransform from_itk(const ItkPose& pose) {
 Status compare_with_itk(const Patient& patient) {
   const auto window = whole_image(patient.recording);
   const auto grid =
-      ultrasound::enclosing_grid(patient.recording, patient.poses, window, Vec3::Constant(1.0));
+      test_support::enclosing_grid(patient.recording, patient.poses, window, Vec3::Constant(1.0));
   if (!grid) return tl::unexpected(grid.error());
-  auto volume = ultrasound::compound(patient.recording, patient.poses, window, *grid);
+  auto volume = test_support::compound(patient.recording, patient.poses, window, *grid);
   if (!volume) return tl::unexpected(volume.error());
   // Black corners of the images are no tissue.
   for (std::size_t i = 0; i < volume->weight.size(); ++i)

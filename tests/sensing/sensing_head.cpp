@@ -7,7 +7,7 @@
 #include "client/tools/replay/score.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::sensing {
 

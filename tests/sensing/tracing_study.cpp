@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "common/core/stopwatch.hpp"
-#include "common/ultrasound/lesion_polar.hpp"
 #include "common/ultrasound/lesion_tracer.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/support/virtual_sweep.hpp"

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -15,25 +16,105 @@
 
 #include "common/core/mesh.hpp"
 #include "common/io/config/plus_config.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/files/packed_values.hpp"
 #include "common/io/recording/sequence_file.hpp"
+#include "common/io/recording/sequence_header.hpp"
 #include "common/tracking/chain.hpp"
-#include "common/ultrasound/compound.hpp"
 #include "tests/benchmarks/csv_table.hpp"
-#include "tests/sensing/answer_volume.hpp"
+#include "tests/support/compound.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift {
 namespace {
 
 namespace fs = std::filesystem;
-using test_support::Agreement;
-using test_support::AnswerVolume;
-using test_support::compare;
+using test_support::CompoundedVolume;
 using test_support::record;
 using test_support::record_check;
 using test_support::record_left_out;
+using test_support::VolumeGrid;
 
 constexpr const char* kStudy = "ultrasound";
+
+// A volume that PLUS compounded, for comparison with ours.
+
+// MetaImage of unsigned char whose Offset and ElementSpacing are in the Reference frame, mm.
+struct AnswerVolume {
+  VolumeGrid grid;
+  std::vector<float> values;
+};
+
+// PLUS's volume holds no weights: empty voxels are 0, as are black ones.
+enum class Voxels {
+  kWeFilled,    // our weight is positive
+  kPlusFilled,  // PLUS's value is positive; ours is 0 where we have no pixel
+};
+
+// Agreement over some voxels, our volume moved against PLUS's by whole voxels.
+struct Agreement {
+  double correlation = 0.0;
+  double mean_difference = 0.0;  // absolute, grey values, where PLUS's is not 0
+  long voxels = 0;
+};
+
+Vec3 three_numbers(const io::SequenceHeader& header, const char* key) {
+  Vec3 value = Vec3::Zero();
+  const std::string& text = header.fields.at(key);
+  char* rest = nullptr;
+  const char* at = text.c_str();
+  for (int axis = 0; axis < 3; ++axis, at = rest) value[axis] = std::strtod(at, &rest);
+  return value;
+}
+
+Result<AnswerVolume> read_answer(const std::filesystem::path& path) {
+  const auto content = io::read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  const auto header = io::parse_meta_sequence(*content);
+  if (!header) return io::file_error(header.error().code, path, header.error().message);
+  const auto bytes = io::unpack(*header, 1);
+  if (!bytes) return io::file_error(bytes.error().code, path, bytes.error().message);
+  AnswerVolume volume;
+  volume.grid.origin_mm = three_numbers(*header, "Offset");
+  volume.grid.spacing_mm = three_numbers(*header, "ElementSpacing");
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    volume.grid.dims[axis] = static_cast<int>(header->sizes[axis]);
+  }
+  for (const char byte : *bytes) {
+    volume.values.push_back(static_cast<float>(static_cast<unsigned char>(byte)));
+  }
+  return volume;
+}
+
+Agreement compare(const CompoundedVolume& ours, const AnswerVolume& answer,
+                  const std::array<int, 3>& shift = {0, 0, 0}, Voxels voxels = Voxels::kWeFilled) {
+  const std::array<int, 3>& dims = answer.grid.dims;
+  double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, difference = 0, bright = 0;
+  for (std::size_t i = 0; i < answer.values.size(); ++i) {
+    if (voxels == Voxels::kWeFilled && ours.weight[i] <= 0.0F) continue;
+    const int at = static_cast<int>(i);
+    const std::array<int, 3> moved{at % dims[0] + shift[0], at / dims[0] % dims[1] + shift[1],
+                                   at / dims[0] / dims[1] + shift[2]};
+    bool inside = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      inside = inside && moved[axis] >= 0 && moved[axis] < dims[axis];
+    }
+    if (!inside) continue;
+    const double x = ours.image.values[i];
+    const double y =
+        answer
+            .values[static_cast<std::size_t>(moved[0] + dims[0] * (moved[1] + dims[1] * moved[2]))];
+    if (voxels == Voxels::kPlusFilled && y <= 0.0) continue;
+    n += 1, sx += x, sy += y, sxx += x * x, syy += y * y, sxy += x * y;
+    if (y > 0.0) difference += std::abs(x - y), bright += 1;
+  }
+  Agreement result;
+  const double vx = sxx / n - sx * sx / n / n, vy = syy / n - sy * sy / n / n;
+  result.correlation = (sxy / n - sx * sy / n / n) / std::sqrt(std::max(1e-300, vx * vy));
+  result.mean_difference = difference / std::max(1.0, bright);
+  result.voxels = std::lround(n);
+  return result;
+}
 
 template <typename T>
 T value_or_exit(Result<T> result) {
@@ -52,7 +133,7 @@ bool check(const std::string& name, double value, const std::string& bound, bool
 
 // Records the correlation for moves along x. Returns the length of the best of the 27 moves by at
 // most one voxel along each axis.
-double best_move(const std::string& series, const ultrasound::CompoundedVolume& ours,
+double best_move(const std::string& series, const CompoundedVolume& ours,
                  const AnswerVolume& answer) {
   for (int move = -3; move <= 3; ++move) {
     record({kStudy, series, "move along x in voxels", "correlation with PLUS", double(move),
@@ -116,11 +197,11 @@ int fullest_slice(const std::vector<float>& weight, const std::array<int, 3>& di
 
 // A row per voxel of one slice of both volumes: slice_NAME.csv, which tests/studies/sensing.py
 // draws.
-void write_slices(const std::string& name, const ultrasound::CompoundedVolume& ours,
+void write_slices(const std::string& name, const CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const char* folder = std::getenv("BRAINSHIFT_STUDY_DIR");
   if (folder == nullptr) return;
-  const ultrasound::VolumeGrid& grid = answer.grid;
+  const VolumeGrid& grid = answer.grid;
   const int k = fullest_slice(ours.weight, grid.dims);
   auto file = value_or_exit(bench::CsvWriter::create(fs::path(folder) / ("slice_" + name + ".csv"),
                                                      "x_mm,y_mm,brainshift,PLUS"));
@@ -140,7 +221,7 @@ void write_slices(const std::string& name, const ultrasound::CompoundedVolume& o
   }
 }
 
-void check_volume(const std::string& what, const ultrasound::CompoundedVolume& ours,
+void check_volume(const std::string& what, const CompoundedVolume& ours,
                   const AnswerVolume& answer) {
   const Agreement agreement = compare(ours, answer);
   fmt::print("{}: {} voxels filled, mean |difference| {:.2f} grey values\n", what, agreement.voxels,
@@ -150,8 +231,7 @@ void check_volume(const std::string& what, const ultrasound::CompoundedVolume& o
         ">= 0.9", agreement.correlation >= 0.9, source);
   // The voxels that PLUS filled and we did not count here too, so the figure depends on the data
   // that each volume was made of.
-  const double over_plus =
-      compare(ours, answer, {0, 0, 0}, test_support::Voxels::kPlusFilled).correlation;
+  const double over_plus = compare(ours, answer, {0, 0, 0}, Voxels::kPlusFilled).correlation;
   fmt::print("-     {} volume: correlation over the voxels that PLUS filled = {:.4f}\n", what,
              over_plus);
   test_support::record_figure(
@@ -168,9 +248,9 @@ void study_spine(const fs::path& folder) {
                  folder / "PlusDeviceSet_SpinePhantomFreehandReconstructionOnly.xml", "Image");
   check_counts("spine", sweep, 21);
   const AnswerVolume answer =
-      value_or_exit(test_support::read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
+      value_or_exit(read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
-  const auto grid = value_or_exit(ultrasound::enclosing_grid(
+  const auto grid = value_or_exit(test_support::enclosing_grid(
       sweep.recording, sweep.chain.T_target_source, window, *sweep.config.output_spacing_mm));
   const double origin_mm = (grid.origin_mm - answer.grid.origin_mm).cwiseAbs().maxCoeff();
   check("spine origin of the enclosing grid against PLUS's mm", origin_mm, "<= 0.001",
@@ -178,13 +258,13 @@ void study_spine(const fs::path& folder) {
   const bool same = grid.dims == answer.grid.dims;
   check("spine voxels along each axis as PLUS's", same ? 1 : 0, "= 1", same,
         "DimSize in PLUS's volume");
-  for (const auto& [paste, label] : {std::pair{ultrasound::Paste::kLinear, "linear"},
-                                     std::pair{ultrasound::Paste::kNearest, "nearest"}}) {
-    const auto ours = value_or_exit(ultrasound::compound(
+  for (const auto& [paste, label] : {std::pair{test_support::Paste::kLinear, "linear"},
+                                     std::pair{test_support::Paste::kNearest, "nearest"}}) {
+    const auto ours = value_or_exit(test_support::compound(
         sweep.recording, sweep.chain.T_target_source, window, answer.grid, paste));
     const std::string what = std::string("spine ") + label;
     check_volume(what, ours, answer);
-    if (paste == ultrasound::Paste::kLinear) write_slices("spine", ours, answer);
+    if (paste == test_support::Paste::kLinear) write_slices("spine", ours, answer);
   }
 }
 
@@ -197,10 +277,10 @@ void study_nwire(const fs::path& folder) {
                  "CroppedImage");
   check_counts("nwire", sweep, 20);
   const AnswerVolume answer =
-      value_or_exit(test_support::read_answer(folder / "NwirePhantomFreehandReconstructed.mha"));
+      value_or_exit(read_answer(folder / "NwirePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
   const auto ours = value_or_exit(
-      ultrasound::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
+      test_support::compound(sweep.recording, sweep.chain.T_target_source, window, answer.grid));
   check_volume("nwire", ours, answer);
   write_slices("nwire", ours, answer);
 }

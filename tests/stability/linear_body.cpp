@@ -109,10 +109,7 @@ void solve_linear(const LinearBody& body, Point point, const Options& options) {
   if (options.fault == Fault::kNormal) turn_one_force(given);
   if (options.fault == Fault::kScale) matrix *= 1.01;
   const auto u = answer(body, matrix, given, point);
-  if (!u) {
-    set_refused(u.error(), point);
-    return options.record(point);
-  }
+  if (!u) return options.record_refused(u.error(), point);
   point.answered = true;
   point.status = "solved";
   point.min_volume_ratio = fem::measure_deformation(body.mesh, *u).min_volume_ratio;

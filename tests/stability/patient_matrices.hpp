@@ -5,7 +5,7 @@
 //
 //   supports   a fixed node keeps its mean boundary normal (paper 2.3), found from the tetrahedra
 //   K          B^T D B of each element, from G and nu
-//   contact    three-step search over the skull's triangles (paper 2.3; contact_search.hpp)
+//   contact    three-step search over the skull's triangles (paper 2.3; penalty.hpp)
 //   Sigma      sigma_f^2 V R V (x) I + M M^T: Wendland's C2 kernel (force_prior.hpp), M: buoyancy
 //              of each fluid plane along gravity and across it (load_modes.hpp)
 //   A          barycentric weights of the tetrahedron around each datum
@@ -13,7 +13,7 @@
 #pragma once
 
 #include "common/configuration/case_config.hpp"
-#include "common/contact/contact_search.hpp"
+#include "common/contact/penalty.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/stability/reference.hpp"

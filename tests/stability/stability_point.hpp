@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -65,13 +66,27 @@ struct Options {
   Grid grid = Grid::kFull;
   Fault fault = Fault::kNone;
   std::function<void(const Point&)> record;
+
+  void record_refused(const Error& error, Point point) const {
+    set_refused(error, point);
+    record(point);
+  }
 };
+
+// A point of a sheet, before it is asked.
+inline Point point_at(std::string sheet, std::string parameter, double x, std::string row = {}) {
+  Point point;
+  point.sheet = std::move(sheet);
+  point.parameter = std::move(parameter);
+  point.x = x;
+  point.row = std::move(row);
+  return point;
+}
 
 std::vector<double> thinned(const std::vector<double>& values, Grid grid);
 // 10^from ... 10^to, one per decade.
 std::vector<double> decades(int from, int to);
 
-// One source file each: sweep_<name>.cpp.
 void sweep_penalty(const Options& options);
 void sweep_material(const Options& options);
 void sweep_mesh(const Options& options);

@@ -12,8 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/stability/stability_point.hpp"
 

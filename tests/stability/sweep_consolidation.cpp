@@ -93,20 +93,14 @@ void one_step(const Block& block, const fem::PoroMaterial& material, double dt_s
   if (options.fault == Fault::kScale) given.elastic.shear *= 1.01;
   auto stepper = fem::BiotStepper::build(mesh, fem::MaterialMap::uniform(given, mesh.num_tets()),
                                          block.body.dofs, block.drained);
-  if (!stepper) {
-    set_refused(stepper.error(), point);
-    return options.record(point);
-  }
+  if (!stepper) return options.record_refused(stepper.error(), point);
   fem::BiotLoad load;
   load.force = block.load;
   auto force = load.force.col(block.drained.front());
   if (options.fault == Fault::kSign) force = -force;
   if (options.fault == Fault::kNormal) force = turned(force);
   const auto state = stepper->step(fem::BiotState::at_rest(mesh.num_nodes()), load, dt_s);
-  if (!state) {
-    set_refused(state.error(), point);
-    return options.record(point);
-  }
+  if (!state) return options.record_refused(state.error(), point);
   point.answered = true;
   point.status = "solved";
   point.backward_error = stepper->diagnostics().backward_error;

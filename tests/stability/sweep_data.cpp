@@ -15,10 +15,7 @@ void standard_deviation(const Options& options) {
     for (const double noise_mm : {0.0, 0.1}) {
       const auto data = sagging_data(*problem, {.noise_mm = noise_mm, .sd_mm = sd_mm});
       for (const Method method : kMethods) {
-        Point point;
-        point.sheet = "data";
-        point.parameter = "standard deviation of the data (mm)";
-        point.x = sd_mm;
+        Point point = point_at("data", "standard deviation of the data (mm)", sd_mm);
         point.row =
             std::string(to_string(method)) + (noise_mm > 0.0 ? ", noise of 0.1 mm" : ", no noise");
         invert_and_record(*problem, *data, method, point, options);
@@ -33,13 +30,9 @@ void correlation_length(const Options& options) {
     CaseConfig config = stability_config();
     config.prior.correlation_length_mm = length_mm;
     auto problem = ToyProblem::make(config, options.fault);
-    Point point;
-    point.sheet = "data";
-    point.parameter = "correlation length of the prior (mm)";
-    point.x = length_mm;
+    Point point = point_at("data", "correlation length of the prior (mm)", length_mm);
     if (!problem) {
-      set_refused(problem.error(), point);
-      options.record(point);
+      options.record_refused(problem.error(), point);
       continue;
     }
     const auto data = sagging_data(*problem, {});
@@ -60,10 +53,7 @@ void duplicates(const Options& options) {
     data.positions << once->positions, once->positions.col(0).replicate(1, more);
     data.displacements << once->displacements, once->displacements.col(0).replicate(1, more);
     for (const Method method : kMethods) {
-      Point point;
-      point.sheet = "data";
-      point.parameter = "copies of one datum";
-      point.x = copies;
+      Point point = point_at("data", "copies of one datum", copies);
       invert_and_record(*problem, data, method, point, options);
     }
   }
@@ -78,10 +68,7 @@ void contradictions(const Options& options) {
     data.positions.col(1) = data.positions.col(0);
     data.displacements.col(1) = data.displacements.col(0) + Vec3(0.0, apart_mm, 0.0);
     for (const Method method : kMethods) {
-      Point point;
-      point.sheet = "data";
-      point.parameter = "contradiction of two data at one place (mm)";
-      point.x = apart_mm;
+      Point point = point_at("data", "contradiction of two data at one place (mm)", apart_mm);
       invert_and_record(*problem, data, method, point, options);
     }
   }

@@ -54,10 +54,7 @@ void one_ratio(fem::Element element, double nu, Point point, const Options& opti
   point.must_warn = element == fem::Element::kP1 && nu > kLocks;
   const forward::ForwardProblem problem = block_under_weight(element, nu);
   const auto solution = forward::solve(spoilt(problem, options.fault));
-  if (!solution) {
-    set_refused(solution.error(), point);
-    return options.record(point);
-  }
+  if (!solution) return options.record_refused(solution.error(), point);
   point.answered = true;
   point.warned = !solution->warnings.empty();
   point.status = "solved";

@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/fem/deformation.hpp"
-#include "common/fem/gravity.hpp"
-#include "common/inversion/invert.hpp"
-#include "common/inversion/prepared/data_region.hpp"
+#include "common/inversion/inverter.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/reference_descent.hpp"
 #include "tests/support/toy_patient.hpp"
@@ -225,10 +225,7 @@ void invert_and_record(ToyProblem& problem, const SparseData& data, Method metho
   point.rcond = problem.model->forward().factor().rcond();
   point.backward_error = std::numeric_limits<double>::quiet_NaN();
   const auto estimate = inversion::invert(*problem.model, data, method);
-  if (!estimate) {
-    set_refused(estimate.error(), point);
-    return options.record(point);
-  }
+  if (!estimate) return options.record_refused(estimate.error(), point);
   set_answered(*estimate, point);
   if (method == Method::kCondensed) {
     compare_with_posterior(problem, data, *estimate, point);
@@ -243,10 +240,7 @@ void solve_and_record(ToyProblem& problem, const Points& load, Point point,
   point.unit = "relative";
   point.rcond = problem.model->forward().factor().rcond();
   const auto solution = problem.model->forward().solve_with_contact(load);
-  if (!solution) {
-    set_refused(solution.error(), point);
-    return options.record(point);
-  }
+  if (!solution) return options.record_refused(solution.error(), point);
   point.answered = true;
   point.warned = !solution->converged;
   point.status = solution->converged ? "solved" : "not_converged";

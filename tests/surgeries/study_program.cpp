@@ -6,8 +6,7 @@
 
 #include "common/core/exit_status.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::surgeries {
 namespace {

@@ -17,7 +17,7 @@
 
 #include "client/tools/twin/varied_patient.hpp"
 #include "common/core/stopwatch.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/surgeries/study_program.hpp"
 #include "tests/surgeries/surgery_place.hpp"

@@ -8,7 +8,7 @@
 
 #include "client/tools/twin/surgery.hpp"
 #include "client/tools/twin/variation.hpp"
-#include "common/contact/full_solve.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "tests/surgeries/played_brain.hpp"

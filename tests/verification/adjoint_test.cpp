@@ -7,8 +7,7 @@
 
 #include <cmath>
 
-#include "common/contact/refactorised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/unit/inversion/objective.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "common/geometry/region_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/igtl/surface.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "client/tools/cli/command.hpp"
 #include "common/core/exit_status.hpp"
-#include "common/linalg/blas_kernel.hpp"
+#include "common/linalg/openblas.hpp"
 
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();

@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include "common/contact/forward_model.hpp"
-#include "common/contact/full_solve.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/linalg/blas_kernel.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -9,7 +9,7 @@
 #include "common/core/small_matrices.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/registration/cppd.hpp"
+#include "common/registration/surface_distances.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "client/tools/twin/truth_load.hpp"
 #include "common/contact/penalty.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "common/fem/swelling.hpp"
+#include "common/fem/body_loads.hpp"
 
 namespace brainshift::client {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tissue that changes its volume in a simulated surgery, and the nodal forces it causes
-// (fem/swelling.hpp).
+// (fem/body_loads.hpp).
 #pragma once
 
 #include <functional>

@@ -7,9 +7,9 @@
 //   stiffness of a removed tetrahedron: kCavityStiffness times the case's shear modulus, with
 //             Poisson ratio 0, so that the cavity neither holds its wall nor keeps its volume
 //   weight    none. A cavity is filled by what surrounds the brain at its depth, fluid below the
-//             fluid plane and air above it, so the net weight (fem/gravity.hpp) of its content is
-//             0 on either side of the plane: loads come from the tissue that is left. The brain
-//             sags into the cavity.
+//             fluid plane and air above it, so the net weight (fem/body_loads.hpp) of its content
+//             is 0 on either side of the plane: loads come from the tissue that is left. The
+//             brain sags into the cavity.
 // The way in is not modelled: the tissue between the cortex and the tumour stays whole.
 //
 // A node is *attached* when it belongs to a tetrahedron that is left. Inside the cavity the

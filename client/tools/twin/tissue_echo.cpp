@@ -11,7 +11,6 @@
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/mask.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -10,7 +10,7 @@
 #pragma once
 
 #include "common/contact/forward_model.hpp"
-#include "common/contact/woodbury_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {

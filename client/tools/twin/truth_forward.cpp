@@ -5,7 +5,7 @@
 #include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/gaussian_field.hpp"
 #include "client/tools/twin/truth_brain.hpp"
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -6,8 +6,7 @@
 #include <numbers>
 
 #include "client/tools/twin/load.hpp"
-#include "common/fem/gravity.hpp"
-#include "common/fem/swelling.hpp"
+#include "common/fem/body_loads.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "common/anatomy/node_sets.hpp"
+#include "common/anatomy/brain_model_builder.hpp"
 #include "common/core/random.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"

@@ -9,13 +9,12 @@
 
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/contradictions.hpp"
 #include "common/inversion/condensed/omission_estimates.hpp"
 #include "common/inversion/condensed/reason.hpp"
+#include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/settled_loads.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
-#include "common/inversion/contract/penetration.hpp"
-#include "common/linalg/blas_threads.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::inversion {
 namespace {

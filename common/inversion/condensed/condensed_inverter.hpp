@@ -40,7 +40,6 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/contract/inversion_options.hpp"
-#include "common/inversion/contract/omission_errors.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/sparse_data.hpp"
@@ -53,7 +52,7 @@ struct CondensedOptions {
   bool contact = true;
   bool uncertainty = true;
   bool gravity_modes = true;
-  // Nodes that are rebuilt, sorted; the others are interpolated (far_field.hpp). Empty: every node.
+  // Nodes that are rebuilt, sorted; the others are interpolated (FarField). Empty: every node.
   std::vector<NodeIndex> region_of_interest;
   int rank = 0;     // use only so many modes; 0: all
   int threads = 0;  // 0: as many as cores

@@ -11,7 +11,7 @@
 // Reads r + k compact columns once (compact_columns.hpp), split over the team by blocks of nodes.
 // Results do not depend on timing. With a region of interest only blocks with a node of it are
 // summed, beside control and probe nodes, whose rows the constructor unpacks; the other nodes are
-// interpolated (far_field.hpp). For the same z and f the nodes of the region then have the
+// interpolated (FarField). For the same z and f the nodes of the region then have the
 // displacement that they have in the whole field, within 1e-9 mm (with the loops as they are, to
 // the bit), control and probe nodes within 1e-6 of their largest term. Does not allocate after
 // construction, but for outputs of the wrong size.
@@ -21,7 +21,6 @@
 #include <vector>
 
 #include "common/core/thread_team.hpp"
-#include "common/inversion/condensed/far_field.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
@@ -30,6 +29,31 @@
 #include "common/operators/condensed_operators.hpp"
 
 namespace brainshift::inversion {
+
+// FarField: which nodes a rebuild sums up from modes and contact forces, and which it interpolates.
+//
+// A scene may ask for a region of interest only. Then the nodes of the region, the control nodes
+// and kProbes probe nodes are rebuilt, as in the whole field (FieldRebuild); every other node
+// is interpolated from the control nodes (CondensedOperators::control_neighbours). The probes
+// measure the price in every update:
+//   error <= kFarFieldSafety * max( |u_probe - interpolated|,
+//                                   |N_i . (u_i - interpolated)| over far slaves )
+// Probes are the far nodes where interpolating the modes is worst, sum_j |U_j - interpolated|^2
+// (the variance of the interpolation error under the prior), no two between the same control nodes.
+// The normal displacement of a slave is known from its penetration without rebuilding it.
+inline constexpr int kProbes = 64;
+// Between probes the error may be larger: up to 1.2 times the greatest probe's on the toy patient,
+// 1.04 times on the default head (tests/benchmarks/bench_scenes.cpp).
+inline constexpr double kFarFieldSafety = 2.0;
+
+struct FarField {
+  std::vector<NodeIndex> rebuilt;  // sorted; empty: every node
+  std::vector<int> row;            // per node: index into `rebuilt`, -1 when interpolated
+  std::vector<NodeIndex> probes;   // rebuilt, but neither in the region nor control nodes
+  std::vector<int> far_slaves;     // indices of slaves that are interpolated
+
+  bool empty() const { return rebuilt.empty(); }
+};
 
 class FieldRebuild {
  public:

@@ -12,13 +12,13 @@
 // compliance of its slaves. J is searched in two ways:
 //
 //   rough  From afar J looks smooth, with more or less curvature than its pieces have. Gradients
-//          correct H as the search goes on (quasi_newton.hpp), also those of trials that J did not
+//          correct H as the search goes on (newton_steps.hpp), also those of trials that J did not
 //          fall to. While the set changes much, the linear model is made anew instead.
 //   fine   A minimum often lies on an edge between pieces, where no Newton step of any of them
 //          falls. The pieces that the trials meet are gathered, and the next step is to the minimum
-//          of their maximum (newton_bundle.hpp).
+//          of their maximum (newton_steps.hpp).
 //
-// A rough step is shortened where contact would change in many slaves (contact_reach.hpp); how many
+// A rough step is shortened where contact would change in many slaves (ContactReach); how many
 // are allowed grows with steps that fall and shrinks with others. A search for contact begins with
 // the forces that the linear model predicts.
 //
@@ -37,12 +37,10 @@
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/inversion/condensed/mode_posterior.hpp"
-#include "common/inversion/condensed/newton_bundle.hpp"
-#include "common/inversion/condensed/quasi_newton.hpp"
+#include "common/inversion/condensed/newton_steps.hpp"
 #include "common/inversion/condensed/sampled_operators.hpp"
 #include "common/inversion/condensed/update_profile.hpp"
 #include "common/inversion/skull/contact_at_loads.hpp"
-#include "common/inversion/skull/contact_reach.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/inversion/skull/contact_system.hpp"
 #include "common/inversion/strengths/prior_strengths.hpp"

@@ -14,7 +14,7 @@
 //                  exact where the set stays; kGravitySafety times its greatest size at the control
 //                  nodes. Where slaves would penetrate that the step leaves open, contact pushes
 //                  back: kContactSafety times the greatest of these depths is added.
-//   far field      far_field.hpp
+//   far field      field_rebuild.hpp
 #pragma once
 
 #include "common/core/error.hpp"

@@ -1,15 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// InversionOptions: what a caller may ask of one inversion, whatever its method.
+// InversionOptions: what a caller may ask of one inversion, whatever its method;
+// OmissionErrors: what it may have lost by what a scene leaves out.
 #pragma once
 
 #include <functional>
 #include <stop_token>
+#include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
-#include "common/inversion/contract/moving_data.hpp"
 #include "common/values/estimate.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
+
+// MovingData: data that depend on where the brain is, such as distances to a measured surface,
+// whose closest points move with the estimate.
+// The inversion measures the data anew for every estimate until they stay where they are.
+struct MovingData {
+  std::vector<NodeIndex> nodes;  // relocate() is given the displacement of these nodes
+  // u: 3 x nodes, mm. Replaces `data` and returns true; returns false when the data have not moved
+  // enough to matter.
+  std::function<bool(const Points& u, SparseData& data)> relocate;
+};
 
 struct InversionOptions {
   // Called after every iteration with the iterate so far (status kIterating); may be empty. Method
@@ -25,6 +38,20 @@ struct InversionOptions {
 
 // The error of an inversion that ended because its caller asked for it: kNotConverged, "inversion
 // was stopped at iteration K". iteration: the one that was not begun, from 1.
-tl::unexpected<Error> stopped(int iteration);
+inline tl::unexpected<Error> stopped(int iteration) {
+  return fail(ErrorCode::kNotConverged,
+              "inversion was stopped at iteration " + std::to_string(iteration));
+}
+
+// OmissionErrors: what an update may have lost by the parts that its scene leaves out.
+// Upper estimates of the greatest move of any node, mm; 0 for a part that was carried.
+struct OmissionErrors {
+  double contact_mm = 0.0;
+  double gravity_modes_mm = 0.0;
+  double far_field_mm = 0.0;
+  // Least distance between a slave and the skull, mm; negative when a slave penetrates, infinite
+  // without slaves.
+  double nearest_slave_mm = 0.0;
+};
 
 }  // namespace brainshift::inversion

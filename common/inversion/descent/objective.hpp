@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a descent on Omega (steepest_descent.hpp) needs of it for the active set of a system: its
+// What a descent on Omega (descents.hpp) needs of it for the active set of a system: its
 // negative gradient by the adjoint, and the step that minimises it along a direction s = Sigma dw.
 //
 //   K_p lambda = 2 A^T W_e e        (paper eq. 5)
@@ -9,9 +9,38 @@
 
 #include "common/contact/penalised_system.hpp"
 #include "common/core/error.hpp"
-#include "common/inversion/descent/misfit.hpp"
+#include "common/core/types.hpp"
+#include "common/fem/sampling.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
+#include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
+
+// d, A and W_e of one inversion (paper eq. 4): misfit e = d - A u and its weighted products.
+//
+//   W_e = diag(1 / sd^2), one standard deviation per datum, the same for its three components
+// Shapes: u is 3 x n (mm); residuals and samples are 3 x m (mm); adjoint() is 3 x n.
+class Misfit {
+ public:
+  // Errors as fem::sampling_matrix: a datum outside the brain by more than kOutsideTolerance_mm.
+  // Keeps a reference to `data`.
+  static Result<Misfit> build(const PreparedModel& model, const SparseData& data);
+
+  // A u
+  Points sample(const Points& u) const;
+  // d - A u
+  Points residual(const Points& u) const;
+  // A^T W_e r
+  Points adjoint(const Points& r) const;
+  // r . W_e s
+  double inner(const Points& r, const Points& s) const;
+
+ private:
+  Misfit(const SparseData& data, const fem::SamplingMatrix& sampling);
+  const SparseData& data_;
+  fem::SamplingMatrix sampling_;
+  VecX weights_;
+};
 
 // sum of a_ij b_ij
 double inner(const Points& a, const Points& b);

@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "common/core/random.hpp"
-#include "common/geometry/spread_nodes.hpp"
-#include "common/inversion/prepared/block_runner.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/inversion/prepared/contact_columns.hpp"
-#include "common/inversion/prepared/data_region.hpp"
+#include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/operators/encode_columns.hpp"
 #include "common/values/quality.hpp"

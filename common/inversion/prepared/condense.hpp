@@ -3,7 +3,7 @@
 // solves.
 //
 // Right-hand sides are solved in blocks that are dealt to the cores in a fixed partition
-// (block_runner.hpp), one BLAS thread each, so the result is bit-identical from run to run.
+// (contact_columns.hpp), one BLAS thread each, so the result is bit-identical from run to run.
 //   1. load modes K^-1 M
 //   2. for each residual field g of the prior, with one set of test vectors: sketch
 //      F = K^-1 Sigma_g K^-1 Omega; Omega^T F = V Lambda V^T; U_g = F V Lambda^-1/2, leading

@@ -53,8 +53,7 @@ void make_symmetric(MatrixXd& phi) {
   }
 }
 
-}  // namespace
-
+// Keeps the rows of `blocks` blocks in memory for as long as the store or a copy of it lives.
 BlockStore memory_store(int blocks) {
   const auto kept = std::make_shared<std::vector<MatrixXf>>(static_cast<std::size_t>(blocks));
   BlockStore store;
@@ -69,6 +68,8 @@ BlockStore memory_store(int blocks) {
   };
   return store;
 }
+
+}  // namespace
 
 ColumnGroup ContactColumns::group(float step) const {
   ColumnGroup group;

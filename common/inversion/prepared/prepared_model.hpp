@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "common/configuration/case_config.hpp"
 #include "common/contact/forward_model.hpp"
@@ -69,5 +70,15 @@ class PreparedModel {
 
 // The case's prior with the standard deviations of its parts multiplied by `scales`.
 prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales);
+
+// The data region: the nodes near the places where data are measured. Condensed operators are
+// prepared for them. (A scene's region of interest is something else: the nodes where an answer is
+// wanted.)
+inline constexpr double kRegionMargin_mm = 8.0;
+
+// Nodes within the margin of the tumour surface or of a craniotomy node, and the nodes of the
+// tetrahedra that the tumour surface passes through (at its vertices and the centres of its
+// triangles); sorted.
+std::vector<NodeIndex> data_region(const BrainModel& model);
 
 }  // namespace brainshift::inversion

@@ -1,11 +1,162 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/skull/contact_system.hpp"
 
+#include <algorithm>
 #include <string>
 
+#include "common/linalg/blas.hpp"
+
 namespace brainshift::inversion {
+namespace {
 
 namespace blas = linalg::blas;
+
+constexpr Eigen::Index kTile = 64;
+
+// The upper triangle becomes the lower one's mirror image.
+void mirror_lower(Eigen::Map<Eigen::MatrixXd> a, ThreadTeam& team) {
+  const Eigen::Index n = a.rows(), tiles = (n + kTile - 1) / kTile;
+  team.split(tiles, [&](long begin, long end) {
+    for (Eigen::Index j = begin * kTile; j < std::min(n, end * kTile); j += kTile) {
+      const Eigen::Index width = std::min(kTile, n - j);
+      for (Eigen::Index i = 0; i < j; i += kTile) {
+        a.block(i, j, kTile, width) = a.block(j, i, width, kTile).transpose();
+      }
+      a.block(j, j, width, width).triangularView<Eigen::StrictlyUpper>() =
+          a.block(j, j, width, width).transpose();
+    }
+  });
+}
+
+}  // namespace
+
+ReleasedSlaves::ReleasedSlaves(const CondensedOperators& operators, ModeWindow window, double beta,
+                               ThreadTeam& team)
+    : operators_(operators),
+      window_(window),
+      beta_(beta),
+      team_(team),
+      inverse_(new double[static_cast<std::size_t>(operators.compliance.size())]),
+      factor_(inverse_.get(), operators.num_slaves(), 0.0, team),
+      released_set_(static_cast<std::size_t>(operators.num_slaves()), 0),
+      loads_(operators.num_slaves(), window.count + 1),
+      all_(operators.num_slaves()),
+      released_(operators.num_slaves()),
+      response_(operators.num_slaves(), window.count + 1),
+      work_(PrincipalFactor::most_work_rows(operators.num_slaves()), window.count + 1),
+      gathered_(new double[static_cast<std::size_t>(operators.compliance.size()) / 4 + 1]) {
+  pressing_.reserve(static_cast<std::size_t>(operators.num_slaves()));
+}
+
+bool ReleasedSlaves::make_inverse() {
+  auto e = inverse();
+  e = operators_.compliance;
+  e.diagonal().array() += 1.0 / beta_;
+  if (!linalg::cholesky(e, team_) || !blas::invert_factored(e)) return false;
+  mirror_lower(e, team_);
+  const Eigen::Index r = window_.count;
+  response_.leftCols(r) = operators_.slave_modes.middleCols(window_.first, r);
+  response_.col(r) = operators_.initial_penetration_mm;
+  team_.split(r + 1, [&](long begin, long end) {
+    blas::multiply(1.0, e, response_.middleCols(begin, end - begin), 0.0,
+                   loads_.middleCols(begin, end - begin));
+  });
+  made_ = true;
+  return true;
+}
+
+bool ReleasedSlaves::take(const contact::ActiveSet& pressing) {
+  if (!made_ && !make_inverse()) return false;
+  for (std::size_t i = 0; i < pressing.size(); ++i) released_set_[i] = pressing[i] ? 0 : 1;
+  list_active(pressing, pressing_);
+  return factor_.take(released_set_);
+}
+
+void ReleasedSlaves::solve(const VecX& z, Eigen::Ref<VecX> forces, VecX& penetration) {
+  const Eigen::Index r = window_.count;
+  const std::vector<int>& released = factor_.active();
+  team_.split(slaves(), [&](long begin, long end) {
+    all_.segment(begin, end - begin).noalias() =
+        loads_.col(r).segment(begin, end - begin) -
+        loads_.middleRows(begin, end - begin).leftCols(r) * z;
+  });
+  auto depth = released_.head(factor_.size());
+  gather(all_.data(), released, depth.data());
+  factor_.solve(depth, work_.topLeftCorner(factor_.work_rows(), 1));
+  team_.split(slaves(), [&](long begin, long end) {
+    for (std::size_t j = 0; j < released.size(); ++j) {
+      blas::add_scaled(end - begin, -depth[static_cast<Eigen::Index>(j)],
+                       column(released[j]) + begin, all_.data() + begin);
+    }
+  });
+  for (std::size_t j = 0; j < pressing_.size(); ++j) {
+    forces[static_cast<Eigen::Index>(j)] = all_[pressing_[j]];
+    penetration[pressing_[j]] = all_[pressing_[j]] / beta_;
+  }
+  for (std::size_t j = 0; j < released.size(); ++j) {
+    penetration[released[j]] = depth[static_cast<Eigen::Index>(j)];
+  }
+}
+
+void ReleasedSlaves::respond(Eigen::Ref<Eigen::MatrixXd> out) {
+  const auto q = static_cast<Eigen::Index>(factor_.size());
+  const auto k = static_cast<Eigen::Index>(pressing_.size());
+  const std::vector<int>& released = factor_.active();
+  Eigen::Map<Eigen::MatrixXd> between(gathered_.get(), q, k);
+  team_.split(k, [&](long begin, long end) {
+    for (Eigen::Index j = begin; j < end; ++j) {
+      gather(column(pressing_[static_cast<std::size_t>(j)]), released, between.col(j).data());
+    }
+  });
+  auto depth = response_.topRows(q);
+  team_.split(out.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      gather(loads_.col(c).data(), released, depth.col(c).data());
+      gather(loads_.col(c).data(), pressing_, out.col(c).data());
+    }
+    auto own = depth.middleCols(begin, end - begin);
+    factor_.solve(own, work_.block(0, begin, factor_.work_rows(), end - begin));
+    if (q > 0) {
+      blas::multiply_transposed(-1.0, between, own, 1.0, out.middleCols(begin, end - begin));
+    }
+  });
+}
+
+// With w_A = felt, w_Q = -E_QQ^-1 E_QA felt: L_A^T D_AA^-1 felt = (E L)^T w.
+void ReleasedSlaves::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
+  const std::vector<int>& released = factor_.active();
+  all_.setZero();
+  for (std::size_t j = 0; j < pressing_.size(); ++j) {
+    all_[pressing_[j]] = felt[static_cast<Eigen::Index>(j)];
+  }
+  auto depth = released_.head(factor_.size());
+  team_.split(depth.size(), [&](long begin, long end) {
+    for (Eigen::Index j = begin; j < end; ++j) {
+      depth[j] =
+          all_.dot(Eigen::Map<const VecX>(column(released[static_cast<std::size_t>(j)]), slaves()));
+    }
+  });
+  factor_.solve(depth, work_.topLeftCorner(factor_.work_rows(), 1));
+  for (std::size_t j = 0; j < released.size(); ++j) {
+    all_[released[j]] = -depth[static_cast<Eigen::Index>(j)];
+  }
+  out.noalias() += loads_.leftCols(window_.count).transpose() * all_;
+}
+
+void ReleasedSlaves::solve(blas::Out<double> b) {
+  Eigen::MatrixXd given = Eigen::MatrixXd::Zero(slaves(), b.cols());
+  given(pressing_, Eigen::all) = b;
+  Eigen::MatrixXd solved(slaves(), b.cols());
+  blas::multiply(1.0, inverse(), given, 0.0, solved);
+  const std::vector<int>& released = factor_.active();
+  Eigen::MatrixXd depth = solved(released, Eigen::all);
+  Eigen::MatrixXd work(factor_.work_rows(), b.cols());
+  factor_.solve(depth, work);
+  given.setZero();
+  given(released, Eigen::all) = depth;
+  blas::multiply(-1.0, inverse(), given, 1.0, solved);
+  b = solved(pressing_, Eigen::all);
+}
 
 void subtract_penetration(const CondensedOperators& operators, const std::vector<int>& slaves,
                           const Eigen::Ref<const VecX>& change, ThreadTeam& team,

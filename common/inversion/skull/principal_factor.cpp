@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/linalg/team_cholesky.hpp"
+#include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 namespace {

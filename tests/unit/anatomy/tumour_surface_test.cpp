@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a tumour is fitted into the brain. Its making is tested in brain_model_builder_test.cpp.
-#include "common/anatomy/tumour_surface.hpp"
+#include "common/anatomy/brain_mesh.hpp"
 
 #include <gmock/gmock.h>
 

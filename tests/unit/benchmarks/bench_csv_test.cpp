@@ -37,15 +37,6 @@ TEST(CsvTable, NamesTheLineWhoseCellsDoNotFit) {
   EXPECT_EQ(CsvTable::read("/nowhere/t.csv").error().code, ErrorCode::kNotFound);
 }
 
-TEST(CsvTable, JoinsOnlyEqualHeadings) {
-  CsvTable all;
-  EXPECT_TRUE(all.append(*CsvTable::parse("a,b\n1,2\n", "")));
-  EXPECT_TRUE(all.append(*CsvTable::parse("a,b\n3,4\n", "")));
-  EXPECT_EQ(all.rows(), 2u);
-  EXPECT_FALSE(all.append(*CsvTable::parse("b,a\n3,4\n", "")));
-  EXPECT_EQ(all.rows(), 2u);
-}
-
 TEST(CsvWriter, WritesWhatTheTableReads) {
   const test_support::TemporaryFolder folder;
   const auto path = folder.path() / "w.csv";

@@ -1,16 +1,267 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/contact/penalty.hpp"
-
 #include <gtest/gtest.h>
 
-#include "common/contact/contact_solver.hpp"
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <vector>
+
 #include "common/contact/forward_model.hpp"
+#include "common/contact/penalty.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::contact {
 namespace {
+
+using geometry::ellipsoid_surface;
+
+TriangleSurface make_surface(const std::vector<Vec3>& vertices,
+                             const std::vector<std::array<int, 3>>& triangles) {
+  TriangleSurface surface;
+  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    surface.vertices.col(static_cast<Eigen::Index>(i)) = vertices[i];
+  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    surface.triangles.col(static_cast<Eigen::Index>(i)) =
+        Eigen::Map<const Eigen::Vector3i>(triangles[i].data());
+  return surface;
+}
+
+// A square plate in z = height, outward +z: the brain is below.
+TriangleSurface plate(double height) {
+  return make_surface({{0, 0, height}, {4, 0, height}, {4, 4, height}, {0, 4, height}},
+                      {{0, 1, 2}, {0, 2, 3}});
+}
+
+// Two plates that meet in the edge x = 0, z = 0 (from y = -3 to y = 3) and fall away to both
+// sides with slope `fall`. Outward is up. Seen from below a fall > 0 is a roof (convex skull), a
+// fall < 0 a valley.
+TriangleSurface roof(double fall) {
+  return make_surface({{0, -3, 0}, {0, 3, 0}, {-4, 0, -4 * fall}, {4, 0, -4 * fall}},
+                      {{0, 1, 2}, {1, 0, 3}});
+}
+
+std::vector<NodeIndex> all_of(const Points& nodes) {
+  std::vector<NodeIndex> slaves(static_cast<std::size_t>(nodes.cols()));
+  std::iota(slaves.begin(), slaves.end(), 0);
+  return slaves;
+}
+
+ContactPair search_one(const Vec3& slave, const TriangleSurface& skull) {
+  const auto pairs = search_contact(Points(slave), {0}, skull);
+  EXPECT_TRUE(pairs.has_value()) << (pairs ? "" : pairs.error().message);
+  return pairs ? pairs->front() : ContactPair{};
+}
+
+// Independent oracle: closest point of a triangle by minimising over a barycentric grid that is
+// refined round its best point; needs no case distinction between face, edge and vertex.
+Vec3 closest_on_triangle(const std::array<Vec3, 3>& corners, const Vec3& x) {
+  double u = 1.0 / 3.0, v = 1.0 / 3.0, step = 0.5;
+  const auto at = [&](double a, double b) -> Vec3 {
+    return (1.0 - a - b) * corners[0] + a * corners[1] + b * corners[2];
+  };
+  double best = (at(u, v) - x).squaredNorm();
+  while (step > 1e-13) {
+    bool moved = false;
+    for (int du = -1; du <= 1; ++du)
+      for (int dv = -1; dv <= 1; ++dv) {
+        const double a = u + du * step, b = v + dv * step;
+        if (a < 0.0 || b < 0.0 || a + b > 1.0) continue;
+        if (const double d = (at(a, b) - x).squaredNorm(); d < best) {
+          best = d;
+          u = a;
+          v = b;
+          moved = true;
+        }
+      }
+    if (!moved) step *= 0.5;
+  }
+  return at(u, v);
+}
+
+Vec3 closest_by_brute_force(const TriangleSurface& surface, const Vec3& x) {
+  Vec3 best = Vec3::Constant(std::numeric_limits<double>::infinity());
+  for (int t = 0; t < surface.num_triangles(); ++t) {
+    std::array<Vec3, 3> corners;
+    for (int k = 0; k < 3; ++k)
+      corners[static_cast<std::size_t>(k)] = surface.vertices.col(surface.triangles(k, t));
+    const Vec3 y = closest_on_triangle(corners, x);
+    if ((y - x).squaredNorm() < (best - x).squaredNorm()) best = y;
+  }
+  return best;
+}
+
+TEST(ContactSearch, ProjectsOntoAPlateByHand) {
+  // 1.5 mm below the plate: y straight above, N down into the brain, gap open by 1.5 mm (eq. 9).
+  const ContactPair pair = search_one(Vec3(3.0, 1.0, -0.5), plate(1.0));
+  EXPECT_EQ(pair.slave, 0);
+  EXPECT_LT((pair.contact_point - Vec3(3.0, 1.0, 1.0)).norm(), 1e-14);
+  EXPECT_LT((pair.normal - Vec3(0, 0, -1)).norm(), 1e-14);
+  EXPECT_NEAR(pair.initial_penetration_mm, -1.5, 1e-14);
+}
+
+TEST(ContactSearch, PenetrationFollowsDisplacement) {
+  // Eq. 11: moved 2 mm up through a gap of 1.5 mm, the slave penetrates by 0.5 mm.
+  const ContactPair pair = search_one(Vec3(3.0, 1.0, -0.5), plate(1.0));
+  const Vec3 displacement(0.3, -0.2, 2.0);
+  EXPECT_NEAR(pair.initial_penetration_mm - pair.normal.dot(displacement), 0.5, 1e-14);
+}
+
+TEST(ContactSearch, SlaveBeyondTheSkullPenetrates) {
+  EXPECT_NEAR(search_one(Vec3(3.0, 1.0, 1.25), plate(1.0)).initial_penetration_mm, 0.25, 1e-14);
+}
+
+TEST(ContactSearch, SlaveOnTheSkullIsClosed) {
+  const ContactPair pair = search_one(Vec3(3.0, 1.0, 1.0), plate(1.0));
+  EXPECT_EQ(pair.initial_penetration_mm, 0.0);
+  EXPECT_LT((pair.normal - Vec3(0, 0, -1)).norm(), 1e-14);
+}
+
+TEST(ContactSearch, ConcaveEdgeIsUsedWhereNoFaceHoldsAProjection) {
+  // From below a valley, projections onto both plates fall beyond the common edge.
+  const ContactPair pair = search_one(Vec3(0.1, 0.5, -1.0), roof(-0.5));
+  EXPECT_LT((pair.contact_point - Vec3(0, 0.5, 0)).norm(), 1e-14);
+  // Both plates are inclined alike, so the mean of their normals is vertical.
+  EXPECT_LT((pair.normal - Vec3(0, 0, -1)).norm(), 1e-14);
+  EXPECT_NEAR(pair.initial_penetration_mm, -1.0, 1e-14);
+}
+
+TEST(ContactSearch, ConvexRoofUsesTheNearerFace) {
+  const double fall = 0.5;
+  const ContactPair pair = search_one(Vec3(0.4, 0.2, -1.0), roof(fall));
+  const Vec3 outward = Vec3(fall, 0, 1).normalized();
+  EXPECT_LT((pair.normal + outward).norm(), 1e-14);
+  // Distance to the plane fall * x + z = 0.
+  const double gap = -(fall * 0.4 - 1.0) / std::hypot(fall, 1.0);
+  EXPECT_NEAR(pair.initial_penetration_mm, -gap, 1e-14);
+}
+
+TEST(ContactSearch, ConcaveTipUsesTheNode) {
+  // A pit pointing down at the slave: neither faces nor edges hold a projection.
+  const TriangleSurface pit = make_surface({{0, 0, 0}, {2, 0, 2}, {-1, 1.7, 2}, {-1, -1.7, 2}},
+                                           {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}});
+  const ContactPair pair = search_one(Vec3(0.05, -0.02, -1.0), pit);
+  EXPECT_LT(pair.contact_point.norm(), 1e-14);
+  EXPECT_LT(pair.normal.z(), -0.99);
+  EXPECT_NEAR(pair.normal.norm(), 1.0, 1e-14);
+  EXPECT_NEAR(pair.initial_penetration_mm, -1.0, 0.01);
+}
+
+TEST(ContactSearch, SlaveBesideThePlateTakesItsRimOrCorner) {
+  const ContactPair rim = search_one(Vec3(2.0, -1.0, 0.0), plate(1.0));
+  EXPECT_LT((rim.contact_point - Vec3(2, 0, 1)).norm(), 1e-14);
+  EXPECT_NEAR(rim.initial_penetration_mm, -1.0, 1e-14);
+  const ContactPair corner = search_one(Vec3(-1.0, -1.0, 0.0), plate(1.0));
+  EXPECT_LT((corner.contact_point - Vec3(0, 0, 1)).norm(), 1e-14);
+  EXPECT_LT((corner.normal - Vec3(0, 0, -1)).norm(), 1e-14);
+}
+
+TEST(ContactSearch, FoldedEdgeHasAFiniteNormal) {
+  // Two faces back to back: their normals cancel on the common edge.
+  const TriangleSurface fold =
+      make_surface({{0, -1, 0}, {0, 1, 0}, {2, 0, 0}, {2, 0, 0}}, {{0, 1, 2}, {1, 0, 3}});
+  for (const Vec3& s : {Vec3(-1, 0.3, 0), Vec3(-1, 5, 0), Vec3(1, 0, 0.5), Vec3(0, 0.3, 0)}) {
+    const ContactPair pair = search_one(s, fold);
+    EXPECT_NEAR(pair.normal.norm(), 1.0, 1e-14);
+    EXPECT_TRUE(std::isfinite(pair.initial_penetration_mm));
+  }
+}
+
+TEST(ContactSearch, SphereInASphereIsOpenByTheGap) {
+  const TriangleSurface brain = ellipsoid_surface(Vec3(3, -20, 7), Vec3::Constant(50.0), 6.0);
+  const TriangleSurface skull = geometry::offset_surface(brain, 1.0);
+  const auto pairs = search_contact(brain.vertices, all_of(brain.vertices), skull);
+  ASSERT_TRUE(pairs);
+  ASSERT_EQ(pairs->size(), static_cast<std::size_t>(brain.num_vertices()));
+  for (const ContactPair& pair : *pairs) {
+    // Faceting moves the skull inwards by at most edge^2 / (6 R) = 0.12 mm between its vertices.
+    EXPECT_NEAR(pair.initial_penetration_mm, -1.0, 0.12);
+    const Vec3 outward = (brain.vertices.col(pair.slave) - Vec3(3, -20, 7)).normalized();
+    EXPECT_GT(pair.normal.dot(-outward), 0.99);
+  }
+}
+
+TEST(ContactSearch, FindsTheClosestPointOfConvexBodies) {
+  const TriangleSurface skull = ellipsoid_surface(Vec3(1, 2, 3), Vec3(20, 17, 15), 4.0);
+  const TriangleSurface inner = ellipsoid_surface(Vec3(1.3, 1.9, 3.2), Vec3(19, 16, 14), 5.0);
+  const TriangleSurface outer = ellipsoid_surface(Vec3(0.9, 2.2, 2.9), Vec3(20.8, 18, 16), 5.0);
+  int open = 0, penetrating = 0;
+  for (const TriangleSurface* slaves : {&inner, &outer}) {
+    const auto pairs = search_contact(slaves->vertices, all_of(slaves->vertices), skull);
+    ASSERT_TRUE(pairs);
+    for (const ContactPair& pair : *pairs) {
+      const Vec3 s = slaves->vertices.col(pair.slave);
+      const Vec3 expected = closest_by_brute_force(skull, s);
+      // The oracle's own resolution is the square root of rounding.
+      EXPECT_NEAR((pair.contact_point - s).norm(), (expected - s).norm(), 1e-9);
+      EXPECT_LT((pair.contact_point - expected).norm(), 1e-5);
+      EXPECT_NEAR(pair.normal.norm(), 1.0, 1e-12);
+      (pair.initial_penetration_mm > 0.0 ? penetrating : open) += 1;
+    }
+  }
+  EXPECT_EQ(open, inner.num_vertices());
+  EXPECT_EQ(penetrating, outer.num_vertices());
+}
+
+TEST(ContactSearch, KeepsTheOrderOfTheSlaves) {
+  Points nodes(3, 3);
+  nodes << 1, 2, 3, 1, 1, 1, 0, 0, 0;
+  const auto pairs = search_contact(nodes, {2, 0}, plate(1.0));
+  ASSERT_TRUE(pairs);
+  ASSERT_EQ(pairs->size(), 2u);
+  EXPECT_EQ((*pairs)[0].slave, 2);
+  EXPECT_EQ((*pairs)[1].slave, 0);
+  EXPECT_NEAR((*pairs)[0].contact_point.x(), 3.0, 1e-14);
+}
+
+TEST(ContactSearch, NoSlavesGiveNoPairs) {
+  const auto pairs = search_contact(Points(3, 0), {}, plate(1.0));
+  ASSERT_TRUE(pairs);
+  EXPECT_TRUE(pairs->empty());
+}
+
+TEST(ContactSearch, IgnoresVerticesWithoutTriangles) {
+  // First in the list, so that indices of master nodes and of vertices differ; right at the
+  // slave.
+  TriangleSurface skull = plate(1.0);
+  const Points corners = skull.vertices;
+  skull.vertices.resize(3, 5);
+  skull.vertices << Vec3(3.0, 1.0, -0.5), corners;
+  skull.triangles.array() += 1;
+  for (const Vec3& slave : {Vec3(3.0, 1.0, -0.5), Vec3(0.5, 3.5, -0.5), Vec3(-1.0, -1.0, -0.5)})
+    EXPECT_NEAR(search_one(slave, skull).initial_penetration_mm, -1.5, 1e-14);
+  EXPECT_LT((search_one(Vec3(-1.0, -1.0, 0.0), skull).contact_point - Vec3(0, 0, 1)).norm(), 1e-14);
+}
+
+TEST(ContactSearch, RejectsWhatItCannotSearch) {
+  const Points nodes = Vec3(1, 1, 0);
+  const auto code = [&](const std::vector<NodeIndex>& slaves, const TriangleSurface& skull) {
+    const auto pairs = search_contact(nodes, slaves, skull);
+    EXPECT_FALSE(pairs);
+    return pairs ? ErrorCode::kInternal : pairs.error().code;
+  };
+  EXPECT_EQ(code({0}, TriangleSurface{}), ErrorCode::kEmptySet);
+  EXPECT_EQ(code({1}, plate(1.0)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code({-1}, plate(1.0)), ErrorCode::kInvalidArgument);
+
+  TriangleSurface flat = plate(1.0);
+  flat.vertices.col(3) = flat.vertices.col(2);
+  EXPECT_EQ(code({0}, flat), ErrorCode::kDegenerateMesh);
+  TriangleSurface nan = plate(1.0);
+  nan.vertices(1, 2) = std::nan("");
+  EXPECT_EQ(code({0}, nan), ErrorCode::kNotFinite);
+  TriangleSurface dangling = plate(1.0);
+  dangling.triangles(0, 1) = 4;
+  EXPECT_EQ(code({0}, dangling), ErrorCode::kInvalidArgument);
+
+  Points bad = nodes;
+  bad(2, 0) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(search_contact(bad, {0}, plate(1.0)).error().code, ErrorCode::kNotFinite);
+}
 
 using test_support::box_mesh;
 using test_support::nodes_where;

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/fem/assembly.hpp"
+#include "common/fem/elasticity.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
 

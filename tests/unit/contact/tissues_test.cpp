@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 
 #include <gmock/gmock.h>
 
-#include "common/contact/forward_model.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::contact {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
 

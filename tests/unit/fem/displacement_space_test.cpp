@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "common/fem/displacement_constraints.hpp"
 #include "common/fem/space_elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
 

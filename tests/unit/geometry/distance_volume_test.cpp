@@ -9,7 +9,6 @@
 #include <string>
 
 #include "common/core/random.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::geometry {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "common/geometry/surface.hpp"
-#include "common/geometry/surface_rims.hpp"
 
 namespace brainshift::geometry {
 namespace {

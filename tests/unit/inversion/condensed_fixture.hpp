@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "common/core/random.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/fem/sampling.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"

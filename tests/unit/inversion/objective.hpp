@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Omega (paper eq. 4) and its gradient for a given active set, from the product's parts: what steps
-// 2 to 5 of steepest_descent.hpp compute, for comparison with finite differences.
+// 2 to 5 of descents.hpp compute, for comparison with finite differences.
 #pragma once
 
-#include "common/contact/refactorised_system.hpp"
-#include "common/inversion/descent/misfit.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/inversion/descent/objective.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 

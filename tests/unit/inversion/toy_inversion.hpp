@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "common/core/random.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/values/sparse_data.hpp"

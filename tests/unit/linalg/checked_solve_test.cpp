@@ -5,8 +5,8 @@
 
 #include <limits>
 
-#include "common/fem/block_solver.hpp"
 #include "common/fem/elasticity.hpp"
+#include "common/fem/stiffness_factor.hpp"
 #include "tests/support/box_mesh.hpp"
 
 namespace brainshift::linalg {

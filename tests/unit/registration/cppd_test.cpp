@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/registration/cppd.hpp"
+#include "common/registration/surface_distances.hpp"
 
 #include <gtest/gtest.h>
 

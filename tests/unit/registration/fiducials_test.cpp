@@ -9,7 +9,7 @@
 #include <string>
 
 #include "common/core/random.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 
 namespace brainshift::registration {
 namespace {

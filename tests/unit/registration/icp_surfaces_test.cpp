@@ -1,19 +1,95 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Alignment to interpolated distances and to measured clouds; covariance, weights and sentences of
-// the result.
+// Alignment to interpolated distances; covariance, weights and sentences of the result.
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "common/core/random.hpp"
-#include "common/geometry/signed_distance_grid.hpp"
+#include "common/geometry/distance_volume.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/icp.hpp"
 #include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {
 namespace {
+
+// A surface as ICP sees it: triangles and a distance volume of one sphere measure alike.
+
+using geometry::PointRows;
+
+const Vec3 kSphereCentre(5, -3, 8);
+const TriangleSurface& sphere() {
+  static const TriangleSurface surface =
+      geometry::ellipsoid_surface(kSphereCentre, Vec3(12, 12, 12), 0.6);
+  return surface;
+}
+constexpr double kTargetRadius_mm = 12.0;
+// Facets with edges of 0.6 mm lie 0.6^2 / (8 R) = 0.004 mm inside the sphere; the volume
+// adds hundredths of a millimetre.
+constexpr double kTolerance_mm = 0.05;
+
+PointRows points_around() {
+  Random random(3);
+  PointRows points(200, 3);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const double radius = kTargetRadius_mm + 4.0 * random.uniform() - 2.0;
+    points.row(i) = kSphereCentre + radius * random.direction();
+  }
+  return points;
+}
+
+struct Measured {
+  VecX distances_mm;
+  PointRows gradients;
+};
+
+Measured measure(const TargetSurface& surface, const PointRows& points) {
+  Measured measured{VecX(points.rows()), PointRows(points.rows(), 3)};
+  surface.measure(points, measured.distances_mm, measured.gradients);
+  return measured;
+}
+
+// The size of the distance is that from the sphere; the gradient is radial. Triangles give no sign
+// to the distance, so both may be turned round together.
+void expect_sphere(const TargetSurface& surface) {
+  const PointRows points = points_around();
+  const Measured measured = measure(surface, points);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const Vec3 arm = points.row(i).transpose() - kSphereCentre;
+    const double outside_mm = arm.norm() - kTargetRadius_mm;
+    EXPECT_NEAR(std::abs(measured.distances_mm[i]), std::abs(outside_mm), kTolerance_mm);
+    if (std::abs(outside_mm) < 2.0 * kTolerance_mm) continue;  // the sign is rounding there
+    const Vec3 away = measured.distances_mm[i] * Vec3(measured.gradients.row(i));
+    EXPECT_LT((away - outside_mm * arm.normalized()).norm(), 2.0 * kTolerance_mm);
+  }
+}
+
+TEST(TargetSurface, TrianglesMeasureTheDistance) {
+  expect_sphere(geometry::ClosestPointIndex::build(sphere()).value());
+}
+
+TEST(TargetSurface, AVolumeMeasuresTheDistance) {
+  const auto index = geometry::ClosestPointIndex::build(sphere()).value();
+  expect_sphere(
+      geometry::DistanceVolume::create(geometry::signed_distance_grid(index).value()).value());
+}
+
+// On the surface the direction to the closest point is rounding, and the triangle's normal
+// decides.
+TEST(TargetSurface, AVertexOfTheTrianglesHasAUnitGradient) {
+  const auto index = geometry::ClosestPointIndex::build(sphere()).value();
+  const PointRows vertices = sphere().vertices.leftCols(20).transpose();
+  const Measured measured = measure(index, vertices);
+  EXPECT_LT(measured.distances_mm.cwiseAbs().maxCoeff(), 1e-9);
+  for (Eigen::Index i = 0; i < vertices.rows(); ++i) {
+    const Vec3 outwards = (vertices.row(i).transpose() - kSphereCentre).normalized();
+    // Normals of neighbouring facets differ by about the edge over the radius, 0.05.
+    EXPECT_GT(measured.gradients.row(i).dot(outwards), 0.99);
+  }
+}
 
 using test::kCentre;
 using test::kDegree;
@@ -172,25 +248,6 @@ TEST(IcpOnDistances, StaysFiniteFarFromTheGrid) {
   EXPECT_LT((result->T_surface_points * points.col(0) - kCentre).norm(), 100.0);
 }
 
-TEST(IcpOnACloud, FindsThePoseWithoutTriangles) {
-  const TriangleSurface surface = bumpy_surface();
-  const auto cloud = geometry::OrientedCloud::build(geometry::sample_surface(surface, 4000, 7));
-  ASSERT_TRUE(cloud);
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    Random random(seed);
-    const RigidTransform T = motion(random, 4.0, 6.0);
-    const Points points =
-        traced_surface(geometry::sample_surface(surface, 600, 70 + seed), T, 0.2, random);
-    const auto result =
-        align(points, *cloud, RigidTransform::Identity(), surface_without_prior(0.2));
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged);
-    // Planes over neighbourhoods of 1 mm miss a surface of 10 mm radius by some hundredths; noise
-    // adds to that.
-    EXPECT_LT(placement_error(result->T_surface_points, T.inverse(), points), 0.3);
-  }
-}
-
 TEST(IcpOnDistances, RefusesTheSameInputs) {
   const TriangleSurface surface = bumpy_surface();
   const auto volume = volume_of(surface);
@@ -199,11 +256,69 @@ TEST(IcpOnDistances, RefusesTheSameInputs) {
   EXPECT_THAT(few.error().message, testing::HasSubstr("2 given"));
   IcpOptions options;
   options.sd_mm = -1.0;
-  const auto cloud = geometry::OrientedCloud::build(surface.vertices);
-  ASSERT_TRUE(cloud);
-  const auto refused = align(surface.vertices, *cloud, RigidTransform::Identity(), options);
+  const auto refused = align(surface.vertices, volume, RigidTransform::Identity(), options);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, testing::HasSubstr("icp.sd_mm = -1"));
+}
+
+// The input that align() rejects, and its messages.
+
+TriangleSurface input_ellipsoid() {
+  return geometry::ellipsoid_surface(Vec3(35, -45, 20), Vec3(18, 13, 9), 3.0);
+}
+
+void expect_refused(const Points& points, const RigidTransform& T, const IcpOptions& options,
+                    ErrorCode code, const std::string& naming) {
+  const auto surface = geometry::ClosestPointIndex::build(input_ellipsoid());
+  ASSERT_TRUE(surface);
+  const auto result = align(points, *surface, T, options);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, code);
+  EXPECT_NE(result.error().message.find(naming), std::string::npos) << result.error().message;
+  EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
+}
+
+TEST(Icp, RefusesPointsThatFixNoPose) {
+  const RigidTransform T = RigidTransform::Identity();
+  Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
+  expect_refused(points.leftCols(2), T, {}, ErrorCode::kInvalidArgument, "2 given");
+  expect_refused(Points(3, 0), T, {}, ErrorCode::kInvalidArgument, "0 given");
+  Points line(3, 10);
+  for (int i = 0; i < 10; ++i) line.col(i) = Vec3(1, 2, 3) + i * Vec3(0.1, 0.7, -0.3);
+  expect_refused(line, T, {}, ErrorCode::kInvalidArgument, "one line");
+  expect_refused(Vec3(1, 2, 3).replicate(1, 5), T, {}, ErrorCode::kInvalidArgument, "one line");
+  points(1, 7) = std::nan("");
+  expect_refused(points, T, {}, ErrorCode::kNotFinite, "point 7");
+}
+
+TEST(Icp, RefusesAnInitialPoseThatIsNotRigid) {
+  const Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
+  RigidTransform T = RigidTransform::Identity();
+  T.linear() *= 1.01;
+  expect_refused(points, T, {}, ErrorCode::kInvalidArgument, "not a rotation");
+  T.linear() = -Mat3::Identity();
+  expect_refused(points, T, {}, ErrorCode::kInvalidArgument, "not a rotation");
+  T = RigidTransform::Identity();
+  T.translation().x() = std::nan("");
+  expect_refused(points, T, {}, ErrorCode::kNotFinite, "initial pose");
+}
+
+TEST(Icp, RefusesOptionsOutOfRangeByName) {
+  const Points points = geometry::sample_surface(input_ellipsoid(), 20, 1);
+  const auto refused = [&](auto member, auto value, const std::string& name) {
+    IcpOptions options;
+    options.*member = value;
+    expect_refused(points, RigidTransform::Identity(), options, ErrorCode::kInvalidArgument, name);
+  };
+  const double nan = std::nan("");
+  refused(&IcpOptions::sd_mm, 0.0, "icp.sd_mm = 0");
+  refused(&IcpOptions::sd_mm, nan, "icp.sd_mm");
+  refused(&IcpOptions::welsch_scale_mm, -1.0, "icp.welsch_scale_mm = -1");
+  refused(&IcpOptions::max_iterations, 0, "icp.max_iterations = 0");
+  refused(&IcpOptions::translation_tolerance_mm, 0.0, "icp.translation_tolerance_mm");
+  refused(&IcpOptions::rotation_tolerance_deg, nan, "icp.rotation_tolerance_deg");
+  refused(&IcpOptions::rotation_sd_deg, nan, "icp.rotation_sd_deg");
+  refused(&IcpOptions::observability_ratio, 1.0, "icp.observability_ratio = 1");
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 #include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {

@@ -7,7 +7,7 @@
 
 #include "common/core/random.hpp"
 #include "common/core/types.hpp"
-#include "common/registration/rigid_increment.hpp"
+#include "common/registration/pose_information.hpp"
 
 namespace brainshift::registration::test {
 

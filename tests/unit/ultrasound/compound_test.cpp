@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/ultrasound/compound.hpp"
+#include "tests/support/compound.hpp"
 
 #include <gmock/gmock.h>
 
 #include <numeric>
 
-namespace brainshift::ultrasound {
+namespace brainshift::test_support {
 namespace {
 
 using testing::HasSubstr;
@@ -129,4 +129,4 @@ TEST(Compound, RefusesWhatCannotBeDone) {
 }
 
 }  // namespace
-}  // namespace brainshift::ultrasound
+}  // namespace brainshift::test_support

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // More of it in condensed_inverter_test.cpp.
-#include "common/inversion/condensed/mode_posterior.hpp"
+#include <gtest/gtest.h>
 
-#include "common/inversion/condensed/source_check.hpp"
+#include <Eigen/Cholesky>
+
+#include "common/core/random.hpp"
+#include "common/inversion/condensed/mode_posterior.hpp"
 #include "common/inversion/skull/contact_system.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
@@ -77,6 +80,96 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   EXPECT_GT(agreed, 0) << under_the_first << " " << contradicted;
   EXPECT_GT(contradicted, 0);
   EXPECT_GT(under_the_first, 0);
+}
+
+using Eigen::MatrixXd;
+
+constexpr int kUnknowns = 30, kFirst = 80, kSecond = 60;
+
+struct Problem {
+  MatrixXd jacobian = MatrixXd(kFirst + kSecond, kUnknowns);
+  VecX data = VecX(kFirst + kSecond), prior = VecX(kUnknowns);
+
+  Consistency check_second() const {
+    const MatrixXd own = jacobian.bottomRows(kSecond);
+    const MatrixXd gram = jacobian.transpose() * jacobian, own_gram = own.transpose() * own;
+    const VecX right = jacobian.transpose() * data;
+    const VecX own_right = own.transpose() * data.tail(kSecond);
+    Consistency result;
+    EXPECT_TRUE(SourceCheck().run(gram, right, own_gram, own_right, prior, result));
+    return result;
+  }
+};
+
+VecX normal_vector(Random& random, Eigen::Index size) {
+  VecX values(size);
+  for (double& value : values) value = random.normal();
+  return values;
+}
+
+// The second source sees ten of the unknowns only.
+Problem drawn(std::uint64_t seed) {
+  Random random(seed);
+  Problem problem;
+  for (double& value : problem.jacobian.reshaped()) value = random.normal();
+  problem.jacobian.bottomRightCorner(kSecond, kUnknowns - 10).setZero();
+  problem.prior = VecX::LinSpaced(kUnknowns, 0.5, 2.0);
+  const VecX x = normal_vector(random, kUnknowns).cwiseQuotient(problem.prior.cwiseSqrt());
+  problem.data = problem.jacobian * x + normal_vector(random, kFirst + kSecond);
+  return problem;
+}
+
+TEST(SourceCheck, ConsistentSourcesHaveUniformPValues) {
+  constexpr int kTrials = 400;
+  int below_tenth = 0, below_half = 0;
+  double sum = 0.0, degrees = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Consistency result = drawn(static_cast<std::uint64_t>(trial)).check_second();
+    below_tenth += result.p_value < 0.1;
+    below_half += result.p_value < 0.5;
+    sum += result.chi_square;
+    degrees += result.degrees_of_freedom;
+  }
+  EXPECT_NEAR(below_tenth / static_cast<double>(kTrials), 0.1, 0.05);  // 3.3 standard errors
+  EXPECT_NEAR(below_half / static_cast<double>(kTrials), 0.5, 0.08);
+  EXPECT_NEAR(sum / degrees, 1.0, 0.05);
+}
+
+TEST(SourceCheck, DegreesOfFreedomAreWhatTheSourceCanSay) {
+  EXPECT_NEAR(drawn(3).check_second().degrees_of_freedom, 10.0, 0.1);
+}
+
+// The statistic for a source with all its rows, from the covariance of the innovation, minus the
+// rows that are noise to everyone, is the same up to the damping.
+TEST(SourceCheck, EqualsTheInnovationStatisticOfTheRowsThatSeeTheUnknowns) {
+  const Problem problem = drawn(11);
+  const MatrixXd first = problem.jacobian.topRows(kFirst);
+  const MatrixXd own = problem.jacobian.bottomRows(kSecond);
+  MatrixXd information = first.transpose() * first;
+  information.diagonal() += problem.prior;
+  const Eigen::LLT<MatrixXd> others(information);
+  const VecX mean = others.solve(first.transpose() * problem.data.head(kFirst));
+  const VecX innovation = problem.data.tail(kSecond) - own * mean;
+  MatrixXd covariance = own * others.solve(own.transpose());
+  covariance.diagonal().array() += 1.0;
+  const double all = innovation.dot(covariance.llt().solve(innovation));
+  const MatrixXd seen = own.leftCols(10);
+  const VecX noise =
+      innovation - seen * (seen.transpose() * seen).llt().solve(seen.transpose() * innovation);
+  EXPECT_NEAR(problem.check_second().chi_square, all - noise.squaredNorm(), 0.05);
+}
+
+TEST(SourceCheck, AShiftThatTheOthersWouldHaveSeenIsAContradiction) {
+  Problem problem = drawn(5);
+  ASSERT_GT(problem.check_second().p_value, 1e-3);
+  problem.data.tail(kSecond) += problem.jacobian.bottomRows(kSecond) * VecX::Ones(kUnknowns);
+  EXPECT_LT(problem.check_second().p_value, 1e-6);
+}
+
+TEST(SourceCheck, OtherSourcesThatAreNotPositiveDefiniteAreSaid) {
+  const MatrixXd gram = MatrixXd::Identity(2, 2), own = 3.0 * MatrixXd::Identity(2, 2);
+  Consistency result;
+  EXPECT_FALSE(SourceCheck().run(gram, VecX::Zero(2), own, VecX::Zero(2), VecX::Ones(2), result));
 }
 
 }  // namespace

@@ -1,14 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/inversion/contract/estimate_check.hpp"
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <limits>
+#include <string>
+#include <vector>
 
-#include "common/inversion/invert.hpp"
+#include "common/inversion/contract/estimate_check.hpp"
+#include "common/inversion/inverter.hpp"
 #include "common/operators/encode_columns.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
 namespace {
+
+TEST(Penetration, CountsSlavesAboveTheToleranceAndKeepsTheDeepest) {
+  const PenetrationSummary summary =
+      summarise_penetration(VecX{{-2.0, 0.5 * kPenetrationTolerance_mm, 0.3, 0.0, 1.5}});
+  EXPECT_EQ(summary.penetrating, 2);
+  EXPECT_EQ(summary.max_mm, 1.5);
+}
+
+TEST(Penetration, OfOpenSlavesAndOfNoneIsZero) {
+  for (const VecX& open : {VecX{{-1.0, -0.1}}, VecX()}) {
+    const PenetrationSummary summary = summarise_penetration(open);
+    EXPECT_EQ(summary.penetrating, 0);
+    EXPECT_EQ(summary.max_mm, 0.0);
+  }
+}
 
 using EstimateCheck = Condensed;
 
@@ -114,6 +135,155 @@ TEST_F(EstimateCheck, LinearElementsNearIncompressibilityAreSaidToLock) {
   ASSERT_TRUE(paper.has_value());
   EXPECT_NE(paper->reason.find("lock"), std::string::npos) << paper->reason;
   EXPECT_FALSE(std::isnan(paper->min_volume_ratio));
+}
+
+using testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// An estimate with nothing wrong, each of its figures at or within its bound.
+Estimate sound() {
+  Estimate estimate;
+  estimate.status = EstimateStatus::kConverged;
+  estimate.displacement = Points::Zero(3, 4);
+  estimate.displacement.col(2) = Vec3(30.0, 0.0, -40.0);  // 50 mm
+  estimate.sd_mm = VecX::Constant(4, 0.3);
+  estimate.contact_force_n = VecX::Constant(2, 0.01);
+  estimate.contact.max_penetration_mm = kDeepestInSkull_mm;
+  estimate.contact.decrement = kMostContactDecrement;
+  estimate.contact.max_violation_mm = kMostContactViolation_mm;
+  estimate.misfit_ratio = kUnexplainedMisfit;
+  estimate.min_volume_ratio = 0.1;  // of a flat element
+  estimate.min_nodal_volume_ratio = kLeastVolumeRatio;
+  estimate.sources.resize(2);
+  estimate.hypotheses.resize(2);
+  return estimate;
+}
+
+QualityVerdict judged(const Estimate& estimate) {
+  QualityVerdict verdict;
+  judge(estimate, verdict);
+  return verdict;
+}
+
+TEST(QualityCheck, AnEstimateWithNothingWrongIsGood) {
+  const QualityVerdict verdict = judged(sound());
+  EXPECT_EQ(verdict.quality, Quality::kGood);
+  EXPECT_TRUE(verdict.flags.empty());
+  EXPECT_EQ(verdict.reason, "");
+}
+
+// Such as a method of the paper, which has no uncertainty, no scales and no certificate.
+TEST(QualityCheck, WhatAMethodDoesNotComputeIsNoFault) {
+  Estimate estimate;
+  estimate.status = EstimateStatus::kConverged;
+  estimate.displacement = Points::Ones(3, 4);
+  EXPECT_EQ(judged(estimate).quality, Quality::kGood);
+}
+
+struct Fault {
+  QualityFlag flag;
+  const char* figure;  // in the reason
+  std::function<void(Estimate&)> make;
+};
+
+std::vector<Fault> faults() {
+  const auto above = [](double bound) { return std::nextafter(bound, kInfinity); };
+  return {
+      {QualityFlag::kMisfitUnexplained, "at most 1.5",
+       [=](Estimate& e) { e.misfit_ratio = above(kUnexplainedMisfit); }},
+      {QualityFlag::kStrengthAtBound, to_string(static_cast<PriorPart>(kPriorParts - 1)).data(),
+       [](Estimate& e) { e.prior_at_bound.back() = true; }},
+      {QualityFlag::kSourcesContradict, "\"ius\"",
+       [](Estimate& e) {
+         e.sources[1].source = "ius";
+         e.sources[1].consistent = false;
+       }},
+      {QualityFlag::kDataOutsideRegion, "(7)", [](Estimate& e) { e.data_outside_region = 7; }},
+      {QualityFlag::kDeadline, "time", [](Estimate& e) { e.status = EstimateStatus::kDeadline; }},
+      {QualityFlag::kContactNotCertified, "decrement 0.001",
+       [=](Estimate& e) { e.contact.decrement = above(kMostContactDecrement); }},
+      {QualityFlag::kContactNotCertified, "violation 0.01 mm",
+       [=](Estimate& e) {
+         e.contact.decrement = kNan;
+         e.contact.max_violation_mm = above(kMostContactViolation_mm);
+       }},
+      {QualityFlag::kIterationLimit, "limit",
+       [](Estimate& e) { e.status = EstimateStatus::kIterationLimit; }},
+      {QualityFlag::kInvertedElements, "133, smallest volume ratio -0.25",
+       [](Estimate& e) {
+         e.inverted_elements = 133;
+         e.min_volume_ratio = -0.25;
+       }},
+      {QualityFlag::kVolumeLost, "at least 0.5",
+       [](Estimate& e) { e.min_nodal_volume_ratio = std::nextafter(kLeastVolumeRatio, 0.0); }},
+      {QualityFlag::kBeyondSkull, "motion 50.2 mm, at most 50 mm",
+       [](Estimate& e) { e.displacement.col(3) = Vec3(0.0, -50.2, 0.0); }},
+      {QualityFlag::kBeyondSkull, "3.5 mm deep in the skull, at most 3 mm",
+       [](Estimate& e) { e.contact.max_penetration_mm = 3.5; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.displacement(1, 1) = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.displacement(2, 0) = -kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.sd_mm[3] = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.contact_force_n[0] = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.contact.max_penetration_mm = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.contact.decrement = kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.contact.max_violation_mm = kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.misfit_mm.mean = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.initial_misfit_mm.std = kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.misfit_ratio = kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.min_volume_ratio = -kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.min_nodal_volume_ratio = -kInfinity; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.prior_scales.front() = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.prior_absent.back() = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.hypotheses[1].weight = kNan; }},
+      {QualityFlag::kNotFinite, "", [](Estimate& e) { e.hypotheses[0].scales.back() = kInfinity; }},
+  };
+}
+
+TEST(QualityCheck, EachFaultSetsItsFlagAndNoOther) {
+  QualityFlags seen;
+  const std::vector<Fault> all = faults();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Fault& fault = all[i];
+    SCOPED_TRACE("fault " + std::to_string(i) + ", " + std::string(to_string(fault.flag)));
+    Estimate estimate = sound();
+    fault.make(estimate);
+    const QualityVerdict verdict = judged(estimate);
+    QualityFlags expected;
+    expected.set(fault.flag);
+    EXPECT_EQ(verdict.flags, expected) << verdict.reason;
+    EXPECT_EQ(verdict.quality, expected.quality());
+    EXPECT_THAT(verdict.reason, testing::StartsWith(std::string(sentence(fault.flag))));
+    EXPECT_THAT(verdict.reason, HasSubstr(fault.figure));
+    seen.set(fault.flag);
+  }
+  for (const QualityFlag flag : kAllQualityFlags) {
+    EXPECT_TRUE(seen.has(flag)) << "no fault for " << to_string(flag);
+  }
+}
+
+TEST(QualityCheck, TheReasonNamesEveryFlagTheWorstFirst) {
+  Estimate estimate = sound();
+  estimate.status = EstimateStatus::kDeadline;
+  estimate.inverted_elements = 1;
+  estimate.misfit_ratio = 3.0;
+  const QualityVerdict verdict = judged(estimate);
+  EXPECT_EQ(verdict.quality, Quality::kUnusable);
+  EXPECT_THAT(verdict.reason, testing::StartsWith("elements are turned inside out (1,"));
+  EXPECT_THAT(verdict.reason, HasSubstr("; the data lie farther off"));
+  EXPECT_THAT(verdict.reason, testing::EndsWith("; the time ran out before the inversion settled"));
+}
+
+TEST(QualityCheck, NothingOfAnEarlierVerdictStays) {
+  Estimate estimate = sound();
+  estimate.inverted_elements = 1;
+  QualityVerdict verdict;
+  judge(estimate, verdict);
+  judge(sound(), verdict);
+  EXPECT_EQ(verdict.quality, Quality::kGood);
+  EXPECT_TRUE(verdict.flags.empty());
+  EXPECT_EQ(verdict.reason, "");
 }
 
 }  // namespace

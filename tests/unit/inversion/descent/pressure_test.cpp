@@ -5,10 +5,9 @@
 
 #include <Eigen/LU>
 
-#include "common/contact/refactorised_system.hpp"
-#include "common/contact/woodbury_system.hpp"
+#include "common/contact/penalised_system.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
-#include "common/inversion/invert.hpp"
+#include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "common/geometry/region_nodes.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/toy_patient.hpp"
 

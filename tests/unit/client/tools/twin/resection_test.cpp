@@ -10,9 +10,9 @@
 #include <set>
 
 #include "client/tools/twin/surgery.hpp"
-#include "common/contact/tissues.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/units.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "tests/support/toy_patient.hpp"
 

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "client/tools/twin/load.hpp"
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
