@@ -20,7 +20,7 @@
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"
 #include "common/io/geometry/image_file.hpp"
-#include "common/io/geometry/surface_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 
 namespace brainshift::client {
 namespace {

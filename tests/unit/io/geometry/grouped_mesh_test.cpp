@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {

@@ -9,8 +9,7 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/surface_writer.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
