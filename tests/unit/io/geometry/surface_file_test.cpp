@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces in .stl, .ply and .obj, points as text, and what write_surface writes; .vtp is in
-// vtk_file_test.cpp.
+// Surfaces in .stl, .ply and .obj and points as text; .vtp is in vtk_file_test.cpp.
 #include <gmock/gmock.h>
 
 #include <cstdint>
@@ -8,7 +7,6 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -273,16 +271,7 @@ TEST(SurfaceSpace, WordThatOnlyEndsLikeTheKeySaysNothing) {
   EXPECT_EQ(read->vertices.col(1), Vec3(10.5, 0, 0));
 }
 
-// ---- point clouds in, surfaces out ----
-
-TriangleSurface sample() {
-  TriangleSurface surface;
-  surface.vertices.resize(3, 4);
-  surface.vertices << 0, 1.0 / 3.0, 0, -1e-7, 0, 0, 2, 5, 0, 0, 0, 7;
-  surface.triangles.resize(3, 2);
-  surface.triangles << 0, 1, 1, 3, 2, 2;
-  return surface;
-}
+// ---- points ----
 
 class SurfacePoints : public testing::Test {
  protected:
@@ -325,45 +314,6 @@ TEST_F(SurfacePoints, BadTextsAreRefused) {
                         {"x y z\n", "has no point"}});
   EXPECT_THAT(refusal_of(read_surface_or_points(folder_.write("p.las", "1 2 3\n"))),
               HasSubstr("unknown surface format '.las'"));
-}
-
-TEST_F(SurfacePoints, WrittenSurfacesComeBackBitForBit) {
-  const TriangleSurface surface = sample();
-  const Eigen::MatrixXd sd = Eigen::RowVector4d(0.1, 0.2, 0.3, 0.4);
-  for (const char* name : {"s.ply", "s.vtp"}) {
-    const auto path = folder_ / name;
-    ASSERT_TRUE(write_surface(path, surface, {{"sd_mm", sd}}));
-    const auto read = read_surface(path);
-    ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->vertices, surface.vertices) << name;
-    EXPECT_EQ(read->triangles, surface.triangles) << name;
-  }
-}
-
-TEST_F(SurfacePoints, WrittenPointsComeBack) {
-  TriangleSurface points = sample();
-  points.triangles.resize(3, 0);
-  for (const char* name : {"p.ply", "p.vtp"}) {
-    const auto path = folder_ / name;
-    ASSERT_TRUE(write_surface(path, points));
-    const auto read = read_surface_or_points(path);
-    ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->vertices, points.vertices) << name;
-    EXPECT_EQ(read->num_triangles(), 0);
-  }
-}
-
-TEST_F(SurfacePoints, WhatCannotBeWrittenIsNamed) {
-  const auto path = [&](const char* name) { return folder_ / name; };
-  EXPECT_THAT(write_surface(path("s.stl"), sample()).error().message,
-              HasSubstr("s.stl: unknown surface format '.stl' to write"));
-  const Eigen::MatrixXd three = Eigen::MatrixXd::Zero(1, 3);
-  EXPECT_THAT(write_surface(path("s.vtp"), sample(), {{"sd_mm", three}}).error().message,
-              HasSubstr("field 'sd_mm' has 3 columns: must have one per vertex, 4"));
-  const Eigen::MatrixXd normals = Eigen::MatrixXd::Zero(3, 4);
-  EXPECT_THAT(write_surface(path("s.ply"), sample(), {{"normal", normals}}).error().message,
-              HasSubstr("field 'normal': a PLY file takes one number per vertex"));
-  EXPECT_TRUE(write_surface(path("s.vtp"), sample(), {{"normal", normals}}));
 }
 
 }  // namespace
