@@ -6,7 +6,6 @@
 
 #include "client/tools/twin/ultrasound.hpp"
 #include "common/anatomy/tumour_surface.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"

@@ -16,7 +16,6 @@
 #include "common/anatomy/node_sets.hpp"
 #include "common/anatomy/tumour_surface.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 

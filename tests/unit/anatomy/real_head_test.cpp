@@ -7,7 +7,6 @@
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 
 namespace brainshift::anatomy {
