@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/io/fields/nifti_writer.hpp"
+#include "common/io/fields/field_files.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "tests/integration/process.hpp"
