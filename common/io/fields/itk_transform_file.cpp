@@ -96,7 +96,7 @@ Status write_itk_transform(const std::filesystem::path& path, const Displacement
     out.group("TransformGroup");
     out.group(kGroup);
     write_type(file.get());
-    out.list(std::string(kGroup) + "/TransformFixedParameters", fixed_parameters(field.grid));
+    out.write(std::string(kGroup) + "/TransformFixedParameters", fixed_parameters(field.grid));
     write_parameters(file.get(), field.ras_mm);
     check_hdf5(H5Fflush(file.get(), H5F_SCOPE_GLOBAL), "buffers");
     if (!file.close()) throw Hdf5Problem{"buffers"};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/io/landmarks/named_points.hpp"
+#include "common/io/landmarks/pair_file.hpp"
 
 #include <gmock/gmock.h>
 
