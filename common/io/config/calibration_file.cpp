@@ -12,8 +12,6 @@
 namespace brainshift::io {
 namespace {
 
-constexpr Presence kRequired = Presence::kRequired;
-
 void read_camera(YamlSection section, CameraIntrinsics& camera) {
   section.number("focal_x_px", camera.focal_x_px, kRequired);
   section.number("focal_y_px", camera.focal_y_px, kRequired);

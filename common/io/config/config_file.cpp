@@ -55,8 +55,8 @@ std::string quoted(const std::string& value) {
   return out + "\"";
 }
 
-// Visitor of a key table (configuration/key_table.hpp) that writes every key with its value as YAML:
-// absolute paths, numbers with 17 significant digits, which give every double back.
+// Visitor of a key table (configuration/key_table.hpp) that writes every key with its value as
+// YAML: absolute paths, numbers with 17 significant digits, which give every double back.
 class KeyWriter : public KeyWalker<KeyWriter> {
  public:
   template <typename... More>

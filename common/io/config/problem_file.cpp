@@ -9,8 +9,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Presence kRequired = Presence::kRequired;
-
 void optional_number(YamlSection& section, const std::string& key, std::optional<double>& value) {
   if (section.has(key)) section.number(key, value.emplace());
 }

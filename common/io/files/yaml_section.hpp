@@ -23,6 +23,7 @@
 namespace brainshift::io {
 
 enum class Presence { kOptional, kRequired };
+inline constexpr Presence kRequired = Presence::kRequired;
 
 class YamlSection;
 

@@ -37,8 +37,8 @@ Result<TriangleSurface> parse_ply(const std::string& content);
 // skipped. Messages name the line.
 Result<TriangleSurface> parse_obj(const std::string& content);
 // Points in plain text, without triangles: x, y, z at the start of each line, numbers between
-// blanks, tabs, commas or semicolons. A first line of words is a heading; empty lines and those that
-// begin with '#' or "//" are skipped. Messages name line or point.
+// blanks, tabs, commas or semicolons. A first line of words is a heading; empty lines and those
+// that begin with '#' or "//" are skipped. Messages name line or point.
 Result<TriangleSurface> parse_xyz(const std::string& content);
 
 // Numbers of a list, one column after the other.

@@ -42,7 +42,8 @@ std::string escaped(const std::string& text) {
 }
 
 // Bytes as the content of a DataArray: a header [blocks][block size][size of a partial last block,
-// or 0][compressed sizes], then the blocks; both are base64 streams of their own, as VTK writes them.
+// or 0][compressed sizes], then the blocks; both are base64 streams of their own, as VTK writes
+// them.
 std::string vtk_encoded(std::string_view bytes) {
   std::string blocks;
   std::string sizes;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tetrahedra and surfaces with fields to files; mm RAS, and a VTK file says so (SPACE). A file is
-// written to a temporary name, synced, renamed. kWriteFailed names the file; kInvalidArgument a field
-// that does not fit.
+// written to a temporary name, synced, renamed. kWriteFailed names the file; kInvalidArgument a
+// field that does not fit.
 #pragma once
 
 #include <filesystem>

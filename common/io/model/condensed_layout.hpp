@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The /condensed group of a model file (model_file.hpp lists it). Private to the room. Errors of the
-// file are thrown as Hdf5Problem.
+// The /condensed group of a model file (model_file.hpp lists it). Private to the room. Errors of
+// the file are thrown as Hdf5Problem.
 #pragma once
 
 #include <optional>
