@@ -283,16 +283,16 @@ void Reader::read_elements_4() {
 
 std::vector<int> Reader::indices(const std::vector<std::int64_t>& tags, std::size_t vertices,
                                  const std::string& cell) const {
-  std::vector<int> indices;
+  std::vector<int> found_indices;
   for (std::size_t i = 0; i < tags.size(); ++i) {
     const auto found = index_of_tag_.find(tags[i]);
     if (found == index_of_tag_.end()) {
       refuse_format(cell + " " + std::to_string(i / vertices) + " has node " +
                     std::to_string(tags[i]) + ", which does not exist");
     }
-    indices.push_back(found->second);
+    found_indices.push_back(found->second);
   }
-  return indices;
+  return found_indices;
 }
 
 GroupedMesh Reader::mesh() const {
