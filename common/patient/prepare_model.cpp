@@ -11,7 +11,6 @@
 #include "common/core/fnv1a.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 
 namespace brainshift::patient {

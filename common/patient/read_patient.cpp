@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "common/anatomy/brain_model_builder.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 
 namespace brainshift::patient {

@@ -19,6 +19,7 @@ namespace brainshift::registration {
 //
 //   T(xi) x = c + exp([w]x) (x - c) + t,      xi = (w, t): rotation vector (rad), translation (mm)
 //   d/dxi  n . T(xi) x  at xi = 0   =   ((x - c) x n,  n)
+//
 // T(xi), mm.
 RigidTransform rigid_increment(const Vec6& xi, const Vec3& centre);
 

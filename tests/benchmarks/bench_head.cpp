@@ -10,7 +10,7 @@
 #include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "common/io/config/case_inputs_file.hpp"
+#include "common/io/config/config_file.hpp"
 #include "tests/benchmarks/tools.hpp"
 
 namespace brainshift::bench {

@@ -14,7 +14,7 @@
 #include "client/tools/twin/load.hpp"
 #include "client/tools/twin/truth_load.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
-#include "common/io/config/case_inputs_file.hpp"
+#include "common/io/config/config_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/calculix_deck.hpp"

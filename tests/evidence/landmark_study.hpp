@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/io/landmarks/named_points.hpp"
+#include "common/io/landmarks/pair_file.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 
 namespace brainshift::evidence {

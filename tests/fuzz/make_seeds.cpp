@@ -10,8 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "common/io/geometry/surface_writer.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "tests/support/virtual_sweep.hpp"

@@ -14,7 +14,6 @@
 #include "common/core/random.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/registration/image_registration.hpp"

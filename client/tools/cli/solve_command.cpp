@@ -14,7 +14,7 @@
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 
 namespace brainshift::client {
 namespace {

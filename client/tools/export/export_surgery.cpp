@@ -14,13 +14,11 @@
 #include "client/tools/export/warp_image.hpp"
 #include "client/tools/journal/journal_export.hpp"
 #include "client/tools/journal/journal_fields.hpp"
-#include "common/io/fields/itk_transform_file.hpp"
-#include "common/io/fields/nifti_writer.hpp"
-#include "common/io/fields/nrrd_writer.hpp"
+#include "common/io/fields/field_files.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"
 #include "common/io/geometry/image_file.hpp"
-#include "common/io/geometry/surface_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 
 namespace brainshift::client {
 namespace {

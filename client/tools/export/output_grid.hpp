@@ -5,7 +5,7 @@
 #include "client/tools/volume/outside_taper.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
-#include "common/io/fields/voxel_grid.hpp"
+#include "common/io/fields/displacement_field.hpp"
 
 namespace brainshift::client {
 

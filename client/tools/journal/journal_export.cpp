@@ -7,7 +7,7 @@
 
 #include "client/tools/journal/journal_fields.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"

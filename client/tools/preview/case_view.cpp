@@ -14,7 +14,6 @@
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/image_file.hpp"
 

@@ -10,7 +10,7 @@
 #include "client/tools/replay/run_unit.hpp"
 #include "client/tools/replay/score.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/recording/surgery_file.hpp"
 
 namespace brainshift::client {

@@ -4,8 +4,8 @@
 #include "client/tools/stereo/pictures.hpp"
 #include "common/io/config/calibration_file.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/geometry/pose_file.hpp"
-#include "common/io/geometry/surface_writer.hpp"
 
 namespace brainshift::client {
 namespace {

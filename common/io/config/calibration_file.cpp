@@ -12,8 +12,6 @@
 namespace brainshift::io {
 namespace {
 
-constexpr Presence kRequired = Presence::kRequired;
-
 void read_camera(YamlSection section, CameraIntrinsics& camera) {
   section.number("focal_x_px", camera.focal_x_px, kRequired);
   section.number("focal_y_px", camera.focal_y_px, kRequired);
@@ -79,31 +77,30 @@ std::string camera_text(const std::string& name, const CameraIntrinsics& camera)
 Result<StereoCalibration> read_calibration(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());
-  YamlDocument document = YamlDocument::parse(*text, path);
-  YamlSection root = document.root();
-  StereoCalibration calibration;
-  YamlSection image = root.section("image", kRequired);
-  image.integer("width_px", calibration.width_px, kRequired);
-  image.integer("height_px", calibration.height_px, kRequired);
-  image.done();
-  read_camera(root.section("left", kRequired), calibration.left);
-  read_camera(root.section("right", kRequired), calibration.right);
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  read_camera_transform(root.section("T_right_left", kRequired), matrix);
-  root.number("rms_px", calibration.rms_px);
-  root.number("epipolar_rms_px", calibration.epipolar_rms_px);
-  YamlSection pairs = root.section("pairs");
-  for (const std::string& name : pairs.names()) {
-    calibration.pairs.push_back({name, 0.0});
-    pairs.number(name, calibration.pairs.back().rms_px);
-  }
-  root.done();
-  if (Status ok = document.status(); !ok) return tl::unexpected(ok.error());
-  if (Status ok = check_rigid("T_right_left.rotation", matrix); !ok)
-    return tl::unexpected(document.locate(ok.error()));
-  calibration.T_right_left = nearest_rigid(matrix);
-  if (Status ok = validate(calibration); !ok) return tl::unexpected(document.locate(ok.error()));
-  return calibration;
+  const auto read = [&](YamlSection& root, StereoCalibration& calibration) {
+    YamlSection image = root.section("image", kRequired);
+    image.integer("width_px", calibration.width_px, kRequired);
+    image.integer("height_px", calibration.height_px, kRequired);
+    image.done();
+    read_camera(root.section("left", kRequired), calibration.left);
+    read_camera(root.section("right", kRequired), calibration.right);
+    read_camera_transform(root.section("T_right_left", kRequired), matrix);
+    root.number("rms_px", calibration.rms_px);
+    root.number("epipolar_rms_px", calibration.epipolar_rms_px);
+    YamlSection pairs = root.section("pairs");
+    for (const std::string& name : pairs.names()) {
+      calibration.pairs.push_back({name, 0.0});
+      pairs.number(name, calibration.pairs.back().rms_px);
+    }
+  };
+  const auto check = [&](StereoCalibration& calibration) {
+    return check_rigid("T_right_left.rotation", matrix).and_then([&] {
+      calibration.T_right_left = nearest_rigid(matrix);
+      return validate(calibration);
+    });
+  };
+  return parse_yaml<StereoCalibration>(*text, path, read, check);
 }
 
 std::string calibration_text(const StereoCalibration& calibration) {
@@ -120,12 +117,9 @@ std::string calibration_text(const StereoCalibration& calibration) {
       "\nrms_px: " + digits(calibration.rms_px) +
       "\nepipolar_rms_px: " + digits(calibration.epipolar_rms_px) + "\n";
   if (!calibration.pairs.empty()) text += "pairs:\n";
-  for (const CalibrationPair& pair : calibration.pairs)
-    text.append("  ")
-        .append(in_quotes(pair.name))
-        .append(": ")
-        .append(digits(pair.rms_px))
-        .append("\n");
+  for (const CalibrationPair& pair : calibration.pairs) {
+    text += "  " + in_quotes(pair.name) + ": " + digits(pair.rms_px) + "\n";
+  }
   return text;
 }
 

@@ -2,11 +2,15 @@
 #include "common/io/config/config_file.hpp"
 
 #include <cmath>
+#include <cstdio>
+#include <optional>
 
 #include "common/configuration/case_keys.hpp"
 #include "common/io/config/key_reader.hpp"
-#include "common/io/config/key_writer.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/label_map_file.hpp"
+#include "common/io/geometry/mesh_file.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -20,35 +24,160 @@ Vec3 unit(const Vec3& direction) {
   return std::abs(length - 1.0) < 1e-15 ? direction : direction / length;
 }
 
+std::string exact_digits(double value) {
+  char buffer[40];
+  std::snprintf(buffer, sizeof buffer, "%.17g", value);
+  return buffer;
+}
+
+std::string yaml_list(const std::vector<double>& values) {
+  std::string items;
+  for (const double value : values)
+    items.append(items.empty() ? "" : ", ").append(exact_digits(value));
+  return "[" + items + "]";
+}
+
+// Double-quoted YAML: only these need an escape in printable text; control characters by number.
+std::string quoted(const std::string& value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      char buffer[8];
+      std::snprintf(buffer, sizeof buffer, "\\x%02x", static_cast<unsigned>(c));
+      out += buffer;
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+// Visitor of a key table (configuration/key_table.hpp) that writes every key with its value as
+// YAML: absolute paths, numbers with 17 significant digits, which give every double back.
+class KeyWriter : public KeyWalker<KeyWriter> {
+ public:
+  template <typename... More>
+  void operator()(const Key& key, double value, const Limits&, const More&...) {
+    line(key, exact_digits(value));
+  }
+  void operator()(const Key& key, int value, const Limits&) { line(key, std::to_string(value)); }
+  void operator()(const Key& key, const Vec3& value, const Limits&, Need = Need::kOptional) {
+    line(key, yaml_list({value.begin(), value.end()}));
+  }
+  void operator()(const Key& key, const std::vector<double>& value, const Limits&) {
+    line(key, yaml_list(value));
+  }
+  void operator()(const Key& key, const std::string& value, Need = Need::kOptional) {
+    line(key, quoted(value));
+  }
+  void operator()(const Key& key, const fs::path& value, Need = Need::kOptional) {
+    line(key, quoted(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
+  }
+  void operator()(const Key& key, const std::optional<fs::path>& value) {
+    if (value) (*this)(key, *value);
+  }
+  void operator()(const Key& key, const std::optional<std::string>& value) {
+    if (value) (*this)(key, *value);
+  }
+  template <typename T, typename W, std::size_t N>
+  void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
+    line(key, quoted(word_of(value, words)));
+  }
+  void open(const Key& key) { line(key, ""); }
+
+  const std::string& text() const { return text_; }
+
+ private:
+  void line(const Key& key, const std::string& value) {
+    text_.append(2 * depth(), ' ').append(key.name).append(value.empty() ? ":" : ": ");
+    text_.append(value).append("\n");
+  }
+  std::string text_;
+};
+
+// Puts what the files of a case hold into their places.
+class Loader {
+ public:
+  explicit Loader(const CaseConfig& config) : config_(config) {}
+
+  // Puts what `read` makes of the file into its place. An error names the key. Nothing happens
+  // after the first error.
+  template <typename Read, typename T>
+  void load(const fs::path& member, const Read& read, std::optional<T>& place) {
+    if (!status_) return;
+    auto result = read(member);
+    if (result) {
+      place = std::move(*result);
+    } else {
+      blame(member, result.error());
+    }
+  }
+  void look_up(const fs::path& member) {
+    if (member.empty() || !status_) return;
+    if (Status found = check_regular_file(member); !found) blame(member, found.error());
+  }
+  const Status& status() const { return status_; }
+
+ private:
+  void blame(const fs::path& member, const Error& error) {
+    status_ = fail(error.code, key_of(config_, member) + ": " + error.message);
+  }
+  const CaseConfig& config_;
+  Status status_;
+};
+
 }  // namespace
 
 Result<CaseConfig> parse_case_config(const std::string& text, const fs::path& file) {
-  YamlDocument document = YamlDocument::parse(text, file);
-  YamlSection root = document.root();
-  CaseConfig config;
-  config.file = fs::absolute(file).lexically_normal();
-  KeyReader reader(root);
-  visit(reader, config);
-  root.done();
-  if (Status status = document.status(); !status) return tl::unexpected(status.error());
-  if (Status status = brainshift::validate(config); !status) {
-    return tl::unexpected(document.locate(status.error()));
-  }
-  config.gravity_direction = unit(config.gravity_direction);
-  config.craniotomy.long_axis_direction = unit(config.craniotomy.long_axis_direction);
+  const auto read = [](YamlSection& root, CaseConfig& config) {
+    KeyReader reader(root);
+    visit(reader, config);
+  };
+  const auto check = [](const CaseConfig& config) { return brainshift::validate(config); };
+  auto config = parse_yaml<CaseConfig>(text, file, read, check);
+  if (!config) return config;
+  config->file = fs::absolute(file).lexically_normal();
+  config->gravity_direction = unit(config->gravity_direction);
+  config->craniotomy.long_axis_direction = unit(config->craniotomy.long_axis_direction);
   return config;
 }
 
 Result<CaseConfig> read_case_config(const fs::path& path) {
-  const Result<std::string> text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
-  return parse_case_config(*text, path);
+  return read_file(path).and_then(
+      [&](const std::string& text) { return parse_case_config(text, path); });
 }
 
 std::string case_config_text(const CaseConfig& config) {
   KeyWriter writer;
   visit(writer, config);
   return writer.text();
+}
+
+Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
+  CaseInputs inputs;
+  inputs.config = config;
+  Loader loader(config);
+  loader.look_up(config.mri);
+  if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
+    loader.load(file->path, read_tet_mesh, inputs.mesh);
+  } else {
+    loader.load(config.brain, read_nifti, inputs.brain);
+  }
+  if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
+    const LabelChoice choice{label->segment.value_or(""), label->label};
+    const auto read = [&](const fs::path& path) { return read_label_map(path, choice); };
+    loader.load(label->path, read, inputs.tumour_labels);
+  } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {
+    loader.load(surface->path, read_surface, inputs.tumour_surface);
+  }
+  if (config.contact.skull_file) {
+    loader.load(*config.contact.skull_file, read_surface, inputs.skull);
+  }
+  if (!loader.status()) return tl::unexpected(loader.status().error());
+  return inputs;
 }
 
 }  // namespace brainshift::io

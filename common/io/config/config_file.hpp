@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Case files (YAML) to plain values and back, by the table of values/case_keys.hpp. Unknown keys
-// are errors. Every message is one line: file, line, key, value, constraint.
+// Case files (YAML) to plain values and back, by the table of configuration/case_keys.hpp, and the
+// files that a case names. Unknown keys are errors. Every message is one line: file, line, key,
+// value, constraint.
 #pragma once
 
 #include <filesystem>
 #include <string>
 
 #include "common/configuration/case_config.hpp"
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::io {
@@ -24,5 +26,9 @@ Result<CaseConfig> parse_case_config(const std::string& text, const std::filesys
 // digits. parse_case_config(case_config_text(c), c.file) gives c again, bit for bit, when c is
 // valid and its two directions have length 1 up to rounding.
 std::string case_config_text(const CaseConfig& config);
+
+// Reads the files that a case names. The MRI, which only pictures need, is just looked up.
+// kNotFound, kUnreadable: the message names key and file.
+Result<CaseInputs> load_case_inputs(const CaseConfig& config);
 
 }  // namespace brainshift::io

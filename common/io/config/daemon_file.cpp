@@ -178,17 +178,11 @@ Status check_metrics_endpoint(const std::string& endpoint, bool allow_remote) {
 Result<DaemonConfig> read_daemon_config(const std::filesystem::path& path) {
   const Result<std::string> text = read_file(path);
   if (!text) return tl::unexpected(text.error());
-  YamlDocument document = YamlDocument::parse(*text, path);
-  YamlSection root = document.root();
-  DaemonConfig config;
-  KeyReader reader(root);
-  visit(reader, config);
-  root.done();
-  if (Status status = document.status(); !status) return tl::unexpected(status.error());
-  if (Status status = validate(config); !status) {
-    return tl::unexpected(document.locate(status.error()));
-  }
-  return config;
+  const auto read = [](YamlSection& root, DaemonConfig& config) {
+    KeyReader reader(root);
+    visit(reader, config);
+  };
+  return parse_yaml<DaemonConfig>(*text, path, read, validate);
 }
 
 std::vector<KeyDocument> daemon_key_documents() {

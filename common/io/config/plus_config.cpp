@@ -31,17 +31,17 @@ Result<PlusTransform> read_transform(const pugi::xml_node& node) {
   frames.from = node.attribute("From").value();
   frames.to = node.attribute("To").value();
   if (frames.from.empty() || frames.to.empty()) {
-    return fail(ErrorCode::kUnreadable, "a Transform without From or To");
+    return unreadable("a Transform without From or To");
   }
   const std::string name = "Transform " + frames.name();
   const auto numbers = parse_numbers<16>(node.attribute("Matrix").value());
-  if (!numbers) return fail(ErrorCode::kUnreadable, name + ": Matrix is not 16 numbers");
+  if (!numbers) return unreadable(name + ": Matrix is not 16 numbers");
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
   const bool scales = tracking::is_image_frame(frames.from) || tracking::is_image_frame(frames.to);
   const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
   if (!usable) {
-    return fail(ErrorCode::kUnreadable, name + ": Matrix " + usable.error().message);
+    return unreadable(name + ": Matrix " + usable.error().message);
   }
   if (scales) {
     transform.link.T_to_from.matrix() = matrix;
@@ -64,8 +64,7 @@ Status read_reconstruction(const pugi::xml_node& node, PlusConfig& config) {
     const auto pixels = [](double value) { return value >= 0.0 && value <= 1e5; };
     if (!origin || !size || !pixels((*origin)[0]) || !pixels((*origin)[1]) || !pixels((*size)[0]) ||
         !pixels((*size)[1])) {
-      return fail(
-          ErrorCode::kUnreadable,
+      return unreadable(
           fmt::format("ClipRectangleOrigin = \"{}\", ClipRectangleSize = \"{}\": must be two "
                       "numbers of pixels each",
                       origin_text, size_text));
@@ -77,8 +76,8 @@ Status read_reconstruction(const pugi::xml_node& node, PlusConfig& config) {
   if (*spacing_text == '\0') return {};
   const auto spacing = parse_numbers<3>(spacing_text);
   if (!spacing || !((*spacing)[0] > 0.0 && (*spacing)[1] > 0.0 && (*spacing)[2] > 0.0)) {
-    return fail(ErrorCode::kUnreadable,
-                fmt::format("OutputSpacing = \"{}\": must be three lengths in mm", spacing_text));
+    return unreadable(
+        fmt::format("OutputSpacing = \"{}\": must be three lengths in mm", spacing_text));
   }
   config.output_spacing_mm = Vec3((*spacing)[0], (*spacing)[1], (*spacing)[2]);
   return {};
@@ -87,26 +86,25 @@ Status read_reconstruction(const pugi::xml_node& node, PlusConfig& config) {
 }  // namespace
 
 Result<PlusConfig> read_plus_config(const std::filesystem::path& path) {
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  pugi::xml_document document;
-  const pugi::xml_parse_result parsed = document.load_buffer(content->data(), content->size());
-  if (!parsed) {
-    return file_error(ErrorCode::kUnreadable, path,
-                      fmt::format("is no XML: {} at byte {}", parsed.description(), parsed.offset));
-  }
-  const pugi::xml_node root = document.child("PlusConfiguration");
-  if (!root) return file_error(ErrorCode::kUnreadable, path, "has no element PlusConfiguration");
-  PlusConfig config;
-  for (const pugi::xml_node& node : root.child("CoordinateDefinitions").children("Transform")) {
-    auto transform = read_transform(node);
-    if (!transform) return file_error(transform.error().code, path, transform.error().message);
-    config.transforms.push_back(std::move(*transform));
-  }
-  if (Status ok = read_reconstruction(root.child("VolumeReconstruction"), config); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
-  }
-  return config;
+  return parse_file(path, [](const std::string& content) -> Result<PlusConfig> {
+    pugi::xml_document document;
+    const pugi::xml_parse_result parsed = document.load_buffer(content.data(), content.size());
+    if (!parsed) {
+      return unreadable(
+          fmt::format("is no XML: {} at byte {}", parsed.description(), parsed.offset));
+    }
+    const pugi::xml_node root = document.child("PlusConfiguration");
+    if (!root) return unreadable("has no element PlusConfiguration");
+    PlusConfig config;
+    for (const pugi::xml_node& node : root.child("CoordinateDefinitions").children("Transform")) {
+      auto transform = read_transform(node);
+      if (!transform) return tl::unexpected(transform.error());
+      config.transforms.push_back(std::move(*transform));
+    }
+    const Status ok = read_reconstruction(root.child("VolumeReconstruction"), config);
+    if (!ok) return tl::unexpected(ok.error());
+    return config;
+  });
 }
 
 }  // namespace brainshift::io

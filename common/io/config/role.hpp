@@ -21,8 +21,22 @@ enum class Role { kViewer, kSource, kOwner, kAdmin };
 inline constexpr std::array kAllRoles = {Role::kViewer, Role::kSource, Role::kOwner, Role::kAdmin};
 
 // Stable lower-case words, used in allow-lists and on the command line.
-std::string_view to_string(Role role);
-std::optional<Role> role_from(std::string_view word);
+constexpr std::string_view to_string(Role role) {
+  switch (role) {
+    case Role::kViewer: return "viewer";
+    case Role::kSource: return "source";
+    case Role::kOwner: return "owner";
+    case Role::kAdmin: return "admin";
+  }
+  return "viewer";
+}
+
+constexpr std::optional<Role> role_from(std::string_view word) {
+  for (const Role role : kAllRoles) {
+    if (to_string(role) == word) return role;
+  }
+  return std::nullopt;
+}
 
 // Whether `role` may do what needs the role `least`.
 constexpr bool includes(Role role, Role least) { return role >= least; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/io/fields/itk_transform_file.hpp"
+#include "common/io/fields/field_files.hpp"
 
 #include <algorithm>
 #include <string>
@@ -15,7 +15,7 @@ constexpr const char* kGroup = "TransformGroup/0";
 constexpr const char* kType = "DisplacementFieldTransform_double_3_3";
 // Numbers in a piece that is compressed on its own: 1 MiB.
 constexpr hsize_t kChunk = hsize_t{1} << 17;
-constexpr unsigned kDeflateLevel = 1;  // as gzip_output.cpp
+constexpr unsigned kDeflateLevel = 1;  // as field_files.cpp
 
 std::vector<double> fixed_parameters(const VoxelGrid& grid) {
   const Mat3 lps_ras = Vec3(-1, -1, 1).asDiagonal();
@@ -77,9 +77,7 @@ void write_parameters(hid_t file, const std::vector<float>& ras_mm) {
 }  // namespace
 
 Status write_itk_transform(const std::filesystem::path& path, const DisplacementField& field) {
-  if (Status ok = validate(field); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
-  }
+  if (Status ok = validate(field); !ok) return file_error(path, ok.error());
   if (path.extension() != ".h5") {
     return file_error(ErrorCode::kUnreadable, path, "must end in .h5");
   }
@@ -98,7 +96,7 @@ Status write_itk_transform(const std::filesystem::path& path, const Displacement
     out.group("TransformGroup");
     out.group(kGroup);
     write_type(file.get());
-    out.list(std::string(kGroup) + "/TransformFixedParameters", fixed_parameters(field.grid));
+    out.write(std::string(kGroup) + "/TransformFixedParameters", fixed_parameters(field.grid));
     write_parameters(file.get(), field.ras_mm);
     check_hdf5(H5Fflush(file.get(), H5F_SCOPE_GLOBAL), "buffers");
     if (!file.close()) throw Hdf5Problem{"buffers"};

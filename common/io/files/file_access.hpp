@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "common/core/error.hpp"
 
@@ -47,5 +48,25 @@ class PendingFile {
 // "PATH: MESSAGE" as an Error.
 tl::unexpected<Error> file_error(ErrorCode code, const std::filesystem::path& path,
                                  const std::string& message);
+inline tl::unexpected<Error> file_error(const std::filesystem::path& path, const Error& error) {
+  return file_error(error.code, path, error.message);
+}
+
+// What is wrong with a file's content, for parsers that do not know the file's name.
+inline tl::unexpected<Error> unreadable(std::string message) {
+  return fail(ErrorCode::kUnreadable, std::move(message));
+}
+
+// What `parse` makes of the bytes of a regular file: a Result. Errors of read_file, and those of
+// `parse` with the path in front.
+template <typename Parse>
+auto parse_file(const std::filesystem::path& path, const Parse& parse)
+    -> decltype(parse(std::string())) {
+  Result<std::string> content = read_file(path);
+  if (!content) return tl::unexpected(content.error());
+  auto parsed = parse(std::move(*content));
+  if (!parsed) return file_error(path, parsed.error());
+  return parsed;
+}
 
 }  // namespace brainshift::io

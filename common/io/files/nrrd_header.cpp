@@ -6,13 +6,10 @@
 #include <algorithm>
 
 #include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
 namespace {
-
-tl::unexpected<Error> unreadable(const std::string& message) {
-  return fail(ErrorCode::kUnreadable, message);
-}
 
 Status store_line(NrrdHeader& header, std::string_view line) {
   const std::size_t colon = line.find(':');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // NumberCursor: walks a file's numbers from front to back, as text or in binary, so that a reader
-// of nested lists stays a plain list of numbers. It throws FormatProblem, which parse_ply and
-// parse_gmsh catch: no exception leaves them.
+// of nested lists stays a plain list of numbers. It throws FormatProblem, which the parsers of mesh
+// files catch (format_problems_as_errors): no exception leaves them.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +18,33 @@ struct FormatProblem {
 };
 
 [[noreturn]] inline void refuse_format(const std::string& message) { throw FormatProblem{message}; }
+
+// What read() returns; kUnreadable for a FormatProblem.
+template <typename Read>
+auto format_problems_as_errors(const Read& read) -> Result<decltype(read())> {
+  try {
+    return read();
+  } catch (const FormatProblem& problem) {
+    return fail(ErrorCode::kUnreadable, problem.message);
+  }
+}
+
+// The other way round: the value, or a FormatProblem with the error's sentence.
+template <typename T>
+T value_of(Result<T> result) {
+  if (!result) refuse_format(result.error().message);
+  return std::move(*result);
+}
+
+// read(), with `place` in front of a FormatProblem's sentence.
+template <typename Read>
+auto placed(const std::string& place, const Read& read) {
+  try {
+    return read();
+  } catch (const FormatProblem& problem) {
+    refuse_format(place + problem.message);
+  }
+}
 
 class NumberCursor {
  public:

@@ -8,9 +8,9 @@
 #include <bit>
 #include <charconv>
 #include <limits>
-#include <map>
 
 #include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -19,16 +19,12 @@ constexpr std::size_t kLargestData = std::size_t{8} << 30;
 // No deflate stream expands further than this (zlib's technical notes: 1032 to 1).
 constexpr std::size_t kLargestRatio = 1040;
 
-tl::unexpected<Error> unreadable_values(const std::string& message) {
-  return fail(ErrorCode::kUnreadable, message);
-}
-
 Result<std::size_t> expected_bytes(const PackedValues& packed, int bytes_per_value) {
   auto bytes = static_cast<std::size_t>(bytes_per_value);
   for (const std::int64_t size : packed.sizes) {
     if (size == 0) return std::size_t{0};
     if (bytes > kLargestData / static_cast<std::size_t>(size)) {
-      return unreadable_values("its sizes promise more than 8 GiB of pixels");
+      return unreadable("its sizes promise more than 8 GiB of pixels");
     }
     bytes *= static_cast<std::size_t>(size);
   }
@@ -38,7 +34,7 @@ Result<std::size_t> expected_bytes(const PackedValues& packed, int bytes_per_val
 // zlib or gzip stream, whichever it is, in pieces: zlib counts its buffers with 32 bits.
 Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
   if (size / kLargestRatio > compressed.size()) {
-    return unreadable_values(
+    return unreadable(
         fmt::format("its sizes promise {} bytes of pixels: {} compressed ones are too few", size,
                     compressed.size()));
   }
@@ -65,11 +61,10 @@ Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
     if (out > 0) written += out - stream.avail_out;
   }
   inflateEnd(&stream);
-  if (written > size) return unreadable_values("its pixels are more than its sizes say");
+  if (written > size) return unreadable("its pixels are more than its sizes say");
   if (state != Z_STREAM_END || written != size) {
-    return unreadable_values(fmt::format("its compressed pixels are {}: {} of {} bytes",
-                                         state == Z_DATA_ERROR ? "damaged" : "truncated", written,
-                                         size));
+    return unreadable(fmt::format("its compressed pixels are {}: {} of {} bytes",
+                                  state == Z_DATA_ERROR ? "damaged" : "truncated", written, size));
   }
   return expanded;
 }
@@ -77,46 +72,23 @@ Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
 }  // namespace
 
 std::string element_type(const std::string& name) {
-  static const std::map<std::string, std::string> kNames = {{"MET_CHAR", "int8"},
-                                                            {"MET_UCHAR", "uint8"},
-                                                            {"MET_SHORT", "int16"},
-                                                            {"MET_USHORT", "uint16"},
-                                                            {"MET_INT", "int32"},
-                                                            {"MET_UINT", "uint32"},
-                                                            {"MET_FLOAT", "float"},
-                                                            {"MET_DOUBLE", "double"},
-                                                            {"signed char", "int8"},
-                                                            {"int8_t", "int8"},
-                                                            {"uchar", "uint8"},
-                                                            {"unsigned char", "uint8"},
-                                                            {"uint8_t", "uint8"},
-                                                            {"short", "int16"},
-                                                            {"short int", "int16"},
-                                                            {"int16_t", "int16"},
-                                                            {"signed short", "int16"},
-                                                            {"signed short int", "int16"},
-                                                            {"ushort", "uint16"},
-                                                            {"unsigned short", "uint16"},
-                                                            {"uint16_t", "uint16"},
-                                                            {"unsigned short int", "uint16"},
-                                                            {"int", "int32"},
-                                                            {"signed int", "int32"},
-                                                            {"int32_t", "int32"},
-                                                            {"uint", "uint32"},
-                                                            {"unsigned int", "uint32"},
-                                                            {"uint32_t", "uint32"},
-                                                            {"longlong", "int64"},
-                                                            {"long long", "int64"},
-                                                            {"long long int", "int64"},
-                                                            {"signed long long", "int64"},
-                                                            {"signed long long int", "int64"},
-                                                            {"int64_t", "int64"},
-                                                            {"ulonglong", "uint64"},
-                                                            {"unsigned long long", "uint64"},
-                                                            {"unsigned long long int", "uint64"},
-                                                            {"uint64_t", "uint64"}};
-  const auto found = kNames.find(name);
-  return found == kNames.end() ? name : found->second;
+  // The first of each row is ours.
+  static const std::vector<std::vector<std::string>> kNames = {
+      {"int8", "MET_CHAR", "signed char", "int8_t"},
+      {"uint8", "MET_UCHAR", "uchar", "unsigned char", "uint8_t"},
+      {"int16", "MET_SHORT", "short", "short int", "int16_t", "signed short", "signed short int"},
+      {"uint16", "MET_USHORT", "ushort", "unsigned short", "uint16_t", "unsigned short int"},
+      {"int32", "MET_INT", "int", "signed int", "int32_t"},
+      {"uint32", "MET_UINT", "uint", "unsigned int", "uint32_t"},
+      {"int64", "longlong", "long long", "long long int", "signed long long",
+       "signed long long int", "int64_t"},
+      {"uint64", "ulonglong", "unsigned long long", "unsigned long long int", "uint64_t"},
+      {"float", "MET_FLOAT"},
+      {"double", "MET_DOUBLE"}};
+  for (const auto& names : kNames) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return names.front();
+  }
+  return name;
 }
 
 Result<std::vector<std::int64_t>> parse_sizes(const std::string& field, std::string_view text,
@@ -126,7 +98,7 @@ Result<std::vector<std::int64_t>> parse_sizes(const std::string& field, std::str
     std::int64_t size = 0;
     const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), size);
     if (error != std::errc() || size < least || size > kLargestSize) {
-      return unreadable_values(
+      return unreadable(
           fmt::format("{} = {}: every size must be {} to {}", field, text, least, kLargestSize));
     }
     sizes.push_back(size);
@@ -145,7 +117,7 @@ Result<std::string> unpack(const PackedValues& packed, int bytes_per_value) {
     values = std::move(*expanded);
   } else {
     if (packed.data.size() != *size) {
-      return unreadable_values(
+      return unreadable(
           fmt::format("holds {} bytes of pixels, its sizes say {}", packed.data.size(), *size));
     }
     values = std::string(packed.data);

@@ -21,6 +21,12 @@ struct YamlDocument::State {
   std::map<std::string, int> line_of_key;  // 1-based
   std::string problem;
 
+  // 0: unknown.
+  int line_of(const std::string& full_key) const {
+    const auto found = line_of_key.find(full_key);
+    return found == line_of_key.end() ? 0 : found->second;
+  }
+
   void fail_at(int line, const std::string& message) {
     if (!problem.empty()) return;
     problem = file.string();
@@ -170,9 +176,9 @@ Status YamlDocument::status() const {
 
 Error YamlDocument::locate(const Error& error) const {
   const std::string key = error.message.substr(0, error.message.find_first_of(" :["));
-  const auto found = state_->line_of_key.find(key);
+  const int line = state_->line_of(key);
   std::string place = state_->file.string();
-  if (found != state_->line_of_key.end()) place.append(":").append(std::to_string(found->second));
+  if (line > 0) place.append(":").append(std::to_string(line));
   return {error.code, place + ": " + error.message};
 }
 
@@ -200,13 +206,13 @@ std::string YamlSection::full_key(const std::string& key) const {
 }
 
 int YamlSection::line_of_key(const std::string& key) const {
-  const auto found = state_->line_of_key.find(full_key(key));
-  return found == state_->line_of_key.end() ? 0 : found->second;
+  return state_->line_of(full_key(key));
 }
 
-int YamlSection::own_line() const {
-  const auto found = state_->line_of_key.find(prefix_);
-  return found == state_->line_of_key.end() ? 0 : found->second;
+int YamlSection::own_line() const { return state_->line_of(prefix_); }
+
+void YamlSection::refuse_value(const std::string& key, const Node& node, const std::string& what) {
+  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node.yaml) + ": " + what);
 }
 
 bool YamlSection::has(const std::string& key) {
@@ -232,8 +238,7 @@ YamlSection YamlSection::section(const std::string& key, Presence presence) {
   // A heading whose keys are all commented out.
   if (value && value->yaml.IsNull()) value = nullptr;
   if (value && !value->yaml.IsMap()) {
-    state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(value->yaml) +
-                                          ": must be a section of keys and values");
+    refuse_value(key, *value, "must be a section of keys and values");
     value = nullptr;
   }
   return YamlSection(*state_, value, full_key(key));
@@ -255,25 +260,19 @@ std::string YamlSection::one_of(const std::vector<std::string>& keys, Presence p
 void YamlSection::number(const std::string& key, double& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node || parse_finite(node->yaml, value)) return;
-  state_->fail_at(line_of_key(key),
-                  full_key(key) + " = " + shown_value(node->yaml) + ": must be a finite number");
+  refuse_value(key, *node, "must be a finite number");
 }
 
 void YamlSection::integer(const std::string& key, int& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node || parse_scalar(node->yaml, value)) return;
-  state_->fail_at(line_of_key(key),
-                  full_key(key) + " = " + shown_value(node->yaml) + ": must be an integer");
+  refuse_value(key, *node, "must be an integer");
 }
 
 void YamlSection::text(const std::string& key, std::string& value, Presence presence) {
   const std::shared_ptr<Node> node = take(key, presence);
   if (!node) return;
-  if (!node->yaml.IsScalar()) {
-    state_->fail_at(line_of_key(key),
-                    full_key(key) + " = " + shown_value(node->yaml) + ": must be text");
-    return;
-  }
+  if (!node->yaml.IsScalar()) return refuse_value(key, *node, "must be text");
   value = node->yaml.Scalar();
 }
 
@@ -281,14 +280,12 @@ void YamlSection::choice(const std::string& key, std::string& value,
                          const std::vector<std::string>& words) {
   std::string word = value;
   text(key, word);
-  for (const std::string& known : words) {
-    if (word != known) continue;
+  if (std::find(words.begin(), words.end(), word) != words.end()) {
     value = word;
     return;
   }
-  std::string list;
-  for (const std::string& known : words) list += (list.empty() ? "" : ", ") + known;
-  state_->fail_at(line_of_key(key), full_key(key) + " = " + word + ": must be one of " + list);
+  state_->fail_at(line_of_key(key),
+                  full_key(key) + " = " + word + ": must be one of " + joined(words));
 }
 
 void YamlSection::fail(const std::string& key, const std::string& what) {
@@ -316,12 +313,8 @@ void YamlSection::vector3(const std::string& key, Vec3& value, Presence presence
   Vec3 parsed = Vec3::Zero();
   bool ok = node->yaml.IsSequence() && node->yaml.size() == 3;
   for (int i = 0; ok && i < 3; ++i) ok = parse_finite(node->yaml[i], parsed[i]);
-  if (ok) {
-    value = parsed;
-    return;
-  }
-  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node->yaml) +
-                                        ": must be a list of three finite numbers");
+  if (!ok) return refuse_value(key, *node, "must be a list of three finite numbers");
+  value = parsed;
 }
 
 void YamlSection::numbers(const std::string& key, std::vector<double>& value, Presence presence) {
@@ -330,12 +323,8 @@ void YamlSection::numbers(const std::string& key, std::vector<double>& value, Pr
   bool ok = node->yaml.IsSequence();
   std::vector<double> parsed(ok ? node->yaml.size() : 0);
   for (std::size_t i = 0; ok && i < parsed.size(); ++i) ok = parse_finite(node->yaml[i], parsed[i]);
-  if (ok) {
-    value = std::move(parsed);
-    return;
-  }
-  state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node->yaml) +
-                                        ": must be a list of finite numbers");
+  if (!ok) return refuse_value(key, *node, "must be a list of finite numbers");
+  value = std::move(parsed);
 }
 
 std::vector<std::string> YamlSection::names() {

@@ -23,6 +23,7 @@
 namespace brainshift::io {
 
 enum class Presence { kOptional, kRequired };
+inline constexpr Presence kRequired = Presence::kRequired;
 
 class YamlSection;
 
@@ -87,11 +88,28 @@ class YamlSection {
   // belongs).
   int line_of_key(const std::string& key) const;
   int own_line() const;
+  // "KEY = VALUE: what".
+  void refuse_value(const std::string& key, const Node& node, const std::string& what);
 
   YamlDocument::State* state_;
   std::shared_ptr<Node> node_;  // null: section is absent
   std::string prefix_;
   std::vector<std::string> known_;
 };
+
+// A value out of a document: read(root, value) takes every key, and check(value) judges the value
+// when each key is good by itself. A message of check begins with a key and gets file and line.
+template <typename T, typename Read, typename Check>
+Result<T> parse_yaml(const std::string& text, const std::filesystem::path& file, const Read& read,
+                     const Check& check) {
+  YamlDocument document = YamlDocument::parse(text, file);
+  YamlSection root = document.root();
+  T value;
+  read(root, value);
+  root.done();
+  if (Status status = document.status(); !status) return tl::unexpected(status.error());
+  if (Status status = check(value); !status) return tl::unexpected(document.locate(status.error()));
+  return value;
+}
 
 }  // namespace brainshift::io

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Both encodings hold the same numbers in the same order, so one reader walks both and only the
 // cursor differs.
-#include "common/io/geometry/gmsh_file.hpp"
-
-#include <limits>
 #include <map>
 #include <unordered_map>
 
 #include "common/io/files/binary_codec.hpp"
 #include "common/io/files/number_cursor.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -92,10 +90,9 @@ class Reader {
   void add_node(std::int64_t tag, double x, double y, double z);
   // Takes over the element's vertices if it is a tetrahedron or a triangle.
   void add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical);
-  // Indices of nodes given by tags.
-  template <int Vertices>
-  Eigen::Matrix<int, Vertices, Eigen::Dynamic> cells(const std::vector<std::int64_t>& tags,
-                                                     const std::string& name) const;
+  // Indices of nodes given by tags, of cells with so many vertices.
+  std::vector<int> indices(const std::vector<std::int64_t>& tags, std::size_t vertices,
+                           const std::string& cell) const;
   GroupedMesh mesh() const;
 
   Cursor cursor_;
@@ -284,35 +281,31 @@ void Reader::read_elements_4() {
   }
 }
 
-template <int Vertices>
-Eigen::Matrix<int, Vertices, Eigen::Dynamic> Reader::cells(const std::vector<std::int64_t>& tags,
-                                                           const std::string& name) const {
-  Eigen::Matrix<int, Vertices, Eigen::Dynamic> indices(
-      Vertices, static_cast<Eigen::Index>(tags.size() / Vertices));
+std::vector<int> Reader::indices(const std::vector<std::int64_t>& tags, std::size_t vertices,
+                                 const std::string& cell) const {
+  std::vector<int> found_indices;
   for (std::size_t i = 0; i < tags.size(); ++i) {
     const auto found = index_of_tag_.find(tags[i]);
     if (found == index_of_tag_.end()) {
-      refuse_format(name + " " + std::to_string(i / Vertices) + " has node " +
+      refuse_format(cell + " " + std::to_string(i / vertices) + " has node " +
                     std::to_string(tags[i]) + ", which does not exist");
     }
-    indices.data()[i] = found->second;
+    found_indices.push_back(found->second);
   }
-  return indices;
+  return found_indices;
 }
 
 GroupedMesh Reader::mesh() const {
   if (tets_.empty()) refuse_format("has no 4-node tetrahedron");
   GroupedMesh result;
   TetMesh& mesh = result.mesh;
-  mesh.nodes = Eigen::Map<const Points>(coordinates_.data(), 3,
-                                        static_cast<Eigen::Index>(coordinates_.size() / 3));
-  mesh.tets = cells<4>(tets_, "tetrahedron");
+  mesh.nodes = as_columns<3>(coordinates_);
+  mesh.tets = as_columns<4>(indices(tets_, 4, "tetrahedron"));
   // A file without physical groups has no labels.
-  for (const int label : labels_) {
-    if (label != 0) mesh.labels = labels_;
-    if (label != 0) break;
-  }
-  result.triangles = cells<3>(triangles_, "triangle");
+  const bool labelled =
+      std::any_of(labels_.begin(), labels_.end(), [](int label) { return label != 0; });
+  if (labelled) mesh.labels = labels_;
+  result.triangles = as_columns<3>(indices(triangles_, 3, "triangle"));
   result.triangle_labels = triangle_labels_;
   result.volume_names = volume_names_;
   result.surface_names = surface_names_;
@@ -348,11 +341,7 @@ GroupedMesh Reader::read() {
 }  // namespace
 
 Result<GroupedMesh> parse_gmsh(const std::string& content) {
-  try {
-    return Reader(content).read();
-  } catch (const FormatProblem& problem) {
-    return fail(ErrorCode::kUnreadable, problem.message);
-  }
+  return format_problems_as_errors([&] { return Reader(content).read(); });
 }
 
 }  // namespace brainshift::io

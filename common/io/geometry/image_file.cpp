@@ -1,23 +1,216 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/geometry/image_file.hpp"
 
+#include <fmt/format.h>
 #include <nifti2_io.h>
 
 #include <algorithm>
-#include <cassert>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <sstream>
+#include <optional>
+#include <string_view>
 
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/nifti_header.hpp"
 
 namespace brainshift::io {
 namespace {
 
 namespace fs = std::filesystem;
+
+// ---- voxels as numbers ----
+
+using Converter = void (*)(const void* data, double slope, double intercept,
+                           std::vector<float>& values);
+
+template <typename T>
+void convert(const void* data, double slope, double intercept, std::vector<float>& values) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    T value;
+    std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
+    values[i] = static_cast<float>(static_cast<double>(value) * slope + intercept);
+  }
+}
+
+// Null for a type that is neither integer nor real.
+Converter converter_of(int datatype) {
+  switch (datatype) {
+    case DT_UINT8: return convert<std::uint8_t>;
+    case DT_INT8: return convert<std::int8_t>;
+    case DT_UINT16: return convert<std::uint16_t>;
+    case DT_INT16: return convert<std::int16_t>;
+    case DT_UINT32: return convert<std::uint32_t>;
+    case DT_INT32: return convert<std::int32_t>;
+    case DT_UINT64: return convert<std::uint64_t>;
+    case DT_INT64: return convert<std::int64_t>;
+    case DT_FLOAT32: return convert<float>;
+    case DT_FLOAT64: return convert<double>;
+    case DT_FLOAT128: return convert<long double>;
+    default: return nullptr;
+  }
+}
+
+// ---- the header, checked before libnifti sees the file ----
+//
+// libnifti prints complaints of its own to stderr, takes an impossible place of the voxels for
+// another one, and trusts the sizes of what lies before it. With a file that passes it does none of
+// that.
+
+struct Free {
+  void operator()(char* text) const { std::free(text); }
+};
+
+// deflate cannot do better than about 1032:1, so a header that promises more than this lies.
+constexpr double kLargestExpansion = 1040.0;
+constexpr std::size_t kNifti1Bytes = 348;
+constexpr std::size_t kNifti2Bytes = 540;
+constexpr int kMostVoxelsAlong = 32767;
+
+// Byte offsets of nifti1.h and nifti2.h.
+struct Layout {
+  std::size_t dim, datatype, vox_offset;
+};
+constexpr Layout kNifti1 = {40, 70, 108};
+constexpr Layout kNifti2 = {16, 12, 168};
+
+// What is looked at, in this machine's byte order.
+struct PackedHeader {
+  bool single_file = false;  // voxels lie behind the header, else in a second file
+  std::size_t bytes = 0;     // of the header
+  std::array<std::int64_t, 8> dim{};
+  int datatype = 0;
+  double vox_offset = 0.0;
+};
+
+template <typename T>
+T field(std::string_view bytes, std::size_t offset, bool swapped) {
+  std::array<char, sizeof(T)> raw{};
+  bytes.copy(raw.data(), sizeof(T), offset);
+  if (swapped) std::reverse(raw.begin(), raw.end());
+  T value;
+  std::memcpy(&value, raw.data(), sizeof(T));
+  return value;
+}
+
+template <typename Dim, typename Offset>
+void fill(PackedHeader& header, std::string_view bytes, const Layout& layout, bool swapped) {
+  for (std::size_t i = 0; i < header.dim.size(); ++i) {
+    header.dim[i] = field<Dim>(bytes, layout.dim + i * sizeof(Dim), swapped);
+  }
+  header.datatype = field<std::int16_t>(bytes, layout.datatype, swapped);
+  header.vox_offset = static_cast<double>(field<Offset>(bytes, layout.vox_offset, swapped));
+}
+
+// The bytes of the largest header, or all that there are.
+std::string first_bytes(const fs::path& path) {
+  znzFile file = znzopen(path.c_str(), "rb", nifti_is_gzfile(path.c_str()));
+  if (znz_isnull(file)) return {};
+  std::string bytes(kNifti2Bytes, '\0');
+  bytes.resize(std::min(bytes.size(), znzread(bytes.data(), 1, bytes.size(), file)));
+  znzclose(file);
+  return bytes;
+}
+
+// None: no NIfTI header. An ANALYZE 7.5 header has no magic, and no affine.
+std::optional<PackedHeader> parse(std::string_view bytes) {
+  const auto has_magic = [&](std::size_t offset, std::string_view magic) {
+    return bytes.substr(offset, magic.size()) == magic;
+  };
+  if (bytes.size() < kNifti1Bytes) return std::nullopt;
+  PackedHeader header;
+  for (const bool swapped : {false, true}) {
+    const auto size = static_cast<std::size_t>(field<std::uint32_t>(bytes, 0, swapped));
+    header.bytes = size;
+    using namespace std::string_view_literals;
+    if (size == kNifti1Bytes && (has_magic(344, "n+1\0"sv) || has_magic(344, "ni1\0"sv))) {
+      header.single_file = bytes[345] == '+';
+      fill<std::int16_t, float>(header, bytes, kNifti1, swapped);
+      return header;
+    }
+    if (size == kNifti2Bytes && bytes.size() == kNifti2Bytes &&
+        (has_magic(4, "n+2\0\r\n\032\n"sv) || has_magic(4, "ni2\0\r\n\032\n"sv))) {
+      header.single_file = bytes[5] == '+';
+      fill<std::int64_t, std::int64_t>(header, bytes, kNifti2, swapped);
+      return header;
+    }
+  }
+  return std::nullopt;
+}
+
+// Each of the following: what is wrong, or nothing.
+
+std::string check_dimensions(const PackedHeader& header) {
+  const std::int64_t dimensions = header.dim[0];
+  for (std::size_t axis = 1; axis <= 3; ++axis) {
+    if (dimensions < 3 || dimensions > 7 || header.dim[axis] < 1) {
+      return fmt::format("is not a 3-D image ({} dimensions)", dimensions);
+    }
+    if (header.dim[axis] > kMostVoxelsAlong) {
+      return fmt::format("dimension {} has {} voxels: must be at most {}", axis, header.dim[axis],
+                         kMostVoxelsAlong);
+    }
+  }
+  for (std::size_t axis = 4; axis <= static_cast<std::size_t>(dimensions); ++axis) {
+    if (header.dim[axis] > 1) {
+      return fmt::format("dimension {} has {} entries: only one volume can be read", axis,
+                         header.dim[axis]);
+    }
+  }
+  return {};
+}
+
+std::string check_datatype(const PackedHeader& header) {
+  if (converter_of(header.datatype) != nullptr) return {};
+  return fmt::format("voxel type {} ({}) is not supported: must be integer or real",
+                     nifti_datatype_string(header.datatype), header.datatype);
+}
+
+std::string check_offset(const PackedHeader& header) {
+  // libnifti keeps it as an int.
+  constexpr double kMost = std::numeric_limits<int>::max();
+  const double least = header.single_file ? static_cast<double>(header.bytes) : 0.0;
+  const double offset = header.vox_offset;
+  const bool whole = offset == std::floor(offset);  // false for NaN
+  if (offset == 0.0 || (whole && offset >= least && offset <= kMost)) return {};
+  return fmt::format("vox_offset is {}: must be a whole number, {} to {:.0f}", offset, least,
+                     kMost);
+}
+
+// Bytes that a regular file can hold at most once unpacked: its size, or for a .gz file what
+// deflate can make of it.
+double largest_content(const fs::path& path) {
+  const auto size = static_cast<double>(fs::file_size(path));
+  return nifti_is_gzfile(path.c_str()) != 0 ? size * kLargestExpansion : size;
+}
+
+// Ok for a NIfTI-1 or -2 header (.nii, .nii.gz, .hdr) of one 3-D volume of integer or real voxels:
+// 1 to 32767 voxels along each axis, one entry along every other, and vox_offset a whole number
+// behind the header (0 in a single file: right behind it) and inside the file. Precondition: `path`
+// is a regular file.
+Status check_nifti_header(const fs::path& path) {
+  const std::unique_ptr<char, Free> header_file(nifti_findhdrname(path.c_str()));
+  const auto header = header_file ? parse(first_bytes(header_file.get())) : std::nullopt;
+  if (!header) return file_error(ErrorCode::kUnreadable, path, "is not a NIfTI image");
+  for (const auto check : {check_dimensions, check_datatype, check_offset}) {
+    if (const std::string problem = check(*header); !problem.empty()) {
+      return file_error(ErrorCode::kUnreadable, path, problem);
+    }
+  }
+  const double most = header->single_file ? largest_content(header_file.get()) : header->vox_offset;
+  if (header->vox_offset > most) {
+    return file_error(
+        ErrorCode::kUnreadable, path,
+        fmt::format("vox_offset is {}: beyond the end of the file", header->vox_offset));
+  }
+  return {};
+}
+
+// ---- what libnifti reads ----
 
 struct FreeImage {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
@@ -53,35 +246,6 @@ Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path
   return affine;
 }
 
-template <typename T>
-void convert(const void* data, double slope, double intercept, std::vector<float>& values) {
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    T value;
-    std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
-    values[i] = static_cast<float>(static_cast<double>(value) * slope + intercept);
-  }
-}
-
-void convert_any(const nifti_image& image, double slope, double intercept,
-                 std::vector<float>& values) {
-  const void* data = image.data;
-  switch (image.datatype) {
-    case DT_UINT8: return convert<std::uint8_t>(data, slope, intercept, values);
-    case DT_INT8: return convert<std::int8_t>(data, slope, intercept, values);
-    case DT_UINT16: return convert<std::uint16_t>(data, slope, intercept, values);
-    case DT_INT16: return convert<std::int16_t>(data, slope, intercept, values);
-    case DT_UINT32: return convert<std::uint32_t>(data, slope, intercept, values);
-    case DT_INT32: return convert<std::int32_t>(data, slope, intercept, values);
-    case DT_UINT64: return convert<std::uint64_t>(data, slope, intercept, values);
-    case DT_INT64: return convert<std::int64_t>(data, slope, intercept, values);
-    case DT_FLOAT32: return convert<float>(data, slope, intercept, values);
-    case DT_FLOAT64: return convert<double>(data, slope, intercept, values);
-    case DT_FLOAT128: return convert<long double>(data, slope, intercept, values);
-    default: assert(false && "check_nifti_header() admitted an unknown type");
-  }
-}
-
 // Before any voxel is read: the file is large enough for them.
 Status check_voxels(const nifti_image& image, const fs::path& path) {
   // The data may lie in a second file (.img); libnifti has looked it up.
@@ -90,11 +254,9 @@ Status check_voxels(const nifti_image& image, const fs::path& path) {
   const double needed = static_cast<double>(image.nvox) * image.nbyper;
   const double available = largest_content(data_file) - static_cast<double>(image.iname_offset);
   if (needed > available) {
-    std::ostringstream text;
-    text << std::fixed;
-    text.precision(0);
-    text << "is truncated: the header promises " << needed << " bytes of voxels";
-    return file_error(ErrorCode::kUnreadable, path, text.str());
+    return file_error(
+        ErrorCode::kUnreadable, path,
+        fmt::format("is truncated: the header promises {:.0f} bytes of voxels", needed));
   }
   return {};
 }
@@ -131,7 +293,7 @@ Result<VoxelImage> read_nifti(const fs::path& path) {
   }
   result.T_ras_voxel = *affine;
   result.values.resize(result.num_voxels());
-  convert_any(*image, slope, intercept, result.values);
+  converter_of(image->datatype)(image->data, slope, intercept, result.values);
   return result;
 }
 

@@ -26,10 +26,6 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kMostLabelsAlong = 32767;  // as NIfTI's
 constexpr int kMostSegments = 10000;
 
-tl::unexpected<Error> unreadable_labels(const std::string& message) {
-  return fail(ErrorCode::kUnreadable, message);
-}
-
 struct Segment {
   std::string name;
   int label = 1;
@@ -65,7 +61,7 @@ Result<ValueType> value_type(const std::string& name) {
       {"float", {4, value_at<float>}},        {"double", {8, value_at<double>}}};
   const auto found = kTypes.find(name);
   if (found == kTypes.end()) {
-    return unreadable_labels("type = " + name + ": must be an integer or floating-point type");
+    return unreadable("type = " + name + ": must be an integer or floating-point type");
   }
   return found->second;
 }
@@ -76,10 +72,10 @@ Result<Vec3> signs_to_ras(const NrrdHeader& header) {
   if (space == "left-posterior-superior" || space == "LPS") return Vec3(-1, -1, 1);
   if (space == "right-anterior-superior" || space == "RAS") return Vec3(1, 1, 1);
   if (space == "left-anterior-superior" || space == "LAS") return Vec3(-1, 1, 1);
-  if (space.empty()) return unreadable_labels("space is missing, so its place is unknown");
-  return unreadable_labels("space = " + space +
-                           ": must be left-posterior-superior, right-anterior-superior or "
-                           "left-anterior-superior");
+  if (space.empty()) return unreadable("space is missing, so its place is unknown");
+  return unreadable("space = " + space +
+                    ": must be left-posterior-superior, right-anterior-superior or "
+                    "left-anterior-superior");
 }
 
 // "(1,2,3)" off the front of `rest`; "none" gives no vector. False: neither.
@@ -108,7 +104,7 @@ Status check_units(const NrrdHeader& header) {
   for (std::size_t at = units.find('"'); at != std::string::npos; at = units.find('"', at + 1)) {
     const std::size_t end = units.find('"', at + 1);
     if (end == std::string::npos || units.substr(at + 1, end - at - 1) != "mm") {
-      return unreadable_labels("space units = " + units + ": must be mm");
+      return unreadable("space units = " + units + ": must be mm");
     }
     at = end;
   }
@@ -122,8 +118,8 @@ Result<Axes> read_space(const NrrdHeader& header, VoxelImage& image) {
   if (Status ok = check_units(header); !ok) return tl::unexpected(ok.error());
   const std::string text = header.field("space directions"), where = header.field("space origin");
   if (text.empty() || where.empty()) {
-    return unreadable_labels(std::string(text.empty() ? "space directions" : "space origin") +
-                             " is missing, so its place is unknown");
+    return unreadable(std::string(text.empty() ? "space directions" : "space origin") +
+                      " is missing, so its place is unknown");
   }
   std::string_view rest = text;
   Axes axes;
@@ -133,8 +129,8 @@ Result<Axes> read_space(const NrrdHeader& header, VoxelImage& image) {
     const bool read = take_vector(rest, direction);
     const bool too_many = direction ? spatial == 3 : axes.list.has_value();
     if (!read || too_many) {
-      return unreadable_labels("space directions = " + text +
-                               ": must be three vectors (x,y,z), and none for an axis of layers");
+      return unreadable("space directions = " + text +
+                        ": must be three vectors (x,y,z), and none for an axis of layers");
     }
     if (direction) {
       image.T_ras_voxel.linear().col(static_cast<Eigen::Index>(spatial)) =
@@ -147,17 +143,17 @@ Result<Axes> read_space(const NrrdHeader& header, VoxelImage& image) {
   std::optional<Vec3> origin;
   std::string_view origin_text = where;
   if (spatial != 3 || !trimmed(rest).empty()) {
-    return unreadable_labels(fmt::format("space directions = {}: does not agree with {} sizes",
-                                         text, header.sizes.size()));
+    return unreadable(fmt::format("space directions = {}: does not agree with {} sizes", text,
+                                  header.sizes.size()));
   }
   if (!take_vector(origin_text, origin) || !origin || !trimmed(origin_text).empty()) {
-    return unreadable_labels("space origin = " + where + ": must be a point (x,y,z)");
+    return unreadable("space origin = " + where + ": must be a point (x,y,z)");
   }
   image.T_ras_voxel.translation() = signs->cwiseProduct(*origin);
   const Mat3 linear = image.T_ras_voxel.linear();
   // Relative to the voxel's edges, so that the test does not depend on the voxel's size.
   if (!(std::abs(linear.determinant()) > 1e-6 * linear.colwise().norm().prod())) {
-    return unreadable_labels("space directions = " + text + ": are linearly dependent");
+    return unreadable("space directions = " + text + ": are linearly dependent");
   }
   return axes;
 }
@@ -166,8 +162,8 @@ Status read_dims(const NrrdHeader& header, const Axes& axes, VoxelImage& image) 
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t size = header.sizes[axes.space[i]];
     if (size < 1 || size > kMostLabelsAlong) {
-      return unreadable_labels(fmt::format("sizes = {}: must be 1 to {} voxels along each axis",
-                                           header.field("sizes"), kMostLabelsAlong));
+      return unreadable(fmt::format("sizes = {}: must be 1 to {} voxels along each axis",
+                                    header.field("sizes"), kMostLabelsAlong));
     }
     image.dims[i] = static_cast<int>(size);
   }
@@ -181,7 +177,7 @@ Result<int> whole_number(const NrrdHeader& header, const std::string& key, int o
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);
   if (error != std::errc() || stop != end || value < 0) {
-    return unreadable_labels(fmt::format("{} = {}: must be a whole number from 0", key, text));
+    return unreadable(fmt::format("{} = {}: must be a whole number from 0", key, text));
   }
   return value;
 }
@@ -261,7 +257,7 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
   const auto header = parse_nrrd_header(content);
   if (!header) return tl::unexpected(header.error());
   if (header->sizes.size() != 3 && header->sizes.size() != 4) {
-    return unreadable_labels(
+    return unreadable(
         fmt::format("has {} axes: must be a volume, or layers of one", header->sizes.size()));
   }
   const auto type = value_type(header->element_type);
@@ -277,11 +273,11 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
   const std::int64_t layer = *segment ? (*segment)->layer : 0;
   const std::int64_t layers = axes->list ? header->sizes[*axes->list] : 1;
   if (*segment && layer >= layers) {
-    return unreadable_labels(fmt::format("segment \"{}\" is in layer {}: the file has {}",
-                                         (*segment)->name, layer, layers));
+    return unreadable(fmt::format("segment \"{}\" is in layer {}: the file has {}",
+                                  (*segment)->name, layer, layers));
   }
   if (!*segment && layers != 1) {
-    return unreadable_labels(fmt::format("has {} layers and names no segments", layers));
+    return unreadable(fmt::format("has {} layers and names no segments", layers));
   }
   const auto bytes = unpack(*header, type->bytes);
   if (!bytes) return tl::unexpected(bytes.error());
@@ -302,11 +298,7 @@ Result<VoxelImage> read_label_map(const fs::path& path, const LabelChoice& choic
     return file_error(ErrorCode::kInvalidArgument, path,
                       "names no segments: only a .seg.nrrd file does");
   }
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  auto image = parse_nrrd(*content, choice);
-  if (!image) return file_error(image.error().code, path, image.error().message);
-  return image;
+  return parse_file(path, [&](const std::string& content) { return parse_nrrd(content, choice); });
 }
 
 }  // namespace brainshift::io

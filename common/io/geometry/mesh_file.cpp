@@ -5,12 +5,7 @@
 #include <cctype>
 
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/gmsh_file.hpp"
-#include "common/io/geometry/obj_file.hpp"
-#include "common/io/geometry/ply_file.hpp"
-#include "common/io/geometry/stl_file.hpp"
-#include "common/io/geometry/vtk_xml_file.hpp"
-#include "common/io/geometry/xyz_file.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -26,17 +21,15 @@ template <typename Cells>
 Status check_indices(const Points& points, const Cells& cells, const std::string& cell_name) {
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     if (!points.col(i).allFinite()) {
-      return fail(ErrorCode::kUnreadable,
-                  "node " + std::to_string(i) + " has a coordinate that is not finite");
+      return unreadable("node " + std::to_string(i) + " has a coordinate that is not finite");
     }
   }
   for (Eigen::Index c = 0; c < cells.cols(); ++c) {
     for (Eigen::Index k = 0; k < cells.rows(); ++k) {
       if (cells(k, c) >= 0 && cells(k, c) < points.cols()) continue;
-      return fail(ErrorCode::kUnreadable, cell_name + " " + std::to_string(c) + " has node index " +
-                                              std::to_string(cells(k, c)) +
-                                              ": must be between 0 and " +
-                                              std::to_string(points.cols() - 1));
+      return unreadable(cell_name + " " + std::to_string(c) + " has node index " +
+                        std::to_string(cells(k, c)) + ": must be between 0 and " +
+                        std::to_string(points.cols() - 1));
     }
   }
   return {};
@@ -75,72 +68,59 @@ GroupedMesh without_unreferenced_nodes(const GroupedMesh& grouped) {
   return kept;
 }
 
-Result<MeshWithFields> load_vtu(const fs::path& path, bool with_fields) {
-  Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  Result<MeshWithFields> read = parse_vtu(std::move(*content), with_fields);
-  if (!read) return file_error(read.error().code, path, read.error().message);
-  if (Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron"); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
-  }
-  return read;
+// Of the extension's format; possibly without triangles.
+Result<TriangleSurface> parse_surface(const std::string& extension, std::string content) {
+  if (extension == ".stl") return parse_stl(content);
+  if (extension == ".ply") return parse_ply(content);
+  if (extension == ".obj") return parse_obj(content);
+  if (extension == ".vtp") return parse_vtp(std::move(content));
+  return unreadable("unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
 }
 
-Result<GroupedMesh> load_grouped(const fs::path& path) {
+Result<TriangleSurface> load_surface(const fs::path& path, bool points) {
+  return parse_file(path, [&](std::string content) {
+    auto surface =
+        points ? parse_xyz(content) : parse_surface(lower_extension(path), std::move(content));
+    if (!surface) return surface;
+    const Status ok = check_indices(surface->vertices, surface->triangles, "triangle");
+    if (!ok) surface = tl::unexpected(ok.error());
+    return surface;
+  });
+}
+
+}  // namespace
+
+Result<GroupedMesh> read_grouped_mesh(const fs::path& path) {
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
   const std::string extension = lower_extension(path);
   if (extension != ".msh" && extension != ".vtu") {
     return file_error(ErrorCode::kUnreadable, path,
                       "unknown mesh format '" + extension + "': must be .msh or .vtu");
   }
-  Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  Result<GroupedMesh> read =
-      extension == ".msh" ? parse_gmsh(*content) : parse_grouped_vtu(std::move(*content));
-  if (!read) return file_error(read.error().code, path, read.error().message);
-  const Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron").and_then([&] {
-    return check_indices(read->mesh.nodes, read->triangles, "triangle");
+  return parse_file(path, [&](std::string content) -> Result<GroupedMesh> {
+    auto read = extension == ".msh" ? parse_gmsh(content) : parse_grouped_vtu(std::move(content));
+    if (!read) return read;
+    const Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron").and_then([&] {
+      return check_indices(read->mesh.nodes, read->triangles, "triangle");
+    });
+    if (!ok) return tl::unexpected(ok.error());
+    return without_unreferenced_nodes(*read);
   });
-  if (!ok) return file_error(ok.error().code, path, ok.error().message);
-  return without_unreferenced_nodes(*read);
 }
-
-Result<TriangleSurface> checked(Result<TriangleSurface> surface, const fs::path& path) {
-  if (!surface) return file_error(surface.error().code, path, surface.error().message);
-  if (Status ok = check_indices(surface->vertices, surface->triangles, "triangle"); !ok) {
-    return file_error(ok.error().code, path, ok.error().message);
-  }
-  return surface;
-}
-
-Result<TriangleSurface> load_points(const fs::path& path) {
-  const Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  return checked(parse_xyz(*content), path);
-}
-
-// Possibly without triangles.
-Result<TriangleSurface> load_surface(const fs::path& path) {
-  Result<std::string> content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  const std::string extension = lower_extension(path);
-  if (extension == ".stl") return checked(parse_stl(*content), path);
-  if (extension == ".ply") return checked(parse_ply(*content), path);
-  if (extension == ".obj") return checked(parse_obj(*content), path);
-  if (extension == ".vtp") return checked(parse_vtp(std::move(*content)), path);
-  return file_error(ErrorCode::kUnreadable, path,
-                    "unknown surface format '" + extension + "': must be .stl, .ply, .obj or .vtp");
-}
-
-}  // namespace
 
 Result<TetMesh> read_tet_mesh(const fs::path& path) {
-  return load_grouped(path).map([](GroupedMesh&& read) { return std::move(read.mesh); });
+  return read_grouped_mesh(path).map([](GroupedMesh&& read) { return std::move(read.mesh); });
 }
 
-Result<GroupedMesh> read_grouped_mesh(const fs::path& path) { return load_grouped(path); }
-
-Result<MeshWithFields> read_vtu(const fs::path& path) { return load_vtu(path, true); }
+Result<MeshWithFields> read_vtu(const fs::path& path) {
+  return parse_file(path, [](std::string content) {
+    Result<MeshWithFields> read = parse_vtu(std::move(content));
+    if (!read) return read;
+    const Status ok = check_indices(read->mesh.nodes, read->mesh.tets, "tetrahedron");
+    if (!ok) read = tl::unexpected(ok.error());
+    return read;
+  });
+}
 
 std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -150,14 +130,14 @@ std::string lower_extension(const fs::path& path) {
 }
 
 Result<TriangleSurface> read_surface_or_points(const fs::path& path) {
-  auto surface = is_point_format(lower_extension(path)) ? load_points(path) : load_surface(path);
+  auto surface = load_surface(path, is_point_format(lower_extension(path)));
   if (surface && surface->num_vertices() == 0)
     return file_error(ErrorCode::kUnreadable, path, "has no point");
   return surface;
 }
 
 Result<TriangleSurface> read_surface(const fs::path& path) {
-  auto surface = load_surface(path);
+  auto surface = load_surface(path, false);
   if (surface && surface->num_triangles() == 0)
     return file_error(ErrorCode::kUnreadable, path, "has no triangle");
   return surface;

@@ -44,8 +44,8 @@ Result<std::vector<double>> pose_numbers(std::string_view rest, const std::strin
     double number = 0.0;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (error != std::errc() || stop != word.data() + word.size()) {
-      return fail(ErrorCode::kUnreadable, fmt::format("\"{}\" is no number of a 4 x 4 matrix {}",
-                                                      word.substr(0, 30), name));
+      return unreadable(
+          fmt::format("\"{}\" is no number of a 4 x 4 matrix {}", word.substr(0, 30), name));
     }
     numbers.push_back(number);
     rest.remove_prefix(end);
@@ -69,21 +69,20 @@ std::string without_comments(std::string_view text) {
 
 Result<RigidTransform> read_pose(const std::filesystem::path& path, const std::string& name,
                                  double tolerance) {
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  const auto numbers = pose_numbers(without_comments(*content), name);
-  if (!numbers) return file_error(numbers.error().code, path, numbers.error().message);
-  if (numbers->size() != 16) {
-    return file_error(ErrorCode::kUnreadable, path,
-                      fmt::format("{} has {} numbers: must have 16, a 4 x 4 matrix row by row",
-                                  name, numbers->size()));
-  }
-  const Eigen::Matrix4d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
-  if (Status rigid = check_rigid(matrix, tolerance); !rigid) {
-    return file_error(ErrorCode::kUnreadable, path, name + " " + rigid.error().message);
-  }
-  return nearest_rigid(matrix);
+  return parse_file(path, [&](const std::string& content) -> Result<RigidTransform> {
+    const auto numbers = pose_numbers(without_comments(content), name);
+    if (!numbers) return tl::unexpected(numbers.error());
+    if (numbers->size() != 16) {
+      return unreadable(fmt::format("{} has {} numbers: must have 16, a 4 x 4 matrix row by row",
+                                    name, numbers->size()));
+    }
+    const Eigen::Matrix4d matrix =
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
+    if (Status rigid = check_rigid(matrix, tolerance); !rigid) {
+      return unreadable(name + " " + rigid.error().message);
+    }
+    return nearest_rigid(matrix);
+  });
 }
 
 Status write_pose(const std::filesystem::path& path, const std::string& name,

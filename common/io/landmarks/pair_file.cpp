@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <optional>
 #include <set>
 #include <sstream>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/landmarks/point_file.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -19,10 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kMagic = "MNI Tag Point File";
-
-tl::unexpected<Error> unreadable(const std::string& message) {
-  return fail(ErrorCode::kUnreadable, message);
-}
 
 struct Columns {
   std::optional<std::size_t> name;
@@ -187,7 +183,56 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
   return pairs;
 }
 
+// ---- two lists by name ----
+
+using Index = std::map<std::string, std::size_t>;
+
+Result<Index> index_of(const NamedPoints& list, const char* what) {
+  Index index;
+  for (std::size_t i = 0; i < list.names.size(); ++i) {
+    if (list.names[i].empty()) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("point {} of the {} list has no name", i + 1, what));
+    }
+    if (!index.emplace(list.names[i], i).second) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("the {} list has two points called \"{}\"", what, list.names[i]));
+    }
+  }
+  return index;
+}
+
 }  // namespace
+
+void NamedPairs::add(std::string name, const Vec3& one, const Vec3& other) {
+  names.push_back(std::move(name));
+  first.push_back(one);
+  second.push_back(other);
+}
+
+Result<NamedPairs> pair_by_name(const NamedPoints& first, const NamedPoints& second) {
+  const auto ones = index_of(first, "first"), others = index_of(second, "second");
+  if (!ones) return tl::unexpected(ones.error());
+  if (!others) return tl::unexpected(others.error());
+  NamedPairs pairs;
+  for (std::size_t i = 0; i < first.names.size(); ++i) {
+    const std::string& name = first.names[i];
+    const auto found = others->find(name);
+    if (found == others->end()) {
+      pairs.left_out.push_back(name);
+    } else {
+      pairs.add(name, first.points[i], second.points[found->second]);
+    }
+  }
+  for (const std::string& name : second.names) {
+    if (ones->count(name) == 0) pairs.left_out.push_back(name);
+  }
+  if (pairs.names.empty()) {
+    return fail(ErrorCode::kEmptySet, fmt::format("no name is in both lists of {} and {} points",
+                                                  first.names.size(), second.names.size()));
+  }
+  return pairs;
+}
 
 Result<NamedPairs> read_pairs(const fs::path& path) {
   const std::string extension = path.extension().string();
@@ -199,11 +244,9 @@ Result<NamedPairs> read_pairs(const fs::path& path) {
   if (extension != ".csv" && extension != ".tag") {
     return file_error(ErrorCode::kUnreadable, path, "landmarks must be a .csv or .tag file");
   }
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  auto pairs = extension == ".csv" ? parse_csv(*content) : parse_tag_file(*content);
-  if (!pairs) return file_error(pairs.error().code, path, pairs.error().message);
-  return pairs;
+  return parse_file(path, [&](const std::string& content) {
+    return extension == ".csv" ? parse_csv(content) : parse_tag_file(content);
+  });
 }
 
 Result<NamedPairs> read_pairs(const fs::path& before, const fs::path& during) {

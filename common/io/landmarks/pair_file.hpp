@@ -15,11 +15,28 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
-#include "common/io/landmarks/named_points.hpp"
+#include "common/core/types.hpp"
+#include "common/io/landmarks/point_file.hpp"
 
 namespace brainshift::io {
+
+// Pair i: first[i] and second[i], called names[i].
+struct NamedPairs {
+  std::vector<std::string> names;
+  std::vector<Vec3> first, second;  // mm
+  // Names that only one of two lists has, in the order of the lists.
+  std::vector<std::string> left_out = {};
+
+  void add(std::string name, const Vec3& one, const Vec3& other);
+};
+
+// In the order of `first`. kInvalidArgument, naming the list ("first", "second") and the point: a
+// point without a name, a name that a list has twice. kEmptySet: no name is in both.
+Result<NamedPairs> pair_by_name(const NamedPoints& first, const NamedPoints& second);
 
 // first: before surgery, second: during it. kNotFound; kUnreadable or kEmptySet naming the file,
 // the line and what is wrong there; for two files also the errors of pair_by_name, naming both

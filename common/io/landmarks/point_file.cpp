@@ -2,18 +2,153 @@
 #include "common/io/landmarks/point_file.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <sstream>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/landmarks/markups_file.hpp"
 
 namespace brainshift::io {
 namespace {
+
+using nlohmann::json;
+
+// ---- 3D Slicer's point lists ----
+
+constexpr std::string_view kSlicersColumns =
+    "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
+
+Result<Vec3> signs_to_ras(const std::string& system) {
+  if (system == "RAS" || system == "0") return Vec3(1, 1, 1);
+  if (system == "LPS" || system == "1") return Vec3(-1, -1, 1);
+  if (system.empty()) {
+    return unreadable("coordinateSystem is missing: its points could be mirrored");
+  }
+  return unreadable("coordinateSystem = " + system.substr(0, 30) + ": must be LPS or RAS");
+}
+
+// A text, or the text of a number; empty for anything else.
+std::string text_of(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return {};
+  if (found->is_string()) return found->get<std::string>();
+  return found->is_number() ? found->dump() : std::string("(no text)");
+}
+
+Status check_units(const json& markup) {
+  const auto units = markup.find("coordinateUnits");
+  if (units == markup.end()) return {};
+  const auto is_mm = [](const json& unit) { return unit == "mm"; };
+  const bool good =
+      units->is_array() ? std::all_of(units->begin(), units->end(), is_mm) : is_mm(*units);
+  if (good) return {};
+  return unreadable("coordinateUnits = " + units->dump().substr(0, 30) + ": must be mm");
+}
+
+Status take_point(const json& point, std::size_t number, const Vec3& signs, NamedPoints& list) {
+  if (!point.is_object()) return unreadable(fmt::format("control point {} is no object", number));
+  const std::string status = text_of(point, "positionStatus");
+  if (!status.empty() && status != "defined") return {};
+  const auto position = point.find("position");
+  const bool three = position != point.end() && position->is_array() && position->size() == 3;
+  Vec3 value;
+  for (std::size_t i = 0; three && i < 3; ++i) {
+    const json& number_at = (*position)[i];
+    value[static_cast<Eigen::Index>(i)] =
+        number_at.is_number() ? number_at.get<double>() : std::nan("");
+  }
+  if (!three || !value.allFinite()) {
+    return unreadable(
+        fmt::format("control point {}: position must be three finite numbers", number));
+  }
+  list.add(text_of(point, "label"), signs.cwiseProduct(value));
+  return {};
+}
+
+std::size_t column_of(const std::vector<std::string>& columns, const char* name) {
+  return static_cast<std::size_t>(std::find(columns.begin(), columns.end(), name) -
+                                  columns.begin());
+}
+
+// The value behind "NAME =" in a comment line, if it is one of that name.
+std::optional<std::string> setting(std::string_view line, std::string_view name) {
+  line.remove_prefix(1);  // '#'
+  line = trimmed(line);
+  if (!line.starts_with(name)) return std::nullopt;
+  line = trimmed(line.substr(name.size()));
+  if (!line.starts_with('=')) return std::nullopt;
+  return std::string(trimmed(line.substr(1)));
+}
+
+Result<NamedPoints> parse_markups_json(const std::string& content) {
+  const json document = json::parse(content, nullptr, false);
+  const auto list = document.is_object() ? document.find("markups") : document.end();
+  if (!document.is_object() || list == document.end() || !list->is_array()) {
+    return unreadable("must be JSON with a list \"markups\"");
+  }
+  if (list->size() != 1 || !(*list)[0].is_object()) {
+    return unreadable(fmt::format("holds {} markups: must hold one point list", list->size()));
+  }
+  const json& markup = (*list)[0];
+  if (const std::string type = text_of(markup, "type"); type != "Fiducial") {
+    return unreadable("type = " + type.substr(0, 30) + ": must be Fiducial, a point list");
+  }
+  const auto signs = signs_to_ras(text_of(markup, "coordinateSystem"));
+  if (!signs) return tl::unexpected(signs.error());
+  if (Status ok = check_units(markup); !ok) return tl::unexpected(ok.error());
+  const auto points = markup.find("controlPoints");
+  if (points == markup.end() || !points->is_array()) {
+    return unreadable("has no list \"controlPoints\"");
+  }
+  NamedPoints named;
+  std::size_t number = 0;
+  for (const json& point : *points) {
+    if (Status ok = take_point(point, ++number, *signs, named); !ok) {
+      return tl::unexpected(ok.error());
+    }
+  }
+  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point that was placed");
+  return named;
+}
+
+Result<NamedPoints> parse_fcsv(const std::string& content) {
+  std::istringstream lines(content);
+  std::string line, system;
+  std::vector<std::string> columns = quoted_cells_of(kSlicersColumns);
+  NamedPoints named;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const std::string_view text = trimmed(line);
+    if (text.empty()) continue;
+    if (text.front() == '#') {
+      if (const auto value = setting(text, "CoordinateSystem")) system = *value;
+      if (const auto value = setting(text, "columns")) columns = quoted_cells_of(*value);
+      continue;
+    }
+    const auto signs = signs_to_ras(system);
+    if (!signs) return tl::unexpected(signs.error());
+    const auto cells = quoted_cells_of(text);
+    const auto cell = [&](const char* name) {
+      const std::size_t at = column_of(columns, name);
+      return at < cells.size() && at < columns.size() ? cells[at] : std::string();
+    };
+    Vec3 point;
+    if (!parse_number(cell("x"), point[0]) || !parse_number(cell("y"), point[1]) ||
+        !parse_number(cell("z"), point[2])) {
+      return unreadable(fmt::format("line {}: \"{}\" must have finite numbers as x, y and z",
+                                    number, text.substr(0, 60)));
+    }
+    named.add(cell("label"), signs->cwiseProduct(point));
+  }
+  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point");
+  return named;
+}
+
+// ---- tables ----
 
 // Where in a row the name and the coordinates are.
 struct PointColumnsOf {
@@ -75,10 +210,10 @@ Result<NamedPoints> parse_points(const std::string& content) {
     }
     first = false;
     if (!columns) {
-      return fail(ErrorCode::kUnreadable,
-                  fmt::format("line {}: \"{}\" must be x,y,z or name,x,y,z, or a heading with the "
-                              "columns x,y,z or r,a,s or l,p,s",
-                              number, text.substr(0, 60)));
+      return unreadable(
+          fmt::format("line {}: \"{}\" must be x,y,z or name,x,y,z, or a heading with the "
+                      "columns x,y,z or r,a,s or l,p,s",
+                      number, text.substr(0, 60)));
     }
     if (heading) continue;
     const auto cell = [&](std::size_t at) { return at < cells.size() ? cells[at] : std::string(); };
@@ -87,10 +222,9 @@ Result<NamedPoints> parse_points(const std::string& content) {
                          parse_number(cell(columns->at[1]), point[1]) &&
                          parse_number(cell(columns->at[2]), point[2]);
     if (!numbers || (expected != 0 && cells.size() != expected)) {
-      return fail(ErrorCode::kUnreadable,
-                  fmt::format("line {}: \"{}\" must have three finite numbers{}", number,
-                              text.substr(0, 60),
-                              expected == 4 ? " behind a name, as the rows above" : ""));
+      return unreadable(fmt::format("line {}: \"{}\" must have three finite numbers{}", number,
+                                    text.substr(0, 60),
+                                    expected == 4 ? " behind a name, as the rows above" : ""));
     }
     named.add(columns->name ? cell(*columns->name) : std::string(),
               columns->signs.cwiseProduct(point));
@@ -101,19 +235,34 @@ Result<NamedPoints> parse_points(const std::string& content) {
 
 }  // namespace
 
+void NamedPoints::add(std::string name, const Vec3& point) {
+  names.push_back(std::move(name));
+  points.push_back(point);
+}
+
+bool NamedPoints::all_named() const {
+  return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.empty(); });
+}
+
+Points columns_of(const std::vector<Vec3>& points) {
+  Points matrix(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
+  }
+  return matrix;
+}
+
 Result<NamedPoints> read_points(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".json" && extension != ".fcsv" && extension != ".csv") {
     return file_error(ErrorCode::kUnreadable, path,
                       "points must be a .mrk.json, .fcsv or .csv file");
   }
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  auto named = extension == ".json"   ? parse_markups_json(*content)
-               : extension == ".fcsv" ? parse_fcsv(*content)
-                                      : parse_points(*content);
-  if (!named) return file_error(named.error().code, path, named.error().message);
-  return named;
+  return parse_file(path, [&](const std::string& content) {
+    return extension == ".json"   ? parse_markups_json(content)
+           : extension == ".fcsv" ? parse_fcsv(content)
+                                  : parse_points(content);
+  });
 }
 
 }  // namespace brainshift::io

@@ -2,11 +2,115 @@
 #include "common/io/model/condensed_layout.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <cstring>
 
-#include "common/io/model/condensed_check.hpp"
+#include "common/core/thread_team.hpp"
 
 namespace brainshift::io {
 namespace {
+
+// ---- whether operators can be used with a model ----
+
+// A number is finite unless all bits of its exponent are set. Whole-number arithmetic without
+// branches, so that the compiler vectorises it: the loop runs as fast as memory.
+bool finite(const float* values, std::size_t count) {
+  constexpr std::uint32_t kExponent = 0x7f800000u;
+  std::uint32_t bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t bits;
+    std::memcpy(&bits, values + i, sizeof bits);
+    bad |= (bits & kExponent) == kExponent ? 1u : 0u;
+  }
+  return bad == 0;
+}
+bool finite(const double* values, std::size_t count) {
+  constexpr std::uint64_t kExponent = 0x7ff0000000000000u;
+  std::uint64_t bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint64_t bits;
+    std::memcpy(&bits, values + i, sizeof bits);
+    bad |= (bits & kExponent) == kExponent ? 1u : 0u;
+  }
+  return bad == 0;
+}
+
+constexpr Eigen::Index kWorthThreads = 1 << 20;
+
+template <typename Matrix>
+bool all_finite(const Matrix& values) {
+  std::atomic<bool> good{true};
+  ThreadTeam team(values.size() < kWorthThreads ? 1 : 0);
+  team.split(static_cast<long>(values.size()), [&](long begin, long end) {
+    if (!finite(values.data() + begin, static_cast<std::size_t>(end - begin))) good = false;
+  });
+  return good;
+}
+
+// Collects the first thing that is wrong.
+class Check {
+ public:
+  explicit Check(Boundary boundary)
+      : group_("condensed/" + std::string(to_string(boundary)) + "/") {}
+
+  void that(bool holds, const std::string& name, const std::string& problem) {
+    if (!holds && !found_) found_ = group_ + name + " " + problem;
+  }
+  template <typename Matrix>
+  void matrix(const std::string& name, const Matrix& values, Eigen::Index rows,
+              Eigen::Index columns) {
+    // Without slaves or control nodes, an array has no numbers and any shape is as good.
+    const bool fits = (values.rows() == rows && values.cols() == columns) ||
+                      (values.size() == 0 && rows * columns == 0);
+    that(fits, name,
+         "is " + shape(values.rows(), values.cols()) + ": must be " + shape(rows, columns));
+    if constexpr (!std::is_same_v<typename Matrix::Scalar, int>) {
+      if (!found_) that(all_finite(values), name, "holds a number that is not finite");
+    }
+  }
+  // Distinct indices below `limit`.
+  void nodes(const std::string& name, const std::vector<NodeIndex>& list, Eigen::Index limit,
+             bool sorted) {
+    std::vector<NodeIndex> ordered = list;
+    if (!sorted) std::sort(ordered.begin(), ordered.end());
+    const bool rises = std::adjacent_find(ordered.begin(), ordered.end(),
+                                          [](int a, int b) { return a >= b; }) == ordered.end();
+    that(rises, name, sorted ? "is not sorted" : "names a node twice");
+    that(!rises || ordered.empty() || (ordered.front() >= 0 && ordered.back() < limit), name,
+         "names a node that the mesh does not have");
+  }
+  std::optional<std::string> found() const { return found_; }
+
+ private:
+  static std::string shape(Eigen::Index rows, Eigen::Index columns) {
+    return std::to_string(rows) + " x " + std::to_string(columns);
+  }
+  std::string group_;
+  std::optional<std::string> found_;
+};
+
+bool symmetric(const Eigen::MatrixXd& matrix) {
+  constexpr Eigen::Index kTile = 64;  // both tiles stay in the cache
+  const Eigen::Index n = matrix.cols();
+  for (Eigen::Index j = 0; j < n; j += kTile) {
+    for (Eigen::Index i = 0; i <= j; i += kTile) {
+      const Eigen::Index rows = std::min(kTile, n - i), columns = std::min(kTile, n - j);
+      if (matrix.block(i, j, rows, columns) != matrix.block(j, i, columns, rows).transpose()) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool are_slaves(std::vector<NodeIndex> list, std::vector<NodeIndex> slaves) {
+  std::sort(list.begin(), list.end());
+  std::sort(slaves.begin(), slaves.end());
+  return std::includes(slaves.begin(), slaves.end(), list.begin(), list.end());
+}
+
+// ---- the group in the file ----
 
 std::string group_of(Boundary boundary) { return "condensed/" + std::string(to_string(boundary)); }
 
@@ -51,66 +155,62 @@ std::string modes_of(int part) {
   return std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
 }
 
-void write_compact(Hdf5Writer& out, const std::string& group, const CompactParts& parts) {
-  const std::string in_group = group + "/";
-  out.group(group);
-  out.list(in_group + "steps", parts.steps);
-  out.list(in_group + "order", parts.order);
-  out.matrix(in_group + "blocks", parts.blocks);
-  out.list(in_group + "wide_basis", parts.wide_basis);
-  out.list(in_group + "basis", parts.basis);
-  out.list(in_group + "basis_scales", parts.basis_scales);
-  out.list(in_group + "lengths", parts.lengths);
-  out.list(in_group + "longs", parts.longs);
-  out.list(in_group + "words", parts.words);
-  out.list(in_group + "bytes", parts.bytes);
+// array(name, values) for each array, in the order of the file.
+template <typename Array, typename Parts>
+void visit_compact(const Array& array, Parts& parts) {
+  array("steps", parts.steps);
+  array("order", parts.order);
+  array("blocks", parts.blocks);
+  array("wide_basis", parts.wide_basis);
+  array("basis", parts.basis);
+  array("basis_scales", parts.basis_scales);
+  array("lengths", parts.lengths);
+  array("longs", parts.longs);
+  array("words", parts.words);
+  array("bytes", parts.bytes);
 }
 
-// The numbers are read to where they stay.
-CompactColumns read_compact(const Hdf5Reader& in, const std::string& group) {
-  const std::string in_group = group + "/";
-  CompactParts parts;
-  in.matrix(in_group + "steps", parts.steps);
-  parts.order = in.list<int>(in_group + "order");
-  in.matrix(in_group + "blocks", parts.blocks);
-  in.matrix(in_group + "wide_basis", parts.wide_basis);
-  in.matrix(in_group + "basis", parts.basis);
-  in.matrix(in_group + "basis_scales", parts.basis_scales);
-  in.matrix(in_group + "lengths", parts.lengths);
-  in.matrix(in_group + "longs", parts.longs);
-  in.matrix(in_group + "words", parts.words);
-  in.matrix(in_group + "bytes", parts.bytes);
-  auto columns = CompactColumns::from_parts(std::move(parts));
-  if (!columns) throw Hdf5Problem{in_group + columns.error().message};
-  return std::move(*columns);
+// The same for those behind the responses and the compliance.
+template <typename Array, typename Operators>
+void visit_operators(const Array& array, Operators& operators) {
+  array("slave_modes", operators.slave_modes);
+  array("slave_normals", operators.slave_normals);
+  array("initial_penetration_mm", operators.initial_penetration_mm);
+  array("slaves", operators.slaves);
+  array("region", operators.region);
+  array("region_responses", operators.region_responses);
+  array("control", operators.control);
+  array("truncated_variance_mm2", operators.truncated_variance_mm2);
+  array("control_neighbours", operators.control_neighbours);
+  array("control_weights", operators.control_weights);
+}
+
+// Arrays into a group, or out of it; the numbers are read to where they stay.
+auto into(Hdf5Writer& out, const std::string& group) {
+  return [&out, group](const char* name, const auto& values) {
+    out.write(group + "/" + name, values);
+  };
+}
+auto out_of(const Hdf5Reader& in, const std::string& group) {
+  return [&in, group](const char* name, auto& values) { in.read(group + "/" + name, values); };
 }
 
 void write_one(Hdf5Writer& out, const CondensedOperators& operators) {
   const std::string group = group_of(operators.boundary);
-  const std::string in_group = group + "/";
   out.group(group);
   out.attribute(group, "model_id", operators.model_id);
   for (int part = 0; part < kPriorParts; ++part) {
     out.number(group, modes_of(part), operators.part_columns[static_cast<std::size_t>(part)]);
   }
   out.number(group, "prepare_s", operators.prepare_s);
-  write_compact(out, in_group + "responses", operators.responses.parts());
-  out.list(in_group + "compliance_lower", packed_lower(operators.compliance));
-  out.matrix(in_group + "slave_modes", operators.slave_modes);
-  out.matrix(in_group + "slave_normals", operators.slave_normals);
-  out.list(in_group + "initial_penetration_mm", operators.initial_penetration_mm);
-  out.list(in_group + "slaves", operators.slaves);
-  out.list(in_group + "region", operators.region);
-  out.matrix(in_group + "region_responses", operators.region_responses);
-  out.list(in_group + "control", operators.control);
-  out.matrix(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
-  out.matrix(in_group + "control_neighbours", operators.control_neighbours);
-  out.matrix(in_group + "control_weights", operators.control_weights);
+  out.group(group + "/responses");
+  visit_compact(into(out, group + "/responses"), operators.responses.parts());
+  out.write(group + "/compliance_lower", packed_lower(operators.compliance));
+  visit_operators(into(out, group), operators);
 }
 
 CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
   const std::string group = group_of(boundary);
-  const std::string in_group = group + "/";
   CondensedOperators operators;
   operators.boundary = boundary;
   operators.model_id = in.attribute_text(group, "model_id");
@@ -118,23 +218,71 @@ CondensedOperators read_one(const Hdf5Reader& in, Boundary boundary) {
     operators.part_columns[static_cast<std::size_t>(part)] = in.number<int>(group, modes_of(part));
   }
   operators.prepare_s = in.number<double>(group, "prepare_s");
-  operators.responses = read_compact(in, in_group + "responses");
-  operators.slaves = in.list<int>(in_group + "slaves");
-  read_symmetric(in, in_group + "compliance_lower",
+  CompactParts parts;
+  visit_compact(out_of(in, group + "/responses"), parts);
+  auto columns = CompactColumns::from_parts(std::move(parts));
+  if (!columns) throw Hdf5Problem{group + "/responses/" + columns.error().message};
+  operators.responses = std::move(*columns);
+  visit_operators(out_of(in, group), operators);
+  read_symmetric(in, group + "/compliance_lower",
                  static_cast<Eigen::Index>(operators.slaves.size()), operators.compliance);
-  in.matrix(in_group + "slave_modes", operators.slave_modes);
-  in.matrix(in_group + "slave_normals", operators.slave_normals);
-  in.matrix(in_group + "initial_penetration_mm", operators.initial_penetration_mm);
-  operators.region = in.list<int>(in_group + "region");
-  in.matrix(in_group + "region_responses", operators.region_responses);
-  operators.control = in.list<int>(in_group + "control");
-  in.matrix(in_group + "truncated_variance_mm2", operators.truncated_variance_mm2);
-  in.matrix(in_group + "control_neighbours", operators.control_neighbours);
-  in.matrix(in_group + "control_weights", operators.control_weights);
   return operators;
 }
 
 }  // namespace
+
+std::optional<std::string> incompatibility_of(const CondensedOperators& operators,
+                                              const BrainModel& model) {
+  const Eigen::Index n = model.mesh.num_nodes();
+  const auto s = static_cast<Eigen::Index>(operators.slaves.size());
+  const Eigen::Index r = operators.responses.num_columns() - s;
+  const auto c = static_cast<Eigen::Index>(operators.control.size());
+  Check check(operators.boundary);
+  check.that(operators.model_id == model.model_id, "model_id",
+             "is '" + operators.model_id + "': the operators belong to another model than '" +
+                 model.model_id + "'");
+  check.nodes("slaves", operators.slaves, n, false);
+  check.that(are_slaves(operators.slaves, model.slaves), "slaves",
+             "names a node that is no slave of the model");
+  check.nodes("region", operators.region, n, true);
+  check.nodes("control", operators.control, n, true);
+  check.that(
+      operators.num_nodes() == n, "responses",
+      "has " + std::to_string(operators.num_nodes()) + " nodes: must have " + std::to_string(n));
+  check.that(
+      r >= 0, "responses",
+      "has " + std::to_string(r + s) + " columns: fewer than the " + std::to_string(s) + " slaves");
+  check.matrix("region_responses", operators.region_responses,
+               3 * static_cast<Eigen::Index>(operators.region.size()), r + s);
+  int left = static_cast<int>(r);
+  for (int part = 0; part < kPriorParts; ++part) {
+    const int columns = operators.part_columns[static_cast<std::size_t>(part)];
+    const std::string name = std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
+    check.that(columns >= 0 && columns <= left, name,
+               "= " + std::to_string(columns) + ": must be from 0 to the " + std::to_string(left) +
+                   " modes that the parts before it leave");
+    left -= std::max(0, columns);
+  }
+  check.that(left == 0, "responses",
+             "has " + std::to_string(left) + " columns of no part of the prior");
+  check.matrix("compliance", operators.compliance, s, s);
+  if (!check.found()) {
+    check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
+  }
+  check.that(
+      operators.num_modes() == r, "slave_modes",
+      "has " + std::to_string(operators.num_modes()) + " columns: must have " + std::to_string(r));
+  check.matrix("slave_modes", operators.slave_modes, s, r);
+  check.matrix("slave_normals", operators.slave_normals, 3, s);
+  check.matrix("initial_penetration_mm", operators.initial_penetration_mm, s, 1);
+  check.matrix("truncated_variance_mm2", operators.truncated_variance_mm2, c, kRemainders);
+  check.matrix("control_neighbours", operators.control_neighbours, 4, c == 0 ? 0 : n);
+  check.matrix("control_weights", operators.control_weights, 4, c == 0 ? 0 : n);
+  const auto& neighbours = operators.control_neighbours;
+  check.that(neighbours.size() == 0 || (neighbours.minCoeff() >= 0 && neighbours.maxCoeff() < c),
+             "control_neighbours", "names a control node that does not exist");
+  return check.found();
+}
 
 void write_condensed(Hdf5Writer& out, const std::vector<CondensedOperators>& operators) {
   out.group("condensed");

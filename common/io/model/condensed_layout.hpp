@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The /condensed group of a model file (model_file.hpp lists it). Private to the room. Errors are
-// thrown as Hdf5Problem.
+// The /condensed group of a model file (model_file.hpp lists it). Private to the room. Errors of
+// the file are thrown as Hdf5Problem.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/io/model/hdf5_access.hpp"
@@ -10,6 +12,12 @@
 #include "common/values/brain_model.hpp"
 
 namespace brainshift::io {
+
+// What makes the operators unusable: another model_id, shapes or indices that do not fit, numbers
+// that are not finite, a compliance that is not symmetric. One sentence without a file name;
+// nothing if they fit.
+std::optional<std::string> incompatibility_of(const CondensedOperators& operators,
+                                              const BrainModel& model);
 
 void write_condensed(Hdf5Writer& out, const std::vector<CondensedOperators>& operators);
 // Those of the wanted boundary conditions that the file has. Throws also when they do not fit the

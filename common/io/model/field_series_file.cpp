@@ -57,8 +57,8 @@ Result<FieldSeriesFile> FieldSeriesFile::create(const fs::path& path, const Brai
     out.attribute("/", "case_id", model.case_id);
     out.attribute("/", "model_id", model.model_id);
     out.group("mesh");
-    out.matrix("mesh/nodes_mm", model.mesh.nodes);
-    out.matrix("mesh/tets", model.mesh.tets);
+    out.write("mesh/nodes_mm", model.mesh.nodes);
+    out.write("mesh/tets", model.mesh.tets);
     out.group("updates");
   });
   if (!written) return tl::unexpected(written.error());
@@ -70,11 +70,9 @@ Status FieldSeriesFile::add(const Update& update, double time_s) {
     const Estimate& estimate = update.estimate;
     const std::string group = fmt::format("updates/{:06}", update.sequence);
     out.group(group);
-    const Eigen::Matrix3Xf displacement = estimate.displacement.cast<float>();
-    out.matrix(group + "/displacement_mm", displacement);
+    out.write(group + "/displacement_mm", Eigen::Matrix3Xf(estimate.displacement.cast<float>()));
     if (estimate.sd_mm.size() > 0) {
-      const Eigen::VectorXf sd = estimate.sd_mm.cast<float>();
-      out.list(group + "/sd_mm", sd);
+      out.write(group + "/sd_mm", Eigen::VectorXf(estimate.sd_mm.cast<float>()));
     }
     out.number(group, "time_s", time_s);
     out.number(group, "sequence", update.sequence);

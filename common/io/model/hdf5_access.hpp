@@ -72,47 +72,22 @@ inline void check_hdf5(herr_t status, const std::string& what) {
 }
 
 // The types of a number in memory and in the file.
+struct Hdf5Types {
+  hid_t memory, file;
+};
+inline Hdf5Types hdf5_types(double) { return {H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE}; }
+inline Hdf5Types hdf5_types(float) { return {H5T_NATIVE_FLOAT, H5T_IEEE_F32LE}; }
+inline Hdf5Types hdf5_types(int) { return {H5T_NATIVE_INT, H5T_STD_I32LE}; }
+inline Hdf5Types hdf5_types(std::int16_t) { return {H5T_NATIVE_INT16, H5T_STD_I16LE}; }
+inline Hdf5Types hdf5_types(std::int8_t) { return {H5T_NATIVE_INT8, H5T_STD_I8LE}; }
+inline Hdf5Types hdf5_types(char) { return {H5T_NATIVE_UCHAR, H5T_STD_U8LE}; }
+inline Hdf5Types hdf5_types(std::uint64_t) { return {H5T_NATIVE_UINT64, H5T_STD_U64LE}; }
+inline Hdf5Types hdf5_types(std::uint32_t) { return {H5T_NATIVE_UINT32, H5T_STD_U32LE}; }
+
+// Two dimensions in the file; all else has one: std::vector, std::string, Eigen vectors.
 template <typename T>
-struct Hdf5Type;
-template <>
-struct Hdf5Type<double> {
-  static hid_t memory() { return H5T_NATIVE_DOUBLE; }
-  static hid_t file() { return H5T_IEEE_F64LE; }
-};
-template <>
-struct Hdf5Type<float> {
-  static hid_t memory() { return H5T_NATIVE_FLOAT; }
-  static hid_t file() { return H5T_IEEE_F32LE; }
-};
-template <>
-struct Hdf5Type<int> {
-  static hid_t memory() { return H5T_NATIVE_INT; }
-  static hid_t file() { return H5T_STD_I32LE; }
-};
-template <>
-struct Hdf5Type<std::int16_t> {
-  static hid_t memory() { return H5T_NATIVE_INT16; }
-  static hid_t file() { return H5T_STD_I16LE; }
-};
-template <>
-struct Hdf5Type<std::int8_t> {
-  static hid_t memory() { return H5T_NATIVE_INT8; }
-  static hid_t file() { return H5T_STD_I8LE; }
-};
-template <>
-struct Hdf5Type<char> {
-  static hid_t memory() { return H5T_NATIVE_UCHAR; }
-  static hid_t file() { return H5T_STD_U8LE; }
-};
-template <>
-struct Hdf5Type<std::uint64_t> {
-  static hid_t memory() { return H5T_NATIVE_UINT64; }
-  static hid_t file() { return H5T_STD_U64LE; }
-};
-template <>
-struct Hdf5Type<std::uint32_t> {
-  static hid_t memory() { return H5T_NATIVE_UINT32; }
-  static hid_t file() { return H5T_STD_U32LE; }
+concept Hdf5Matrix = requires {
+  requires T::ColsAtCompileTime != 1;
 };
 
 // Names are paths from the root ("mesh/nodes"); an attribute's `object` is a group, "/" for the
@@ -125,28 +100,29 @@ class Hdf5Writer {
     const Hdf5Handle group(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                            H5Gclose, name);
   }
-  // Works for everything with data() and size(): std::vector, std::string, Eigen vectors.
-  template <typename List>
-  void list(const std::string& name, const List& values) {
-    const hsize_t dims[1] = {static_cast<hsize_t>(values.size())};
-    array(name, values.data(), 1, dims);
-  }
-  template <typename Matrix>
-  void matrix(const std::string& name, const Matrix& values) {
-    const hsize_t dims[2] = {static_cast<hsize_t>(values.cols()),
-                             static_cast<hsize_t>(values.rows())};
-    array(name, values.data(), 2, dims);
+  // Of everything with data() and size(): std::vector, std::string, Eigen's.
+  template <typename Values>
+  void write(const std::string& name, const Values& values) {
+    if constexpr (Hdf5Matrix<Values>) {
+      const hsize_t dims[2] = {static_cast<hsize_t>(values.cols()),
+                               static_cast<hsize_t>(values.rows())};
+      array(name, values.data(), 2, dims);
+    } else {
+      const hsize_t dims[1] = {static_cast<hsize_t>(values.size())};
+      array(name, values.data(), 1, dims);
+    }
   }
   template <typename List>
   void attribute(const std::string& object, const std::string& name, const List& values) {
     using T = std::remove_cv_t<std::remove_reference_t<decltype(*values.data())>>;
     const hsize_t dims[1] = {static_cast<hsize_t>(values.size())};
     const Hdf5Handle space(H5Screate_simple(1, dims, nullptr), H5Sclose, name);
-    const Hdf5Handle set(H5Acreate_by_name(file_, object.c_str(), name.c_str(), Hdf5Type<T>::file(),
-                                           space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                         H5Aclose, name);
+    const Hdf5Handle set(
+        H5Acreate_by_name(file_, object.c_str(), name.c_str(), hdf5_types(T{}).file, space.get(),
+                          H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+        H5Aclose, name);
     if (values.size() == 0) return;
-    check_hdf5(H5Awrite(set.get(), Hdf5Type<T>::memory(), values.data()), name);
+    check_hdf5(H5Awrite(set.get(), hdf5_types(T{}).memory, values.data()), name);
   }
   template <typename T>
   void number(const std::string& object, const std::string& name, T value) {
@@ -157,11 +133,11 @@ class Hdf5Writer {
   template <typename T>
   void array(const std::string& name, const T* data, int rank, const hsize_t* dims) {
     const Hdf5Handle space(H5Screate_simple(rank, dims, nullptr), H5Sclose, name);
-    const Hdf5Handle set(H5Dcreate2(file_, name.c_str(), Hdf5Type<T>::file(), space.get(),
+    const Hdf5Handle set(H5Dcreate2(file_, name.c_str(), hdf5_types(T{}).file, space.get(),
                                     H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                          H5Dclose, name);
     if (dims[0] == 0 || dims[rank - 1] == 0) return;
-    check_hdf5(H5Dwrite(set.get(), Hdf5Type<T>::memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data),
+    check_hdf5(H5Dwrite(set.get(), hdf5_types(T{}).memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, data),
                name);
   }
   hid_t file_;
@@ -189,13 +165,17 @@ class Hdf5Reader {
     const std::vector<char> values = list<char>(name);
     return {values.begin(), values.end()};
   }
+  template <typename T>
+  void read(const std::string& name, std::vector<T>& out) const {
+    out = list<T>(name);
+  }
   // One allocation, not filled beforehand, read into at once.
   template <typename Matrix>
-  void matrix(const std::string& name, Matrix& out) const {
+  void read(const std::string& name, Eigen::PlainObjectBase<Matrix>& out) const {
     using Scalar = typename Matrix::Scalar;
     constexpr int kRows = Matrix::RowsAtCompileTime;
     const DataSet set(*this, name);
-    if constexpr (Matrix::ColsAtCompileTime == 1) {
+    if constexpr (!Hdf5Matrix<Matrix>) {
       out.resize(static_cast<Eigen::Index>(set.extent(1, sizeof(Scalar))[0]));
     } else {
       const Extent dims = set.extent(2, sizeof(Scalar));
@@ -224,7 +204,7 @@ class Hdf5Reader {
     std::vector<T> values(
         static_cast<std::size_t>(checked_extent(space.get(), what, 1, sizeof(T))[0]));
     if (values.empty()) return values;
-    check_hdf5(H5Aread(set.get(), Hdf5Type<T>::memory(), values.data()), what + " is damaged");
+    check_hdf5(H5Aread(set.get(), hdf5_types(T{}).memory, values.data()), what + " is damaged");
     return values;
   }
   std::string attribute_text(const std::string& object, const std::string& name) const {
@@ -252,7 +232,7 @@ class Hdf5Reader {
     template <typename T>
     void read(T* place, std::size_t size) const {
       if (size == 0) return;
-      check_hdf5(H5Dread(set_.get(), Hdf5Type<T>::memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT, place),
+      check_hdf5(H5Dread(set_.get(), hdf5_types(T{}).memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, place),
                  name_ + " is truncated or damaged");
     }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file around the groups of model_layout.hpp: its first block, its checksum, its atomic
-// writing.
+// The groups of the file but /condensed, its first block, its checksum, its atomic writing.
 #include "common/io/model/model_file.hpp"
 
 #include <fcntl.h>
@@ -12,18 +11,131 @@
 #include <string>
 #include <string_view>
 
+#include "common/io/config/config_file.hpp"
 #include "common/io/files/checksum.hpp"
 #include "common/io/files/descriptor.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/model/condensed_check.hpp"
 #include "common/io/model/condensed_layout.hpp"
-#include "common/io/model/model_layout.hpp"
 #include "common/values/model_id.hpp"
 
 namespace brainshift::io {
 namespace {
 
 namespace fs = std::filesystem;
+
+// ---- the groups; errors are thrown as Hdf5Problem ----
+
+constexpr const char* kDistanceGroup = "tumour_distance";
+
+void write_distance_grid(Hdf5Writer& out, const DistanceGrid& grid) {
+  if (grid.empty()) return;
+  out.group(kDistanceGroup);
+  out.attribute(kDistanceGroup, "origin_mm", grid.origin_mm);
+  out.number(kDistanceGroup, "spacing_mm", grid.spacing_mm);
+  out.attribute(kDistanceGroup, "dims", grid.dims);
+  out.write(std::string(kDistanceGroup) + "/values_mm", grid.values);
+}
+
+DistanceGrid read_distance_grid(const Hdf5Reader& in) {
+  DistanceGrid grid;
+  if (!in.has(kDistanceGroup)) return grid;
+  const std::vector<double> origin = in.attribute<double>(kDistanceGroup, "origin_mm");
+  const std::vector<int> dims = in.attribute<int>(kDistanceGroup, "dims");
+  if (origin.size() != 3 || dims.size() != 3)
+    throw Hdf5Problem{"attributes of tumour_distance are not three numbers each"};
+  grid.origin_mm = Vec3(origin[0], origin[1], origin[2]);
+  grid.spacing_mm = in.number<double>(kDistanceGroup, "spacing_mm");
+  grid.dims = {dims[0], dims[1], dims[2]};
+  grid.values = in.list<float>(std::string(kDistanceGroup) + "/values_mm");
+  if (Status valid = validate(grid); !valid)
+    throw Hdf5Problem{"tumour_distance: " + valid.error().message};
+  return grid;
+}
+
+// array(name, values) for each array of a model, in the order of the file.
+template <typename Array, typename Model>
+void visit_arrays(const Array& array, Model& model) {
+  array("mesh/nodes", model.mesh.nodes);
+  array("mesh/tets", model.mesh.tets);
+  array("mesh/labels", model.mesh.labels);
+  array("boundary_triangles", model.boundary_triangles);
+  array("skull/vertices", model.skull.vertices);
+  array("skull/triangles", model.skull.triangles);
+  array("tumour/vertices", model.tumour.vertices);
+  array("tumour/triangles", model.tumour.triangles);
+  array("sets/craniotomy", model.craniotomy);
+  array("sets/brainstem", model.brainstem);
+  array("sets/slaves", model.slaves);
+  array("sets/fixed", model.fixed);
+}
+
+void write_brain_model(Hdf5Writer& out, const BrainModel& model) {
+  out.attribute("/", "case_id", model.case_id);
+  out.attribute("/", "model_id", model.model_id);
+  out.attribute("/", "gravity_direction", model.gravity_direction);
+  out.number("/", "fluid_plane_depth_mm", model.fluid_plane_depth_mm);
+  out.number("/", "slave_plane_depth_mm", model.slave_plane_depth_mm);
+  for (const char* group : {"mesh", "skull", "tumour", "sets"}) out.group(group);
+  visit_arrays([&](const char* name, const auto& values) { out.write(name, values); }, model);
+  write_distance_grid(out, model.tumour_distance);
+}
+
+// Throws also when the content does not hash to its model_id.
+BrainModel read_brain_model(const Hdf5Reader& in) {
+  BrainModel model;
+  model.case_id = in.attribute_text("/", "case_id");
+  model.model_id = in.attribute_text("/", "model_id");
+  const std::vector<double> gravity = in.attribute<double>("/", "gravity_direction");
+  if (gravity.size() != 3) throw Hdf5Problem{"attribute gravity_direction is not three numbers"};
+  model.gravity_direction = Vec3(gravity[0], gravity[1], gravity[2]);
+  model.fluid_plane_depth_mm = in.number<double>("/", "fluid_plane_depth_mm");
+  model.slave_plane_depth_mm = in.number<double>("/", "slave_plane_depth_mm");
+  visit_arrays([&](const char* name, auto& values) { in.read(name, values); }, model);
+  model.tumour_distance = read_distance_grid(in);
+  if (content_hash(model) != model.model_id) {
+    throw Hdf5Problem{"content does not match its model_id (" + model.model_id +
+                      "): the file was altered"};
+  }
+  return model;
+}
+
+void write_case(Hdf5Writer& out, const CaseConfig& config) {
+  out.group("case");
+  out.write("case/yaml", case_config_text(config));
+  out.write("case/file", config.file.string());
+}
+
+CaseConfig read_case(const Hdf5Reader& in) {
+  const std::string case_file = in.text("case/file");
+  Result<CaseConfig> config = parse_case_config(in.text("case/yaml"), case_file);
+  if (!config) throw Hdf5Problem{"case/yaml: " + config.error().message};
+  config->file = case_file;
+  return std::move(*config);
+}
+
+void write_inputs(Hdf5Writer& out, const std::vector<InputFile>& inputs) {
+  out.group("inputs");
+  for (const InputFile& input : inputs) {
+    const std::string group = "inputs/" + input.key;
+    out.group(group);
+    out.attribute(group, "path", input.path.string());
+    out.number(group, "bytes", input.bytes);
+    out.number(group, "crc32", input.crc32);
+  }
+}
+
+std::vector<InputFile> read_inputs(const Hdf5Reader& in) {
+  std::vector<InputFile> inputs;
+  for (const std::string& key : in.names("inputs")) {
+    const std::string group = "inputs/" + key;
+    inputs.push_back({key, in.attribute_text(group, "path"),
+                      in.number<std::uint64_t>(group, "bytes"),
+                      in.number<std::uint32_t>(group, "crc32")});
+  }
+  return inputs;
+}
+
+// ---- the file around them ----
 
 constexpr std::size_t kHeaderSize = 512;  // the smallest user block that HDF5 knows
 constexpr std::string_view kMagic = "brainshift model file\n";

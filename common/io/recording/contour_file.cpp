@@ -26,14 +26,10 @@ struct Row {
 };
 
 bool parse_row(std::string_view text, Row& row) {
+  const auto cells = cells_of(text);
   double frame = 0.0;
-  const std::size_t first = text.find(',');
-  if (first == std::string_view::npos) return false;
-  const std::size_t second = text.find(',', first + 1);
-  if (second == std::string_view::npos) return false;
-  if (!parse_number(text.substr(0, first), frame) ||
-      !parse_number(text.substr(first + 1, second - first - 1), row.at_px.x()) ||
-      !parse_number(text.substr(second + 1), row.at_px.y())) {
+  if (cells.size() != 3 || !parse_number(cells[0], frame) ||
+      !parse_number(cells[1], row.at_px.x()) || !parse_number(cells[2], row.at_px.y())) {
     return false;
   }
   if (frame < 0.0 || frame > kMostFrames || frame != std::floor(frame)) return false;
@@ -41,7 +37,7 @@ bool parse_row(std::string_view text, Row& row) {
   return true;
 }
 
-Result<std::vector<Row>> read_rows(const fs::path& path, const std::string& content) {
+Result<std::vector<Row>> read_rows(const std::string& content) {
   std::vector<Row> rows;
   std::istringstream lines(content);
   std::string text;
@@ -55,20 +51,16 @@ Result<std::vector<Row>> read_rows(const fs::path& path, const std::string& cont
     heading_allowed = false;
     if (heading) continue;
     if (!parse_row(cells, row)) {
-      return io::file_error(
-          ErrorCode::kUnreadable, path,
-          fmt::format("line {}: \"{}\" must be frame,u_px,v_px with a frame from 0", line,
-                      cells.substr(0, 60)));
+      return unreadable(fmt::format("line {}: \"{}\" must be frame,u_px,v_px with a frame from 0",
+                                    line, cells.substr(0, 60)));
     }
     rows.push_back(row);
   }
-  if (rows.empty())
-    return io::file_error(ErrorCode::kEmptySet, path, "holds no row frame,u_px,v_px");
+  if (rows.empty()) return fail(ErrorCode::kEmptySet, "holds no row frame,u_px,v_px");
   return rows;
 }
 
-Result<std::vector<ultrasound::Contour>> contours_of_rows(const fs::path& path,
-                                                          const std::vector<Row>& rows,
+Result<std::vector<ultrasound::Contour>> contours_of_rows(const std::vector<Row>& rows,
                                                           bool closed) {
   std::vector<ultrasound::Contour> contours;
   std::set<int> finished;
@@ -76,9 +68,8 @@ Result<std::vector<ultrasound::Contour>> contours_of_rows(const fs::path& path,
     std::size_t end = first;
     while (end < rows.size() && rows[end].frame == rows[first].frame) ++end;
     if (!finished.insert(rows[first].frame).second) {
-      return io::file_error(ErrorCode::kUnreadable, path,
-                            fmt::format("line {}: frame {} comes a second time", rows[first].line,
-                                        rows[first].frame));
+      return unreadable(fmt::format("line {}: frame {} comes a second time", rows[first].line,
+                                    rows[first].frame));
     }
     ultrasound::Contour contour;
     contour.frame = rows[first].frame;
@@ -122,49 +113,43 @@ std::string read_entry(const json& entry, ultrasound::Contour& contour) {
   return {};
 }
 
-Result<std::vector<ultrasound::Contour>> contours_of_json(const fs::path& path,
-                                                          const std::string& content) {
+Result<std::vector<ultrasound::Contour>> contours_of_json(const std::string& content) {
   const json document = json::parse(content, nullptr, false);
   const auto list = document.is_object() ? document.find("contours") : document.end();
   if (!document.is_object() || list == document.end() || !list->is_array()) {
-    return io::file_error(ErrorCode::kUnreadable, path, "must be JSON with a list \"contours\"");
+    return unreadable("must be JSON with a list \"contours\"");
   }
   std::vector<ultrasound::Contour> contours;
   for (std::size_t i = 0; i < list->size(); ++i) {
     ultrasound::Contour contour;
     const std::string problem = read_entry((*list)[i], contour);
     if (!problem.empty()) {
-      return io::file_error(ErrorCode::kUnreadable, path,
-                            fmt::format("contours[{}]: {}", i, problem));
+      return unreadable(fmt::format("contours[{}]: {}", i, problem));
     }
     contours.push_back(std::move(contour));
   }
-  if (contours.empty()) return io::file_error(ErrorCode::kEmptySet, path, "holds no contour");
+  if (contours.empty()) return fail(ErrorCode::kEmptySet, "holds no contour");
   return contours;
 }
 
 }  // namespace
 
 Result<std::vector<ultrasound::Contour>> read_contours(const fs::path& path, bool closed) {
-  const auto content = io::read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  if (path.extension() == ".json") return contours_of_json(path, *content);
-  if (path.extension() != ".csv") {
-    return io::file_error(ErrorCode::kUnreadable, path, "contours must be a .csv or .json file");
-  }
-  const auto rows = read_rows(path, *content);
-  if (!rows) return tl::unexpected(rows.error());
-  return contours_of_rows(path, *rows, closed);
+  using Contours = std::vector<ultrasound::Contour>;
+  return parse_file(path, [&](const std::string& content) -> Result<Contours> {
+    if (path.extension() == ".json") return contours_of_json(content);
+    if (path.extension() != ".csv") return unreadable("contours must be a .csv or .json file");
+    return read_rows(content).and_then(
+        [&](const std::vector<Row>& rows) { return contours_of_rows(rows, closed); });
+  });
 }
 
 Result<std::vector<ultrasound::Seed>> read_seeds(const fs::path& path) {
-  const auto content = io::read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  const auto rows = read_rows(path, *content);
-  if (!rows) return tl::unexpected(rows.error());
-  std::vector<ultrasound::Seed> seeds;
-  for (const Row& row : *rows) seeds.push_back({row.frame, row.at_px});
-  return seeds;
+  return parse_file(path, read_rows).map([](const std::vector<Row>& rows) {
+    std::vector<ultrasound::Seed> seeds;
+    for (const Row& row : rows) seeds.push_back({row.frame, row.at_px});
+    return seeds;
+  });
 }
 
 }  // namespace brainshift::io

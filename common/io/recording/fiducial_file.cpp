@@ -49,36 +49,32 @@ Points columns(const std::vector<Vec3>& points) {
 }  // namespace
 
 Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
-  const auto content = io::read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  Rows rows;
-  std::istringstream lines(*content);
-  std::string text;
-  bool heading_allowed = true;
-  for (int line = 1; std::getline(lines, text); ++line) {
-    const std::string_view row = trimmed(std::string_view(text).substr(0, text.find('#')));
-    if (row.empty()) continue;
-    const bool taken = take_row(cells_of(row), rows);
-    double number = 0.0;
-    const bool heading = heading_allowed && !taken && !parse_number(cells_of(row).back(), number);
-    heading_allowed = false;
-    if (heading) continue;
-    if (!taken || (rows.paired && rows.single)) {
-      return io::file_error(
-          ErrorCode::kUnreadable, path,
-          fmt::format("line {}: \"{}\" must be 6 numbers (reference x, y, z, RAS x, y, z), or "
-                      "reference,x,y,z and ras,x,y,z in every row",
-                      line, row.substr(0, 60)));
+  return parse_file(path, [](const std::string& content) -> Result<FiducialFile> {
+    Rows rows;
+    std::istringstream lines(content);
+    std::string text;
+    bool heading_allowed = true;
+    for (int line = 1; std::getline(lines, text); ++line) {
+      const std::string_view row = trimmed(std::string_view(text).substr(0, text.find('#')));
+      if (row.empty()) continue;
+      const bool taken = take_row(cells_of(row), rows);
+      double number = 0.0;
+      const bool heading = heading_allowed && !taken && !parse_number(cells_of(row).back(), number);
+      heading_allowed = false;
+      if (heading) continue;
+      if (!taken || (rows.paired && rows.single)) {
+        return unreadable(
+            fmt::format("line {}: \"{}\" must be 6 numbers (reference x, y, z, RAS x, y, z), or "
+                        "reference,x,y,z and ras,x,y,z in every row",
+                        line, row.substr(0, 60)));
+      }
     }
-  }
-  FiducialFile file;
-  file.matched = rows.single;
-  auto fit = rows.single
-                 ? registration::match_fiducials(columns(rows.reference), columns(rows.ras))
-                 : registration::register_fiducials(columns(rows.reference), columns(rows.ras));
-  if (!fit) return io::file_error(fit.error().code, path, fit.error().message);
-  file.fit = std::move(*fit);
-  return file;
+    auto fit = rows.single
+                   ? registration::match_fiducials(columns(rows.reference), columns(rows.ras))
+                   : registration::register_fiducials(columns(rows.reference), columns(rows.ras));
+    if (!fit) return tl::unexpected(fit.error());
+    return FiducialFile{std::move(*fit), rows.single};
+  });
 }
 
 }  // namespace brainshift::io

@@ -6,23 +6,19 @@
 #include <charconv>
 
 #include "common/io/files/csv_numbers.hpp"
-#include "common/io/files/nrrd_header.hpp"
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
 namespace {
 
 constexpr std::string_view kFramePrefix = "Seq_Frame";
 
-tl::unexpected<Error> unreadable_header(const std::string& message) {
-  return fail(ErrorCode::kUnreadable, message);
-}
-
 // Puts a key either among the file's fields or, "Seq_Frame0012_Name", among those of a frame.
 Status store(SequenceHeader& header, std::string_view key, std::string_view value) {
   std::string_view rest = key;
   if (!rest.starts_with(kFramePrefix)) {
     const bool is_new = header.fields.emplace(key, value).second;
-    if (!is_new) return unreadable_header(fmt::format("field {} is given twice", key));
+    if (!is_new) return unreadable(fmt::format("field {} is given twice", key));
     return {};
   }
   rest.remove_prefix(kFramePrefix.size());
@@ -31,52 +27,40 @@ Status store(SequenceHeader& header, std::string_view key, std::string_view valu
   rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
   if (error != std::errc() || frame < 0 || frame >= kLargestSize || rest.size() < 2 ||
       rest[0] != '_') {
-    return unreadable_header(fmt::format("field {} does not name a frame and a value", key));
+    return unreadable(fmt::format("field {} does not name a frame and a value", key));
   }
   const bool is_new = header.frames[frame].emplace(rest.substr(1), value).second;
-  if (!is_new) return unreadable_header(fmt::format("field {} is given twice", key));
-  return {};
-}
-
-std::string take_field(SequenceHeader& header, const std::string& key) {
-  const auto found = header.fields.find(key);
-  return found == header.fields.end() ? std::string() : found->second;
-}
-
-Status check_dimensions(const SequenceHeader& header, const std::string& dimensions,
-                        const std::string& sizes) {
-  if (sizes.empty() || std::to_string(header.sizes.size()) != dimensions) {
-    return unreadable_header(fmt::format("NDims = \"{}\" does not agree with the {} sizes \"{}\"",
-                                         dimensions, header.sizes.size(), sizes));
-  }
+  if (!is_new) return unreadable(fmt::format("field {} is given twice", key));
   return {};
 }
 
 Status understand_meta(SequenceHeader& header) {
-  const std::string dim_size = take_field(header, "DimSize");
+  const std::string dim_size = header.field("DimSize");
   auto sizes = parse_sizes("DimSize", dim_size, 0);
   if (!sizes) return tl::unexpected(sizes.error());
   header.sizes = std::move(*sizes);
-  if (Status ok = check_dimensions(header, take_field(header, "NDims"), dim_size); !ok) {
-    return ok;
+  const std::string dimensions = header.field("NDims");
+  if (dim_size.empty() || std::to_string(header.sizes.size()) != dimensions) {
+    return unreadable(fmt::format("NDims = \"{}\" does not agree with the {} sizes \"{}\"",
+                                  dimensions, header.sizes.size(), dim_size));
   }
-  header.element_type = element_type(take_field(header, "ElementType"));
+  header.element_type = element_type(header.field("ElementType"));
   const auto flag = [&](const std::string& key, bool& value) -> Status {
-    const std::string text = take_field(header, key);
+    const std::string text = header.field(key);
     if (!text.empty() && text != "True" && text != "False") {
-      return unreadable_header(fmt::format("{} = {}: must be True or False", key, text));
+      return unreadable(fmt::format("{} = {}: must be True or False", key, text));
     }
     value = text == "True";
     return {};
   };
   if (Status ok = flag("BinaryDataByteOrderMSB", header.big_endian); !ok) return ok;
   if (Status ok = flag("CompressedData", header.compressed); !ok) return ok;
-  if (take_field(header, "BinaryData") == "False") {
-    return unreadable_header("BinaryData = False: pixels as text are not supported");
+  if (header.field("BinaryData") == "False") {
+    return unreadable("BinaryData = False: pixels as text are not supported");
   }
-  const std::string channels = take_field(header, "ElementNumberOfChannels");
+  const std::string channels = header.field("ElementNumberOfChannels");
   if (!channels.empty() && channels != "1") {
-    return unreadable_header("ElementNumberOfChannels = " + channels + ": must be 1 (grey images)");
+    return unreadable("ElementNumberOfChannels = " + channels + ": must be 1 (grey images)");
   }
   return {};
 }
@@ -92,19 +76,19 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
   std::string_view rest = content;
   while (true) {
     if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
-      return unreadable_header("is no MetaImage: its header has no ElementDataFile");
+      return unreadable("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view line = take_line(rest);
     const std::size_t equals = line.find('=');
     if (equals == std::string_view::npos) {
       if (trimmed(line).empty()) continue;
-      return unreadable_header("is no MetaImage: its header has no ElementDataFile");
+      return unreadable("is no MetaImage: its header has no ElementDataFile");
     }
     const std::string_view key = trimmed(line.substr(0, equals));
     const std::string_view value = trimmed(line.substr(equals + 1));
     if (key == "ElementDataFile") {
       if (value != "LOCAL") {
-        return unreadable_header(
+        return unreadable(
             fmt::format("ElementDataFile = {}: must be LOCAL (pixels in the same file)", value));
       }
       break;
@@ -121,7 +105,7 @@ Result<SequenceHeader> parse_nrrd_sequence(std::string_view content) {
   if (!nrrd) return tl::unexpected(nrrd.error());
   const std::string kinds = nrrd->field("kinds");
   if (!kinds.starts_with("domain") && !kinds.empty()) {
-    return unreadable_header("kinds = " + kinds + ": the first axis must be the image's");
+    return unreadable("kinds = " + kinds + ": the first axis must be the image's");
   }
   SequenceHeader header;
   static_cast<PackedValues&>(header) = std::move(*nrrd);

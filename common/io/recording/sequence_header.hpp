@@ -12,12 +12,12 @@
 #include <string_view>
 
 #include "common/core/error.hpp"
-#include "common/io/files/packed_values.hpp"
+#include "common/io/files/nrrd_header.hpp"
 
 namespace brainshift::io {
 
-struct SequenceHeader : PackedValues {
-  std::map<std::string, std::string> fields;  // of the whole file, MetaImage names
+// Its fields, by MetaImage names, are those of the whole file.
+struct SequenceHeader : NrrdHeader {
   // Fields of each frame, "ProbeToTrackerTransform" for Seq_Frame0012_ProbeToTrackerTransform; by
   // frame number.
   std::map<int, std::map<std::string, std::string>> frames;

@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "common/io/files/file_access.hpp"
-#include "common/io/recording/sqlite_statement.hpp"
 
 namespace brainshift::io {
 namespace {

@@ -13,9 +13,7 @@
 #include "common/io/files/file_access.hpp"
 #include "common/io/recording/record_chain.hpp"
 #include "common/io/recording/sqlite_database.hpp"
-#include "common/io/recording/sqlite_statement.hpp"
 #include "common/io/recording/surgery_layout.hpp"
-#include "common/io/recording/surgery_truth.hpp"
 
 namespace brainshift::io {
 namespace {

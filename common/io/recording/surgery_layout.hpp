@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tables of a surgery file, its version, its meta table and its seals; private to it. The
-// layout itself is described in surgery_file.hpp.
+// The tables of a surgery file, its version, its meta table, its seals and its truth; private to
+// it. The layout itself is described in surgery_file.hpp.
 #pragma once
 
 #include <cstdint>
@@ -37,5 +37,14 @@ Result<SurgeryHeader> read_header(const SqliteDatabase& database, bool damaged);
 Result<std::optional<Seal>> read_closed_seal(const SqliteDatabase& database);
 Status write_closed_seal(const SqliteDatabase& database, const Seal& seal);
 Status remove_closed_seal(const SqliteDatabase& database);
+
+// ---- truth ----
+
+// All rows of one observation's truth, or none. kNotFinite, kInvalidArgument or kWriteFailed.
+Status write_truth_rows(const SqliteDatabase& database, std::int64_t sequence,
+                        const SurgeryTruth& truth);
+
+// kNotFound without truth for that observation; kUnreadable when it is not what was written.
+Result<SurgeryTruth> read_truth_rows(const SqliteDatabase& database, std::int64_t sequence);
 
 }  // namespace brainshift::io

@@ -13,7 +13,6 @@
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/values/model_id.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/io/config/config_file.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"

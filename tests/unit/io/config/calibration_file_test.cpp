@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/config/calibration_file.hpp"
 
-#include <gmock/gmock.h>
-
-#include <fstream>
-
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
-
-using testing::HasSubstr;
 
 StereoCalibration sample() {
   StereoCalibration c;
@@ -29,21 +24,10 @@ StereoCalibration sample() {
 
 class CalibrationFile : public testing::Test {
  protected:
-  std::string write(const std::string& text) {
-    std::ofstream(folder_ / "c.yaml") << text;
-    return (folder_ / "c.yaml").string();
+  Result<StereoCalibration> read(const std::string& text) {
+    return read_calibration(folder_.write("c.yaml", text));
   }
-  // The sample with `from` replaced by `to`.
-  std::string refusal(const std::string& from, const std::string& to) {
-    std::string text = calibration_text(sample());
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    text.replace(at, from.size(), to);
-    const auto read = read_calibration(write(text));
-    return read ? "no refusal" : read.error().message;
-  }
-  test_support::TemporaryFolder temporary_;
-  std::filesystem::path folder_ = temporary_.path();
+  test_support::TemporaryFolder folder_;
 };
 
 TEST_F(CalibrationFile, ComesBackBitForBit) {
@@ -65,30 +49,23 @@ TEST_F(CalibrationFile, ComesBackBitForBit) {
 }
 
 TEST_F(CalibrationFile, BadOnesNameLineAndKey) {
-  EXPECT_THAT(refusal("width_px: 640", "width_px: wide"),
-              HasSubstr("c.yaml:3: image.width_px = wide: must be an integer"));
-  EXPECT_THAT(refusal("height_px: 480", "height: 480"),
-              HasSubstr("image.height_px: key is missing"));
-  EXPECT_THAT(refusal("focal_y_px: 367.1", "focal_y_px: .nan"), HasSubstr("left.focal_y_px"));
-  EXPECT_THAT(refusal("focal_x_px: 366\n", "focal_x_px: -366\n"),
-              HasSubstr("right.focal_x_px = -366: must be finite and > 0"));
-  EXPECT_THAT(refusal("-0.11, 0.06", "0.06"),
-              HasSubstr("right.distortion: has 4 numbers: must have five"));
-  EXPECT_THAT(refusal("rotation: [", "rotation: [1, "),
-              HasSubstr("T_right_left.rotation: has 10 numbers: must have nine"));
-  EXPECT_THAT(refusal("rotation: [0.9", "rotation: [1.9"),
-              HasSubstr("T_right_left.rotation is no rigid motion"));
-  EXPECT_THAT(refusal("translation_mm: [-", "translation_mm: ["),
-              HasSubstr("left and right are swapped"));
-  EXPECT_THAT(refusal("rms_px", "rmse_px"), HasSubstr("rmse_px: unknown key"));
-}
-
-TEST_F(CalibrationFile, EmptyAndAbsentFilesAreRefused) {
-  EXPECT_THAT(read_calibration(write("")).error().message,
-              HasSubstr("c.yaml: is not a YAML mapping"));
-  const auto absent = read_calibration(folder_ / "absent.yaml");
-  ASSERT_FALSE(absent);
-  EXPECT_EQ(absent.error().code, ErrorCode::kNotFound);
+  const auto read = [this](const std::string& text) { return this->read(text); };
+  test_support::expect_edits_refused(
+      read, calibration_text(sample()),
+      {{"width_px: 640", "width_px: wide", "c.yaml:3: image.width_px = wide: must be an integer"},
+       {"height_px: 480", "height: 480", "image.height_px: key is missing"},
+       {"focal_y_px: 367.1", "focal_y_px: .nan", "left.focal_y_px"},
+       {"focal_x_px: 366\n", "focal_x_px: -366\n",
+        "right.focal_x_px = -366: must be finite and > 0"},
+       {"-0.11, 0.06", "0.06", "right.distortion: has 4 numbers: must have five"},
+       {"rotation: [", "rotation: [1, ", "T_right_left.rotation: has 10 numbers: must have nine"},
+       {"rotation: [0.9", "rotation: [1.9", "T_right_left.rotation is no rigid motion"},
+       {"translation_mm: [-", "translation_mm: [", "left and right are swapped"},
+       {"rms_px", "rmse_px", "rmse_px: unknown key"}},
+      ErrorCode::kInvalidArgument);
+  test_support::expect_refused(read, {{"", "c.yaml: is not a YAML mapping"}},
+                               ErrorCode::kInvalidArgument);
+  test_support::refusal_of(read_calibration(folder_ / "absent.yaml"), ErrorCode::kNotFound);
 }
 
 }  // namespace

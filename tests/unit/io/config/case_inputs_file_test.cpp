@@ -2,9 +2,8 @@
 // load_case_inputs: which files are read, and which key a bad one is blamed on.
 #include <gmock/gmock.h>
 
-#include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/config/documented_keys.hpp"
 
@@ -11,6 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using test_support::content_of;
+using test_support::expect_refused;
+using test_support::refusal_of;
 using test_support::TemporaryFolder;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -43,6 +46,14 @@ class DaemonFileKeys : public testing::Test {
   Result<DaemonConfig> read(const std::string& text) {
     return read_daemon_config(folder_.write("d.yaml", text));
   }
+  // The same; an error names the file with its folder.
+  auto reading() {
+    return [this](const std::string& text) {
+      auto config = read(text);
+      if (!config) EXPECT_THAT(config.error().message, HasSubstr((folder_ / "d.yaml").string()));
+      return config;
+    };
+  }
   TemporaryFolder folder_;
 };
 
@@ -69,38 +80,33 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
 }
 
 TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
-  const std::pair<const char*, const char*> kBad[] = {
-      {"# a\nport: 5", "d.yaml:2: port: unknown key"},
-      {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
-      {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
-      {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
-      {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 64"},
-      {"max_message_mib: 65", "d.yaml:1: max_message_mib = 65: must be"},
-      {"log_level: loud",
-       "d.yaml:1: log_level = loud: must be one of trace, debug, info, warn, error"},
-      {"endpoint: 5555", "d.yaml:1: endpoint = 5555: must be tcp://HOST:PORT"},
-      {"endpoint: 'tcp://'", "endpoint = tcp://: must be"},
-      {"endpoint: 'tcp://host'", "endpoint = tcp://host: must be"},
-      {"endpoint: 'tcp://host:'", "endpoint = tcp://host:: must be"},
-      {"endpoint: 'ipc://'", "endpoint = ipc://: must be"},
-      {"endpoint: 'inproc://x'", "endpoint = inproc://x: must be tcp://HOST:PORT or ipc://PATH"},
-      {"endpoint: 'ws://127.0.0.1:80'", "must be tcp://HOST:PORT or ipc://PATH"},
-      {"endpoint: 'ipc://@abstract'", "must name the path of a socket"},
-      {"endpoint: 'ipc://*'", "must name the path of a socket"},
-      {"endpoint: 'tcp://0.0.0.0:5555'", "d.yaml:1: endpoint = tcp://0.0.0.0:5555: other machines"},
-      {"allow_remote: maybe", "d.yaml:1: allow_remote = maybe: must be one of true, false"},
-      {"metrics: {port: 5}", "d.yaml:1: metrics.port: unknown key"},
-      {"metrics:\n  endpoint: 0.0.0.0:80",
-       "d.yaml:2: metrics.endpoint = 0.0.0.0:80: other machines"},
-      {"model: [a]", "d.yaml:1: model = [a]: must be text"},
-  };
-  for (const auto& [text, message] : kBad) {
-    const auto config = read(text);
-    ASSERT_FALSE(config) << text;
-    EXPECT_EQ(config.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(config.error().message,
-                AllOf(HasSubstr(message), HasSubstr(folder_.path().string())));
-  }
+  expect_refused(
+      reading(),
+      {{"# a\nport: 5", "d.yaml:2: port: unknown key"},
+       {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
+       {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
+       {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
+       {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 64"},
+       {"max_message_mib: 65", "d.yaml:1: max_message_mib = 65: must be"},
+       {"log_level: loud",
+        "d.yaml:1: log_level = loud: must be one of trace, debug, info, warn, error"},
+       {"endpoint: 5555", "d.yaml:1: endpoint = 5555: must be tcp://HOST:PORT"},
+       {"endpoint: 'tcp://'", "endpoint = tcp://: must be"},
+       {"endpoint: 'tcp://host'", "endpoint = tcp://host: must be"},
+       {"endpoint: 'tcp://host:'", "endpoint = tcp://host:: must be"},
+       {"endpoint: 'ipc://'", "endpoint = ipc://: must be"},
+       {"endpoint: 'inproc://x'", "endpoint = inproc://x: must be tcp://HOST:PORT or ipc://PATH"},
+       {"endpoint: 'ws://127.0.0.1:80'", "must be tcp://HOST:PORT or ipc://PATH"},
+       {"endpoint: 'ipc://@abstract'", "must name the path of a socket"},
+       {"endpoint: 'ipc://*'", "must name the path of a socket"},
+       {"endpoint: 'tcp://0.0.0.0:5555'",
+        "d.yaml:1: endpoint = tcp://0.0.0.0:5555: other machines"},
+       {"allow_remote: maybe", "d.yaml:1: allow_remote = maybe: must be one of true, false"},
+       {"metrics: {port: 5}", "d.yaml:1: metrics.port: unknown key"},
+       {"metrics:\n  endpoint: 0.0.0.0:80",
+        "d.yaml:2: metrics.endpoint = 0.0.0.0:80: other machines"},
+       {"model: [a]", "d.yaml:1: model = [a]: must be text"}},
+      ErrorCode::kInvalidArgument);
 }
 
 TEST_F(DaemonFileKeys, WithoutAllowRemoteTheEndpointIsOnThisMachineAlone) {
@@ -113,10 +119,8 @@ TEST_F(DaemonFileKeys, WithoutAllowRemoteTheEndpointIsOnThisMachineAlone) {
         "tcp://::1:5555:5555", "tcp://[fe80::1]:5555", "tcp://eth0:5555", "tcp://localhost.org:1",
         "tcp://127.0.0.1.org:1", "tcp://0.0.0.0;127.0.0.1:5555", "tcp://[::ffff:10.0.0.1]:1",
         "tcp://127.1:1", "tcp://2130706433:1"}) {
-    const Status status = check_endpoint(remote, false);
-    ASSERT_FALSE(status) << remote;
-    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(status.error().message, AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
+    EXPECT_THAT(refusal_of(check_endpoint(remote, false), ErrorCode::kInvalidArgument),
+                AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
     EXPECT_TRUE(check_endpoint(remote, true)) << remote;
   }
   EXPECT_FALSE(check_endpoint("inproc://x", true));
@@ -131,18 +135,13 @@ TEST_F(DaemonFileKeys, OffThisMachineADaemonTakesKeysAndAnAllowList) {
   EXPECT_TRUE(read(remote + both));
   EXPECT_TRUE(read(local + both));
   EXPECT_TRUE(read(local));
-  const std::pair<std::string, const char*> kBad[] = {
-      {remote, "security.secret_key is missing: other machines may reach"},
-      {remote + secret, "security.allow_list is missing"},
-      {remote + list, "security.secret_key is missing"},
-      {local + secret, "security.allow_list is missing"},
-      {local + list, "security.secret_key is missing"}};
-  for (const auto& [text, message] : kBad) {
-    const auto config = read(text);
-    ASSERT_FALSE(config) << text;
-    EXPECT_EQ(config.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(config.error().message, AllOf(HasSubstr("d.yaml"), HasSubstr(message)));
-  }
+  expect_refused(reading(),
+                 {{remote, "security.secret_key is missing: other machines may reach"},
+                  {remote + secret, "security.allow_list is missing"},
+                  {remote + list, "security.secret_key is missing"},
+                  {local + secret, "security.allow_list is missing"},
+                  {local + list, "security.secret_key is missing"}},
+                 ErrorCode::kInvalidArgument);
 }
 
 TEST_F(DaemonFileKeys, MetricsAreForThisMachineUnlessAllowRemote) {
@@ -150,29 +149,23 @@ TEST_F(DaemonFileKeys, MetricsAreForThisMachineUnlessAllowRemote) {
     EXPECT_TRUE(check_metrics_endpoint(local, false)) << local;
   }
   for (const char* remote : {"0.0.0.0:9464", "10.0.0.1:80", "[::]:9464"}) {
-    const Status status = check_metrics_endpoint(remote, false);
-    ASSERT_FALSE(status) << remote;
-    EXPECT_THAT(status.error().message, AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
+    EXPECT_THAT(refusal_of(check_metrics_endpoint(remote, false), ErrorCode::kInvalidArgument),
+                AllOf(HasSubstr(remote), HasSubstr("allow_remote")));
     EXPECT_TRUE(check_metrics_endpoint(remote, true)) << remote;
   }
   for (const char* bad :
        {"9464", ":9464", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:443s",
         "127.0.0.1:80,0.0.0.0:81", "host:80", "+80", "127.0.0.1:-1", "http://127.0.0.1:80"}) {
-    const Status status = check_metrics_endpoint(bad, true);
-    ASSERT_FALSE(status) << bad;
-    EXPECT_THAT(status.error().message, HasSubstr("must be HOST:PORT")) << bad;
+    EXPECT_THAT(refusal_of(check_metrics_endpoint(bad, true), ErrorCode::kInvalidArgument),
+                HasSubstr("must be HOST:PORT"))
+        << bad;
   }
 }
 
-TEST_F(DaemonFileKeys, TheImagesFileIsRead) {
+TEST_F(DaemonFileKeys, TheImagesFileIsReadAndAMissingOneIsNotFound) {
   const auto config = read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "docker/daemon.yaml");
   EXPECT_TRUE(config) << config.error().message;
-}
-
-TEST_F(DaemonFileKeys, MissingFileIsNotFound) {
-  const auto config = read_daemon_config(folder_ / "absent.yaml");
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().code, ErrorCode::kNotFound);
+  refusal_of(read_daemon_config(folder_ / "absent.yaml"), ErrorCode::kNotFound);
 }
 
 }  // namespace

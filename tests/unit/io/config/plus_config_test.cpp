@@ -3,13 +3,15 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::refusal_of;
 using test_support::TemporaryFolder;
-using testing::HasSubstr;
 
 const char* const kGood = R"(<PlusConfiguration version="2.1">
   <DataCollection><Device Id="x"/></DataCollection>
@@ -25,22 +27,15 @@ const char* const kGood = R"(<PlusConfiguration version="2.1">
   <VolumeReconstruction ClipRectangleOrigin="167 62" ClipRectangleSize="495 488" OutputSpacing="0.5 0.5 0.4"/>
 </PlusConfiguration>)";
 
-std::string plus_refusal(const std::string& what, const std::string& with) {
-  std::string text = kGood;
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  text.replace(at, what.size(), with);
+Result<PlusConfig> read_plus(const std::string& text) {
   const TemporaryFolder folder;
-  const auto config = read_plus_config(folder.write("device.xml", text));
-  if (config) return {};
-  EXPECT_EQ(config.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(config.error().message, HasSubstr("device.xml: "));
-  return config.error().message;
+  auto config = read_plus_config(folder.write("device.xml", text));
+  if (!config) EXPECT_THAT(config.error().message, testing::HasSubstr("device.xml: "));
+  return config;
 }
 
 TEST(PlusConfig, ReadsTransformsAndReconstruction) {
-  const TemporaryFolder folder;
-  const auto config = read_plus_config(folder.write("device.xml", kGood));
+  const auto config = read_plus(kGood);
   ASSERT_TRUE(config) << config.error().message;
   ASSERT_EQ(config->transforms.size(), 2U);
   const PlusTransform& image = config->transforms[0];
@@ -56,31 +51,21 @@ TEST(PlusConfig, ReadsTransformsAndReconstruction) {
 }
 
 TEST(PlusConfig, NamesTransformAndAttributeThatAreWrong) {
-  EXPECT_THAT(plus_refusal("3e0", ""),
-              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(plus_refusal("3e0", "3 9"),
-              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(plus_refusal("3e0", "far"),
-              HasSubstr("Transform ImageToProbe: Matrix is not 16 numbers"));
-  EXPECT_THAT(plus_refusal("0.1  0    0   1", "0 0 0 1"),
-              HasSubstr("ImageToProbe: Matrix cannot be inverted"));
-  EXPECT_THAT(plus_refusal("0 -1 0 5", "0 -1.1 0 5"),
-              HasSubstr("Transform PhantomToReference: Matrix is no rigid"));
-  EXPECT_THAT(plus_refusal("0 -1 0 5", "0 1 0 5"), HasSubstr("reflection"));
-  EXPECT_THAT(plus_refusal("From=\"Phantom\"", ""), HasSubstr("without From or To"));
-  EXPECT_THAT(plus_refusal("\"495 488\"", "\"495\""), HasSubstr("ClipRectangleSize = \"495\""));
-  EXPECT_THAT(plus_refusal("\"167 62\"", "\"-1 62\""),
-              HasSubstr("ClipRectangleOrigin = \"-1 62\""));
-  EXPECT_THAT(plus_refusal("0.5 0.5 0.4", "0.5 0 0.4"), HasSubstr("OutputSpacing = \"0.5 0 0.4\""));
-  EXPECT_THAT(plus_refusal("</PlusConfiguration>", ""), HasSubstr("is no XML"));
-  EXPECT_THAT(plus_refusal("<PlusConfiguration", "<Other"), HasSubstr("XML"));
-}
-
-TEST(PlusConfig, AMissingFileIsNotFound) {
-  const TemporaryFolder folder;
-  const auto config = read_plus_config(folder / "none.xml");
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().code, ErrorCode::kNotFound);
+  expect_edits_refused(
+      read_plus, kGood,
+      {{"3e0", "", "Transform ImageToProbe: Matrix is not 16 numbers"},
+       {"3e0", "3 9", "Transform ImageToProbe: Matrix is not 16 numbers"},
+       {"3e0", "far", "Transform ImageToProbe: Matrix is not 16 numbers"},
+       {"0.1  0    0   1", "0 0 0 1", "ImageToProbe: Matrix cannot be inverted"},
+       {"0 -1 0 5", "0 -1.1 0 5", "Transform PhantomToReference: Matrix is no rigid"},
+       {"0 -1 0 5", "0 1 0 5", "reflection"},
+       {"From=\"Phantom\"", "", "without From or To"},
+       {"\"495 488\"", "\"495\"", "ClipRectangleSize = \"495\""},
+       {"\"167 62\"", "\"-1 62\"", "ClipRectangleOrigin = \"-1 62\""},
+       {"0.5 0.5 0.4", "0.5 0 0.4", "OutputSpacing = \"0.5 0 0.4\""},
+       {"</PlusConfiguration>", "", "is no XML"},
+       {"<PlusConfiguration", "<Other", "XML"}});
+  refusal_of(read_plus_config("/nowhere/none.xml"), ErrorCode::kNotFound);
 }
 
 }  // namespace

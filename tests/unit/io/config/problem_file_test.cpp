@@ -3,13 +3,13 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::Pair;
 
 TEST(ProblemFile, EveryKeyIsRead) {
@@ -55,24 +55,23 @@ probes: {tip: [1, 2, 3]}
   EXPECT_EQ(problem->probes[0].at_mm, Vec3(1, 2, 3));
 }
 
-std::string refusal(const std::string& lines) {
-  const auto problem = parse_problem("mesh: {file: m.msh}\n" + lines, "/data/p.yaml");
-  return problem ? "no refusal" : problem.error().message;
-}
-
-constexpr const char* kMaterials =
+const std::string kMaterials =
     "materials: {m: {shear_modulus_pa: 1000, poisson_ratio: 0.4}}\nregions: {all: m}\n";
 
 TEST(ProblemFile, BadFilesAreRefusedWithFileLineAndKey) {
-  EXPECT_THAT(refusal(""), HasSubstr("/data/p.yaml: materials: key is missing"));
-  EXPECT_THAT(refusal(std::string(kMaterials) + "gravity: 1\n"),
-              HasSubstr("/data/p.yaml:4: gravity: unknown key"));
-  EXPECT_THAT(refusal(std::string(kMaterials) + "groups: {a: {cone: {}}}\n"),
-              HasSubstr("/data/p.yaml:4: groups.a has none: must have exactly one of plane"));
-  EXPECT_THAT(refusal("materials: {m: {shear_modulus_pa: soft, poisson_ratio: 0.4}}\n"),
-              HasSubstr("/data/p.yaml:2: materials.m.shear_modulus_pa = soft: must be"));
-  EXPECT_THAT(refusal(std::string(kMaterials) + "time: {steps_s: 1}\n"),
-              HasSubstr("/data/p.yaml:4: time.steps_s = 1: must be a list"));
+  const auto read = [](const std::string& lines) {
+    return parse_problem("mesh: {file: m.msh}\n" + lines, "/data/p.yaml");
+  };
+  test_support::expect_refused(
+      read,
+      {{"", "/data/p.yaml: materials: key is missing"},
+       {kMaterials + "gravity: 1\n", "/data/p.yaml:4: gravity: unknown key"},
+       {kMaterials + "groups: {a: {cone: {}}}\n",
+        "/data/p.yaml:4: groups.a has none: must have exactly one of plane"},
+       {"materials: {m: {shear_modulus_pa: soft, poisson_ratio: 0.4}}\n",
+        "/data/p.yaml:2: materials.m.shear_modulus_pa = soft: must be"},
+       {kMaterials + "time: {steps_s: 1}\n", "/data/p.yaml:4: time.steps_s = 1: must be a list"}},
+      ErrorCode::kInvalidArgument);
   EXPECT_EQ(read_problem("/nowhere/p.yaml").error().code, ErrorCode::kNotFound);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Read back with HDF5's own calls; ITK itself reads such files in cmake/scripts/interchange.sh.
-#include "common/io/fields/itk_transform_file.hpp"
+#include "common/io/fields/field_files.hpp"
 
 #include <gmock/gmock.h>
 #include <hdf5.h>

@@ -6,17 +6,21 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_refused;
 using test_support::put;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::TemporaryFolder;
-
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Pair;
 
 // Two tetrahedra on nodes 10, 20, 30, 40, 60; node 50 belongs to a triangle only. Tags are neither
 // consecutive nor in order of use.
@@ -198,13 +202,6 @@ INSTANTIATE_TEST_SUITE_P(All, GmshEncoding,
 
 class GmshFile : public testing::Test {
  protected:
-  std::string refusal(const std::string& content) {
-    const auto mesh = read_tet_mesh(folder_.write("m.msh", content));
-    EXPECT_FALSE(mesh);
-    if (mesh) return {};
-    EXPECT_EQ(mesh.error().code, ErrorCode::kUnreadable);
-    return mesh.error().message;
-  }
   static std::string ascii(const std::string& nodes, const std::string& elements) {
     return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n" + nodes + "\n$EndNodes\n$Elements\n" +
            elements + "\n$EndElements\n";
@@ -226,66 +223,129 @@ TEST_F(GmshFile, WindowsLineEndsAreRead) {
   EXPECT_TRUE(read_tet_mesh(folder_.write("m.msh", content)));
 }
 
-TEST_F(GmshFile, HexahedraAloneAreRefused) {
-  EXPECT_THAT(
-      refusal(ascii("8\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1",
-                    "1\n1 5 2 0 1 1 2 3 4 5 6 7 8")),
-      HasSubstr("m.msh: has no 4-node tetrahedron"));
-}
-
-TEST_F(GmshFile, NodeThatDoesNotExistIsNamed) {
-  EXPECT_THAT(refusal(ascii(kFour, "1\n1 4 2 0 1 1 2 3 77")),
-              HasSubstr("tetrahedron 0 has node 77, which does not exist"));
-}
-
-TEST_F(GmshFile, NodeGivenTwiceIsNamed) {
-  EXPECT_THAT(refusal(ascii("4\n1 0 0 0\n2 1 0 0\n2 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 2 4")),
-              HasSubstr("node 2 is given twice"));
-}
-
-TEST_F(GmshFile, NonFiniteCoordinateIsRefused) {
-  EXPECT_THAT(refusal(ascii("4\n1 nan 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 3 4")),
-              HasSubstr("not finite"));
-}
-
-TEST_F(GmshFile, WrongCountsAreRefused) {
-  EXPECT_THAT(refusal(ascii("5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 3 4")),
-              HasSubstr("$Nodes"));
-  EXPECT_THAT(refusal(ascii(kFour, "2\n1 4 2 0 1 1 2 3 4")), HasSubstr("$Elements"));
-  EXPECT_THAT(refusal(ascii(kFour, "999999999999\n1 4 2 0 1 1 2 3 4")),
-              HasSubstr("promises 999999999999"));
-  EXPECT_THAT(refusal(ascii(kFour, "-1\n1 4 2 0 1 1 2 3 4")), HasSubstr("promises -1"));
-}
-
-TEST_F(GmshFile, UnknownElementTypeIsRefused) {
-  EXPECT_THAT(refusal(ascii(kFour, "1\n1 77 2 0 1 1 2 3 4")),
-              HasSubstr("element type 77 is unknown"));
-}
-
-TEST_F(GmshFile, OtherVersionsAreRefused) {
-  EXPECT_THAT(refusal("$MeshFormat\n4 0 8\n$EndMeshFormat\n"),
-              HasSubstr("version 4.0 is not supported"));
-  EXPECT_THAT(refusal("$MeshFormat\n2.2 0 4\n$EndMeshFormat\n"), HasSubstr("data size 4"));
-}
-
-TEST_F(GmshFile, MissingSectionsAreNamed) {
-  EXPECT_THAT(refusal("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), HasSubstr("no $Nodes"));
-  EXPECT_THAT(refusal("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n0\n$EndNodes\n"),
-              HasSubstr("no $Elements"));
-}
-
-TEST_F(GmshFile, OtherFilesAreRefused) {
-  EXPECT_THAT(refusal(""), HasSubstr("not a Gmsh file"));
-  EXPECT_THAT(refusal("<VTKFile>"), HasSubstr("not a Gmsh file"));
+TEST_F(GmshFile, BadFilesAreRefusedByWhatIsWrong) {
+  const auto read = [this](const std::string& content) {
+    return read_tet_mesh(folder_.write("m.msh", content));
+  };
+  expect_refused(
+      read,
+      {{ascii("8\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1",
+              "1\n1 5 2 0 1 1 2 3 4 5 6 7 8"),
+        "m.msh: has no 4-node tetrahedron"},
+       {ascii(kFour, "1\n1 4 2 0 1 1 2 3 77"), "tetrahedron 0 has node 77, which does not exist"},
+       {ascii("4\n1 0 0 0\n2 1 0 0\n2 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 2 4"),
+        "node 2 is given twice"},
+       {ascii("4\n1 nan 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 3 4"), "not finite"},
+       {ascii("5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1", "1\n1 4 2 0 1 1 2 3 4"), "$Nodes"},
+       {ascii(kFour, "2\n1 4 2 0 1 1 2 3 4"), "$Elements"},
+       {ascii(kFour, "999999999999\n1 4 2 0 1 1 2 3 4"), "promises 999999999999"},
+       {ascii(kFour, "-1\n1 4 2 0 1 1 2 3 4"), "promises -1"},
+       {ascii(kFour, "1\n1 77 2 0 1 1 2 3 4"), "element type 77 is unknown"},
+       {"$MeshFormat\n4 0 8\n$EndMeshFormat\n", "version 4.0 is not supported"},
+       {"$MeshFormat\n2.2 0 4\n$EndMeshFormat\n", "data size 4"},
+       {"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "no $Nodes"},
+       {"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n0\n$EndNodes\n", "no $Elements"},
+       {"", "not a Gmsh file"},
+       {"<VTKFile>", "not a Gmsh file"}});
 }
 
 TEST_F(GmshFile, UnknownExtensionAndMissingFileAreNamed) {
-  const auto other = read_tet_mesh(folder_.write("m.xyz", ""));
-  ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().message, HasSubstr("unknown mesh format '.xyz'"));
-  const auto absent = read_tet_mesh(folder_ / "absent.msh");
-  ASSERT_FALSE(absent);
-  EXPECT_EQ(absent.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(refusal_of(read_tet_mesh(folder_.write("m.xyz", ""))),
+              HasSubstr("unknown mesh format '.xyz'"));
+  refusal_of(read_tet_mesh(folder_ / "absent.msh"), ErrorCode::kNotFound);
+}
+
+// ---- names of physical groups and triangles, which brainshift solve reads as well ----
+
+constexpr char kGmsh2[] = R"($MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+2 5 "top lid"
+3 1 "grey"
+1 9 "a line"
+$EndPhysicalNames
+$Nodes
+5
+1 0 0 0
+2 1 0 0
+3 0 1 0
+4 0 0 1
+9 7 7 7
+$EndNodes
+$Elements
+4
+1 4 2 1 1 1 2 3 4
+2 2 2 5 5 2 3 4
+3 2 2 6 5 1 2 3
+4 2 2 5 5 1 2 9
+$EndElements
+)";
+
+constexpr char kGmsh4[] = R"($MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+2 5 "lid"
+2 6 "both"
+$EndPhysicalNames
+$Entities
+0 0 2 1
+1 0 0 0 1 1 1 2 5 6 0
+2 0 0 0 1 1 1 0 0
+1 0 0 0 1 1 1 1 3 2 1 2
+$EndEntities
+$Nodes
+1 4 1 4
+3 1 0 4
+1
+2
+3
+4
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+$EndNodes
+$Elements
+3 3 1 3
+2 1 2 1
+1 2 3 4
+2 2 2 1
+2 1 2 3
+3 1 4 1
+3 1 2 3 4
+$EndElements
+)";
+
+TEST(GroupedMesh, GmshTwoGivesNamesAndTrianglesOfKeptNodes) {
+  const TemporaryFolder folder;
+  const auto mesh = read_grouped_mesh(folder.write("m.msh", kGmsh2));
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_THAT(mesh->surface_names, ElementsAre(Pair("top lid", 5)));
+  EXPECT_THAT(mesh->volume_names, ElementsAre(Pair("grey", 1)));
+  EXPECT_THAT(mesh->triangle_labels, ElementsAre(5, 6));
+  EXPECT_EQ(mesh->triangles.col(0), Eigen::Vector3i(1, 2, 3));
+  EXPECT_EQ(mesh->mesh.num_nodes(), 4);
+}
+
+TEST(GroupedMesh, GmshFourListsATriangleOncePerGroup) {
+  const TemporaryFolder folder;
+  const auto mesh = read_grouped_mesh(folder.write("m.msh", kGmsh4));
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_THAT(mesh->triangle_labels, ElementsAre(5, 6));
+  EXPECT_EQ(mesh->triangles.col(0), mesh->triangles.col(1));
+  EXPECT_THAT(mesh->surface_names, ElementsAre(Pair("both", 6), Pair("lid", 5)));
+  EXPECT_THAT(mesh->mesh.labels, ElementsAre(3));
+}
+
+TEST(GroupedMesh, ANameWithoutQuotationMarksIsRefused) {
+  const TemporaryFolder folder;
+  const std::string text = replaced(kGmsh2, "\"grey\"", "grey");
+  EXPECT_THAT(refusal_of(read_grouped_mesh(folder.write("m.msh", text))),
+              HasSubstr("$PhysicalNames"));
 }
 
 }  // namespace

@@ -7,13 +7,17 @@
 #include <algorithm>
 #include <cstring>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::TemporaryFolder;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -68,25 +72,19 @@ constexpr const char* kThreeSegments =
     "Segment1_Name:=Mass\nSegment1_LabelValue:=1\nSegment1_Layer:=1\n"
     "Segment2_Name:=Edema, left\nSegment2_LabelValue:=2\nSegment2_Layer:=0\n";
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), with);
-}
-
 Result<VoxelImage> read(const std::string& content, const LabelChoice& choice = {},
                         const std::string& name = "map.seg.nrrd") {
   const TemporaryFolder folder;
   return read_label_map(folder.write(name, content), choice);
 }
 
-std::string refusal(const std::string& content, ErrorCode code = ErrorCode::kUnreadable,
-                    const LabelChoice& choice = {}) {
-  const auto image = read(content, choice);
-  if (image) return {};
-  EXPECT_EQ(image.error().code, code) << image.error().message;
-  EXPECT_THAT(image.error().message, HasSubstr("map.seg.nrrd: "));
-  return image.error().message;
+// A reader of this choice; an error names the file.
+auto reading(const LabelChoice& choice = {}) {
+  return [choice](const std::string& content) {
+    auto image = read(content, choice);
+    if (!image) EXPECT_THAT(image.error().message, HasSubstr("map.seg.nrrd: "));
+    return image;
+  };
 }
 
 TEST(LabelMapFile, ReadsEveryTypeEncodingAndByteOrder) {
@@ -163,76 +161,64 @@ TEST(LabelMapFile, LayersMayBeTheLastAxis) {
 
 TEST(LabelMapFile, RefusesAChoiceThatIsNone) {
   const ErrorCode code = ErrorCode::kInvalidArgument;
-  EXPECT_THAT(refusal(layered(kThreeSegments), code),
-              HasSubstr("has 3 segments: name one of \"Head\", \"Mass\", \"Edema, left\""));
-  EXPECT_THAT(refusal(layered(kThreeSegments), code, {"mass", 1}),
-              AllOf(HasSubstr("no segment called \"mass\""), HasSubstr("\"Mass\"")));
-  EXPECT_THAT(refusal(replaced(layered(kThreeSegments), "=Mass", "=Head"), code, {"Head", 1}),
-              HasSubstr("2 segments called \"Head\""));
-  EXPECT_THAT(refusal(nrrd("uchar", counted<std::uint8_t>()), code, {"Head", 1}),
-              HasSubstr("names no segments"));
-  const auto nifti = read("x", {"Head", 1}, "map.nii");
-  ASSERT_FALSE(nifti);
-  EXPECT_EQ(nifti.error().code, code);
-  EXPECT_THAT(nifti.error().message, HasSubstr("only a .seg.nrrd file does"));
+  const std::string three = layered(kThreeSegments);
+  expect_refused(reading(),
+                 {{three, "has 3 segments: name one of \"Head\", \"Mass\", \"Edema, left\""}},
+                 code);
+  expect_refused(reading({"mass", 1}), {{three, "no segment called \"mass\""}, {three, "\"Mass\""}},
+                 code);
+  expect_refused(reading({"Head", 1}),
+                 {{replaced(three, "=Mass", "=Head"), "2 segments called \"Head\""},
+                  {nrrd("uchar", counted<std::uint8_t>()), "names no segments"}},
+                 code);
+  EXPECT_THAT(refusal_of(read("x", {"Head", 1}, "map.nii"), code),
+              HasSubstr("only a .seg.nrrd file does"));
 }
 
 TEST(LabelMapFile, RefusesSegmentsThatAreNotThere) {
-  const auto bad = [](const char* what, const char* with) {
-    return refusal(replaced(layered(kThreeSegments), what, with), ErrorCode::kUnreadable,
-                   {"Mass", 1});
-  };
-  EXPECT_THAT(bad("Segment1_Layer:=1", "Segment1_Layer:=2"),
-              HasSubstr("\"Mass\" is in layer 2: the file has 2"));
-  EXPECT_THAT(bad("Segment1_Layer:=1", "Segment1_Layer:=-1"), HasSubstr("Segment1_Layer = -1"));
-  EXPECT_THAT(bad("Segment1_LabelValue:=1", "Segment1_LabelValue:=one"),
-              HasSubstr("Segment1_LabelValue = one"));
-  EXPECT_THAT(refusal(layered("")), HasSubstr("has 2 layers and names no segments"));
+  expect_edits_refused(
+      reading({"Mass", 1}), layered(kThreeSegments),
+      {{"Segment1_Layer:=1", "Segment1_Layer:=2", "\"Mass\" is in layer 2: the file has 2"},
+       {"Segment1_Layer:=1", "Segment1_Layer:=-1", "Segment1_Layer = -1"},
+       {"Segment1_LabelValue:=1", "Segment1_LabelValue:=one", "Segment1_LabelValue = one"}});
+  expect_refused(reading(), {{layered(""), "has 2 layers and names no segments"}});
 }
 
 TEST(LabelMapFile, RefusesAPlaceThatIsUnknown) {
   const std::string good = nrrd("uchar", counted<std::uint8_t>());
-  const auto bad = [&](const char* what, const char* with) {
-    return refusal(replaced(good, what, with));
-  };
-  EXPECT_THAT(bad("space: left-posterior-superior\n", ""), HasSubstr("space is missing"));
-  EXPECT_THAT(bad("left-posterior-superior", "scanner-xyz"), HasSubstr("space = scanner-xyz"));
-  EXPECT_THAT(bad("space origin: (10,20,30)\n", ""), HasSubstr("space origin is missing"));
-  EXPECT_THAT(bad("(10,20,30)", "(10,20)"), HasSubstr("space origin = (10,20)"));
-  EXPECT_THAT(bad("(10,20,30)", "(10,20,nan)"), HasSubstr("space origin = (10,20,nan)"));
-  EXPECT_THAT(bad("(10,20,30)", "none"), HasSubstr("space origin = none"));
-  EXPECT_THAT(bad("space directions: (2,0,0) (0,3,0) (0,0,4)\n", ""),
-              HasSubstr("space directions is missing"));
-  EXPECT_THAT(bad("(0,0,4)", ""), HasSubstr("must be three vectors"));
-  EXPECT_THAT(bad("(0,0,4)", "(0,0,4) (1,0,0)"), HasSubstr("does not agree with 3 sizes"));
-  EXPECT_THAT(bad("(0,0,4)", "(0,0,inf)"), HasSubstr("space directions ="));
-  EXPECT_THAT(bad("(0,0,4)", "(0,0,4"), HasSubstr("must be three vectors"));
-  EXPECT_THAT(bad("(0,0,4)", "(0,6,0)"), HasSubstr("linearly dependent"));
-  EXPECT_THAT(bad("(0,0,4)", "none"), HasSubstr("does not agree"));
-  EXPECT_THAT(bad("(0,3,0) (0,0,4)", "none none"), HasSubstr("must be three vectors"));
-  EXPECT_THAT(bad("endian: little", "space units: \"mm\" \"mm\" \"m\""),
-              HasSubstr("space units = "));
+  expect_edits_refused(
+      reading(), good,
+      {{"space: left-posterior-superior\n", "", "space is missing"},
+       {"left-posterior-superior", "scanner-xyz", "space = scanner-xyz"},
+       {"space origin: (10,20,30)\n", "", "space origin is missing"},
+       {"(10,20,30)", "(10,20)", "space origin = (10,20)"},
+       {"(10,20,30)", "(10,20,nan)", "space origin = (10,20,nan)"},
+       {"(10,20,30)", "none", "space origin = none"},
+       {"space directions: (2,0,0) (0,3,0) (0,0,4)\n", "", "space directions is missing"},
+       {"(0,0,4)", "", "must be three vectors"},
+       {"(0,0,4)", "(0,0,4) (1,0,0)", "does not agree with 3 sizes"},
+       {"(0,0,4)", "(0,0,inf)", "space directions ="},
+       {"(0,0,4)", "(0,0,4", "must be three vectors"},
+       {"(0,0,4)", "(0,6,0)", "linearly dependent"},
+       {"(0,0,4)", "none", "does not agree"},
+       {"(0,3,0) (0,0,4)", "none none", "must be three vectors"},
+       {"endian: little", "space units: \"mm\" \"mm\" \"m\"", "space units = "}});
 }
 
 TEST(LabelMapFile, RefusesWhatIsNoVolume) {
   const std::string good = nrrd("uchar", counted<std::uint8_t>());
-  const auto bad = [&](const char* what, const char* with) {
-    return refusal(replaced(good, what, with));
-  };
-  EXPECT_THAT(refusal("PNG"), HasSubstr("is no NRRD file"));
-  EXPECT_THAT(bad("uchar", "block"), HasSubstr("type = block"));
-  EXPECT_THAT(bad("sizes: 2 3 2", "sizes: 2 3 0"), HasSubstr("1 to 32767 voxels"));
-  EXPECT_THAT(bad("sizes: 2 3 2", "sizes: 2 3 40000"), HasSubstr("1 to 32767 voxels"));
-  EXPECT_THAT(bad("sizes: 2 3 2", "sizes: 2 3 3"), HasSubstr("holds 12 bytes"));
-  EXPECT_THAT(bad("dimension: 3\nsizes: 2 3 2", "dimension: 2\nsizes: 2 6"),
-              HasSubstr("has 2 axes"));
-  EXPECT_THAT(refusal(good.substr(0, good.size() - 1)), HasSubstr("holds 11 bytes"));
+  expect_edits_refused(reading(), good,
+                       {{"uchar", "block", "type = block"},
+                        {"sizes: 2 3 2", "sizes: 2 3 0", "1 to 32767 voxels"},
+                        {"sizes: 2 3 2", "sizes: 2 3 40000", "1 to 32767 voxels"},
+                        {"sizes: 2 3 2", "sizes: 2 3 3", "holds 12 bytes"},
+                        {"dimension: 3\nsizes: 2 3 2", "dimension: 2\nsizes: 2 6", "has 2 axes"}});
   const std::string packed = gzipped_labels(counted<std::uint8_t>());
-  EXPECT_THAT(refusal(nrrd("uchar", packed.substr(0, 12), kSpace, "", "gzip")),
-              HasSubstr("compressed pixels are"));
-  const auto none = read_label_map("nowhere/map.nrrd");
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  expect_refused(reading(), {{"PNG", "is no NRRD file"},
+                             {good.substr(0, good.size() - 1), "holds 11 bytes"},
+                             {nrrd("uchar", packed.substr(0, 12), kSpace, "", "gzip"),
+                              "compressed pixels are"}});
+  refusal_of(read_label_map("nowhere/map.nrrd"), ErrorCode::kNotFound);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces in .stl, .ply and .obj; .vtp is in vtk_file_test.cpp.
+// Surfaces in .stl, .ply and .obj and points as text; .vtp is in vtk_file_test.cpp.
 #include <gmock/gmock.h>
 
 #include <cstdint>
@@ -7,14 +7,17 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
 using test_support::put;
+using test_support::refusal_of;
 using test_support::TemporaryFolder;
-
 using testing::HasSubstr;
 
 // A tetrahedron's surface, outward.
@@ -157,85 +160,65 @@ INSTANTIATE_TEST_SUITE_P(All, SurfaceFormat,
 
 class BadSurface : public testing::Test {
  protected:
-  std::string refusal(const std::string& name, const std::string& content) {
-    const auto surface = read_surface(folder_.write(name, content));
-    EXPECT_FALSE(surface) << content;
-    if (surface) return {};
-    EXPECT_EQ(surface.error().code, ErrorCode::kUnreadable);
-    return surface.error().message;
-  }
-  static std::string replaced(std::string text, const std::string& from, const std::string& to) {
-    return text.replace(text.find(from), from.size(), to);
+  // read_surface of a file of this name.
+  auto reading(const std::string& name) {
+    return [this, name](const std::string& content) {
+      return read_surface(folder_.write(name, content));
+    };
   }
   TemporaryFolder folder_;
 };
 
-TEST_F(BadSurface, StlThatEndsEarlyIsRefused) {
-  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "endsolid test", "")),
-              HasSubstr("before endsolid"));
-  EXPECT_THAT(refusal("s.stl", stl_binary().substr(0, 200).replace(0, 5, "other")),
-              HasSubstr("neither an ASCII STL nor a binary one"));
-}
-
-TEST_F(BadSurface, StlFacetWithTwoVerticesIsNamed) {
-  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "      vertex 0 0 0\n", "")),
-              HasSubstr("s.stl: facet 0 does not have three vertices"));
-}
-
-TEST_F(BadSurface, NonFiniteStlCoordinatesAreRefused) {
-  EXPECT_THAT(refusal("s.stl", replaced(stl_ascii(), "10.5", "nan")),
-              HasSubstr("'nan' of facet 0"));
-  std::string bytes = stl_binary();
+TEST_F(BadSurface, StlProblemsAreNamed) {
+  const auto read = reading("s.stl");
+  expect_edits_refused(read, stl_ascii(),
+                       {{"endsolid test", "", "before endsolid"},
+                        {"      vertex 0 0 0\n", "", "s.stl: facet 0 does not have three vertices"},
+                        {"10.5", "nan", "'nan' of facet 0"}});
+  std::string not_finite = stl_binary();
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  bytes.replace(84 + 12, 4, reinterpret_cast<const char*>(&nan), 4);
-  EXPECT_THAT(refusal("s.stl", bytes), HasSubstr("triangle 0 has a coordinate that is not finite"));
+  not_finite.replace(84 + 12, 4, reinterpret_cast<const char*>(&nan), 4);
+  expect_refused(read, {{stl_binary().substr(0, 200).replace(0, 5, "other"),
+                         "neither an ASCII STL nor a binary one"},
+                        {not_finite, "triangle 0 has a coordinate that is not finite"}});
 }
 
 TEST_F(BadSurface, PlyProblemsAreNamed) {
-  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "format ascii", "format binary_big_endian")),
-              HasSubstr("'binary_big_endian' is not supported"));
-  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "3 0 1 2", "4 0 1 2 3")),
-              HasSubstr("face 0 has 4 vertices: must have 3"));
-  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "3 0 1 2", "3 0 1 4")),
-              HasSubstr("triangle 0 has node index 4: must be between 0 and 3"));
-  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "element face 4", "element face 5")),
-              HasSubstr("ends too early"));
-  EXPECT_THAT(
-      refusal("s.ply", replaced(ply_ascii(), "element vertex 4", "element vertex 999999999999")),
-      HasSubstr("element 'vertex' ends too early"));
-  EXPECT_THAT(refusal("s.ply", replaced(ply_ascii(), "float z", "float w")),
-              HasSubstr("lacks x, y or z"));
-  EXPECT_THAT(refusal("s.ply", replaced(ply_binary(), "short flag", "strange flag")),
-              HasSubstr("'strange' is unknown"));
-  EXPECT_THAT(refusal("s.ply", "hello"), HasSubstr("not a PLY file"));
+  const auto read = reading("s.ply");
+  expect_edits_refused(
+      read, ply_ascii(),
+      {{"format ascii", "format binary_big_endian", "'binary_big_endian' is not supported"},
+       {"3 0 1 2", "4 0 1 2 3", "face 0 has 4 vertices: must have 3"},
+       {"3 0 1 2", "3 0 1 4", "triangle 0 has node index 4: must be between 0 and 3"},
+       {"element face 4", "element face 5", "ends too early"},
+       {"element vertex 4", "element vertex 999999999999", "element 'vertex' ends too early"},
+       {"float z", "float w", "lacks x, y or z"}});
+  expect_edits_refused(read, ply_binary(),
+                       {{"short flag", "strange flag", "'strange' is unknown"}});
+  expect_refused(read, {{"hello", "not a PLY file"}});
 }
 
 TEST_F(BadSurface, ObjProblemsAreNamed) {
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 1 2 3 4")),
-              HasSubstr("s.obj: line 9: face has 4 vertices: must have 3"));
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 1 2 5")),
-              HasSubstr("triangle 0 has node index 4"));
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f 0 1 2")),
-              HasSubstr("vertex 0 does not exist"));
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f -5 1 2")),
-              HasSubstr("vertex -5 does not exist"));
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "f 1//1 2//1 3//1", "f a b c")),
-              HasSubstr("'a' is no vertex"));
-  EXPECT_THAT(refusal("s.obj", replaced(obj(false), "v 0 0 0", "v 0 0")),
-              HasSubstr("line 3: vertex without three coordinates"));
+  const std::string face = "f 1//1 2//1 3//1";
+  expect_edits_refused(reading("s.obj"), obj(false),
+                       {{face, "f 1 2 3 4", "s.obj: line 9: face has 4 vertices: must have 3"},
+                        {face, "f 1 2 5", "triangle 0 has node index 4"},
+                        {face, "f 0 1 2", "vertex 0 does not exist"},
+                        {face, "f -5 1 2", "vertex -5 does not exist"},
+                        {face, "f a b c", "'a' is no vertex"},
+                        {"v 0 0 0", "v 0 0", "line 3: vertex without three coordinates"}});
 }
 
 TEST_F(BadSurface, SurfaceWithoutTriangleIsRefused) {
-  EXPECT_THAT(refusal("s.obj", "v 0 0 0\n"), HasSubstr("s.obj: has no triangle"));
-  EXPECT_THAT(refusal("s.stl", "solid s\nendsolid s\n"), HasSubstr("has no triangle"));
-  EXPECT_THAT(refusal("s.obj", ""), HasSubstr("has no triangle"));
+  expect_refused(reading("s.obj"),
+                 {{"v 0 0 0\n", "s.obj: has no triangle"}, {"", "has no triangle"}});
+  expect_refused(reading("s.stl"), {{"solid s\nendsolid s\n", "has no triangle"}});
 }
 
 TEST_F(BadSurface, UnknownExtensionAndMissingFileAreNamed) {
-  EXPECT_THAT(refusal("s.xyz", ""), HasSubstr("unknown surface format '.xyz'"));
-  const auto absent = read_surface(folder_ / "absent.stl");
-  ASSERT_FALSE(absent);
-  EXPECT_EQ(absent.error().code, ErrorCode::kNotFound);
+  expect_refused(reading("s.xyz"), {{"", "unknown surface format '.xyz'"},
+                                    {"1 2 3\n", "unknown surface format '.xyz'"}});
+  refusal_of(read_surface(folder_ / "absent.stl"), ErrorCode::kNotFound);
 }
 
 // The text with what 3D Slicer puts into its models: a heading (STL), a comment (PLY, OBJ).
@@ -274,11 +257,10 @@ TEST(SurfaceSpace, ModelThatSaysLpsIsTurnedIntoRas) {
 TEST(SurfaceSpace, AnotherSpaceIsRefusedByFileAndValue) {
   const TemporaryFolder folder;
   for (const auto& [file, text] : slicer_files()) {
-    const auto read = read_surface(folder.write(file, with_heading(file, text, "LAS")));
-    ASSERT_FALSE(read) << file;
-    EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-    EXPECT_THAT(read.error().message, HasSubstr(file));
-    EXPECT_THAT(read.error().message, HasSubstr("SPACE is 'LAS': must be RAS or LPS"));
+    const std::string refusal =
+        refusal_of(read_surface(folder.write(file, with_heading(file, text, "LAS"))));
+    EXPECT_THAT(refusal, HasSubstr(file));
+    EXPECT_THAT(refusal, HasSubstr("SPACE is 'LAS': must be RAS or LPS"));
   }
 }
 
@@ -287,6 +269,51 @@ TEST(SurfaceSpace, WordThatOnlyEndsLikeTheKeySaysNothing) {
   const auto read = read_surface(folder.write("s.obj", "# COLOURSPACE=sRGB\n" + obj(false)));
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->vertices.col(1), Vec3(10.5, 0, 0));
+}
+
+// ---- points ----
+
+class SurfacePoints : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+};
+
+TEST_F(SurfacePoints, TextGivesPointsWithoutTriangles) {
+  for (const char* name : {"p.xyz", "p.TXT", "p.csv", "p.pts"}) {
+    const auto points = read_surface_or_points(folder_.write(
+        name, "x y z colour\n# made by hand\n1 2\t3 255\n// another\n\n -4.5,5e0;+6\r\n"));
+    ASSERT_TRUE(points) << points.error().message;
+    ASSERT_EQ(points->num_vertices(), 2);
+    EXPECT_EQ(points->num_triangles(), 0);
+    EXPECT_EQ(points->vertices.col(0), Vec3(1, 2, 3));
+    EXPECT_EQ(points->vertices.col(1), Vec3(-4.5, 5, 6));
+  }
+}
+
+TEST_F(SurfacePoints, APlyWithoutFacesGivesPointsHereAndIsRefusedAsASurface) {
+  const auto path = folder_.write("p.ply",
+                                  "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n"
+                                  "property float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n");
+  const auto points = read_surface_or_points(path);
+  ASSERT_TRUE(points) << points.error().message;
+  EXPECT_EQ(points->num_vertices(), 2);
+  EXPECT_EQ(points->num_triangles(), 0);
+  EXPECT_THAT(read_surface(path).error().message, HasSubstr("p.ply: has no triangle"));
+}
+
+TEST_F(SurfacePoints, BadTextsAreRefused) {
+  const auto read = [this](const std::string& text) {
+    return read_surface_or_points(folder_.write("p.xyz", text));
+  };
+  expect_refused(read, {{"1 2 3\n4 5\n", "p.xyz: point 1 has 2 coordinates: must have 3"},
+                        {"1 2 3\n# ok\n4 5x 6\n", "line 3: \"5x\" is no number"},
+                        {"1 2 nan\n", "node 0 has a coordinate that is not finite"},
+                        {"nan 2 3\n", "not finite"},
+                        {"-inf 2 3\n", "not finite"},
+                        {"", "p.xyz: has no point"},
+                        {"x y z\n", "has no point"}});
+  EXPECT_THAT(refusal_of(read_surface_or_points(folder_.write("p.las", "1 2 3\n"))),
+              HasSubstr("unknown surface format '.las'"));
 }
 
 }  // namespace

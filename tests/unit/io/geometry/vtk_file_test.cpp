@@ -9,19 +9,20 @@
 #include <sstream>
 
 #include "common/io/geometry/mesh_file.hpp"
-#include "common/io/geometry/surface_writer.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
 using test_support::put;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::TemporaryFolder;
-
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 
 std::string base64(const std::string& bytes) {
   const std::string alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -142,9 +143,22 @@ const std::vector<std::int64_t> kConnectivity = {0, 1, 2, 3, 0, 1, 4, 5, 1, 2, 0
 const std::vector<std::int64_t> kOffsets = {4, 7, 11};
 const std::vector<std::uint8_t> kTypes = {10, 5, 10};
 
-std::string vtu(const VtkEncoding& encoding) {
+// SPACE as VTK's own writer puts it into the field data: a text is its characters and a 0.
+std::string vtk_text(Writer& out, const std::string& text) {
+  std::string array =
+      out.array("SPACE", "Int8", std::vector<std::int8_t>(text.begin(), text.end()));
+  array = replaced(array, "Int8", "String");
+  for (std::size_t at = 0; (at = array.find("DataArray", at)) != std::string::npos;) {
+    array.replace(at, 9, "Array");
+  }
+  return "<FieldData>\n" + array + "</FieldData>\n";
+}
+
+// Files of other programs and of earlier versions of this one have no SPACE.
+std::string vtu(const VtkEncoding& encoding, const std::string& space = {}) {
   Writer out(encoding);
-  std::string piece = "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
+  std::string piece = space.empty() ? "" : vtk_text(out, space + std::string(1, '\0'));
+  piece += "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
   piece += out.array("id", "Int32", std::vector<std::int32_t>{0, 1, 2, 3, 4, 5});
   piece += out.array("u", "Float64", kPoints, 3);
   piece += out.array("p", "Float32", std::vector<float>{1, 2, 3, 4, 5, 6.5f});
@@ -237,172 +251,62 @@ INSTANTIATE_TEST_SUITE_P(
 class VtuFile : public testing::Test {
  protected:
   // The ascii file with one piece of text replaced.
-  std::string refusal(const std::string& from, const std::string& to) {
-    std::string text = vtu(VtkEncoding{.name = "", .ascii = true});
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    const auto mesh = read_tet_mesh(folder_.write("m.vtu", text.replace(at, from.size(), to)));
-    EXPECT_FALSE(mesh) << from << " -> " << to;
-    if (mesh) return {};
-    EXPECT_EQ(mesh.error().code, ErrorCode::kUnreadable);
-    EXPECT_THAT(mesh.error().message, HasSubstr("m.vtu: "));
-    return mesh.error().message;
-  }
-  static TetMesh large_mesh() {
-    TetMesh mesh;
-    mesh.nodes.resize(3, 60000);  // 1.4 MB: more than one compressed block
-    for (Eigen::Index i = 0; i < mesh.nodes.size(); ++i) {
-      mesh.nodes.data()[i] = 1.0 / (1.0 + static_cast<double>(i));
-    }
-    mesh.tets.resize(4, 50000);
-    for (int t = 0; t < 50000; ++t) mesh.tets.col(t) << t, t + 1, t + 2, t + 10000 - 1;
-    return mesh;
+  void expect_refusals(std::initializer_list<test_support::BadEdit> cases) {
+    const auto read = [this](const std::string& text) {
+      auto mesh = read_tet_mesh(folder_.write("m.vtu", text));
+      if (!mesh) EXPECT_THAT(mesh.error().message, HasSubstr("m.vtu: "));
+      return mesh;
+    };
+    expect_edits_refused(read, vtu(VtkEncoding{.name = "", .ascii = true}), cases);
   }
   TemporaryFolder folder_;
 };
 
 TEST_F(VtuFile, IndexOutOfRangeIsNamed) {
-  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 6\n 0\n 1\n 4\n"),
-              HasSubstr("tetrahedron 0 has node index 6: must be between 0 and 5"));
-  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n -1\n 0\n 1\n 4\n"),
-              HasSubstr("tetrahedron 0 has node index -1"));
-  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 4294967296\n 0\n 1\n 4\n"),
-              HasSubstr("tetrahedron 0 has node index -1"));
+  expect_refusals({{"0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 6\n 0\n 1\n 4\n",
+                    "tetrahedron 0 has node index 6: must be between 0 and 5"},
+                   {"0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n -1\n 0\n 1\n 4\n",
+                    "tetrahedron 0 has node index -1"},
+                   {"0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1\n 2\n 4294967296\n 0\n 1\n 4\n",
+                    "tetrahedron 0 has node index -1"}});
 }
 
 TEST_F(VtuFile, WrongCountsAreNamed) {
-  EXPECT_THAT(refusal("NumberOfPoints=\"6\"", "NumberOfPoints=\"7\""),
-              HasSubstr("Points array 'Points' has 18 numbers: must have 7 x 3"));
-  EXPECT_THAT(refusal("NumberOfPoints=\"6\"", "NumberOfPoints=\"-6\""),
-              HasSubstr("must be a count"));
-  EXPECT_THAT(refusal("NumberOfCells=\"3\"", "NumberOfCells=\"2\""),
-              HasSubstr("'offsets' has 3 numbers"));
-  EXPECT_THAT(refusal("10\n 5\n 10\n", "10\n 5\n"), HasSubstr("'types' has 2 numbers"));
-  EXPECT_THAT(refusal("4\n 7\n 11\n", "3\n 7\n 11\n"), HasSubstr("tetrahedron with 3 vertices"));
-  EXPECT_THAT(refusal("4\n 7\n 11\n", "4\n 7\n 12\n"), HasSubstr("offset 2 is 12"));
-  EXPECT_THAT(refusal("4\n 7\n 11\n", "4\n 3\n 11\n"), HasSubstr("offset 1 is 3"));
-  EXPECT_THAT(refusal("3\n 99\n -4\n", "3\n 99\n"), HasSubstr("'label' has 2 numbers"));
-}
-
-TEST_F(VtuFile, HexahedraAloneAreRefused) {
-  EXPECT_THAT(refusal("10\n 5\n 10\n", "12\n 5\n 12\n"), HasSubstr("has no tetrahedron"));
+  expect_refusals({{"NumberOfPoints=\"6\"", "NumberOfPoints=\"7\"",
+                    "Points array 'Points' has 18 numbers: must have 7 x 3"},
+                   {"NumberOfPoints=\"6\"", "NumberOfPoints=\"-6\"", "must be a count"},
+                   {"NumberOfCells=\"3\"", "NumberOfCells=\"2\"", "'offsets' has 3 numbers"},
+                   {"10\n 5\n 10\n", "10\n 5\n", "'types' has 2 numbers"},
+                   {"4\n 7\n 11\n", "3\n 7\n 11\n", "tetrahedron with 3 vertices"},
+                   {"4\n 7\n 11\n", "4\n 7\n 12\n", "offset 2 is 12"},
+                   {"4\n 7\n 11\n", "4\n 3\n 11\n", "offset 1 is 3"},
+                   {"3\n 99\n -4\n", "3\n 99\n", "'label' has 2 numbers"}});
 }
 
 TEST_F(VtuFile, MissingOrUnknownPartsAreNamed) {
-  EXPECT_THAT(refusal("Name=\"types\"", "Name=\"kinds\""), HasSubstr("no array 'types'"));
-  EXPECT_THAT(refusal("type=\"Float64\" Name=\"Points\"", "type=\"Float16\" Name=\"Points\""),
-              HasSubstr("unknown type 'Float16'"));
-  EXPECT_THAT(refusal("type=\"Float64\" Name=\"Points\"", "type=\"Int64\" Name=\"Points\""),
-              HasSubstr("Points"));
-  EXPECT_THAT(refusal("VTKFile type=\"UnstructuredGrid\"", "VTKFile type=\"ImageData\""),
-              HasSubstr("holds 'ImageData': must be 'UnstructuredGrid'"));
-  EXPECT_THAT(refusal(" byte_order", " compressor=\"vtkLZ4DataCompressor\" byte_order"),
-              HasSubstr("vtkLZ4DataCompressor"));
-  EXPECT_THAT(refusal("</Piece>", "</Piece><Piece/>"), HasSubstr("several pieces"));
-  EXPECT_THAT(refusal("0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1,5\n 2\n 3\n 0\n 1\n 4\n"),
-              HasSubstr("not a number"));
-  EXPECT_THAT(refusal("<VTKFile", "<Other"), HasSubstr("m.vtu: "));
+  expect_refusals(
+      {{"Name=\"types\"", "Name=\"kinds\"", "no array 'types'"},
+       {"type=\"Float64\" Name=\"Points\"", "type=\"Float16\" Name=\"Points\"",
+        "unknown type 'Float16'"},
+       {"type=\"Float64\" Name=\"Points\"", "type=\"Int64\" Name=\"Points\"", "Points"},
+       {"VTKFile type=\"UnstructuredGrid\"", "VTKFile type=\"ImageData\"",
+        "holds 'ImageData': must be 'UnstructuredGrid'"},
+       {" byte_order", " compressor=\"vtkLZ4DataCompressor\" byte_order", "vtkLZ4DataCompressor"},
+       {"</Piece>", "</Piece><Piece/>", "several pieces"},
+       {"0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1,5\n 2\n 3\n 0\n 1\n 4\n", "not a number"},
+       {"<VTKFile", "<Other", "is not well-formed XML"},
+       // Hexahedra alone.
+       {"10\n 5\n 10\n", "12\n 5\n 12\n", "has no tetrahedron"}});
 }
-
-TEST_F(VtuFile, WrittenMeshAndFieldsAreReadBackBitForBit) {
-  TetMesh mesh = large_mesh();
-  for (int t = 0; t < mesh.num_tets(); ++t) mesh.labels.push_back(t % 5 - 1);
-  const NodeField displacement{"displacement <mm> & \"more\"", mesh.nodes * 2.0};
-  const NodeField sd{"sd", mesh.nodes.row(1)};
-  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", mesh, {displacement, sd}));
-  EXPECT_EQ(folder_.entries(), 1u);
-  const auto read = read_vtu(folder_ / "m.vtu");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->mesh.nodes, mesh.nodes);
-  EXPECT_EQ(read->mesh.tets, mesh.tets);
-  EXPECT_EQ(read->mesh.labels, mesh.labels);
-  ASSERT_EQ(read->node_fields.size(), 2u);
-  EXPECT_EQ(read->node_fields[0].name, displacement.name);
-  EXPECT_EQ(read->node_fields[0].values, displacement.values);
-  EXPECT_EQ(read->node_fields[1].values, sd.values);
-}
-
-TEST_F(VtuFile, MeshWithoutLabelsHasNoneWhenReadBack) {
-  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", large_mesh(), {}));
-  const auto read = read_vtu(folder_ / "m.vtu");
-  ASSERT_TRUE(read);
-  EXPECT_THAT(read->mesh.labels, IsEmpty());
-  EXPECT_THAT(read->node_fields, IsEmpty());
-}
-
-TEST_F(VtuFile, FieldOfAnotherLengthIsRefusedAndNothingWritten) {
-  const TetMesh mesh = large_mesh();
-  const Status status = write_vtu(folder_ / "m.vtu", mesh, {{"u", mesh.nodes.leftCols(10)}});
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(status.error().message, HasSubstr("field 'u' has 10 columns"));
-  EXPECT_EQ(folder_.entries(), 0u);
-}
-
-TEST_F(VtuFile, UnwritablePlaceIsNamed) {
-  const Status status = write_vtu(folder_ / "no" / "m.vtu", large_mesh(), {});
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(status.error().message, HasSubstr("no/m.vtu"));
-}
-
-// 3D Slicer takes the points of a VTK file for LPS unless it finds this in the field data.
-constexpr const char* kSpaceIsRas =
-    "<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">"
-    "82 65 83 0</Array>\n</FieldData>\n<Piece ";
-
-TEST_F(VtuFile, SaysThatItsPointsAreRas) {
-  ASSERT_TRUE(write_vtu(folder_ / "m.vtu", large_mesh(), {}));
-  EXPECT_THAT(test_support::content_of(folder_ / "m.vtu"), HasSubstr(kSpaceIsRas));
-}
-
-TEST(VtpFile, SaysThatItsPointsAreRasAndIsReadBack) {
-  const TemporaryFolder folder;
-  TriangleSurface surface;
-  surface.vertices = Points::Random(3, 4);
-  surface.triangles.resize(3, 2);
-  surface.triangles << 0, 0, 2, 1, 1, 3;
-  ASSERT_TRUE(write_surface(folder / "s.vtp", surface));
-  EXPECT_THAT(test_support::content_of(folder / "s.vtp"), HasSubstr(kSpaceIsRas));
-  const auto read = read_surface(folder / "s.vtp");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->vertices, surface.vertices);
-  EXPECT_EQ(read->triangles, surface.triangles);
-}
-
-// Files of other programs and of earlier versions of this one have none: TrianglesAreReadIn...
-// and KnownMeshIsReadWithItsFields read such.
-
-// SPACE as VTK's own writer puts it into a file of this encoding: a text is its characters and 0.
-std::string with_space(const VtkEncoding& encoding, const std::string& text) {
-  Writer out(encoding);
-  std::string array =
-      out.array("SPACE", "Int8", std::vector<std::int8_t>(text.begin(), text.end()));
-  array.replace(array.find("Int8"), 4, "String");
-  for (std::size_t at = 0; (at = array.find("DataArray", at)) != std::string::npos;) {
-    array.replace(at, 9, "Array");
-  }
-  std::string piece = "<FieldData>\n" + array + "</FieldData>\n";
-  piece += "<Piece NumberOfPoints=\"6\" NumberOfCells=\"3\">\n<PointData>\n";
-  piece += out.array("u", "Float64", kPoints, 3);
-  piece += out.array("p", "Float32", std::vector<float>{1, 2, 3, 4, 5, 6.5f});
-  piece += "</PointData>\n<Points>\n" + out.array("Points", "Float64", kPoints, 3) +
-           "</Points>\n<Cells>\n" + out.array("connectivity", "Int64", kConnectivity) +
-           out.array("offsets", "Int64", kOffsets) + out.array("types", "UInt8", kTypes) +
-           "</Cells>\n</Piece>\n";
-  return out.file("UnstructuredGrid", piece);
-}
-
-std::string ended(const std::string& text) { return text + std::string(1, '\0'); }
 
 TEST_P(VtuEncoding, PointsAndVectorsInLpsAreTurnedIntoRas) {
   const Eigen::Map<const Points> as_written(kPoints.data(), 3, 6);
   const Eigen::DiagonalMatrix<double, 3> turn(-1.0, -1.0, 1.0);
-  const auto ras = read_vtu(folder_.write("r.vtu", with_space(GetParam(), ended("RAS"))));
+  const auto ras = read_vtu(folder_.write("r.vtu", vtu(GetParam(), "RAS")));
   ASSERT_TRUE(ras) << ras.error().message;
   EXPECT_EQ(ras->mesh.nodes, as_written);
   EXPECT_EQ(ras->node_fields[0].values, as_written);
-  const auto lps = read_vtu(folder_.write("l.vtu", with_space(GetParam(), ended("LPS"))));
+  const auto lps = read_vtu(folder_.write("l.vtu", vtu(GetParam(), "LPS")));
   ASSERT_TRUE(lps) << lps.error().message;
   EXPECT_EQ(lps->mesh.nodes, Points(turn * as_written));
   EXPECT_EQ(lps->mesh.tets, ras->mesh.tets);
@@ -414,65 +318,26 @@ TEST_P(VtuEncoding, PointsAndVectorsInLpsAreTurnedIntoRas) {
 }
 
 TEST_P(VtuEncoding, AnotherSpaceIsRefusedByFileAndValue) {
-  const auto read = read_vtu(folder_.write("m.vtu", with_space(GetParam(), ended("LAS"))));
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(read.error().message, HasSubstr("m.vtu: SPACE is 'LAS': must be RAS or LPS"));
+  EXPECT_THAT(refusal_of(read_vtu(folder_.write("m.vtu", vtu(GetParam(), "LAS")))),
+              HasSubstr("m.vtu: SPACE is 'LAS': must be RAS or LPS"));
 }
 
 TEST_F(VtuFile, MalformedSpaceIsNamed) {
   const VtkEncoding ascii{.name = "", .ascii = true};
-  const std::string whole = with_space(ascii, ended("RAS"));
+  const std::string whole = vtu(ascii, "RAS");
   const std::string codes = "82\n 65\n 83\n 0\n";
-  const auto refused = [&](const std::string& from, const std::string& to) {
-    std::string text = whole;
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    const auto read = read_vtu(folder_.write("m.vtu", text.replace(at, from.size(), to)));
-    EXPECT_FALSE(read) << to;
-    return read ? std::string() : read.error().message;
+  const auto read = [this](const std::string& text) {
+    return read_vtu(folder_.write("m.vtu", text));
   };
-  EXPECT_THAT(refused(codes, ""), HasSubstr("m.vtu: SPACE is '': must be RAS or LPS"));
-  EXPECT_THAT(refused(codes, "RAS"), HasSubstr("'SPACE' holds something that is not the code"));
-  EXPECT_THAT(refused(codes, "82 65 400"), HasSubstr("'SPACE' holds a code that is no character"));
-  EXPECT_THAT(refused(codes, "82 65 83 0 76 80 83 0"), HasSubstr("several texts: must be one"));
-  EXPECT_THAT(refused("type=\"String\"", "type=\"Int8\""), HasSubstr("must be String"));
-  EXPECT_THAT(refused(codes, "27 10 200 0"), HasSubstr("SPACE is '" + std::string(3, '?') + "'"))
-      << "one printable line";
-  EXPECT_TRUE(read_vtu(folder_.write(
-      "m.vtu", std::string(whole).replace(whole.find(codes), codes.size(), "82 65 83"))))
-      << "the ending 0 may be missing";
-}
-
-TEST_F(VtuFile, LpsTwinOfAWrittenMeshLoadsEqual) {
-  const TetMesh mesh = large_mesh();
-  TetMesh turned = mesh;
-  turned.nodes.topRows<2>() *= -1.0;
-  ASSERT_TRUE(write_vtu(folder_ / "ras.vtu", mesh, {{"u", mesh.nodes}}));
-  ASSERT_TRUE(write_vtu(folder_ / "lps.vtu", turned, {{"u", turned.nodes}}));
-  std::string text = test_support::content_of(folder_ / "lps.vtu");
-  text.replace(text.find("82 65 83 0"), 10, "76 80 83 0");
-  const auto ras = read_vtu(folder_ / "ras.vtu"), lps = read_vtu(folder_.write("lps.vtu", text));
-  ASSERT_TRUE(ras && lps);
-  EXPECT_EQ(lps->mesh.nodes, ras->mesh.nodes);
-  EXPECT_EQ(lps->node_fields[0].values, ras->node_fields[0].values);
-}
-
-TEST(VtpFile, LpsTwinOfAWrittenSurfaceLoadsEqual) {
-  const TemporaryFolder folder;
-  TriangleSurface surface;
-  surface.vertices = Points::Random(3, 3);
-  surface.triangles = Eigen::Vector3i(0, 1, 2);
-  ASSERT_TRUE(write_surface(folder / "ras.vtp", surface));
-  surface.vertices.topRows<2>() *= -1.0;
-  ASSERT_TRUE(write_surface(folder / "lps.vtp", surface));
-  std::string text = test_support::content_of(folder / "lps.vtp");
-  text.replace(text.find("82 65 83 0"), 10, "76 80 83 0");
-  const auto ras = read_surface(folder / "ras.vtp");
-  const auto lps = read_surface(folder.write("lps.vtp", text));
-  ASSERT_TRUE(ras && lps);
-  EXPECT_EQ(lps->vertices, ras->vertices);
-  EXPECT_EQ(lps->triangles, ras->triangles);
+  expect_edits_refused(read, whole,
+                       {{codes, "", "m.vtu: SPACE is '': must be RAS or LPS"},
+                        {codes, "RAS", "'SPACE' holds something that is not the code"},
+                        {codes, "82 65 400", "'SPACE' holds a code that is no character"},
+                        {codes, "82 65 83 0 76 80 83 0", "several texts: must be one"},
+                        {"type=\"String\"", "type=\"Int8\"", "must be String"},
+                        // One printable line.
+                        {codes, "27 10 200 0", "SPACE is '" + std::string(3, '?') + "'"}});
+  EXPECT_TRUE(read(replaced(whole, codes, "82 65 83"))) << "the ending 0 may be missing";
 }
 
 std::string vtp(const VtkEncoding& encoding, const std::vector<std::int32_t>& offsets,
@@ -505,13 +370,31 @@ TEST(VtpFile, TrianglesAreReadInEveryEncoding) {
 TEST(VtpFile, PolygonsAndStripsAreRefused) {
   const TemporaryFolder folder;
   const VtkEncoding ascii{.name = "", .ascii = true};
-  const auto quad = read_surface(folder.write("s.vtp", vtp(ascii, {4, 6}, "NumberOfPolys=\"2\"")));
-  ASSERT_FALSE(quad);
-  EXPECT_THAT(quad.error().message, HasSubstr("s.vtp: polygon 0 has 4 vertices: must have 3"));
-  const auto strips = read_surface(
-      folder.write("s.vtp", vtp(ascii, {3, 6}, "NumberOfPolys=\"2\" NumberOfStrips=\"1\"")));
-  ASSERT_FALSE(strips);
-  EXPECT_THAT(strips.error().message, HasSubstr("triangle strips"));
+  const auto read = [&](const std::string& text) {
+    return read_surface(folder.write("s.vtp", text));
+  };
+  expect_refused(
+      read,
+      {{vtp(ascii, {4, 6}, "NumberOfPolys=\"2\""), "s.vtp: polygon 0 has 4 vertices: must have 3"},
+       {vtp(ascii, {3, 6}, "NumberOfPolys=\"2\" NumberOfStrips=\"1\""), "triangle strips"}});
+}
+
+TEST(GroupedMesh, VtuTrianglesTakeTheirLabels) {
+  const TemporaryFolder folder;
+  const auto mesh = read_grouped_mesh(
+      folder.write("m.vtu",
+                   R"(<VTKFile type="UnstructuredGrid" byte_order="LittleEndian"><UnstructuredGrid>
+<Piece NumberOfPoints="4" NumberOfCells="2"><Points>
+<DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">1 2 3 0 1 2 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3 7</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">5 10</DataArray></Cells>
+<CellData><DataArray type="Int32" Name="label" format="ascii">8 2</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>)"));
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_THAT(mesh->triangle_labels, ElementsAre(8));
+  EXPECT_THAT(mesh->mesh.labels, ElementsAre(2));
+  EXPECT_EQ(mesh->triangles.col(0), Eigen::Vector3i(1, 2, 3));
 }
 
 }  // namespace

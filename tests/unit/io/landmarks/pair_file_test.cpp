@@ -5,26 +5,26 @@
 
 #include <cstdlib>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::StartsWith;
+
+// ---- files ----
 
 constexpr const char* kTag =
     "MNI Tag Point File\nVolumes = 2;\n%a comment\n\nPoints =\n"
     " 1 2 3 1.5 2.5 3.5 \"a\"\n 4 5 6 4 5 -6e0 1 2 3 \"b c\";\n";
-
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), with);
-}
 
 void expect_two(const std::string& name, const std::string& content,
                 const std::vector<std::string>& names = {"a", "b c"}) {
@@ -38,16 +38,15 @@ void expect_two(const std::string& name, const std::string& content,
   EXPECT_TRUE(pairs->left_out.empty());
 }
 
-std::string refusal(const std::string& name, const std::string& content,
-                    ErrorCode code = ErrorCode::kUnreadable) {
-  const TemporaryFolder folder;
-  const auto path = folder.write(name, content);
-  const auto pairs = read_pairs(path);
-  EXPECT_FALSE(pairs) << content;
-  if (pairs) return {};
-  EXPECT_EQ(pairs.error().code, code) << pairs.error().message;
-  EXPECT_THAT(pairs.error().message, StartsWith(path.string() + ": "));
-  return pairs.error().message;
+// read_pairs of a file of this name; an error begins with its path.
+auto reading_pairs(const std::string& name) {
+  return [name](const std::string& content) {
+    const TemporaryFolder folder;
+    const auto path = folder.write(name, content);
+    auto read = read_pairs(path);
+    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    return read;
+  };
 }
 
 TEST(PairFile, TagsAndTablesSayTheSame) {
@@ -88,52 +87,45 @@ TEST(PairFile, RefusesTwoListsThatCannotBePaired) {
   const TemporaryFolder folder;
   const auto one = folder.write("one.csv", "a,1,2,3\n"),
              other = folder.write("other.csv", "b,1,2,3\n");
-  const auto pairs = read_pairs(one, other);
-  ASSERT_FALSE(pairs);
-  EXPECT_EQ(pairs.error().code, ErrorCode::kEmptySet);
-  EXPECT_THAT(pairs.error().message,
+  EXPECT_THAT(refusal_of(read_pairs(one, other), ErrorCode::kEmptySet),
               AllOf(HasSubstr("one.csv and "), HasSubstr("other.csv: no name is in both")));
-  EXPECT_EQ(read_pairs(one, folder / "none.csv").error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(read_pairs(folder / "none.csv", one).error().code, ErrorCode::kNotFound);
+  refusal_of(read_pairs(one, folder / "none.csv"), ErrorCode::kNotFound);
+  refusal_of(read_pairs(folder / "none.csv", one), ErrorCode::kNotFound);
 }
 
 TEST(PairFile, RefusesTagFilesThatAreDamaged) {
-  const auto bad = [](const char* what, const char* with) {
-    return refusal("a.tag", replaced(kTag, what, with));
-  };
-  EXPECT_THAT(refusal("a.tag", ""), HasSubstr("is no MNI tag point file"));
-  EXPECT_THAT(refusal("a.tag", "1 2 3 4 5 6\n"), HasSubstr("is no MNI tag point file"));
-  EXPECT_THAT(bad("Volumes = 2;", "Volumes = 1;"), HasSubstr("\"Volumes = 1;\" must be 2"));
-  EXPECT_THAT(bad("Volumes = 2;\n", ""), HasSubstr("comes before \"Volumes = 2;\""));
-  EXPECT_THAT(bad("Points =", "Tags ="), HasSubstr("line 5: \"Tags =\" is neither"));
-  EXPECT_THAT(bad("1.5 2.5 3.5", "1.5 2.5"), HasSubstr("line 6:"));
-  EXPECT_THAT(bad("1.5 2.5 3.5", "1.5 2.5 3.5 4"), HasSubstr("6 or 9 finite numbers"));
-  EXPECT_THAT(bad("2.5", "nan"), HasSubstr("line 6:"));
-  EXPECT_THAT(bad("\"a\"", "\"a"), HasSubstr("line 6:"));
-  EXPECT_THAT(bad("\"a\"", "\"a\" 7"), HasSubstr("line 6:"));
-  EXPECT_THAT(bad("\"b c\";", "\"b c\""), HasSubstr("is truncated"));
-  EXPECT_THAT(refusal("a.tag", std::string(kTag) + "7 8 9 7 8 9\n"),
-              HasSubstr("comes behind the last point"));
-  EXPECT_THAT(
-      refusal("a.tag", "MNI Tag Point File\nVolumes = 2;\nPoints =\n;\n", ErrorCode::kEmptySet),
-      HasSubstr("no landmark"));
+  expect_refused(reading_pairs("a.tag"),
+                 {{"", "is no MNI tag point file"}, {"1 2 3 4 5 6\n", "is no MNI tag point file"}});
+  expect_edits_refused(reading_pairs("a.tag"), kTag,
+                       {{"Volumes = 2;", "Volumes = 1;", "\"Volumes = 1;\" must be 2"},
+                        {"Volumes = 2;\n", "", "comes before \"Volumes = 2;\""},
+                        {"Points =", "Tags =", "line 5: \"Tags =\" is neither"},
+                        {"1.5 2.5 3.5", "1.5 2.5", "line 6:"},
+                        {"1.5 2.5 3.5", "1.5 2.5 3.5 4", "6 or 9 finite numbers"},
+                        {"2.5", "nan", "line 6:"},
+                        {"\"a\"", "\"a", "line 6:"},
+                        {"\"a\"", "\"a\" 7", "line 6:"},
+                        {"\"b c\";", "\"b c\"", "is truncated"}});
+  expect_refused(reading_pairs("a.tag"),
+                 {{std::string(kTag) + "7 8 9 7 8 9\n", "comes behind the last point"}});
+  expect_refused(reading_pairs("a.tag"),
+                 {{"MNI Tag Point File\nVolumes = 2;\nPoints =\n;\n", "no landmark"}},
+                 ErrorCode::kEmptySet);
 }
 
 TEST(PairFile, RefusesTablesOfAnotherShape) {
-  EXPECT_THAT(refusal("a.csv", "1,2,3,4,5\n"),
-              HasSubstr("line 1: \"1,2,3,4,5\" must be 6 numbers"));
-  EXPECT_THAT(refusal("a.csv", "x_src,y_src,z_src,x_dst,y_dst,k_dst,e,f\n1,2,3,4,5,6,7,8\n"),
-              HasSubstr("a heading with x_before"));
-  EXPECT_THAT(refusal("a.csv", "x_src,y_src,z_src,x_dst,y_dst,z_dst,x_before,f\n1,2,3,4,5,6,7,8\n"),
-              HasSubstr("a heading with x_before"));
-  EXPECT_THAT(refusal("a.csv", "1,2,3,4,5,6\n1,2,3,4,5\n"), HasSubstr("line 2:"));
-  EXPECT_THAT(refusal("a.csv", "1,2,3,4,5,6\n1,2,3,4,5,inf\n"), HasSubstr("line 2:"));
-  EXPECT_THAT(refusal("a.csv", "", ErrorCode::kEmptySet), HasSubstr("no landmark"));
-  EXPECT_THAT(refusal("a.fcsv", "x"), HasSubstr("a second file must say"));
-  EXPECT_THAT(refusal("a.txt", "x"), HasSubstr("must be a .csv or .tag file"));
-  const auto none = read_pairs(std::filesystem::path("nowhere/a.csv"));
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  expect_refused(
+      reading_pairs("a.csv"),
+      {{"1,2,3,4,5\n", "line 1: \"1,2,3,4,5\" must be 6 numbers"},
+       {"x_src,y_src,z_src,x_dst,y_dst,k_dst,e,f\n1,2,3,4,5,6,7,8\n", "a heading with x_before"},
+       {"x_src,y_src,z_src,x_dst,y_dst,z_dst,x_before,f\n1,2,3,4,5,6,7,8\n",
+        "a heading with x_before"},
+       {"1,2,3,4,5,6\n1,2,3,4,5\n", "line 2:"},
+       {"1,2,3,4,5,6\n1,2,3,4,5,inf\n", "line 2:"}});
+  expect_refused(reading_pairs("a.csv"), {{"", "no landmark"}}, ErrorCode::kEmptySet);
+  expect_refused(reading_pairs("a.fcsv"), {{"x", "a second file must say"}});
+  expect_refused(reading_pairs("a.txt"), {{"x", "must be a .csv or .tag file"}});
+  refusal_of(read_pairs(std::filesystem::path("nowhere/a.csv")), ErrorCode::kNotFound);
 }
 
 // RESECT, patient 4 (Xiao et al. 2017, doi:10.1002/mp.12268).
@@ -149,6 +141,47 @@ TEST(PairFile, RealLandmarksAreTheSameInBothFormats) {
   EXPECT_EQ(table->names, tags->names);
   EXPECT_EQ(table->first, tags->first);
   EXPECT_EQ(table->second, tags->second);
+}
+
+// ---- two lists by name ----
+
+NamedPoints list(std::initializer_list<const char*> names, double shift = 0.0) {
+  NamedPoints points;
+  for (const char* name : names) {
+    points.add(name, Vec3(shift + static_cast<double>(points.points.size()), 0, 0));
+  }
+  return points;
+}
+
+TEST(NamedPoints, PairsAreFoundByNameInWhateverOrder) {
+  const auto pairs = pair_by_name(list({"a", "b", "c"}), list({"d", "c", "a"}, 10));
+  ASSERT_TRUE(pairs) << pairs.error().message;
+  EXPECT_THAT(pairs->names, ElementsAre("a", "c"));
+  EXPECT_THAT(pairs->first, ElementsAre(Vec3(0, 0, 0), Vec3(2, 0, 0)));
+  EXPECT_THAT(pairs->second, ElementsAre(Vec3(12, 0, 0), Vec3(11, 0, 0)));
+  EXPECT_THAT(pairs->left_out, ElementsAre("b", "d"));
+}
+
+TEST(NamedPoints, RefusesNamesThatDoNotName) {
+  const auto refusal = [](const NamedPoints& first, const NamedPoints& second, ErrorCode code) {
+    return refusal_of(pair_by_name(first, second), code);
+  };
+  const ErrorCode bad = ErrorCode::kInvalidArgument;
+  EXPECT_THAT(refusal(list({"a", "b", "a"}), list({"a"}), bad),
+              HasSubstr("the first list has two points called \"a\""));
+  EXPECT_THAT(refusal(list({"a"}), list({"b", "b"}), bad), HasSubstr("the second list"));
+  EXPECT_THAT(refusal(list({"a"}), list({"a", ""}), bad),
+              HasSubstr("point 2 of the second list has no name"));
+  EXPECT_THAT(refusal(list({"a"}), list({"A"}), ErrorCode::kEmptySet),
+              HasSubstr("no name is in both lists of 1 and 1 points"));
+  EXPECT_FALSE(list({"a", ""}).all_named());
+  EXPECT_TRUE(list({"a", "b"}).all_named());
+}
+
+TEST(NamedPoints, ColumnsKeepTheOrder) {
+  const Points columns = columns_of({Vec3(1, 2, 3), Vec3(4, 5, 6)});
+  ASSERT_EQ(columns.cols(), 2);
+  EXPECT_EQ(Vec3(columns.col(1)), Vec3(4, 5, 6));
 }
 
 }  // namespace

@@ -4,15 +4,18 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 constexpr const char* kJson = R"({
   "@schema": "https://raw.githubusercontent.com/slicer/slicer/main/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#",
@@ -31,12 +34,6 @@ constexpr const char* kFcsv =
     "1,-1.5,-2,3,0,0,0,1,1,1,0,nasion,,\r\n"
     "2,4,-5,6.25,0,0,0,1,1,1,0,\"left, ear\",a note,\n";
 
-std::string point_replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), with);
-}
-
 Result<NamedPoints> read(const std::string& name, const std::string& content) {
   const TemporaryFolder folder;
   return read_points(folder.write(name, content));
@@ -51,34 +48,32 @@ void expect_two_points(const std::string& name, const std::string& content, cons
                                         signs.cwiseProduct(Vec3(4, -5, 6.25))));
 }
 
-std::string point_refusal(const std::string& name, const std::string& content,
-                          ErrorCode code = ErrorCode::kUnreadable) {
-  const TemporaryFolder folder;
-  const auto path = folder.write(name, content);
-  const auto list = read_points(path);
-  EXPECT_FALSE(list) << content;
-  if (list) return {};
-  EXPECT_EQ(list.error().code, code) << list.error().message;
-  EXPECT_THAT(list.error().message, StartsWith(path.string() + ": "));
-  return list.error().message;
+// read_points of a file of this name; an error begins with its path.
+auto reading_points(const std::string& name) {
+  return [name](const std::string& content) {
+    const TemporaryFolder folder;
+    const auto path = folder.write(name, content);
+    auto read = read_points(path);
+    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    return read;
+  };
 }
 
 TEST(PointFile, EverySpellingOfSlicersFramesBecomesRas) {
   for (const auto& [spelling, signs] :
        {std::pair{"LPS", Vec3(-1, -1, 1)}, std::pair{"1", Vec3(-1, -1, 1)},
         std::pair{"RAS", Vec3(1, 1, 1)}, std::pair{"0", Vec3(1, 1, 1)}}) {
-    expect_two_points("a.fcsv", point_replaced(kFcsv, "= LPS", "= " + std::string(spelling)),
-                      signs);
-    expect_two_points("a.mrk.json", point_replaced(kJson, "LPS", spelling), signs);
+    expect_two_points("a.fcsv", replaced(kFcsv, "= LPS", "= " + std::string(spelling)), signs);
+    expect_two_points("a.mrk.json", replaced(kJson, "LPS", spelling), signs);
   }
-  expect_two_points("a.mrk.json", point_replaced(kJson, "\"LPS\"", "1"), Vec3(-1, -1, 1));
+  expect_two_points("a.mrk.json", replaced(kJson, "\"LPS\"", "1"), Vec3(-1, -1, 1));
 }
 
 TEST(PointFile, FcsvColumnsAreSlicersUnlessTheFileOrdersThem) {
   expect_two_points(
       "a.fcsv",
-      point_replaced(
-          kFcsv, "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n", ""),
+      replaced(kFcsv, "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n",
+               ""),
       Vec3(-1, -1, 1));
   expect_two_points(
       "a.fcsv",
@@ -106,57 +101,49 @@ TEST(PointFile, TablesHaveANameOrAHeadingOrNeither) {
 }
 
 TEST(PointFile, RefusesMarkupsThatAreNoPointList) {
-  const auto bad = [](const char* what, const char* with) {
-    return point_refusal("a.mrk.json", point_replaced(kJson, what, with));
-  };
-  EXPECT_THAT(point_refusal("a.mrk.json", ""), HasSubstr("must be JSON with a list \"markups\""));
-  EXPECT_THAT(point_refusal("a.mrk.json", "[]"), HasSubstr("a list \"markups\""));
-  EXPECT_THAT(point_refusal("a.mrk.json", R"({"markups": []})"), HasSubstr("holds 0 markups"));
-  EXPECT_THAT(point_refusal("a.mrk.json", R"({"markups": [7]})"),
-              HasSubstr("must hold one point list"));
-  EXPECT_THAT(bad("Fiducial", "Plane"), HasSubstr("type = Plane"));
-  EXPECT_THAT(bad("\"LPS\"", "\"IJK\""), HasSubstr("coordinateSystem = IJK"));
-  EXPECT_THAT(bad("\"LPS\"", "2"), HasSubstr("coordinateSystem = 2"));
-  EXPECT_THAT(bad("\"coordinateSystem\": \"LPS\",", ""), HasSubstr("coordinateSystem is missing"));
-  EXPECT_THAT(bad("\"mm\"", "\"m\""), HasSubstr("coordinateUnits = \"m\""));
-  EXPECT_THAT(bad("controlPoints", "points"), HasSubstr("no list \"controlPoints\""));
-  EXPECT_THAT(bad("[-1.5, -2, 3]", "[-1.5, -2]"), HasSubstr("control point 1: position"));
-  EXPECT_THAT(bad("6.25", "\"six\""), HasSubstr("control point 3: position"));
-  EXPECT_THAT(bad("6.25", "1e999"), HasSubstr("JSON"));
-  EXPECT_THAT(point_refusal("a.mrk.json",
-                            R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
+  expect_refused(reading_points("a.mrk.json"),
+                 {{"", "must be JSON with a list \"markups\""},
+                  {"[]", "a list \"markups\""},
+                  {R"({"markups": []})", "holds 0 markups"},
+                  {R"({"markups": [7]})", "must hold one point list"}});
+  expect_edits_refused(reading_points("a.mrk.json"), kJson,
+                       {{"Fiducial", "Plane", "type = Plane"},
+                        {"\"LPS\"", "\"IJK\"", "coordinateSystem = IJK"},
+                        {"\"LPS\"", "2", "coordinateSystem = 2"},
+                        {"\"coordinateSystem\": \"LPS\",", "", "coordinateSystem is missing"},
+                        {"\"mm\"", "\"m\"", "coordinateUnits = \"m\""},
+                        {"controlPoints", "points", "no list \"controlPoints\""},
+                        {"[-1.5, -2, 3]", "[-1.5, -2]", "control point 1: position"},
+                        {"6.25", "\"six\"", "control point 3: position"},
+                        {"6.25", "1e999", "JSON"}});
+  expect_refused(reading_points("a.mrk.json"),
+                 {{R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
                           "controlPoints": []}]})",
-                            ErrorCode::kEmptySet),
-              HasSubstr("no point that was placed"));
+                   "no point that was placed"}},
+                 ErrorCode::kEmptySet);
 }
 
 TEST(PointFile, RefusesFcsvThatDoesNotSayWhere) {
-  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "# CoordinateSystem = LPS\n", "")),
-              HasSubstr("coordinateSystem is missing"));
-  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "LPS", "2")),
-              HasSubstr("coordinateSystem = 2"));
-  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "-1.5,", "nan,")),
-              HasSubstr("line 4: \"1,nan"));
-  EXPECT_THAT(point_refusal("a.fcsv", point_replaced(kFcsv, "x,y,z", "i,j,k")),
-              HasSubstr("line 4"));
-  EXPECT_THAT(point_refusal("a.fcsv", std::string(kFcsv) + "3,1\n"), HasSubstr("line 6: \"3,1\""));
-  EXPECT_THAT(point_refusal("a.fcsv", "# CoordinateSystem = LPS\n", ErrorCode::kEmptySet),
-              HasSubstr("no point"));
+  expect_refused(reading_points("a.fcsv"), {{replaced(kFcsv, "# CoordinateSystem = LPS\n", ""),
+                                             "coordinateSystem is missing"},
+                                            {replaced(kFcsv, "LPS", "2"), "coordinateSystem = 2"},
+                                            {replaced(kFcsv, "-1.5,", "nan,"), "line 4: \"1,nan"},
+                                            {replaced(kFcsv, "x,y,z", "i,j,k"), "line 4"},
+                                            {std::string(kFcsv) + "3,1\n", "line 6: \"3,1\""}});
+  expect_refused(reading_points("a.fcsv"), {{"# CoordinateSystem = LPS\n", "no point"}},
+                 ErrorCode::kEmptySet);
 }
 
 TEST(PointFile, RefusesTablesOfAnotherShape) {
-  EXPECT_THAT(point_refusal("a.csv", "1,2\n"), HasSubstr("line 1: \"1,2\" must be x,y,z"));
-  EXPECT_THAT(point_refusal("a.csv", "u,v,w\n1,2,3\n"), HasSubstr("a heading with the columns"));
-  EXPECT_THAT(point_refusal("a.csv", "1,2,3\n4,5\n"), HasSubstr("line 2: \"4,5\""));
-  EXPECT_THAT(point_refusal("a.csv", "a,1,2,3\n1,2,3\n"), HasSubstr("behind a name"));
-  EXPECT_THAT(point_refusal("a.csv", "x,y,z\n1,2,inf\n"), HasSubstr("line 2"));
-  EXPECT_THAT(point_refusal("a.csv", "x,y,z\n", ErrorCode::kEmptySet), HasSubstr("no point"));
-  EXPECT_THAT(point_refusal("a.csv", "", ErrorCode::kEmptySet), HasSubstr("no point"));
-  EXPECT_THAT(point_refusal("a.vtk", "1,2,3\n"),
-              HasSubstr("must be a .mrk.json, .fcsv or .csv file"));
-  const auto none = read_points("nowhere/a.csv");
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  expect_refused(reading_points("a.csv"), {{"1,2\n", "line 1: \"1,2\" must be x,y,z"},
+                                           {"u,v,w\n1,2,3\n", "a heading with the columns"},
+                                           {"1,2,3\n4,5\n", "line 2: \"4,5\""},
+                                           {"a,1,2,3\n1,2,3\n", "behind a name"},
+                                           {"x,y,z\n1,2,inf\n", "line 2"}});
+  expect_refused(reading_points("a.csv"), {{"x,y,z\n", "no point"}, {"", "no point"}},
+                 ErrorCode::kEmptySet);
+  expect_refused(reading_points("a.vtk"), {{"1,2,3\n", "must be a .mrk.json, .fcsv or .csv file"}});
+  refusal_of(read_points("nowhere/a.csv"), ErrorCode::kNotFound);
 }
 
 }  // namespace

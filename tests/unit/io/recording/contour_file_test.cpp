@@ -3,21 +3,25 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_refused;
+using test_support::refusal_of;
 using test_support::TemporaryFolder;
-using testing::HasSubstr;
 
-std::string contour_refusal(const std::string& name, const std::string& text) {
-  const TemporaryFolder folder;
-  const auto path = folder.write(name, text);
-  const auto contours = read_contours(path, true);
-  if (contours) return {};
-  EXPECT_THAT(contours.error().message, testing::StartsWith(path.string() + ": "));
-  return contours.error().message;
+// read_contours of a file of this name; an error begins with its path.
+auto reading_contours(const std::string& name) {
+  return [name](const std::string& content) {
+    const TemporaryFolder folder;
+    const auto path = folder.write(name, content);
+    auto read = read_contours(path, true);
+    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    return read;
+  };
 }
 
 TEST(ContourFile, CsvGroupsRowsByFrame) {
@@ -52,37 +56,34 @@ TEST(ContourFile, JsonSaysWhetherEachContourIsClosed) {
 }
 
 TEST(ContourFile, NamesLineAndValueThatAreWrong) {
-  EXPECT_THAT(contour_refusal("c.csv", "frame,u_px,v_px\n1,2,x\n"), HasSubstr("line 2: \"1,2,x\""));
-  EXPECT_THAT(contour_refusal("c.csv", "1,2\n"), HasSubstr("line 1: \"1,2\""));
-  EXPECT_THAT(contour_refusal("c.csv", "1,2,3,4\n"), HasSubstr("line 1"));
-  EXPECT_THAT(contour_refusal("c.csv", "-1,2,3\n"), HasSubstr("line 1: \"-1,2,3\""));
-  EXPECT_THAT(contour_refusal("c.csv", "1.5,2,3\n"), HasSubstr("line 1"));
-  EXPECT_THAT(contour_refusal("c.csv", "1,nan,3\n"), HasSubstr("line 1"));
-  EXPECT_THAT(contour_refusal("c.csv", "1,2,3\n2,2,3\n1,5,5\n"),
-              HasSubstr("line 3: frame 1 comes a second time"));
-  EXPECT_THAT(contour_refusal("c.csv", "frame,u_px,v_px\n"), HasSubstr("holds no row"));
-  EXPECT_THAT(contour_refusal("c.txt", "1,2,3\n"), HasSubstr("must be a .csv or .json"));
+  expect_refused(reading_contours("c.csv"),
+                 {{"frame,u_px,v_px\n1,2,x\n", "line 2: \"1,2,x\""},
+                  {"1,2\n", "line 1: \"1,2\""},
+                  {"1,2,3,4\n", "line 1"},
+                  {"-1,2,3\n", "line 1: \"-1,2,3\""},
+                  {"1.5,2,3\n", "line 1"},
+                  {"1,nan,3\n", "line 1"},
+                  {"1,2,3\n2,2,3\n1,5,5\n", "line 3: frame 1 comes a second time"}});
+  expect_refused(reading_contours("c.csv"), {{"frame,u_px,v_px\n", "holds no row"}},
+                 ErrorCode::kEmptySet);
+  expect_refused(reading_contours("c.txt"), {{"1,2,3\n", "must be a .csv or .json"}});
 }
 
 TEST(ContourFile, NamesContourAndKeyThatAreWrong) {
-  EXPECT_THAT(contour_refusal("c.json", "{"), HasSubstr("must be JSON"));
-  EXPECT_THAT(contour_refusal("c.json", "[]"), HasSubstr("list \"contours\""));
-  EXPECT_THAT(contour_refusal("c.json", R"({"contours": []})"), HasSubstr("holds no contour"));
-  EXPECT_THAT(contour_refusal("c.json", R"({"contours": [3]})"),
-              HasSubstr("contours[0]: is no object"));
-  EXPECT_THAT(contour_refusal("c.json", R"({"contours": [{"frame": -1, "points_px": []}]})"),
-              HasSubstr("contours[0]: frame must be"));
-  EXPECT_THAT(
-      contour_refusal("c.json", R"({"contours": [{"frame": 1, "points_px": [[1, 2], [3]]}]})"),
-      HasSubstr("contours[0]: points_px[1] must be [u, v]"));
-  EXPECT_THAT(
-      contour_refusal("c.json", R"({"contours": [{"frame": 1, "closed": 1, "points_px": []}]})"),
-      HasSubstr("closed must be true or false"));
-  EXPECT_THAT(contour_refusal("c.json", R"({"contours": [{"frame": 1, "points": []}]})"),
-              HasSubstr("key points is unknown"));
-  const auto none = read_contours("/nonexistent/c.csv", true);
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  expect_refused(
+      reading_contours("c.json"),
+      {{"{", "must be JSON"},
+       {"[]", "list \"contours\""},
+       {R"({"contours": [3]})", "contours[0]: is no object"},
+       {R"({"contours": [{"frame": -1, "points_px": []}]})", "contours[0]: frame must be"},
+       {R"({"contours": [{"frame": 1, "points_px": [[1, 2], [3]]}]})",
+        "contours[0]: points_px[1] must be [u, v]"},
+       {R"({"contours": [{"frame": 1, "closed": 1, "points_px": []}]})",
+        "closed must be true or false"},
+       {R"({"contours": [{"frame": 1, "points": []}]})", "key points is unknown"}});
+  expect_refused(reading_contours("c.json"), {{R"({"contours": []})", "holds no contour"}},
+                 ErrorCode::kEmptySet);
+  refusal_of(read_contours("/nonexistent/c.csv", true), ErrorCode::kNotFound);
 }
 
 TEST(SeedFile, HasASeedPerRow) {

@@ -6,14 +6,19 @@
 #include <algorithm>
 #include <cstring>
 
+#include "tests/support/refusals.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/virtual_sweep.hpp"
 
 namespace brainshift::io {
 namespace {
 
+using test_support::expect_edits_refused;
+using test_support::expect_refused;
 using test_support::meta_text;
 using test_support::nrrd_text;
+using test_support::refusal_of;
+using test_support::replaced;
 using test_support::SequenceContent;
 using test_support::TemporaryFolder;
 using test_support::VirtualSweep;
@@ -37,22 +42,23 @@ const tracking::LinkSeries* find_link(const Recording& recording, const std::str
   return nullptr;
 }
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), with);
+// read_sequence of a file of this name; an error begins with its path.
+auto reading_sequence(const std::string& name = "bad.igs.mha",
+                      const SequenceOptions& options = {}) {
+  return [name, options](const std::string& text) {
+    const TemporaryFolder folder;
+    const auto path = folder.write(name, text);
+    auto recording = read_sequence(path, options);
+    if (!recording) {
+      EXPECT_THAT(recording.error().message, testing::StartsWith(path.string() + ": "));
+    }
+    return recording;
+  };
 }
 
-// What reading says of a text; empty when it is accepted.
-std::string refusal(const std::string& text, const std::string& name = "bad.igs.mha",
-                    const SequenceOptions& options = {}) {
-  const TemporaryFolder folder;
-  const auto path = folder.write(name, text);
-  const auto recording = read_sequence(path, options);
-  if (recording) return {};
-  EXPECT_EQ(recording.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(recording.error().message, testing::StartsWith(path.string() + ": "));
-  return recording.error().message;
+// What reading it says of bad content.
+std::string refusal(const SequenceContent& content) {
+  return refusal_of(reading_sequence()(meta_text(content, true)));
 }
 
 TEST(SequenceFile, SaysTheSameInEveryFormat) {
@@ -221,19 +227,17 @@ TEST(SequenceFile, ATrackerAloneIsReadWhereNoImagesAreWanted) {
 TEST(SequenceFile, NamesFrameAndFieldOfBadTimes) {
   SequenceContent content = small_sweep().content();
   content.frames[2].erase("Timestamp");
-  EXPECT_THAT(refusal(meta_text(content, true)),
-              HasSubstr("frame 2: Seq_Frame0002_Timestamp is missing"));
-  EXPECT_THAT(refusal(nrrd_text(content, true), "bad.nrrd"),
+  EXPECT_THAT(refusal(content), HasSubstr("frame 2: Seq_Frame0002_Timestamp is missing"));
+  EXPECT_THAT(refusal_of(reading_sequence("bad.nrrd")(nrrd_text(content, true))),
               HasSubstr("frame 2: Seq_Frame0002_Timestamp is missing"));
   content.frames[2]["Timestamp"] = "999.5";
   EXPECT_THAT(
-      refusal(meta_text(content, true)),
+      refusal(content),
       AllOf(HasSubstr("frame 2: Seq_Frame0002_Timestamp = 999.5 s: the clock runs backwards"),
             HasSubstr("1000.1 s")));
   for (const char* text : {"soon", "nan", "inf", "1 2", ""}) {
     content.frames[2]["Timestamp"] = text;
-    EXPECT_THAT(refusal(meta_text(content, true)),
-                HasSubstr("Seq_Frame0002_Timestamp = " + std::string(text)));
+    EXPECT_THAT(refusal(content), HasSubstr("Seq_Frame0002_Timestamp = " + std::string(text)));
   }
 }
 
@@ -242,119 +246,100 @@ TEST(SequenceFile, NamesFrameAndFieldOfBadMatrices) {
   for (const char* text :
        {"1 0 0", "one 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "", "1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1"}) {
     content.frames[1]["ProbeToTrackerTransform"] = text;
-    EXPECT_THAT(refusal(meta_text(content, true)),
+    EXPECT_THAT(refusal(content),
                 HasSubstr("frame 1: Seq_Frame0001_ProbeToTrackerTransform is not 16 numbers"));
   }
   content = small_sweep().content();
   content.frames[1]["probeTransform"] = test_support::matrix_text(Eigen::Matrix4d::Identity());
-  EXPECT_THAT(refusal(meta_text(content, true)), HasSubstr("Seq_Frame0001_probeTransform"));
+  EXPECT_THAT(refusal(content), HasSubstr("Seq_Frame0001_probeTransform"));
 }
 
 TEST(SequenceFile, RefusesHeadersThatDisagree) {
   const std::string good = meta_text(small_sweep().content(), true);
-  const auto bad = [&](const char* what, const char* with) {
-    return refusal(replaced(good, what, with));
-  };
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9 3"), HasSubstr("Seq_Frame0003"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9 5"),
-              HasSubstr("frame 4: Seq_Frame0004_Timestamp"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 8 4"), HasSubstr("more than its sizes say"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 10 4"),
-              HasSubstr("truncated: 432 of 480 bytes"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 0 4"), HasSubstr("images of 12 x 0 pixels"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9 0"), HasSubstr("0 of them"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 -9 4"), HasSubstr("every size must be"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 nine 4"), HasSubstr("DimSize = 12 nine 4"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9"), HasSubstr("NDims"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 20000 9 4"), HasSubstr("20000 x 9 pixels"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12 9 99999999"), HasSubstr("every size must be"));
-  EXPECT_THAT(bad("DimSize = 12 9 4", "DimSize = 12000 16000 4"),
-              HasSubstr("compressed ones are too few"));
-  EXPECT_THAT(bad("MET_UCHAR", "MET_FLOAT"), HasSubstr("pixel type float"));
-  EXPECT_THAT(bad("ElementDataFile = LOCAL", "ElementDataFile = other.raw"),
-              HasSubstr("other.raw"));
-  EXPECT_THAT(bad("BinaryData = True", "BinaryData = False"), HasSubstr("BinaryData = False"));
-  EXPECT_THAT(bad("CompressedData = True", "CompressedData = Yes"),
-              HasSubstr("CompressedData = Yes"));
-  EXPECT_THAT(bad("ObjectType = Image", "ElementNumberOfChannels = 3"),
-              HasSubstr("ElementNumberOfChannels = 3"));
-  EXPECT_THAT(bad("ObjectType = Image", "UltrasoundImageType = RF_REAL"), HasSubstr("RF_REAL"));
-  EXPECT_THAT(bad("ObjectType = Image", "NDims = 3"), HasSubstr("field NDims is given twice"));
-  EXPECT_THAT(bad("Seq_Frame0001_", "Seq_FrameX_"), HasSubstr("Seq_FrameX_"));
-  EXPECT_THAT(bad("Seq_Frame0001_", "Seq_Frame999999999999_"), HasSubstr("Seq_Frame999999999999_"));
-  EXPECT_THAT(bad("Seq_Frame0001_ImageStatus", "Seq_Frame0000_ImageStatus"),
-              HasSubstr("given twice"));
+  expect_edits_refused(
+      reading_sequence(), good,
+      {{"DimSize = 12 9 4", "DimSize = 12 9 3", "Seq_Frame0003"},
+       {"DimSize = 12 9 4", "DimSize = 12 9 5", "frame 4: Seq_Frame0004_Timestamp"},
+       {"DimSize = 12 9 4", "DimSize = 12 8 4", "more than its sizes say"},
+       {"DimSize = 12 9 4", "DimSize = 12 10 4", "truncated: 432 of 480 bytes"},
+       {"DimSize = 12 9 4", "DimSize = 12 0 4", "images of 12 x 0 pixels"},
+       {"DimSize = 12 9 4", "DimSize = 12 9 0", "0 of them"},
+       {"DimSize = 12 9 4", "DimSize = 12 -9 4", "every size must be"},
+       {"DimSize = 12 9 4", "DimSize = 12 nine 4", "DimSize = 12 nine 4"},
+       {"DimSize = 12 9 4", "DimSize = 12 9", "NDims"},
+       {"DimSize = 12 9 4", "DimSize = 20000 9 4", "20000 x 9 pixels"},
+       {"DimSize = 12 9 4", "DimSize = 12 9 99999999", "every size must be"},
+       {"DimSize = 12 9 4", "DimSize = 12000 16000 4", "compressed ones are too few"},
+       {"MET_UCHAR", "MET_FLOAT", "pixel type float"},
+       {"ElementDataFile = LOCAL", "ElementDataFile = other.raw", "other.raw"},
+       {"BinaryData = True", "BinaryData = False", "BinaryData = False"},
+       {"CompressedData = True", "CompressedData = Yes", "CompressedData = Yes"},
+       {"ObjectType = Image", "ElementNumberOfChannels = 3", "ElementNumberOfChannels = 3"},
+       {"ObjectType = Image", "UltrasoundImageType = RF_REAL", "RF_REAL"},
+       {"ObjectType = Image", "NDims = 3", "field NDims is given twice"},
+       {"Seq_Frame0001_", "Seq_FrameX_", "Seq_FrameX_"},
+       {"Seq_Frame0001_", "Seq_Frame999999999999_", "Seq_Frame999999999999_"},
+       {"Seq_Frame0001_ImageStatus", "Seq_Frame0000_ImageStatus", "given twice"}});
 }
 
-TEST(SequenceFile, RefusesATrackerAloneWhereImagesAreWanted) {
-  EXPECT_THAT(refusal(meta_text(tracker_alone(), false)),
-              HasSubstr("holds 4 poses of a tracker and no images"));
-}
-
-TEST(SequenceFile, RefusesATrackerAloneWithBadTimesOrMatrices) {
+TEST(SequenceFile, RefusesATrackerAloneWhereImagesAreWantedOrTimesOrMatricesAreBad) {
+  expect_refused(reading_sequence(),
+                 {{meta_text(tracker_alone(), false), "holds 4 poses of a tracker and no images"}});
   SequenceOptions options;
   options.tracking_only = true;
   SequenceContent content = tracker_alone();
   content.frames[2].erase("Timestamp");
-  EXPECT_THAT(refusal(meta_text(content, false), "bad.mha", options),
-              HasSubstr("frame 2: Seq_Frame0002_Timestamp is missing"));
+  const auto read = reading_sequence("bad.mha", options);
+  expect_refused(read,
+                 {{meta_text(content, false), "frame 2: Seq_Frame0002_Timestamp is missing"}});
   content = tracker_alone();
   content.frames[1]["ProbeToTrackerTransform"] = "1 2 3";
-  EXPECT_THAT(refusal(meta_text(content, false), "bad.mha", options), HasSubstr("frame 1"));
+  expect_refused(read, {{meta_text(content, false), "frame 1"}});
 }
 
 TEST(SequenceFile, RefusesOrientationsThatAreNotSaidOrNotFlat) {
   SequenceContent content = small_sweep().content();
   for (const char* text : {"FU", "AMF", "XX", "M", "MFX"}) {
     content.fields["UltrasoundImageOrientation"] = text;
-    EXPECT_THAT(refusal(meta_text(content, true)),
-                HasSubstr("UltrasoundImageOrientation = " + std::string(text)));
+    EXPECT_THAT(refusal(content), HasSubstr("UltrasoundImageOrientation = " + std::string(text)));
   }
   content.fields.clear();
-  EXPECT_THAT(refusal(meta_text(content, true)),
-              HasSubstr("UltrasoundImageOrientation is missing"));
-  EXPECT_EQ(refusal(meta_text(content, true), "good.mha", {"MF"}), "");
+  EXPECT_THAT(refusal(content), HasSubstr("UltrasoundImageOrientation is missing"));
+  EXPECT_TRUE(reading_sequence("good.mha", {"MF"})(meta_text(content, true)));
 }
 
 TEST(SequenceFile, RefusesPixelsThatAreDamaged) {
   const SequenceContent content = small_sweep().content();
   const std::string raw = meta_text(content, false), packed = meta_text(content, true);
-  EXPECT_THAT(refusal(raw.substr(0, raw.size() - 1)),
-              HasSubstr("holds 431 bytes of pixels, its sizes say 432"));
-  EXPECT_THAT(refusal(raw + "x"), HasSubstr("holds 433 bytes"));
-  EXPECT_THAT(refusal(packed.substr(0, packed.size() - 8)), HasSubstr("compressed pixels are"));
+  expect_refused(reading_sequence(),
+                 {{raw.substr(0, raw.size() - 1), "holds 431 bytes of pixels, its sizes say 432"},
+                  {raw + "x", "holds 433 bytes"},
+                  {packed.substr(0, packed.size() - 8), "compressed pixels are"}});
   std::string damaged = packed;
   damaged[damaged.size() - 2] = static_cast<char>(damaged[damaged.size() - 2] ^ 0x55);
-  EXPECT_THAT(refusal(damaged), HasSubstr("damaged"));
+  expect_refused(reading_sequence(), {{damaged, "damaged"}});
 }
 
 TEST(SequenceFile, RefusesWhatIsNoSequence) {
-  EXPECT_THAT(refusal(""), HasSubstr("no ElementDataFile"));
-  EXPECT_THAT(refusal("not a header at all"), HasSubstr("no ElementDataFile"));
-  EXPECT_THAT(refusal("NRRD0004\ntype: uint8\n", "a.nrrd"), HasSubstr("header has no end"));
-  EXPECT_THAT(refusal("PNG", "a.nrrd"), HasSubstr("no NRRD file"));
-  EXPECT_THAT(refusal("x", "a.mhd"), HasSubstr("must be a sequence file"));
-  const TemporaryFolder folder;
-  const auto none = read_sequence(folder / "none.mha");
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  expect_refused(reading_sequence(),
+                 {{"", "no ElementDataFile"}, {"not a header at all", "no ElementDataFile"}});
+  expect_refused(reading_sequence("a.nrrd"),
+                 {{"NRRD0004\ntype: uint8\n", "header has no end"}, {"PNG", "no NRRD file"}});
+  expect_refused(reading_sequence("a.mhd"), {{"x", "must be a sequence file"}});
+  refusal_of(read_sequence("/nowhere/none.mha"), ErrorCode::kNotFound);
 }
 
 TEST(SequenceFile, RefusesNrrdHeadersThatDisagree) {
   const std::string good = nrrd_text(small_sweep().content(), true);
-  const auto bad = [&](const char* what, const char* with) {
-    return refusal(replaced(good, what, with), "bad.seq.nrrd");
-  };
-  EXPECT_THAT(bad("encoding: gzip", "encoding: bzip2"), HasSubstr("encoding = bzip2"));
-  EXPECT_THAT(bad("endian: little", "endian: middle"), HasSubstr("endian = middle"));
-  EXPECT_THAT(bad("dimension: 3", "dimension: 4"), HasSubstr("dimension = \"4\""));
-  EXPECT_THAT(bad("sizes: 12 9 4", "sizes: 12 9 5"), HasSubstr("frame 4"));
-  EXPECT_THAT(bad("type: uint8", "type: double"), HasSubstr("pixel type double"));
-  EXPECT_THAT(bad("kinds: domain domain list", "kinds: list domain domain"),
-              HasSubstr("kinds = list"));
-  EXPECT_THAT(bad("# written by a test", "data file: other.raw"),
-              HasSubstr("data file = other.raw"));
-  EXPECT_THAT(bad("# written by a test", "a line without a colon"), HasSubstr("has no value"));
+  expect_edits_refused(reading_sequence("bad.seq.nrrd"), good,
+                       {{"encoding: gzip", "encoding: bzip2", "encoding = bzip2"},
+                        {"endian: little", "endian: middle", "endian = middle"},
+                        {"dimension: 3", "dimension: 4", "dimension = \"4\""},
+                        {"sizes: 12 9 4", "sizes: 12 9 5", "frame 4"},
+                        {"type: uint8", "type: double", "pixel type double"},
+                        {"kinds: domain domain list", "kinds: list domain domain", "kinds = list"},
+                        {"# written by a test", "data file: other.raw", "data file = other.raw"},
+                        {"# written by a test", "a line without a colon", "has no value"}});
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "common/io/fields/nifti_writer.hpp"
+#include "common/io/fields/field_files.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "tests/unit/client/tools/export/small_export.hpp"

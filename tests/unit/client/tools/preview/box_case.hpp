@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
 

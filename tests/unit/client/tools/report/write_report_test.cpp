@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "client/tools/replay/run_report.hpp"
-#include "common/io/geometry/vtu_writer.hpp"
+#include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/box.hpp"
 #include "tests/unit/client/tools/report/small_run.hpp"

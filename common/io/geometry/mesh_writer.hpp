@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tetrahedra with fields to a VTK .vtu file; mm RAS. The file says so (vtk_xml_writing.hpp).
+// Tetrahedra and surfaces with fields to files; mm RAS, and a VTK file says so (SPACE). A file is
+// written to a temporary name, synced, renamed. kWriteFailed names the file; kInvalidArgument a
+// field that does not fit.
 #pragma once
 
 #include <filesystem>
@@ -11,8 +13,7 @@
 
 namespace brainshift::io {
 
-// Base64 and zlib. Written to a temporary name, synced, renamed. kWriteFailed names the file;
-// kInvalidArgument names a field that does not fit.
+// A VTK .vtu file, base64 and zlib.
 Status write_vtu(const std::filesystem::path& path, const TetMesh& mesh,
                  const std::vector<NodeField>& node_fields);
 
@@ -26,5 +27,10 @@ struct ElementGrid {
 Status write_vtu(const std::filesystem::path& path, const ElementGrid& grid,
                  const std::vector<NodeField>& node_fields,
                  const std::vector<NodeField>& cell_fields);
+
+// A surface with fields on its vertices, as .ply (binary, little-endian, float64; only fields of
+// one row) or .vtp. kUnreadable for another extension.
+Status write_surface(const std::filesystem::path& path, const TriangleSurface& surface,
+                     const std::vector<NodeField>& vertex_fields = {});
 
 }  // namespace brainshift::io

@@ -1,0 +1,398 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Surfaces and point clouds out of .stl, .ply, .obj and plain text; mesh_formats.hpp says what of
+// each format is read.
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <sstream>
+
+#include "common/io/files/binary_codec.hpp"
+#include "common/io/files/number_cursor.hpp"
+#include "common/io/files/point_space.hpp"
+#include "common/io/geometry/mesh_formats.hpp"
+
+namespace brainshift::io {
+namespace {
+
+// ---- .stl ----
+
+constexpr std::size_t kStlHeader = 84;  // 80 bytes of text, 4 of count
+constexpr std::size_t kStlFacet = 50;   // normal, three corners (floats), 2 bytes of attributes
+
+// Merges corners whose coordinates are equal bit for bit (after making -0 into 0): programs write
+// a shared vertex with the same digits each time.
+class CornerMerger {
+ public:
+  void add_corner(double x, double y, double z) {
+    const std::array<double, 3> key = {x + 0.0, y + 0.0, z + 0.0};
+    const auto [entry, is_new] = index_.emplace(key, static_cast<int>(index_.size()));
+    if (is_new) coordinates_.insert(coordinates_.end(), key.begin(), key.end());
+    corners_.push_back(entry->second);
+  }
+  std::size_t corners() const { return corners_.size(); }
+  TriangleSurface surface() const { return {as_columns<3>(coordinates_), as_columns<3>(corners_)}; }
+
+ private:
+  std::map<std::array<double, 3>, int> index_;
+  std::vector<double> coordinates_;
+  std::vector<int> corners_;
+};
+
+TriangleSurface read_stl_binary(const std::string& content, std::size_t triangles) {
+  CornerMerger builder;
+  for (std::size_t t = 0; t < triangles; ++t) {
+    const char* at = content.data() + kStlHeader + t * kStlFacet + 12;
+    for (int corner = 0; corner < 3; ++corner, at += 12) {
+      const float x = load_number<float>(at, false);
+      const float y = load_number<float>(at + 4, false);
+      const float z = load_number<float>(at + 8, false);
+      // NaN would break the order of the merging map.
+      if (!(std::isfinite(x) && std::isfinite(y) && std::isfinite(z))) {
+        refuse_format("triangle " + std::to_string(t) + " has a coordinate that is not finite");
+      }
+      builder.add_corner(x, y, z);
+    }
+  }
+  return builder.surface();
+}
+
+std::string_view next_word(std::string_view& text) {
+  constexpr std::string_view kSpace = " \t\r\n";
+  const std::size_t begin = text.find_first_not_of(kSpace);
+  if (begin == std::string_view::npos) {
+    text = {};
+    return {};
+  }
+  const std::size_t end = std::min(text.find_first_of(kSpace, begin), text.size());
+  const std::string_view word = text.substr(begin, end - begin);
+  text.remove_prefix(end);
+  return word;
+}
+
+bool parse_real(std::string_view word, double& value) {
+  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && stop == word.data() + word.size() && std::isfinite(value);
+}
+
+TriangleSurface read_stl_ascii(std::string_view text) {
+  CornerMerger builder;
+  std::size_t loops = 0;
+  bool ended = false;
+  for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
+    if (word == "endsolid") ended = true;
+    if (word == "endloop" && builder.corners() != 3 * ++loops) {
+      refuse_format("facet " + std::to_string(loops - 1) + " does not have three vertices");
+    }
+    if (word != "vertex") continue;
+    double p[3];
+    for (double& coordinate : p) {
+      const std::string_view number = next_word(text);
+      if (!parse_real(number, coordinate)) {
+        refuse_format("vertex coordinate '" + std::string(number) + "' of facet " +
+                      std::to_string(loops) + " is not a finite number");
+      }
+    }
+    builder.add_corner(p[0], p[1], p[2]);
+  }
+  if (!ended || builder.corners() != 3 * loops) {
+    refuse_format("ends before endsolid");
+  }
+  return builder.surface();
+}
+
+TriangleSurface as_ras(TriangleSurface surface, std::string_view heading) {
+  turn_to_ras(value_of(point_space_in(heading.substr(0, heading.find('\0')))), surface.vertices);
+  return surface;
+}
+
+TriangleSurface read_stl(const std::string& content) {
+  const std::string_view text(content);
+  // A binary file may begin with "solid" too, so the size decides.
+  if (content.size() >= kStlHeader) {
+    const std::size_t triangles = load_number<std::uint32_t>(content.data() + 80, false);
+    if (content.size() == kStlHeader + triangles * kStlFacet) {
+      return as_ras(read_stl_binary(content, triangles), text.substr(0, 80));
+    }
+  }
+  if (content.rfind("solid", 0) == 0) {
+    return as_ras(read_stl_ascii(content), text.substr(0, text.find('\n')));
+  }
+  refuse_format("is neither an ASCII STL nor a binary one of the promised size");
+}
+
+// ---- .ply ----
+
+struct PlyProperty {
+  std::string name;
+  std::string type;
+  std::string count_type;  // not empty: a list
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+struct PlyHeader {
+  std::string format;
+  PointSpace space = PointSpace::kUnsaid;
+  std::vector<PlyElement> elements;
+};
+
+PlyHeader read_ply_header(std::string_view& rest) {
+  constexpr std::string_view kEnd = "end_header";
+  const std::size_t end = rest.find(kEnd);
+  if (rest.rfind("ply", 0) != 0 || end == std::string_view::npos)
+    refuse_format("is not a PLY file");
+  std::istringstream lines{std::string(rest.substr(0, end))};
+  rest.remove_prefix(std::min(rest.size(), rest.find('\n', end) + 1));
+
+  PlyHeader header;
+  std::string line;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    std::string first;
+    words >> first;
+    if (first == "format") words >> header.format;
+    if (first == "comment" && header.space == PointSpace::kUnsaid) {
+      header.space = value_of(point_space_in(line));
+    }
+    if (first == "element") {
+      PlyElement element;
+      if (!(words >> element.name >> element.count))
+        refuse_format("element without a count: " + line);
+      header.elements.push_back(element);
+    }
+    if (first == "property") {
+      if (header.elements.empty()) refuse_format("property before the first element");
+      PlyProperty property;
+      words >> property.type;
+      if (property.type == "list") words >> property.count_type >> property.type;
+      if (!(words >> property.name)) refuse_format("property without a name");
+      header.elements.back().properties.push_back(property);
+    }
+  }
+  if (header.format != "ascii" && header.format != "binary_little_endian") {
+    refuse_format("PLY format '" + header.format +
+                  "' is not supported: must be ascii or binary_little_endian");
+  }
+  return header;
+}
+
+double read_ply_value(NumberCursor& cursor, bool ascii, const std::string& type) {
+  if (ascii) return cursor.text_number<double>();
+  if (type == "char" || type == "int8") return cursor.binary_number<std::int8_t>(false);
+  if (type == "uchar" || type == "uint8") return cursor.binary_number<std::uint8_t>(false);
+  if (type == "short" || type == "int16") return cursor.binary_number<std::int16_t>(false);
+  if (type == "ushort" || type == "uint16") return cursor.binary_number<std::uint16_t>(false);
+  if (type == "int" || type == "int32") return cursor.binary_number<std::int32_t>(false);
+  if (type == "uint" || type == "uint32") return cursor.binary_number<std::uint32_t>(false);
+  if (type == "float" || type == "float32") {
+    return static_cast<double>(cursor.binary_number<float>(false));
+  }
+  if (type == "double" || type == "float64") return cursor.binary_number<double>(false);
+  refuse_format("property type '" + type + "' is unknown");
+}
+
+int ply_index(double value) {
+  const bool fits = value >= 0.0 && value <= std::numeric_limits<int>::max();
+  return fits ? static_cast<int>(value) : -1;  // the caller's index check names it
+}
+
+// One entry of an element: scalars by name; a list of vertex indices goes to `indices`.
+void read_ply_entry(NumberCursor& cursor, bool ascii, const PlyElement& element,
+                    std::map<std::string, double>& scalars, std::vector<int>& indices) {
+  indices.clear();
+  for (const PlyProperty& property : element.properties) {
+    if (property.count_type.empty()) {
+      scalars[property.name] = read_ply_value(cursor, ascii, property.type);
+      continue;
+    }
+    const double count = read_ply_value(cursor, ascii, property.count_type);
+    if (!(count >= 0.0) || count > static_cast<double>(cursor.rest().size())) {
+      refuse_format("a list promises an impossible number of entries");
+    }
+    const bool is_face = property.name == "vertex_indices" || property.name == "vertex_index";
+    for (int k = 0; k < static_cast<int>(count); ++k) {
+      const double value = read_ply_value(cursor, ascii, property.type);
+      if (is_face) indices.push_back(ply_index(value));
+    }
+  }
+}
+
+TriangleSurface read_ply(std::string_view rest) {
+  const PlyHeader header = read_ply_header(rest);
+  NumberCursor cursor(rest);
+  const bool ascii = header.format == "ascii";
+  TriangleSurface surface;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    // Every entry takes at least a byte.
+    if (element.count > cursor.rest().size())
+      refuse_format("element '" + element.name + "' ends too early");
+    const auto count = static_cast<Eigen::Index>(element.count);
+    if (element.name == "vertex") surface.vertices.resize(3, count);
+    if (element.name == "face") surface.triangles.resize(3, count);
+    std::map<std::string, double> scalars;
+    std::vector<int> indices;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      read_ply_entry(cursor, ascii, element, scalars, indices);
+      if (element.name == "vertex") {
+        if (scalars.count("x") + scalars.count("y") + scalars.count("z") != 3) {
+          refuse_format("element 'vertex' lacks x, y or z");
+        }
+        surface.vertices.col(i) << scalars["x"], scalars["y"], scalars["z"];
+      }
+      if (element.name == "face") {
+        if (indices.size() != 3) {
+          refuse_format("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
+                        " vertices: must have 3");
+        }
+        surface.triangles.col(i) << indices[0], indices[1], indices[2];
+      }
+    }
+  }
+  turn_to_ras(header.space, surface.vertices);
+  return surface;
+}
+
+// ---- .obj ----
+
+// "7/1/3" -> 7
+bool parse_vertex_number(const std::string& word, long long& number) {
+  std::istringstream in(word.substr(0, word.find('/')));
+  return static_cast<bool>(in >> number) && in.peek() == std::istringstream::traits_type::eof();
+}
+
+TriangleSurface read_obj(const std::string& content) {
+  std::istringstream lines(content);
+  std::vector<double> coordinates;
+  std::vector<int> corners;
+  PointSpace space = PointSpace::kUnsaid;
+  std::string text;
+  for (int line = 1; std::getline(lines, text); ++line) {
+    const std::string place = "line " + std::to_string(line) + ": ";
+    std::istringstream words(text);
+    std::string first;
+    words >> first;
+    if (!first.empty() && first.front() == '#' && space == PointSpace::kUnsaid) {
+      space = placed(place, [&] { return value_of(point_space_in(text)); });
+    } else if (first == "v") {
+      double x = 0.0, y = 0.0, z = 0.0;
+      if (!(words >> x >> y >> z)) refuse_format(place + "vertex without three coordinates");
+      coordinates.insert(coordinates.end(), {x, y, z});
+    } else if (first == "f") {
+      const auto known = static_cast<long long>(coordinates.size() / 3);
+      std::string word;
+      int count = 0;
+      while (words >> word) {
+        long long number = 0;
+        if (!parse_vertex_number(word, number))
+          refuse_format(place + "'" + word + "' is no vertex");
+        const long long index = number < 0 ? known + number : number - 1;
+        const bool fits = number != 0 && index >= 0 && index <= std::numeric_limits<int>::max();
+        if (!fits) refuse_format(place + "vertex " + word + " does not exist");
+        corners.push_back(static_cast<int>(index));
+        ++count;
+      }
+      if (count != 3) {
+        refuse_format(place + "face has " + std::to_string(count) + " vertices: must have 3");
+      }
+    }
+  }
+
+  TriangleSurface surface{as_columns<3>(coordinates), as_columns<3>(corners)};
+  turn_to_ras(space, surface.vertices);
+  return surface;
+}
+
+// ---- points ----
+
+constexpr std::string_view kBetween = " \t\r,;";
+
+// Takes one line's numbers; the first word that is none, or "".
+std::string_view take_numbers(std::string_view line, std::vector<double>& row) {
+  for (std::size_t at = line.find_first_not_of(kBetween); at != std::string_view::npos;
+       at = line.find_first_not_of(kBetween)) {
+    line.remove_prefix(at);
+    std::string_view word = line.substr(0, line.find_first_of(kBetween));
+    line.remove_prefix(word.size());
+    const std::string_view whole = word;
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+    double value = 0.0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || stop != word.data() + word.size()) return whole.substr(0, 32);
+    row.push_back(value);
+  }
+  return {};
+}
+
+// Without a first line of words, as spreadsheets and scanners put it.
+std::string without_heading(const std::string& content) {
+  const std::size_t first = content.find_first_not_of(" \t\r\n");
+  const bool letter = first != std::string::npos && ((content[first] | 0x20) >= 'a') &&
+                      ((content[first] | 0x20) <= 'z');
+  if (!letter || content.compare(first, 3, "nan") == 0 || content.compare(first, 3, "inf") == 0)
+    return content;
+  std::string commented = "#";
+  return commented.append(content, first);
+}
+
+// One row per line. "nan" and "inf" are numbers here: the caller's check of the points names them.
+std::vector<std::vector<double>> number_rows(const std::string& text) {
+  std::vector<std::vector<double>> rows;
+  std::string_view rest = text;
+  for (int number = 1; !rest.empty(); ++number) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+    const std::size_t first = line.find_first_not_of(kBetween);
+    if (first == std::string_view::npos || line[first] == '#' || line.substr(first, 2) == "//") {
+      continue;
+    }
+    rows.emplace_back();
+    const std::string_view wrong = take_numbers(line, rows.back());
+    if (wrong.empty()) continue;
+    refuse_format("line " + std::to_string(number) + ": \"" + std::string(wrong) +
+                  "\" is no number");
+  }
+  return rows;
+}
+
+TriangleSurface read_xyz(const std::string& content) {
+  const auto rows = number_rows(without_heading(content));
+  TriangleSurface surface;
+  surface.vertices.resize(3, static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].size() < 3) {
+      refuse_format("point " + std::to_string(i) + " has " + std::to_string(rows[i].size()) +
+                    " coordinates: must have 3");
+    }
+    surface.vertices.col(static_cast<Eigen::Index>(i)) << rows[i][0], rows[i][1], rows[i][2];
+  }
+  return surface;
+}
+
+}  // namespace
+
+Result<TriangleSurface> parse_stl(const std::string& content) {
+  return format_problems_as_errors([&] { return read_stl(content); });
+}
+
+Result<TriangleSurface> parse_ply(const std::string& content) {
+  return format_problems_as_errors([&] { return read_ply(content); });
+}
+
+Result<TriangleSurface> parse_obj(const std::string& content) {
+  return format_problems_as_errors([&] { return read_obj(content); });
+}
+
+Result<TriangleSurface> parse_xyz(const std::string& content) {
+  return format_problems_as_errors([&] { return read_xyz(content); });
+}
+
+}  // namespace brainshift::io
