@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/replays/replay_player.hpp"
 
-#include "client/tools/replay/run_unit.hpp"
+#include "client/tools/replay/replay.hpp"
 
 namespace brainshift::replays {
 namespace {

@@ -3,7 +3,7 @@
 // the case's defaults, one row of a table per update.
 //
 // Place k of a run is the patient of seed `first_seed` + k - 1
-// (client/tools/twin/varied_patient.hpp); its surgeries have the seeds that follow those of the
+// (client/tools/twin/variation.hpp); its surgeries have the seeds that follow those of the
 // place before, from `first_seed` (client/tools/twin/variation.hpp). The run that is published
 // begins at seed 1. While the estimate is being worked on, runs begin at 1001, so that nothing is
 // fitted to what is published.
@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/twin/varied_patient.hpp"
+#include "client/tools/twin/variation.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas_kernel.hpp"
 #include "common/patient/read_patient.hpp"
