@@ -7,10 +7,10 @@
 #include <optional>
 #include <utility>
 
-#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "common/core/stopwatch.hpp"
 #include "tests/evidence/estimate_session.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/gross_errors.hpp"
 
 namespace brainshift::ablations {

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <string>
 
-#include "client/tools/twin/ultrasound.hpp"
 #include "common/anatomy/tumour_surface.hpp"
 #include "common/io/config/case_inputs_file.hpp"
 #include "common/io/config/config_file.hpp"
@@ -13,6 +12,7 @@
 #include "common/registration/rigid_increment.hpp"
 #include "common/ultrasound/frame_samples.hpp"
 #include "tests/sensing/reregistration_trials.hpp"
+#include "tests/simulation/ultrasound.hpp"
 #include "tests/support/study_record.hpp"
 #ifdef BRAINSHIFT_WITH_ITK
 #include "tests/sensing/itk_registration.hpp"

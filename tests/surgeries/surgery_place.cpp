@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "client/tools/twin/surgery.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/contact/full_solve.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/pipeline/pipeline.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/surgery_rows.hpp"
 

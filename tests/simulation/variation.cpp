@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/tools/twin/variation.hpp"
+#include "tests/simulation/variation.hpp"
 
 #include <fmt/format.h>
 

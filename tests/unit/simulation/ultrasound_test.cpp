@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/tools/twin/ultrasound.hpp"
+#include "tests/simulation/ultrasound.hpp"
 
 #include <gmock/gmock.h>
 

@@ -6,10 +6,10 @@
 #include <set>
 
 #include "client/tools/twin/surgery.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
