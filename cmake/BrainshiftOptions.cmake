@@ -32,7 +32,7 @@ target_compile_options(brainshift_warnings INTERFACE -Wno-array-bounds -Wno-rest
 # An edit compiles its whole batch, so the preset dev leaves it off. layout.names keeps names of a folder apart.
 option(BRAINSHIFT_UNITY "Compile the files of a folder together (unity builds)" OFF)
 set(CMAKE_UNITY_BUILD ${BRAINSHIFT_UNITY})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
 if(BRAINSHIFT_UNITY)
   # GCC takes the files of a unit for headers, whose types must not have members of unnamed namespaces.
   target_compile_options(brainshift_warnings INTERFACE -Wno-subobject-linkage)

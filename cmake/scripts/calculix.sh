@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # calculix.sh BUILD_DIR [OUT_DIR]: the brains of the paper's five patients in CalculiX, with the loads of
-# their consistency truths (tests/evidence/calculix_deck.hpp). Writes decks, what CalculiX printed and the
+# their consistency truths (tests/evidence/calculix.hpp). Writes decks, what CalculiX printed and the
 # fields as tables to OUT_DIR (default: out/calculix). `make evidence` reads the fields that are kept
 # in tests/evidence/calculix; copy nodes.csv and patient-*.csv there to renew them. Takes a quarter of an hour.
 set -euo pipefail

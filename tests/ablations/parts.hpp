@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "tests/evidence/variant.hpp"
+#include "tests/evidence/estimate_session.hpp"
 
 namespace brainshift::ablations {
 

@@ -14,11 +14,11 @@
 
 #include "client/tools/replay/score.hpp"
 #include "client/tools/twin/surgery.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/inverter.hpp"
+#include "tests/simulation/variation.hpp"
 
 namespace brainshift::bench {
 namespace {

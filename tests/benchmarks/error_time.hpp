@@ -2,7 +2,7 @@
 // Error and run time of inversion methods on simulated surgeries of one head.
 //
 // Every repetition is a surgery of its own: the scenario's first moment, varied (fluid level, pose,
-// stiffness, swelling; client/tools/twin/variation.hpp), with points and noise of its own. All
+// stiffness, swelling; tests/simulation/variation.hpp), with points and noise of its own. All
 // methods get the same surgeries, so that errors can be compared one by one. The estimate sees the
 // measurement only; the score sees the truth.
 #pragma once

@@ -6,7 +6,7 @@
 
 #include "client/tools/replay/score.hpp"
 #include "common/inversion/prepared/condense.hpp"
-#include "tests/surgeries/surgery_score.hpp"
+#include "tests/surgeries/surgery_rows.hpp"
 
 namespace brainshift::evidence {
 namespace {

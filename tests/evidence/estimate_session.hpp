@@ -1,21 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The daemon's pipeline (method condensed) for one variant of a patient's case, and the rows of
-// what it makes of a surgery. An estimate sees the observations alone; the truth is read for its
-// score.
+// One way to estimate the surgeries of a patient: the case with a change, a boundary condition, and
+// which observations it has. `make evidence` plays two (contact, fixed), `make ablations` many
+// (tests/ablations/parts.hpp).
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "common/pipeline/pipeline.hpp"
+#include "common/values/estimate.hpp"
+#include "common/values/observation.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/evidence_rows.hpp"
 #include "tests/evidence/patient_twin.hpp"
-#include "tests/evidence/variant.hpp"
 
 namespace brainshift::evidence {
 
+// What must be made anew for it, besides the inverter.
+enum class Anew {
+  kNothing,    // the change is of what an update reads: sensing, prior.scales
+  kOperators,  // factor, prior and condensed operators
+  kMesh,       // these and the mesh, so that the surgeries are played anew, on it
+};
+
+struct Variant {
+  std::string name;
+  Anew anew = Anew::kNothing;
+  Boundary boundary = Boundary::kContact;
+  std::function<void(CaseConfig&)> change = {};           // none: the case as it is
+  std::function<bool(const Observation&)> has_seen = {};  // none: every observation
+};
+
+// The daemon's pipeline (method condensed) for one variant of a patient's case, and the rows of
+// what it makes of a surgery. An estimate sees the observations alone; the truth is read for its
+// score.
+//
 // What an update finds must not depend on what else the machine does; how long it took is a column.
 inline constexpr double kNoDeadline_ms = 1e6;
 

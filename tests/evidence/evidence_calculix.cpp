@@ -17,9 +17,8 @@
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/bench_head.hpp"
-#include "tests/evidence/calculix_deck.hpp"
-#include "tests/evidence/calculix_truth.hpp"
-#include "tests/evidence/evidence_truths.hpp"
+#include "tests/evidence/calculix.hpp"
+#include "tests/evidence/patient_twin.hpp"
 #include "tests/surgeries/played_brain.hpp"
 #include "tests/surgeries/study_program.hpp"
 

@@ -13,7 +13,7 @@
 #include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
 #include "tests/evidence/evidence_rows.hpp"
-#include "tests/evidence/evidence_truths.hpp"
+#include "tests/evidence/patient_twin.hpp"
 
 namespace brainshift::evidence {
 

@@ -9,7 +9,7 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/surgeries/row_file.hpp"
-#include "tests/surgeries/surgery_score.hpp"
+#include "tests/surgeries/surgery_rows.hpp"
 
 namespace brainshift::evidence {
 

@@ -1,6 +1,36 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Maps from places before surgery to places during it that need no model of the brain, fitted to
+// pairs (x_i, y_i) of landmarks. What an estimate is held against.
+//
+//   rigid        y = R x + t       least squares (registration/fiducials.hpp)
+//   affine       y = A x + t       least squares
+//   thin plate   y = A x + t + sum_i w_i |x - x_i|,  sum_i w_i = 0,  sum_i w_i x_i^T = 0
+//                through every pair, with the least bending energy in space (Bookstein 1989, IEEE
+//                TPAMI 11:567; the kernel of three dimensions is |x|)
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/core/error.hpp"
+#include "common/core/types.hpp"
+#include "common/io/landmarks/pair_file.hpp"
+#include "tests/benchmarks/bench_head.hpp"
+
+namespace brainshift::evidence {
+
+using PointMap = std::function<Vec3(const Vec3&)>;
+
+// before, during: 3 x n, mm. Errors of register_fiducials.
+Result<PointMap> rigid_map(const Points& before, const Points& during);
+// kInvalidArgument when the numbers differ, below 4, or when all lie in one plane.
+Result<PointMap> affine_map(const Points& before, const Points& during);
+// The same; kInvalidArgument also when two places before surgery are one.
+Result<PointMap> thin_plate_map(const Points& before, const Points& during);
+
 // Landmarks of a real operation, leave-one-out: each landmark is predicted from the others alone,
-// by maps that know no brain (landmark_maps.hpp) and by the daemon's estimate.
+// by maps that know no brain and by the daemon's estimate.
 //
 // The image during surgery may be misregistered by some degrees, which rigid motion of the tissue
 // looks like. The estimate's way, from the pairs (x_j, y_j) other than landmark i:
@@ -9,17 +39,6 @@
 //   T   rigid fit of x_j + u(x_j) to y_j: what the update puts down to the pose
 //   y_i is predicted at T (x_i + u(x_i))
 // Nothing of landmark i is read but x_i, and y_i to score.
-#pragma once
-
-#include <string>
-#include <vector>
-
-#include "common/core/error.hpp"
-#include "common/io/landmarks/pair_file.hpp"
-#include "tests/benchmarks/bench_head.hpp"
-
-namespace brainshift::evidence {
-
 inline constexpr double kLeftPose_mm = 2.0;
 inline constexpr double kLeftPose_deg = 2.0;
 

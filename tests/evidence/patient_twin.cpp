@@ -6,7 +6,7 @@
 
 #include "client/tools/replay/score.hpp"
 #include "common/registration/icp.hpp"
-#include "tests/evidence/calculix_truth.hpp"
+#include "tests/evidence/calculix.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -40,6 +40,26 @@ double shift_error(const BrainModel& model, const Observation& observation,
 }
 
 }  // namespace
+
+const std::vector<TruthKind>& truth_kinds() {
+  static const std::vector<TruthKind> kinds = [] {
+    std::vector<TruthKind> all = {{"consistency", {}}};
+    for (const client::IngredientInfo& info : client::all_ingredients()) {
+      all.push_back({info.name, {info.ingredient}});
+    }
+    all.push_back({"all", *client::ingredients_from("all")});
+    all.push_back({"calculix", {}, true});
+    return all;
+  }();
+  return kinds;
+}
+
+const TruthKind* find_truth(const std::string& name) {
+  for (const TruthKind& kind : truth_kinds()) {
+    if (kind.name == name) return &kind;
+  }
+  return nullptr;
+}
 
 Result<PlayedBrain*> PatientTwin::brain_of(const client::Scenario& scenario, std::uint64_t seed) {
   const BrainModel* other = nullptr;

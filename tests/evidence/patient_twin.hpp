@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Twin of one patient: its true brains, the surgeries that are played on them, and what a rigid
-// shift of the tumour makes of the same data.
+// The truths of the study: consistency, each adverse ingredient alone, all of them, and another
+// code's.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,30 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/surgery.hpp"
 #include "common/core/error.hpp"
 #include "tests/benchmarks/bench_head.hpp"
-#include "tests/evidence/evidence_truths.hpp"
 #include "tests/surgeries/played_brain.hpp"
 
 namespace brainshift::evidence {
 
+inline constexpr int kPatients = 5;  // of the paper; patient N has the case and scenario patient-N
+
+struct TruthKind {
+  std::string name;  // "consistency", "mesh", ..., "all", "calculix"
+  client::Ingredients ingredients;
+  bool calculix = false;  // the displacement is one that CalculiX found (calculix.hpp)
+};
+
+// In this order.
+const std::vector<TruthKind>& truth_kinds();
+const TruthKind* find_truth(const std::string& name);  // nullptr when unknown
+
+// Twin of one patient: its true brains, the surgeries that are played on them, and what a rigid
+// shift of the tumour makes of the same data.
 struct PlayedSurgery {
   // Absent: the truth does nothing on this patient, or its fields are not of this head.
   std::optional<client::SimulatedSurgery> surgery;

@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "client/tools/replay/resume.hpp"
+#include "client/tools/replay/play.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/faults/daemon_process.hpp"

@@ -20,7 +20,6 @@
 #include "client/tools/twin/load.hpp"
 #include "client/tools/twin/stiffness.hpp"
 #include "client/tools/twin/truth.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"
@@ -30,6 +29,7 @@
 #include "common/patient/read_patient.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/benchmarks/csv_table.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::prior_study {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // replays SURGERY...: plays recordings to a running daemon, at the recorded times and at full
-// speed, several times each, and writes a row per observation sent (replay_rows.hpp).
+// speed, several times each, and writes a row per observation sent (replay_player.hpp).
 //
 // All passes of a surgery follow one another, the recorded times first, so that both speeds share
 // what the machine does meanwhile. Every pass is a session of its own.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // replays_corpus: makes the corpus (corpus.hpp) of one head, NAME.surgery each, and corpus.csv with
-// what it holds (manifest.hpp), in a folder that has none of them yet.
+// what it holds (corpus.hpp), in a folder that has none of them yet.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -11,7 +11,6 @@
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/replays/corpus.hpp"
-#include "tests/replays/manifest.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::replays {

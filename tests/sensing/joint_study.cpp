@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surgeries of every joint scenario, each another truth (client/tools/twin/variation.hpp). The
+// Surgeries of every joint scenario, each another truth (tests/simulation/variation.hpp). The
 // first update of a surgery knows the tumour's boundary only, the second the stereo camera's
 // surface too, the third the tracked points.
 #include <cstdio>
@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/twin/variation.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift::sensing {

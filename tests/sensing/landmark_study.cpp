@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fifteen homologous landmarks around the tumour, each found with an error of 1 mm, as in clinical
 // data sets (Xiao et al. 2017); one set in each of twelve surgeries
-// (client/tools/twin/variation.hpp). Each landmark in turn is left out and predicted from the
+// (tests/simulation/variation.hpp). Each landmark in turn is left out and predicted from the
 // others: by the model, and by the best rigid motion.
 #include <cstdio>
 #include <cstdlib>
@@ -11,11 +11,11 @@
 
 #include "client/tools/replay/score.hpp"
 #include "client/tools/twin/measure.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "common/registration/fiducials.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift::sensing {

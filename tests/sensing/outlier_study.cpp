@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/twin/variation.hpp"
 #include "common/core/random.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/gross_errors.hpp"
 #include "tests/support/study_record.hpp"
 
@@ -15,7 +15,7 @@ namespace brainshift::sensing {
 namespace {
 
 constexpr int kOutlierTruths =
-    10;  // surgeries that differ as client/tools/twin/variation.hpp has it
+    10;  // surgeries that differ as tests/simulation/variation.hpp has it
 constexpr int kMeasurements = 2;
 
 using Surgeries = std::vector<client::SimulatedSurgery>;

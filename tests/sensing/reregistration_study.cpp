@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/twin/ultrasound.hpp"
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/core/mesh.hpp"
 #include "common/core/random.hpp"
@@ -19,6 +18,7 @@
 #include "common/registration/image_registration.hpp"
 #include "common/registration/pose_information.hpp"
 #include "common/ultrasound/frame_samples.hpp"
+#include "tests/simulation/ultrasound.hpp"
 #include "tests/support/compound.hpp"
 #include "tests/support/study_record.hpp"
 #ifdef BRAINSHIFT_WITH_ITK

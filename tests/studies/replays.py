@@ -9,7 +9,7 @@
     per surgery   no stage slower than 1.5 x the committed run, p50 and p95 over t_solve
 
 Rows (rows-CASE.csv) are those of the program `replays`, one per observation sent
-(tests/replays/replay_rows.hpp). A surgery at one speed is one entry. The first update of every session is
+(tests/replays/replay_player.hpp). A surgery at one speed is one entry. The first update of every session is
 cold and stands apart, as in BENCHMARK.md. Times in units of t_solve are divided row by row.
 """
 import math
@@ -191,7 +191,7 @@ WHOLE = ("seed", "sequence", "recorded_ns", "acquired_ns", "coordinates", "crc32
 
 
 def entries_of(table):
-    """{(surgery, sequence): its row} of a corpus (tests/replays/manifest.hpp)."""
+    """{(surgery, sequence): its row} of a corpus (tests/replays/corpus.hpp)."""
     for row in table:
         for column in (*WHOLE, "mean_mm", "ordered_mm"):
             value = row.number(column)

@@ -3,8 +3,8 @@
 // the case's defaults, one row of a table per update.
 //
 // Place k of a run is the patient of seed `first_seed` + k - 1
-// (client/tools/twin/varied_patient.hpp); its surgeries have the seeds that follow those of the
-// place before, from `first_seed` (client/tools/twin/variation.hpp). The run that is published
+// (tests/simulation/variation.hpp); its surgeries have the seeds that follow those of the
+// place before, from `first_seed` (tests/simulation/variation.hpp). The run that is published
 // begins at seed 1. While the estimate is being worked on, runs begin at 1001, so that nothing is
 // fitted to what is published.
 //
@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/twin/varied_patient.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/surgeries/study_program.hpp"
 #include "tests/surgeries/surgery_place.hpp"
 

@@ -4,16 +4,17 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "client/tools/twin/surgery.hpp"
-#include "client/tools/twin/variation.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/core/stopwatch.hpp"
+#include "common/inversion/inverter.hpp"
 #include "common/pipeline/pipeline.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/surgeries/played_brain.hpp"
-#include "tests/surgeries/sleeping_inverter.hpp"
-#include "tests/surgeries/surgery_score.hpp"
+#include "tests/surgeries/surgery_rows.hpp"
 
 namespace brainshift::surgeries {
 namespace {
@@ -41,6 +42,36 @@ class PlayedBrains {
   const bench::Head& head_;
   std::uint64_t seed_;
   std::map<bool, std::unique_ptr<PlayedBrain>> brains_;
+};
+
+// An inverter that sleeps through updates: until it is woken, the brain has not moved. A pipeline
+// over it gathers evidence as any other does, so that the update that wakes it is the estimate of
+// all evidence by an inverter that starts cold.
+class SleepingInverter final : public inversion::Inverter {
+ public:
+  // awake: read at every update; must outlive this object. nodes: of the mesh.
+  SleepingInverter(std::unique_ptr<inversion::Inverter> inverter, const bool& awake, int nodes)
+      : inverter_(std::move(inverter)), awake_(awake), nodes_(nodes) {}
+
+  void reset() override { inverter_->reset(); }
+  std::optional<inversion::OmissionErrors> omission_errors() const override {
+    if (awake_) return inverter_->omission_errors();
+    return std::nullopt;
+  }
+  std::uint64_t bytes() const override { return inverter_->bytes(); }
+
+ private:
+  Status invert(const SparseData& data, const inversion::InversionOptions& options,
+                Estimate& estimate) override {
+    if (awake_) return inverter_->update(data, options, estimate);
+    estimate = Estimate{};
+    estimate.displacement = Points::Zero(3, nodes_);
+    return {};
+  }
+
+  std::unique_ptr<inversion::Inverter> inverter_;
+  const bool& awake_;
+  int nodes_;
 };
 
 // The pipeline of the daemon's default session, and one that starts cold at the last update.

@@ -25,8 +25,8 @@ struct PlacePlan {
 using Told = std::function<void(const SurgeryKey&, const Row& last, double seconds)>;
 
 // Surgeries that `rows` has are skipped; the others are appended. A refused update is a row, not an
-// error; so is a scenario that does nothing on this place (client/tools/twin/effects.hpp). Errors:
-// of the twin, of building an inverter, of scoring, of writing.
+// error; so is a scenario that does nothing on this place (client/tools/twin/truth_load.hpp).
+// Errors: of the twin, of building an inverter, of scoring, of writing.
 Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows, const Told& told);
 
 }  // namespace brainshift::surgeries

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The table that `surgeries` writes: one row per update, all rows of a surgery at once.
+// What one update of a simulated surgery is worth: its errors beside those of no correction and of
+// the best rigid motion, and what its error bars are worth. The truth is read here only.
+//
+// All lengths are mm. Nodes inside a cavity (truth point kind `removed`) are no tissue and are left
+// out of everything that is said of nodes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -10,12 +15,54 @@
 #include "client/tools/twin/scenario.hpp"
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 #include "tests/surgeries/row_file.hpp"
-#include "tests/surgeries/surgery_score.hpp"
 
 namespace brainshift::surgeries {
 
+struct FieldErrors {
+  double tumour_mm = 0.0;              // mean over cross-validation points
+  double craniotomy_mm = 0.0;          // mean over its nodes, by displacement
+  double craniotomy_closest_mm = 0.0;  // mean, by closest point of the true surface (CPPD)
+  double mean_mm = 0.0, p50_mm = 0.0, max_mm = 0.0;  // over all nodes
+};
+
+// Central intervals of a Gaussian: the share that each holds, and its half width in standard
+// deviations.
+struct Interval {
+  int percent;
+  double radius;
+};
+inline constexpr std::array<Interval, 6> kIntervals = {
+    {{50, 0.6745}, {68, 0.9945}, {80, 1.2816}, {90, 1.6449}, {95, 1.9600}, {99, 2.5758}}};
+
+struct UpdateScore {
+  FieldErrors estimate;
+  FieldErrors none;  // of no correction
+  // Of the rigid motion that fits the true motion of the tumour's surface best, carried to the
+  // whole brain: no rigid registration to the tumour can do better there.
+  FieldErrors rigid;
+  double recovered_pct = 0.0;  // 100 (1 - estimate / none) at the tumour
+  // Nodes whose error exceeds that of no correction by more than their own 90 % interval, and the
+  // largest excess: |u - t| - |t| - kRadius90 sd. Without sd the interval is 0.
+  int worse_nodes = 0;
+  double worst_excess_mm = 0.0;
+  double coverage_90 = 0.0;  // of nodal components within 1.6449 sd; NaN without sd
+  std::array<double, kIntervals.size()> coverage = {};  // the same for each of kIntervals
+  double mean_sd_mm = 0.0;                              // NaN without sd
+};
+
+// Radius of the ball that holds 90 % of an isotropic Gaussian in three dimensions, in standard
+// deviations of a component: the square root of the 0.9 quantile of chi-square with 3 degrees of
+// freedom, 6.2514.
+inline constexpr double kRadius90 = 2.5003;
+
+// Errors of client::score and registration::register_fiducials.
+Result<UpdateScore> score_update(const BrainModel& model, const io::SurgeryTruth& truth,
+                                 const Estimate& estimate);
+
+// The table that `surgeries` writes: one row per update, all rows of a surgery at once.
 // Which surgery a row belongs to.
 struct SurgeryKey {
   std::string head;  // case_id of the case file

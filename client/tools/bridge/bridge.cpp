@@ -9,10 +9,10 @@
 #include <thread>
 #include <utility>
 
-#include "client/tools/bridge/bridge_line.hpp"
 #include "client/tools/bridge/follower.hpp"
 #include "client/tools/bridge/hub.hpp"
 #include "client/tools/bridge/inbound_worker.hpp"
+#include "client/tools/bridge/picture.hpp"
 
 namespace brainshift::client {
 

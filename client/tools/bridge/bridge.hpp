@@ -15,9 +15,9 @@
 #include <string>
 
 #include "client/lib/client_keys.hpp"
-#include "client/tools/bridge/address.hpp"
 #include "client/tools/bridge/field_stream.hpp"
 #include "client/tools/bridge/inbox.hpp"
+#include "client/tools/bridge/socket.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {

@@ -198,9 +198,7 @@ Status Hub::run(int stop_descriptor) {
     if (upstream_ && polled[3].revents != 0) {
       const bool readable = (polled[3].revents & kReadable) != 0;
       const bool writable = (polled[3].revents & kWritable) != 0;
-      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sink_)) {
-        tell_(*news);
-      }
+      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sink_)) tell_(*news);
     }
   }
 }

@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "client/tools/bridge/peer.hpp"
-#include "client/tools/bridge/upstream.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {

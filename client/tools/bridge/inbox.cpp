@@ -6,10 +6,9 @@
 #include <utility>
 
 #include "client/tools/import/import_boundaries.hpp"
-#include "client/tools/import/seed_contours.hpp"
+#include "client/tools/import/import_case.hpp"
 #include "common/core/rigid_motion.hpp"
 #include "common/igtl/surface.hpp"
-#include "common/io/config/plus_config.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/tracking/transform_graph.hpp"
@@ -69,11 +68,9 @@ Inbox::Inbox(InboxOptions options)
 Result<Inbox> Inbox::open(const InboxOptions& options) {
   if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
   Inbox inbox(options);
-  if (!options.device.empty()) {
-    const auto config = io::read_plus_config(options.device);
-    if (!config) return tl::unexpected(config.error());
-    for (const io::PlusTransform& each : config->transforms) inbox.constants_.push_back(each.link);
-  }
+  auto links = device_links(options.device);
+  if (!links) return tl::unexpected(links.error());
+  inbox.constants_ = std::move(*links);
   if (!options.registration.empty()) {
     const auto T_ras_reference = io::read_pose(options.registration, "T_ras_reference");
     if (!T_ras_reference) return tl::unexpected(T_ras_reference.error());

@@ -6,6 +6,42 @@
 #include <utility>
 
 namespace brainshift::client {
+namespace {
+
+std::string greeting() {
+  igtl::Envelope envelope;
+  envelope.version = 2;
+  envelope.device = "brainshift";
+  std::string bytes;
+  static_cast<void>(igtl::encode(envelope, igtl::StatusRequest{}, bytes));
+  return bytes;
+}
+
+// Reads what has come, kMostReadAtOnce at most. A message that is well framed and cannot be
+// understood is left out.
+Status read_messages(Socket& socket, igtl::StreamReader& reader, const Peer::Sink& sink,
+                     const std::function<void(std::uint16_t version)>& see_version) {
+  std::array<char, 64 * 1024> buffer;
+  for (std::size_t sum = 0; sum < Peer::kMostReadAtOnce;) {
+    const auto count = socket.read(buffer.data(), buffer.size());
+    if (!count) return tl::unexpected(count.error());
+    if (*count == 0) return {};
+    sum += *count;
+    std::string_view bytes(buffer.data(), *count);
+    while (!bytes.empty()) {
+      const auto packet = reader.read(bytes);
+      if (!packet) return tl::unexpected(packet.error());
+      if (!*packet) continue;
+      see_version((*packet)->header.version);
+      if ((*packet)->skipped) continue;
+      auto message = igtl::decode((*packet)->header, (*packet)->body);
+      if (message) sink(std::move(*message));
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 Peer::Peer(Socket socket, igtl::StreamLimits limits)
     : socket_(std::move(socket)), name_(socket_.peer_name()), reader_(std::move(limits)) {}
@@ -79,28 +115,62 @@ void Peer::take_version(std::uint16_t version) {
 }
 
 Status Peer::read(const Sink& sink) {
-  std::array<char, 64 * 1024> buffer;
-  for (std::size_t sum = 0; sum < kMostReadAtOnce;) {
-    const auto count = socket_.read(buffer.data(), buffer.size());
-    if (!count) return tl::unexpected(count.error());
-    if (*count == 0) return {};
-    sum += *count;
-    std::string_view bytes(buffer.data(), *count);
-    while (!bytes.empty()) {
-      const auto packet = reader_.read(bytes);
-      if (!packet) return tl::unexpected(packet.error());
-      if (!*packet) continue;
-      take_version((*packet)->header.version);
-      if ((*packet)->skipped) continue;
-      auto message = igtl::decode((*packet)->header, (*packet)->body);
-      if (message) {
-        sink(std::move(*message));
-      } else {
-        ++not_understood_;
-      }
-    }
+  return read_messages(socket_, reader_, sink,
+                       [&](std::uint16_t version) { take_version(version); });
+}
+
+Upstream::Upstream(Address address, igtl::StreamLimits limits)
+    : address_(std::move(address)), limits_(std::move(limits)) {}
+
+std::optional<std::string> Upstream::tend(TimePoint now) {
+  if (socket_ || now < next_attempt_) return std::nullopt;
+  auto socket = Socket::connect(address_);
+  if (!socket) return lost(socket.error(), now);
+  socket_ = std::move(*socket);
+  reader_.emplace(limits_);
+  connected_ = false;
+  unsent_ = greeting();
+  return std::nullopt;
+}
+
+std::optional<std::string> Upstream::lost(const Error& error, TimePoint now) {
+  const bool was_connected = std::exchange(connected_, false);
+  socket_.reset();
+  next_attempt_ = now + kRetry;
+  if (!was_connected && std::exchange(told_, true)) return std::nullopt;
+  told_ = true;
+  return "from " + to_string(address_) + ": " + error.message + "; trying again";
+}
+
+Status Upstream::write() {
+  while (!unsent_.empty()) {
+    const auto taken = socket_->write(unsent_);
+    if (!taken) return tl::unexpected(taken.error());
+    if (*taken == 0) return {};
+    unsent_.erase(0, *taken);
   }
   return {};
+}
+
+std::optional<std::string> Upstream::ready(bool readable, bool writable, TimePoint now,
+                                           const Peer::Sink& sink) {
+  std::optional<std::string> news;
+  if (writable && !connected_) {
+    if (auto ok = socket_->connected(); !ok) return lost(ok.error(), now);
+    connected_ = true;
+    told_ = false;
+    news = "from " + to_string(address_) + ": connected";
+  }
+  if (writable) {
+    if (auto ok = write(); !ok) return lost(ok.error(), now);
+  }
+  if (readable && connected_) {
+    const auto any_version = [](std::uint16_t) {};
+    if (auto ok = read_messages(*socket_, *reader_, sink, any_version); !ok) {
+      return lost(ok.error(), now);
+    }
+  }
+  return news;
 }
 
 }  // namespace brainshift::client

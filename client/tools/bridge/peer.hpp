@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Peer: one OpenIGTLink client of the bridge's server. Private to client/bridge.
+// The bridge's connections. Private to client/bridge.
+//
+// Peer: one OpenIGTLink client of the bridge's server.
 //
 // Version: the peer gets version 1 until its first message of header version 2, and version 2 from
 // then on. What is shown then is sent once more, so that the peer has its metadata.
@@ -12,10 +14,12 @@
 // Belongs to one thread.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "client/tools/bridge/broadcast.hpp"
@@ -52,8 +56,6 @@ class Peer {
   // gone; kProtocol: it does not talk OpenIGTLink.
   using Sink = std::function<void(igtl::Message&&)>;
   Status read(const Sink& sink);
-  // Messages that were well framed, and could not be understood.
-  std::uint64_t not_understood() const { return not_understood_; }
 
  private:
   void take_version(std::uint16_t version);
@@ -65,7 +67,6 @@ class Peer {
   igtl::StreamReader reader_;
   std::uint16_t version_ = 1;
   std::uint64_t replaced_ = 0;
-  std::uint64_t not_understood_ = 0;
 
   BroadcastPtr shown_;    // the newest picture that was offered
   BroadcastPtr current_;  // being written
@@ -78,6 +79,43 @@ class Peer {
   std::string reply_bytes_;
   BroadcastPtr holder_;
   std::string_view message_;
+};
+
+// Upstream: the bridge as an OpenIGTLink client of PlusServer or 3D Slicer.
+//
+// It connects, sends GET_STATUS of version 2, so that PlusServer answers with version 2 (it starts
+// with version 1 for every client), and reads. It connects again by itself. Belongs to one thread.
+class Upstream {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+  // Between two attempts.
+  static constexpr std::chrono::milliseconds kRetry{500};
+
+  Upstream(Address address, igtl::StreamLimits limits);
+
+  // -1 while there is no connection under way.
+  int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
+  bool connected() const { return connected_; }
+  bool wants_to_write() const { return socket_ && (!connected_ || !unsent_.empty()); }
+
+  // Begins to connect when it is time. A sentence when something is to be told.
+  std::optional<std::string> tend(TimePoint now);
+  // Goes on with the socket, which is ready.
+  std::optional<std::string> ready(bool readable, bool writable, TimePoint now,
+                                   const Peer::Sink& sink);
+
+ private:
+  std::optional<std::string> lost(const Error& error, TimePoint now);
+  Status write();
+
+  Address address_;
+  igtl::StreamLimits limits_;
+  std::optional<Socket> socket_;
+  std::optional<igtl::StreamReader> reader_;
+  bool connected_ = false;
+  bool told_ = false;  // that there is no connection
+  std::string unsent_;
+  TimePoint next_attempt_{};
 };
 
 }  // namespace brainshift::client

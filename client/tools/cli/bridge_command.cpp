@@ -5,7 +5,7 @@
 
 #include "client/tools/bridge/bridge.hpp"
 #include "client/tools/cli/command.hpp"
-#include "client/tools/monitor/choice_text.hpp"
+#include "client/tools/monitor/watch.hpp"
 #include "common/io/files/stop_signals.hpp"
 
 namespace brainshift::client {
@@ -51,14 +51,10 @@ Result<BridgeOptions> read_options(const BridgeArguments& arguments) {
 Status run_bridge(const BridgeArguments& arguments) {
   const auto options = read_options(arguments);
   if (!options) return tl::unexpected(options.error());
-  const auto tell = [](const std::string& line) {
-    std::puts(line.c_str());
-    std::fflush(stdout);
-  };
-  const auto bridge = Bridge::open(*options, tell);
+  const auto bridge = Bridge::open(*options, print_line);
   if (!bridge) return tl::unexpected(bridge.error());
   const Address address = (*bridge)->address();
-  tell("listening on " + to_string(address));
+  print_line("listening on " + to_string(address));
   if (!is_loopback(address)) {
     std::fprintf(stderr,
                  "brainshift: OpenIGTLink has no encryption and no passwords: whoever reaches %s "
@@ -71,24 +67,17 @@ Status run_bridge(const BridgeArguments& arguments) {
 }
 
 void add_stream_options(CLI::App& command, BridgeArguments& arguments) {
-  command.add_option("--endpoint", arguments.options.endpoint, "where the daemon listens")
-      ->capture_default_str();
+  add_with_default(command, "--endpoint", arguments.options.endpoint, "where the daemon listens");
   add_key_options(command, arguments.keys);
-  command
-      .add_option("--listen", arguments.listen,
-                  "where OpenIGTLink clients connect; another address than this computer's own "
-                  "opens the patient's data to the network")
-      ->capture_default_str();
-  command
-      .add_option("--region", arguments.region,
-                  "what the volumes hold: brain, tumour:MARGIN, or a ball X,Y,Z:RADIUS (patient "
-                  "RAS, mm, undeformed)")
-      ->capture_default_str();
-  command
-      .add_option("--margin", arguments.margin,
-                  "how far the volumes reach beyond the region; there the field fades to zero")
-      ->capture_default_str();
-  command.add_option("--spacing", arguments.spacing, "between voxels")->capture_default_str();
+  add_with_default(command, "--listen", arguments.listen,
+                   "where OpenIGTLink clients connect; another address than this computer's own "
+                   "opens the patient's data to the network");
+  add_with_default(command, "--region", arguments.region,
+                   "what the volumes hold: brain, tumour:MARGIN, or a ball X,Y,Z:RADIUS (patient "
+                   "RAS, mm, undeformed)");
+  add_with_default(command, "--margin", arguments.margin,
+                   "how far the volumes reach beyond the region; there the field fades to zero");
+  add_with_default(command, "--spacing", arguments.spacing, "between voxels");
   command.add_flag("--no-sd", arguments.without_sd, "send no standard deviations");
   command.add_flag("--no-surfaces", arguments.without_surfaces,
                    "send neither tumour nor cortex; receive the region alone from the daemon");
@@ -102,7 +91,7 @@ void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
     command.add_option(name, target, help)->group(group);
   };
   const auto number = [&](const char* name, double& target, const char* help) {
-    command.add_option(name, target, help)->group(group)->capture_default_str();
+    add_with_default(command, name, target, help)->group(group);
   };
   file("--from", arguments.from, "PlusServer or 3D Slicer to connect to, as HOST:PORT");
   file("--tumour-device", inbox.tumour_device,
@@ -113,11 +102,9 @@ void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
        "points of this name: places before surgery (RAS)");
   file("--landmarks-after", inbox.landmarks_after,
        "points of this name: where the same-named places are now");
-  command
-      .add_option("--model-frame", inbox.model_frame,
-                  "frame of models and points; transforms lead from there to Ras")
-      ->group(group)
-      ->capture_default_str();
+  add_with_default(command, "--model-frame", inbox.model_frame,
+                   "frame of models and points; transforms lead from there to Ras")
+      ->group(group);
   file("--contours", inbox.contours,
        "traced tumour contours of a sweep's images: .csv frame,u_px,v_px or .json; read when the "
        "sweep ends");
@@ -129,12 +116,11 @@ void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
   command.add_flag("--open-contours", inbox.open_contours, "contours of a .csv are open lines")
       ->group(group);
   file("--image-device", inbox.image_device, "take images of this device name alone");
-  command.add_option("--image", inbox.image_frame, "name of the images' frame")
-      ->group(group)
-      ->capture_default_str();
-  command.add_option("--reference", inbox.reference_frame, "name of the patient's reference frame")
-      ->group(group)
-      ->capture_default_str();
+  add_with_default(command, "--image", inbox.image_frame, "name of the images' frame")
+      ->group(group);
+  add_with_default(command, "--reference", inbox.reference_frame,
+                   "name of the patient's reference frame")
+      ->group(group);
   number("--sweeps", inbox.sweep_gap_s, "a sweep ends after so many seconds without an image");
   number("--sd-mm", inbox.sd_mm, "standard deviation of a tumour boundary point, mm");
   number("--surface-sd-mm", inbox.surface_sd_mm, "standard deviation of a surface point, mm");
@@ -154,21 +140,18 @@ void add_bridge(CLI::App& app, Status& status) {
   add_stream_options(*command, *arguments);
   add_inbound_options(*command, *arguments);
   command->footer(
-      "It starts no session. Clients get, on the undeformed brain in RAS and mm: brainshift_u "
-      "(the\n"
-      "displacement, undeformed to deformed), brainshift_sd, brainshift_tumour, "
-      "brainshift_cortex,\n"
-      "brainshift_state (JSON) and brainshift (STATUS). When the field is not current, the "
-      "volumes\n"
-      "are blank and the reason is given. Examples:\n"
-      "  brainshift bridge\n"
-      "      then, in Slicer's OpenIGTLinkIF: a client connector to localhost, port 18945\n"
-      "  brainshift bridge --region brain --margin 20mm --spacing 3mm --no-surfaces\n"
-      "  brainshift bridge --tumour-device TumourNow\n"
-      "      a model that Slicer sends on the same connection is the tumour's boundary\n"
-      "  brainshift bridge --from 127.0.0.1:18944 --seeds seeds.csv --device device.xml \\\n"
-      "    --registration T_ras_reference.txt\n"
-      "      sweeps of PlusServer; each becomes an observation two seconds after its last image");
+      R"(It starts no session. Clients get, on the undeformed brain in RAS and mm: brainshift_u (the
+displacement, undeformed to deformed), brainshift_sd, brainshift_tumour, brainshift_cortex,
+brainshift_state (JSON) and brainshift (STATUS). When the field is not current, the volumes
+are blank and the reason is given. Examples:
+  brainshift bridge
+      then, in Slicer's OpenIGTLinkIF: a client connector to localhost, port 18945
+  brainshift bridge --region brain --margin 20mm --spacing 3mm --no-surfaces
+  brainshift bridge --tumour-device TumourNow
+      a model that Slicer sends on the same connection is the tumour's boundary
+  brainshift bridge --from 127.0.0.1:18944 --seeds seeds.csv --device device.xml \
+    --registration T_ras_reference.txt
+      sweeps of PlusServer; each becomes an observation two seconds after its last image)");
   command->callback([arguments, &status] { status = run_bridge(*arguments); });
 }
 

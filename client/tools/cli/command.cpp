@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
-#include <string>
 #include <utility>
 
 #include "client/tools/monitor/keys.hpp"
@@ -24,6 +23,15 @@ Status read_keys(const KeyOptions& options, std::optional<ClientKeys>& keys) {
   if (!read) return tl::unexpected(read.error());
   keys = std::move(*read);
   return {};
+}
+
+void print_line(const std::string& line) {
+  std::puts(line.c_str());
+  std::fflush(stdout);
+}
+
+void print_lines(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) print_line(line);
 }
 
 void print_error(std::string_view sentence) {

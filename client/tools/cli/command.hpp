@@ -7,7 +7,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "client/lib/client_keys.hpp"
 #include "common/core/error.hpp"
@@ -47,6 +49,20 @@ void add_key_options(CLI::App& command, KeyOptions& options);
 // client/tools/monitor does.
 Status read_keys(const KeyOptions& options, std::optional<ClientKeys>& keys);
 
+// Adds an option whose value now is its default, which the help shows; or one that must be given.
+// Both give the CLI::Option*.
+template <typename App, typename Value>
+auto add_with_default(App& command, const char* name, Value& value, const char* help) {
+  return command.add_option(name, value, help)->capture_default_str();
+}
+template <typename App, typename Value>
+auto add_required(App& command, const char* name, Value& value, const char* help) {
+  return command.add_option(name, value, help)->required();
+}
+
+// Prints a line to stdout, and lets nothing wait in a buffer.
+void print_line(const std::string& line);
+void print_lines(const std::vector<std::string>& lines);
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);
 

@@ -13,13 +13,10 @@ int main(int argc, char** argv) {
   using namespace brainshift;
   CLI::App app{
       "brainshift: look at a case before it is prepared; simulate surgeries with known truth, "
-      "replay recorded ones to brainshiftd, and "
-      "report how "
-      "well the deformation was recovered; solve single forward problems on any mesh; import "
-      "recordings "
-      "of tracked ultrasound and landmarks; register patients by fiducials; check, export and mend "
-      "journals; watch a running brainshiftd; make "
-      "keys.\n"
+      "replay recorded ones to brainshiftd, and report how well the deformation was recovered; "
+      "solve single forward problems on any mesh; import recordings of tracked ultrasound and "
+      "landmarks; register patients by fiducials; check, export and mend journals; watch a "
+      "running brainshiftd; make keys.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
   app.set_version_flag("--version", "brainshift " BRAINSHIFT_VERSION);
@@ -36,21 +33,14 @@ int main(int argc, char** argv) {
       "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
 
   Status status;
-  client::add_preview(app, status);
-  client::add_simulate(app, status);
-  client::add_replay(app, status);
-  client::add_report(app, status);
-  client::add_solve(app, status);
-  client::add_import(app, status);
-  client::add_register(app, status);
-  client::add_stereo(app, status);
-  client::add_journal(app, status);
-  client::add_export(app, status);
-  client::add_watch(app, status);
-  client::add_bridge(app, status);
-  client::add_status(app, status);
-  client::add_top(app, status);
-  client::add_keys(app, status);
+  for (const auto add :
+       {client::add_preview, client::add_simulate, client::add_replay, client::add_report,
+        client::add_solve, client::add_import, client::add_register, client::add_stereo,
+        client::add_journal, client::add_export, client::add_watch, client::add_bridge,
+        client::add_status, client::add_top, client::add_keys}) {
+    add(app, status);
+  }
+
   // CLI11 would only say that a subcommand is required.
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };

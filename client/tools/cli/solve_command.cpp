@@ -254,9 +254,9 @@ void add_solve(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<SolveArguments>();
   CLI::App* command = app.add_subcommand(
       "solve", "Solve one forward problem on any mesh, to compare with other codes.");
-  command->add_option("--problem", arguments->problem, "problem file (YAML)")->required();
-  command->add_option("--out", arguments->out, "VTU file to write: displacement, stress, contact")
-      ->required();
+  add_required(*command, "--problem", arguments->problem, "problem file (YAML)");
+  add_required(*command, "--out", arguments->out,
+               "VTU file to write: displacement, stress, contact");
   command->add_option("--probes", arguments->probes,
                       "CSV file to write: displacement and pressures at the probes");
   command->add_flag("--json", arguments->json, "print the summary as JSON");

@@ -65,14 +65,11 @@ void add_calibrate(CLI::App& app, Status& status) {
   auto job = std::make_shared<CalibrateJob>();
   CLI::App* command =
       app.add_subcommand("calibrate", "Calibrate two cameras from pictures of a chessboard.");
-  command->add_option("--left", job->left, "pictures of the left camera, files or 'patterns*'")
-      ->required();
-  command->add_option("--right", job->right, "pictures of the right camera, in the same order")
-      ->required();
-  command->add_option("--board", job->board, "inner corners of the board, along x across")
-      ->capture_default_str();
-  command->add_option("--square-mm", job->square_mm, "side of a square, mm")->required();
-  command->add_option("--out", job->out, "calibration file to write (YAML)")->required();
+  add_required(*command, "--left", job->left, "pictures of the left camera, files or 'patterns*'");
+  add_required(*command, "--right", job->right, "pictures of the right camera, in the same order");
+  add_with_default(*command, "--board", job->board, "inner corners of the board, along x across");
+  add_required(*command, "--square-mm", job->square_mm, "side of a square, mm");
+  add_required(*command, "--out", job->out, "calibration file to write (YAML)");
   command->footer(
       "Example, with the pictures of Debian's opencv-doc:\n"
       "  cd /usr/share/doc/opencv-doc/examples/data\n"
@@ -85,22 +82,16 @@ void add_reconstruct(CLI::App& app, Status& status) {
   auto job = std::make_shared<ReconstructJob>();
   CLI::App* command =
       app.add_subcommand("reconstruct", "Make a surface in patient RAS from a pair of pictures.");
-  command->add_option("--left", job->left, "picture of the left camera")->required();
-  command->add_option("--right", job->right, "picture of the right camera")->required();
-  command->add_option("--calibration", job->calibration, "calibration file")->required();
-  command
-      ->add_option("--pose", job->pose,
-                   "T_ras_camera, left camera frame to RAS: 16 numbers (.txt), or YAML")
-      ->required();
-  command->add_option("--out", job->out, "surface to write, .ply or .vtp, with sd_mm per point")
-      ->required();
+  add_required(*command, "--left", job->left, "picture of the left camera");
+  add_required(*command, "--right", job->right, "picture of the right camera");
+  add_required(*command, "--calibration", job->calibration, "calibration file");
+  add_required(*command, "--pose", job->pose,
+               "T_ras_camera, left camera frame to RAS: 16 numbers (.txt), or YAML");
+  add_required(*command, "--out", job->out, "surface to write, .ply or .vtp, with sd_mm per point");
   command->add_option("--disparity-png", job->disparity_picture, "picture of the disparities");
-  command->add_option("--near-mm", job->range.near_mm, "nearest distance looked at")
-      ->capture_default_str();
-  command->add_option("--far-mm", job->range.far_mm, "farthest distance looked at")
-      ->capture_default_str();
-  command->add_option("--spacing-mm", job->options.spacing_mm, "between points")
-      ->capture_default_str();
+  add_with_default(*command, "--near-mm", job->range.near_mm, "nearest distance looked at");
+  add_with_default(*command, "--far-mm", job->range.far_mm, "farthest distance looked at");
+  add_with_default(*command, "--spacing-mm", job->options.spacing_mm, "between points");
   command->footer(
       "The pose is what the tracking system says of the camera at that moment. As text:\n"
       "  1 0 0 -20\n"
@@ -117,22 +108,18 @@ void add_observe(CLI::App& app, Status& status) {
   auto job = std::make_shared<ObserveJob>();
   CLI::App* command = app.add_subcommand(
       "observe", "Check a cortical surface against a case and add it to a surgery file.");
-  command
-      ->add_option("--surface", job->surface,
-                   ".ply, .vtp, .stl or .obj; or points: .xyz, .txt, .csv; mm RAS")
-      ->required();
-  command->add_option("--model", job->model, "model file (brainshiftd prepare)")->required();
-  command->add_option("--sd-mm", job->sd_mm, "standard deviation of a point")->required();
-  command->add_option("--out", job->out, "surgery file; added to if it exists")->required();
+  add_required(*command, "--surface", job->surface,
+               ".ply, .vtp, .stl or .obj; or points: .xyz, .txt, .csv; mm RAS");
+  add_required(*command, "--model", job->model, "model file (brainshiftd prepare)");
+  add_required(*command, "--sd-mm", job->sd_mm, "standard deviation of a point");
+  add_required(*command, "--out", job->out, "surgery file; added to if it exists");
   command->add_option("--time-s", job->time_s,
                       "time of the pictures; default: a second after the last observation");
-  command->add_option("--source", job->source, "where the surface comes from")
-      ->capture_default_str();
+  add_with_default(*command, "--source", job->source, "where the surface comes from");
   command->footer(
-      "A surgery may hold observations of several sources; sequence and time go on from its last.\n"
-      "Example:\n"
-      "  brainshift stereo observe --surface cortex.ply --model colin27.h5 --sd-mm 0.5 --out "
-      "case.surgery");
+      R"(A surgery may hold observations of several sources; sequence and time go on from its last.
+Example:
+  brainshift stereo observe --surface cortex.ply --model colin27.h5 --sd-mm 0.5 --out case.surgery)");
   command->callback([job, &status] { status = run_observe(*job); });
 }
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-#include "client/tools/journal/journal_fields.hpp"
+#include "client/tools/journal/journal_export.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {

@@ -8,12 +8,9 @@
 #include <system_error>
 #include <utility>
 
-#include "client/tools/export/deformed_surface.hpp"
-#include "client/tools/export/output_grid.hpp"
 #include "client/tools/export/sample_field.hpp"
-#include "client/tools/export/warp_image.hpp"
+#include "client/tools/export/warp.hpp"
 #include "client/tools/journal/journal_export.hpp"
-#include "client/tools/journal/journal_fields.hpp"
 #include "common/io/fields/field_files.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"

@@ -15,9 +15,8 @@
 #include <vector>
 
 #include "client/tools/export/chosen_update.hpp"
-#include "client/tools/export/export_format.hpp"
 #include "client/tools/export/manifest.hpp"
-#include "client/tools/volume/outside_taper.hpp"
+#include "client/tools/volume/field_grid.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/io/fields/displacement_field.hpp"

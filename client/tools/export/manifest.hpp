@@ -1,4 +1,48 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// What an export consists of, and its manifest.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/tools/volume/field_grid.hpp"
+#include "common/core/error.hpp"
+#include "common/io/fields/displacement_field.hpp"
+#include "common/io/recording/surgery_record.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+
+// By the words of `brainshift export --formats`.
+enum class ExportFormat {
+  kNiftiLps,  // the field for ITK, ANTs, plastimatch
+  kNiftiRas,  // the field for 3D Slicer
+  kNrrd,      // the field for elastix, plastimatch, 3D Slicer
+  kItk,       // the field as a transform of ITK
+  kSd,
+  kJacobian,
+  kSurfaces,
+  kSeries,  // every usable field of the journal, for ParaView
+};
+inline constexpr std::array kAllExportFormats = {ExportFormat::kNiftiLps, ExportFormat::kNiftiRas,
+                                                 ExportFormat::kNrrd,     ExportFormat::kItk,
+                                                 ExportFormat::kSd,       ExportFormat::kJacobian,
+                                                 ExportFormat::kSurfaces, ExportFormat::kSeries};
+
+// "nifti-1007", "nifti-1006", "nrrd", "itk", "sd", "jacobian", "surfaces", "series"
+std::string_view to_string(ExportFormat format);
+
+using ExportFormats = std::set<ExportFormat>;
+// All but the series, which is as large as the journal.
+ExportFormats default_formats();
+// From the words; "all" stands for all of them. kInvalidArgument names a word that is none, and the
+// words there are. No word: the default.
+Result<ExportFormats> parse_formats(const std::vector<std::string>& words);
+
 // export.json: what the files of an export are, so that nobody has to guess a direction, a frame or
 // a unit.
 //
@@ -18,19 +62,6 @@
 // A member of a file that has no meaning for it is null. folded: elements that the displacement
 // turns inside out (det(I + grad u) <= 0). A series holds every usable field: its sequence and
 // quality are null.
-#pragma once
-
-#include <cstddef>
-#include <string>
-#include <vector>
-
-#include "client/tools/volume/outside_taper.hpp"
-#include "common/io/fields/displacement_field.hpp"
-#include "common/io/recording/surgery_record.hpp"
-#include "common/wire/convert.hpp"
-
-namespace brainshift::client {
-
 struct ManifestFile {
   std::string file;  // relative to the manifest
   std::string content;

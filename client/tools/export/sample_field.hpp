@@ -1,4 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The grid that an export is on, and the field on it.
+#pragma once
+
+#include <cstddef>
+
+#include "client/tools/volume/field_grid.hpp"
+#include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
+#include "common/core/progress.hpp"
+#include "common/io/fields/displacement_field.hpp"
+
+namespace brainshift::client {
+
+// The grid of an image. Errors of io::validate(VoxelGrid).
+Result<io::VoxelGrid> grid_like(const VoxelImage& image);
+
+// One around the brain: along the axes of RAS, the same spacing along all three, around the brain
+// before and after u, with room for the taper outside of it. Errors of grid_around and
+// io::validate(VoxelGrid).
+Result<io::VoxelGrid> grid_around_brain(const TetMesh& mesh, const Points& u, double spacing_mm,
+                                        const OutsideTaper& taper = {});
+
 // The mesh's displacement u on the voxels of an image grid, in one of two directions.
 //
 //   modeling     v(x) =  u(x)          x undeformed
@@ -15,17 +37,6 @@
 //   sd_mm      standard deviation, barycentric; 0 outside of the brain
 //   jacobian   det(I + grad u): volume after over volume before, of the element that holds the
 //              voxel. Below 1 compressed, at 0 and below folded. 1 outside of the brain
-#pragma once
-
-#include <cstddef>
-
-#include "client/tools/volume/outside_taper.hpp"
-#include "common/core/error.hpp"
-#include "common/core/mesh.hpp"
-#include "common/core/progress.hpp"
-#include "common/io/fields/displacement_field.hpp"
-
-namespace brainshift::client {
 
 // One per tetrahedron: det(I + grad u). Precondition: check_mesh(mesh), a column of u per node.
 VecX volume_ratios(const TetMesh& mesh, const Points& u);

@@ -7,10 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "client/tools/import/import_boundaries.hpp"
 #include "client/tools/import/import_case.hpp"
-#include "client/tools/import/seed_contours.hpp"
-#include "client/tools/import/surgery_writer.hpp"
-#include "common/io/config/plus_config.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/io/recording/fiducial_file.hpp"
@@ -59,11 +57,7 @@ Status check_import(const ImportOptions& options) {
   if (Status ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0); !ok) return ok;
   if (Status ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0); !ok) return ok;
   if (Status ok = range("--sweeps", options.sweep_gap_s, 0.0, 86400.0); !ok) return ok;
-  std::error_code ignored;
-  if (fs::exists(options.out, ignored)) {
-    return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
-  }
-  return {};
+  return check_new(options.out);
 }
 
 // T_ras_reference, from the file or from fiducials.
@@ -79,15 +73,11 @@ Result<RigidTransform> patient_registration(const ImportOptions& options,
 // Device transforms and the patient registration.
 Result<std::vector<tracking::ConstantLink>> constant_links(
     const ImportOptions& options, std::optional<io::FiducialFile>& fiducials) {
-  std::vector<tracking::ConstantLink> links;
-  if (!options.device.empty()) {
-    const auto config = io::read_plus_config(options.device);
-    if (!config) return tl::unexpected(config.error());
-    for (const io::PlusTransform& transform : config->transforms) links.push_back(transform.link);
-  }
+  auto links = device_links(options.device);
+  if (!links) return links;
   const auto T_ras_reference = patient_registration(options, fiducials);
   if (!T_ras_reference) return tl::unexpected(T_ras_reference.error());
-  links.push_back({{options.reference_frame, kRas}, AffineTransform(*T_ras_reference)});
+  links->push_back({{options.reference_frame, kRas}, AffineTransform(*T_ras_reference)});
   return links;
 }
 
@@ -201,9 +191,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
 
 std::vector<std::string> report_lines(const ImportReport& report) {
   std::vector<std::string> lines;
-  std::string chain;
-  for (const std::string& link : report.links) chain += (chain.empty() ? "" : ", ") + link;
-  lines.push_back("chain: " + chain);
+  lines.push_back(fmt::format("chain: {}", fmt::join(report.links, ", ")));
   lines.push_back(
       fmt::format("frames: {} of {} with a valid chain", report.frames_used, report.frames));
   const auto tell = [&lines](const char* what, const std::vector<tracking::Dropped>& dropped) {

@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/import/fiducial_report.hpp"
 #include "client/tools/import/import_boundaries.hpp"
+#include "client/tools/import/import_case.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From contours on the images of a recording to tumour boundaries in
-// patient RAS, one for each sweep.
+// From contours on the images of a recording to tumour boundaries in patient RAS, one for each
+// sweep; and contours from seeds.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 #include "common/tracking/chain.hpp"
+#include "common/tracking/recording.hpp"
 #include "common/ultrasound/boundary.hpp"
 
 namespace brainshift::client {
@@ -43,5 +45,13 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
                                      const std::vector<tracking::ConstantLink>& constants,
                                      std::vector<ultrasound::Contour> contours,
                                      const BoundaryOptions& options = {});
+
+// Contours traced from the seeds of a file, for recorded and for live images.
+// By frame, ascending; where two seeds reach the same image, the more confident contour. notes: for
+// each seed what was traced, and where tracing ended. Errors of io::read_seeds and of
+// ultrasound::trace_sweep, which name the file.
+Result<std::vector<ultrasound::Contour>> contours_of_seeds(const tracking::Recording& recording,
+                                                           const std::filesystem::path& path,
+                                                           std::vector<std::string>& notes);
 
 }  // namespace brainshift::client

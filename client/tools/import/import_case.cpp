@@ -6,8 +6,11 @@
 #include <utility>
 
 #include "common/core/utc_time.hpp"
+#include "common/io/config/plus_config.hpp"
 #include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "common/patient/read_patient.hpp"
+#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -17,6 +20,9 @@ namespace fs = std::filesystem;
 ImportCase of(BrainModel model, const fs::path& case_file) {
   return {std::move(model), fs::absolute(case_file).lexically_normal()};
 }
+
+// Below this, a rotation about the line is known five times worse than one across it.
+constexpr double kThin = 0.2;
 
 }  // namespace
 
@@ -40,6 +46,21 @@ Status check_one_case(const fs::path& case_file, const fs::path& model) {
                           model.empty() ? "none" : "both"));
 }
 
+Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {
+  std::vector<tracking::ConstantLink> links;
+  if (device.empty()) return links;
+  const auto config = io::read_plus_config(device);
+  if (!config) return tl::unexpected(config.error());
+  for (const io::PlusTransform& transform : config->transforms) links.push_back(transform.link);
+  return links;
+}
+
+Status check_new(const fs::path& out) {
+  std::error_code ignored;
+  if (!fs::exists(out, ignored)) return {};
+  return fail(ErrorCode::kWriteFailed, out.string() + ": exists already");
+}
+
 Result<ImportCase> load_import_case(const fs::path& case_file, const fs::path& model,
                                     const Progress& progress) {
   if (!model.empty()) {
@@ -50,6 +71,58 @@ Result<ImportCase> load_import_case(const fs::path& case_file, const fs::path& m
   auto patient = patient::read_patient(case_file, progress);
   if (!patient) return tl::unexpected(patient.error());
   return of(std::move(patient->model), case_file);
+}
+
+Status write_surgery(const std::filesystem::path& path, const io::SurgeryMeta& meta,
+                     const std::vector<Observation>& observations) {
+  auto file =
+      io::SurgeryFile::create(path, meta);  // refuses a file that exists, and leaves it alone
+  if (!file) return tl::unexpected(file.error());
+  Status status;
+  for (const Observation& observation : observations) {
+    if (!status) break;
+    status = file->append({io::RecordKind::kObservation, observation.sequence,
+                           observation.acquired_ns, wire::encode(observation)});
+  }
+  if (status) status = file->close();
+  if (!status) io::discard_surgery(path);
+  return status;
+}
+
+FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
+                        const Vec3& target) {
+  FiducialReport report;
+  report.count = static_cast<int>(fit.residuals_mm.size());
+  report.matched = matched;
+  report.fre_mm = fit.fre_mm;
+  report.worst_mm = fit.residuals_mm.maxCoeff(&report.worst);
+  report.tre_mm = registration::expected_tre_mm(fit.image, fit.fle_mm, target);
+  report.thinness = registration::thinness(fit.image);
+  return report;
+}
+
+std::vector<std::string> fiducial_lines(const FiducialReport& report,
+                                        const std::vector<std::string>& names,
+                                        const std::string& target) {
+  const auto worst = static_cast<std::size_t>(report.worst);
+  const std::string name =
+      worst < names.size() && !names[worst].empty() ? " (" + names[worst] + ")" : "";
+  std::vector<std::string> lines = {fmt::format(
+      "fiducials: {}{}, registration error {:.2f} mm rms, {:.2f} mm at worst{}; expected error at "
+      "{} {:.2f} mm rms",
+      report.count, report.matched ? ", order found" : "", report.fre_mm, report.worst_mm, name,
+      target, report.tre_mm)};
+  if (report.thinness < kThin) {
+    lines.push_back(fmt::format(
+        "note: the fiducials lie nearly on a line: a rotation about it is known {:.0f} times worse "
+        "than one across it; touch another one beside the line",
+        1.0 / report.thinness));
+  }
+  if (report.count == 3) {
+    lines.emplace_back(
+        "note: three fiducials leave little to estimate these errors from; touch more");
+  }
+  return lines;
 }
 
 }  // namespace brainshift::client

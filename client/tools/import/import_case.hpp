@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The case that imported data belong to, from its case file or its prepared model.
+// What the imports share: the case that data belong to, from its case file or its prepared model;
+// the surgery file; what is told of fiducials.
 #pragma once
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/core/types.hpp"
+#include "common/io/recording/surgery_file.hpp"
 #include "common/io/recording/surgery_record.hpp"
+#include "common/registration/fiducials.hpp"
+#include "common/tracking/chain.hpp"
 #include "common/values/brain_model.hpp"
+#include "common/values/observation.hpp"
 
 namespace brainshift::client {
 
@@ -30,5 +37,37 @@ Status check_one_case(const std::filesystem::path& case_file, const std::filesys
 Result<ImportCase> load_import_case(const std::filesystem::path& case_file,
                                     const std::filesystem::path& model,
                                     const Progress& progress = {});
+
+// The fixed transforms of a PLUS device set (.xml); none for an empty path. Errors of
+// io::read_plus_config.
+Result<std::vector<tracking::ConstantLink>> device_links(const std::filesystem::path& device);
+
+// kWriteFailed when `out` exists already.
+Status check_new(const std::filesystem::path& out);
+
+// Writes a surgery file of observations, as `brainshift replay` plays it.
+// `path` must not exist. meta: the keys of surgery_file.hpp.
+// kWriteFailed; leaves nothing behind then.
+Status write_surgery(const std::filesystem::path& path, const io::SurgeryMeta& meta,
+                     const std::vector<Observation>& observations);
+
+// What a user should know about a registration by fiducials before relying on it.
+struct FiducialReport {
+  int count = 0;
+  bool matched = false;  // the correspondence was found, not given
+  double fre_mm = 0.0, worst_mm = 0.0;
+  int worst = 0;          // the fiducial with worst_mm, from 0
+  double tre_mm = 0.0;    // expected at the target, rms (registration/fiducials.hpp)
+  double thinness = 0.0;  // registration::thinness of the fiducials
+};
+
+FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
+                        const Vec3& target);
+
+// Lines for a terminal: the errors, and a note where the fiducials lie nearly on a line or are only
+// three. `names`: of the fiducials, or empty. `target`: "the tumour".
+std::vector<std::string> fiducial_lines(const FiducialReport& report,
+                                        const std::vector<std::string>& names,
+                                        const std::string& target);
 
 }  // namespace brainshift::client

@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "client/tools/import/import_case.hpp"
-#include "client/tools/import/surgery_writer.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/io/landmarks/pair_file.hpp"
 #include "common/registration/fiducials.hpp"
@@ -33,11 +32,7 @@ Status check_landmark_import(const LandmarkOptions& options) {
                 fmt::format("--sd-mm {}: must be {} to {}", options.sd_mm, kLeastSd_mm,
                             kMostLandmarkSd_mm));
   }
-  std::error_code ignored;
-  if (fs::exists(options.out, ignored)) {
-    return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
-  }
-  return {};
+  return check_new(options.out);
 }
 
 // "landmark 3", and its name where it has one.

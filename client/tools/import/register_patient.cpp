@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "client/tools/import/import_case.hpp"
-#include "common/io/config/plus_config.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/landmarks/point_file.hpp"
@@ -50,11 +49,7 @@ Status check_register(const RegisterOptions& options) {
       return refuse(fmt::format("{} {}: must be 0.01 to {}", name, value, most));
     }
   }
-  std::error_code ignored;
-  if (fs::exists(options.out, ignored)) {
-    return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
-  }
-  return {};
+  return check_new(options.out);
 }
 
 // Path of the stylus's tip in the reference frame, where the tracker vouches for it.
@@ -63,16 +58,10 @@ Result<std::vector<TipSample>> tip_path(const RegisterOptions& options, Register
   how.tracking_only = true;
   const auto recording = io::read_sequence(options.recording, how);
   if (!recording) return tl::unexpected(recording.error());
-  std::vector<tracking::ConstantLink> constants;
-  if (!options.device.empty()) {
-    const auto config = io::read_plus_config(options.device);
-    if (!config) return tl::unexpected(config.error());
-    for (const io::PlusTransform& transform : config->transforms) {
-      constants.push_back(transform.link);
-    }
-  }
+  const auto constants = device_links(options.device);
+  if (!constants) return tl::unexpected(constants.error());
   const auto chain =
-      tracking::evaluate_chain(*recording, constants, options.tip_frame, options.reference_frame);
+      tracking::evaluate_chain(*recording, *constants, options.tip_frame, options.reference_frame);
   if (!chain) return io::file_error(chain.error().code, options.recording, chain.error().message);
   std::vector<TipSample> path;
   for (int frame = 0; frame < recording->num_frames(); ++frame) {
@@ -239,9 +228,7 @@ Result<RegisterReport> register_patient(const RegisterOptions& options, const Pr
 std::vector<std::string> report_lines(const RegisterReport& report) {
   std::vector<std::string> lines;
   if (report.poses > 0) {
-    std::string chain;
-    for (const std::string& link : report.links) chain += (chain.empty() ? "" : ", ") + link;
-    lines.push_back("chain: " + chain);
+    lines.push_back(fmt::format("chain: {}", fmt::join(report.links, ", ")));
     lines.push_back(
         fmt::format("poses: {} of {} with a valid chain", report.poses_used, report.poses));
     for (const tracking::Dropped& entry : report.dropped) {

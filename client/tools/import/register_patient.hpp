@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/import/fiducial_report.hpp"
 #include "client/tools/import/held_points.hpp"
+#include "client/tools/import/import_case.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/tracking/chain.hpp"

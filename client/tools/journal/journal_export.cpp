@@ -3,12 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
-#include "client/tools/journal/journal_fields.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
+#include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
 
@@ -59,13 +63,90 @@ std::string update_columns(const Update& update) {
 Status write_field(const fs::path& out, const BrainModel& model, const Estimate& estimate) {
   std::vector<io::NodeField> fields;
   fields.push_back({"displacement", estimate.displacement});
-  if (estimate.sd_mm.size() > 0) {
-    fields.push_back({"sd_mm", estimate.sd_mm.transpose()});
-  }
+  if (estimate.sd_mm.size() > 0) fields.push_back({"sd_mm", estimate.sd_mm.transpose()});
   return io::write_vtu(out, model.mesh, fields);
 }
 
+// Seconds since the first record that it was asked for.
+class RecordClock {
+ public:
+  double seconds(std::int64_t recorded_ns) {
+    constexpr double kNanosecondsPerSecond = 1e9;
+    if (!first_ns_) first_ns_ = recorded_ns;
+    return static_cast<double>(recorded_ns - *first_ns_) / kNanosecondsPerSecond;
+  }
+
+ private:
+  std::optional<std::int64_t> first_ns_;
+};
+
+// "PATH: KIND SEQUENCE: reason".
+tl::unexpected<Error> undecodable_record(const fs::path& path, const io::SurgeryRecord& record,
+                                         const Error& error) {
+  return io::file_error(
+      ErrorCode::kUnreadable, path,
+      fmt::format("{} {}: {}", to_string(record.kind), record.sequence, error.message));
+}
+
+// Shows every usable update; gives their number. As above; kUnreadable for a field of another
+// number of nodes, kEmptySet without a usable update.
+using ShowField = std::function<Status(const Update&, double time_s)>;
+Result<int> visit_fields(const io::SurgeryFile& file, const fs::path& path, const BrainModel& model,
+                         const ShowField& show) {
+  int fields = 0;
+  const Status ok =
+      visit_updates(file, path, [&](const UpdateMessage& message, double time_s) -> Status {
+        if (message.error || !message.update.usable()) return {};
+        const auto nodes = message.update.estimate.displacement.cols();
+        if (nodes != model.mesh.num_nodes()) {
+          return io::file_error(
+              ErrorCode::kUnreadable, path,
+              fmt::format("update {}: displacement of {} nodes, the model has {}",
+                          message.update.sequence, nodes, model.mesh.num_nodes()));
+        }
+        ++fields;
+        return show(message.update, time_s);
+      });
+  if (!ok) return tl::unexpected(ok.error());
+  if (fields == 0) return io::file_error(ErrorCode::kEmptySet, path, "holds no usable update");
+  return fields;
+}
+
 }  // namespace
+
+std::string flags_text(const QualityVerdict& verdict) {
+  std::string text;
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (!verdict.flags.has(flag)) continue;
+    text += text.empty() ? "" : "+";
+    text += to_string(flag);
+  }
+  return text;
+}
+
+Result<BrainModel> recorded_model(const io::SurgeryFile& file, const fs::path& path,
+                                  const fs::path& model_file) {
+  auto model = io::read_model(model_file, {});
+  if (!model) return tl::unexpected(model.error());
+  if (model->model.model_id != file.meta().model_id) {
+    return io::file_error(
+        ErrorCode::kInvalidArgument, path,
+        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
+                    model_file.string(), model->model.model_id));
+  }
+  return std::move(model->model);
+}
+
+Status visit_updates(const io::SurgeryFile& file, const fs::path& path, const ShowUpdate& show) {
+  RecordClock clock;
+  return file.visit([&](const io::SurgeryRecord& record) -> Status {
+    const double time_s = clock.seconds(record.recorded_ns);
+    if (record.kind != io::RecordKind::kUpdate) return {};
+    const auto message = wire::decode_update(record.payload);
+    if (!message) return undecodable_record(path, record, message.error());
+    return show(*message, time_s);
+  });
+}
 
 Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& path) {
   std::string text =
@@ -100,13 +181,6 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const fs::path& pat
 }
 
 Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
-                               const FieldSeries& series) {
-  const auto model = recorded_model(file, path, series.model);
-  if (!model) return tl::unexpected(model.error());
-  return write_field_series(file, path, *model, series.folder);
-}
-
-Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path,
                                const BrainModel& model, const fs::path& folder) {
   std::error_code failed;
   fs::create_directories(folder, failed);
@@ -127,14 +201,12 @@ Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path
 }
 
 Result<int> write_field_file(const io::SurgeryFile& file, const fs::path& path,
-                             const fs::path& model_file, const fs::path& out) {
-  const auto model = recorded_model(file, path, model_file);
-  if (!model) return tl::unexpected(model.error());
-  auto series = io::FieldSeriesFile::create(out, *model);
+                             const BrainModel& model, const fs::path& out) {
+  auto series = io::FieldSeriesFile::create(out, model);
   if (!series) return tl::unexpected(series.error());
-  auto fields = visit_fields(
-      file, path, *model,
-      [&](const Update& update, double time_s) -> Status { return series->add(update, time_s); });
+  auto fields = visit_fields(file, path, model, [&](const Update& update, double time_s) -> Status {
+    return series->add(update, time_s);
+  });
   if (!fields) return fields;
   if (Status whole = series->commit(); !whole) return tl::unexpected(whole.error());
   return fields;

@@ -1,15 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surgery file as tables and fields that other programs read.
+// A surgery file as tables and fields that other programs read, in the order of the file.
+//
+// `path` is the surgery's, for messages.
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "common/core/error.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/brain_model.hpp"
+#include "common/values/estimate.hpp"
+#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
+
+// The flags' names, joined by '+'; empty without flags.
+std::string flags_text(const QualityVerdict& verdict);
+
+// The model that the surgery was recorded with. kInvalidArgument names both ids of another model;
+// errors of io::read_model.
+Result<BrainModel> recorded_model(const io::SurgeryFile& file, const std::filesystem::path& path,
+                                  const std::filesystem::path& model_file);
+
+// Shows every update, usable or not, with its time in s since the first record. An error at the
+// first record that is not what was written or cannot be decoded, and of `show`.
+using ShowUpdate = std::function<Status(const UpdateMessage&, double time_s)>;
+Status visit_updates(const io::SurgeryFile& file, const std::filesystem::path& path,
+                     const ShowUpdate& show);
 
 // A heading and one row per record, in the order of the file:
 //   record,kind,sequence,source,recorded_s,bytes,observation_sequence,status,quality,flags,
@@ -20,23 +39,15 @@ namespace brainshift::client {
 // was written.
 Result<std::string> records_csv(const io::SurgeryFile& file, const std::filesystem::path& path);
 
-struct FieldSeries {
-  std::filesystem::path model;   // .h5 that the surgery was recorded with
-  std::filesystem::path folder;  // for write_field_series; is made if it does not exist
-};
-
 // For every usable update a file `<stem>-<sequence>.vtu` with the point arrays displacement and,
 // where the update has it, sd_mm (both mm, RAS, undeformed to deformed), and `<stem>.pvd`, which
-// lists them by their time in s. Gives the number of fields. kInvalidArgument for another model;
-// kEmptySet without a usable update; kWriteFailed.
-Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
-                               const FieldSeries& series);
-// The same with the model at hand (recorded_model of journal_fields.hpp).
+// lists them by their time in s. model: recorded_model(). The folder is made if it does not exist.
+// Gives the number of fields. kEmptySet without a usable update; kWriteFailed.
 Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
                                const BrainModel& model, const std::filesystem::path& folder);
 
 // The same fields as one file, which appears whole or not at all (io::FieldSeriesFile).
 Result<int> write_field_file(const io::SurgeryFile& file, const std::filesystem::path& path,
-                             const std::filesystem::path& model, const std::filesystem::path& out);
+                             const BrainModel& model, const std::filesystem::path& out);
 
 }  // namespace brainshift::client

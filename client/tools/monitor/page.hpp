@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A daemon's report as a page of text (docs/operations.md explains each line). What needs attention
 // stands in words, so that the page can be read without colour; `alarm` marks the same lines.
+// And the report as JSON.
 #pragma once
 
 #include <optional>
@@ -34,5 +35,9 @@ std::string summary(const Reports& reports);
 
 // "0.2 s", "12 min 3 s", "3 h 12 min".
 std::string duration_text(double seconds);
+
+// A daemon's report as JSON: the keys are the fields of brainshift.v1.DaemonReport, with
+// "well" and "complaint" in front.
+std::string report_json(const wire::DaemonReport& report);
 
 }  // namespace brainshift::client

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "client/tools/pictures/ticks.hpp"
+#include "client/tools/pictures/canvas.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -2,10 +2,11 @@
 #include "client/tools/pictures/canvas.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "client/tools/pictures/ticks.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -39,6 +40,14 @@ void draw_segment(cv::Mat& image, cv::Point2d a, cv::Point2d b, const Stroke& st
 }
 
 }  // namespace
+
+Result<std::string> encode_png(const std::string& name, const cv::Mat& image) {
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
+    return fail(ErrorCode::kInternal, name + ": cannot be encoded as PNG");
+  }
+  return std::string(bytes.begin(), bytes.end());
+}
 
 int text_width(const std::string& text, const TextStyle& style) {
   int baseline = 0;
@@ -181,6 +190,89 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& sca
   }
   draw_vertical_text(image, {bar.x + bar.width + 16 + widest + 36, bar.y + bar.height / 2}, label,
                      style);
+}
+
+double axis_fraction(double value, double min, double max, bool log) {
+  assert(min < max && (!log || min > 0.0));
+  return log ? std::log(value / min) / std::log(max / min) : (value - min) / (max - min);
+}
+
+std::vector<double> nice_ticks(double min, double max, int target) {
+  assert(min < max && target >= 1);
+  const double rough = (max - min) / target;
+  const double power = std::pow(10.0, std::floor(std::log10(rough)));
+  double step = 10.0 * power;
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= rough * (1.0 - 1e-9)) {
+      step = factor * power;
+      break;
+    }
+  }
+  std::vector<double> ticks;
+  const auto first = static_cast<long>(std::ceil(min / step - 1e-9));
+  const auto last = static_cast<long>(std::floor(max / step + 1e-9));
+  for (long k = first; k <= last; ++k) ticks.push_back(static_cast<double>(k) * step);
+  return ticks;
+}
+
+std::vector<double> log_ticks(double min, double max) {
+  assert(0.0 < min && min < max);
+  const auto within = [&](const std::vector<double>& factors) {
+    std::vector<double> ticks;
+    const int first = static_cast<int>(std::floor(std::log10(min)));
+    const int last = static_cast<int>(std::ceil(std::log10(max)));
+    for (int exponent = first; exponent <= last; ++exponent) {
+      for (const double factor : factors) {
+        // By its text, so that 0.001 is the nearest number to 0.001.
+        const double tick =
+            std::stod(std::to_string(static_cast<int>(factor)) + "e" + std::to_string(exponent));
+        if (tick >= min * (1.0 - 1e-12) && tick <= max * (1.0 + 1e-12)) ticks.push_back(tick);
+      }
+    }
+    return ticks;
+  };
+  std::vector<double> ticks = within({1.0});
+  if (ticks.size() < 4) ticks = within({1.0, 2.0, 5.0});
+  if (ticks.size() < 3) ticks = nice_ticks(min, max);
+  return ticks;
+}
+
+std::string fixed_decimals(double value, int decimals) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
+  return buffer;
+}
+
+std::string tick_label(double value, double step) {
+  const int decimals =
+      step > 0.0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 0;
+  return fixed_decimals(std::abs(value) < 1e-9 * std::abs(step) ? 0.0 : value, decimals);
+}
+
+std::string log_tick_label(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  const std::string text = buffer;
+  const bool exponent = text.find('e') != std::string::npos;
+  return exponent && value >= 1.0 && value < 1e6 ? fixed_decimals(value, 0) : text;
+}
+
+void draw_gravity_arrow(cv::Mat& image, cv::Point2d along) {
+  constexpr double kHalf_px = 44.0;
+  constexpr double kLeastSeen = 0.1;
+  const TextStyle style{.cap_px = 18.0,
+                        .colour = palette::kWhite,
+                        .align = Align::kCentre,
+                        .bold = false,
+                        .halo = true};
+  const cv::Point2d centre(86.0, 100.0);
+  draw_text(image, {static_cast<int>(centre.x), 34}, "gravity", style);
+  if (cv::norm(along) < kLeastSeen) {
+    draw_text(image, {static_cast<int>(centre.x), 66}, "along view", style);
+    return;
+  }
+  const cv::Point2d half = kHalf_px * along;
+  draw_arrow(image, centre - half, centre + half, {palette::kWhite, 5, 0.0}, 22.0, 3);
 }
 
 }  // namespace brainshift::client

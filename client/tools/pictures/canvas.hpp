@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drawing primitives of charts and pictures: text, lines, arrows, markers, a colour scale.
+// Drawing primitives of charts and pictures: text, lines, arrows, markers, a colour scale, ticks.
 //
 // Pictures are drawn at kPixelRatio times the size at which a page shows them, so that the stroke
 // font stays legible. All lengths here are device pixels; colours are BGR; images are 8-bit BGR.
@@ -9,6 +9,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
+
+#include "common/core/error.hpp"
 
 namespace brainshift::client {
 
@@ -30,6 +32,9 @@ inline const cv::Scalar kInk(40, 40, 40);
 inline const cv::Scalar kGrey(120, 120, 120);
 inline const cv::Scalar kPale(225, 225, 225);
 }  // namespace palette
+
+// An image as the bytes of a PNG file. kInternal; `name` is the file's, for the message.
+Result<std::string> encode_png(const std::string& name, const cv::Mat& image);
 
 enum class Align { kLeft, kCentre, kRight };
 
@@ -74,5 +79,34 @@ struct ColourScale {
 };
 void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& scale,
                      const std::string& label, const cv::Scalar& ink);
+
+// Ticks: where those of an axis stand and how they read.
+//
+// Where a value lies on its axis: 0 at min, 1 at max. log: ln(value / min) / ln(max / min).
+// Precondition: min < max; on a logarithmic axis all three are positive.
+double axis_fraction(double value, double min, double max, bool log);
+
+// Round positions (1, 2 or 5 times a power of ten apart) within [min, max]; about `target` of
+// them. Precondition: min < max.
+std::vector<double> nice_ticks(double min, double max, int target = 6);
+
+// Positions on a logarithmic axis within [min, max]: powers of ten. Where there would be fewer
+// than four, 2 and 5 times these too. Where that is still fewer than three, those of nice_ticks.
+// Precondition: 0 < min < max.
+std::vector<double> log_ticks(double min, double max);
+
+// `value` with as many decimals as the step between ticks needs, at most 6.
+std::string tick_label(double value, double step);
+
+// Shortest text of a logarithmic tick: "0.002", "5", "20000"; "1e-05" and "1e+06" beyond.
+std::string log_tick_label(double value);
+
+// `value` with exactly `decimals` digits after the point.
+std::string fixed_decimals(double value, int decimals);
+
+// The arrow named "gravity" in the upper left corner of a picture of a head.
+// `along`: the direction of gravity, a unit vector, seen in the picture; pixels run right and down.
+// Where gravity is nearly along the line of sight, the words "along view" stand instead.
+void draw_gravity_arrow(cv::Mat& image, cv::Point2d along);
 
 }  // namespace brainshift::client

@@ -43,6 +43,11 @@ struct SliceWindow {
   Vec3 position(cv::Point2d pixel) const;  // in the plane
 };
 
+// The slice through `through` that holds all nodes (3 x n) with a margin of 10 mm, 5 px per mm.
+SliceWindow whole_head(const Points& nodes, const Vec3& through, Plane plane);
+// A square about `centre`, 2 half_mm wide, in the slice through it.
+SliceWindow close_up(const Vec3& centre, double half_mm, double px_per_mm, Plane plane);
+
 // Points of a square grid on the slice that lie inside the mesh, with their sampling weights.
 struct SliceSamples {
   double spacing_mm = 0.0;

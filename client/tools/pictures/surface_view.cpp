@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "client/tools/pictures/gravity_arrow.hpp"
+#include "client/tools/pictures/canvas.hpp"
 
 namespace brainshift::client {
 namespace {

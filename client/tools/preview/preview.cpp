@@ -1,24 +1,137 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/preview/preview.hpp"
 
-#include <opencv2/imgcodecs.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <tuple>
 #include <utility>
+#include <vector>
 
-#include "client/tools/preview/case_pictures.hpp"
+#include "client/tools/pictures/canvas.hpp"
+#include "client/tools/pictures/sheet.hpp"
+#include "client/tools/pictures/slice_panel.hpp"
+#include "client/tools/pictures/surface_view.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
 namespace {
 
-namespace fs = std::filesystem;
+constexpr double kMargin_mm = 12.0;
+constexpr double kSlice_px_per_mm = 4.0;
 
-Status write_png(const cv::Mat& image, const fs::path& path) {
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
-    return fail(ErrorCode::kInternal, path.string() + ": cannot be encoded as PNG");
-  }
-  return io::write_file(path, std::string(bytes.begin(), bytes.end()));
+const Stroke kTumour{palette::kOrange, 5, 0.0};
+const Stroke kFluidPlane{palette::kBlue, 4, 0.0};
+const Stroke kSlavePlane{palette::kBlue, 4, 12.0};
+
+struct RoleStyle {
+  NodeRole role;
+  const char* name;
+  cv::Scalar colour;
+};
+const std::array<RoleStyle, 4> kRoles{{{NodeRole::kFixed, "fixed surface", palette::kPale},
+                                       {NodeRole::kSlave, "may leave the skull", palette::kSkyBlue},
+                                       {NodeRole::kBrainstem, "brainstem", palette::kYellow},
+                                       {NodeRole::kCraniotomy, "craniotomy", palette::kPurple}}};
+const cv::Scalar& colour_of(NodeRole role) {
+  return std::find_if(kRoles.begin(), kRoles.end(),
+                      [role](const RoleStyle& style) { return style.role == role; })
+      ->colour;
 }
+
+// The role that two of the three corners share; the first corner's when all differ.
+NodeRole role_of_triangle(const CaseView& view, int triangle) {
+  const auto corner = [&](int k) {
+    return view.roles[static_cast<std::size_t>(view.brain.triangles(k, triangle))];
+  };
+  return corner(1) == corner(2) ? corner(1) : corner(0);
+}
+
+TriangleSurface part_with_role(const CaseView& view, NodeRole role) {
+  TriangleSurface part{view.brain.vertices, {}};
+  std::vector<int> kept;
+  for (int t = 0; t < view.brain.num_triangles(); ++t) {
+    if (role_of_triangle(view, t) == role) kept.push_back(t);
+  }
+  part.triangles.resize(3, static_cast<Eigen::Index>(kept.size()));
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    part.triangles.col(static_cast<Eigen::Index>(i)) = view.brain.triangles.col(kept[i]);
+  }
+  return part;
+}
+
+// What bounds the pictures: the brain, or the tumour when there is no brain.
+const TriangleSurface& shown(const CaseView& view) {
+  return view.brain.num_vertices() > 0 ? view.brain : view.tumour;
+}
+
+SliceWindow window_of(const CaseView& view, Plane plane, const Vec3& through) {
+  // The tumour is shown wherever it lies.
+  Vec3 low = shown(view).vertices.rowwise().minCoeff();
+  Vec3 high = shown(view).vertices.rowwise().maxCoeff();
+  if (view.tumour.num_vertices() > 0) {
+    low = low.cwiseMin(view.tumour.vertices.rowwise().minCoeff());
+    high = high.cwiseMax(view.tumour.vertices.rowwise().maxCoeff());
+  }
+  low.array() -= kMargin_mm;
+  high.array() += kMargin_mm;
+  SliceWindow window{plane, 0.0, 0.0, 0.0, 0.0, 0.0, kSlice_px_per_mm};
+  window.offset_mm = through(window.normal_axis());
+  window.across_min = low(window.across_axis());
+  window.across_max = high(window.across_axis());
+  window.up_min = low(window.up_axis());
+  window.up_max = high(window.up_axis());
+  return window;
+}
+
+void add_role_legend(const CaseView& view, Sheet& sheet) {
+  if (view.roles.empty()) {
+    if (view.brain.num_vertices() > 0) sheet.legend.push_back({"brain", {palette::kPale, 5, 0.0}});
+    return;
+  }
+  for (const RoleStyle& style : kRoles)
+    sheet.legend.push_back({style.name, {style.colour, 8, 0.0}});
+}
+
+std::string problem_text(const CaseView& view) {
+  return view.problems.empty() ? std::string() : "CANNOT BE PREPARED: " + view.problems.front();
+}
+
+std::vector<cv::Scalar> triangle_colours(const CaseView& view) {
+  std::vector<cv::Scalar> colours(static_cast<std::size_t>(view.brain.num_triangles()),
+                                  palette::kPale);
+  if (view.roles.empty()) return colours;
+  for (int t = 0; t < view.brain.num_triangles(); ++t) {
+    colours[static_cast<std::size_t>(t)] = colour_of(role_of_triangle(view, t));
+  }
+  return colours;
+}
+
+SurfaceView surface_from(const CaseView& view, const Vec3& towards) {
+  const TriangleSurface& bounds = shown(view);
+  const Vec3 low = bounds.vertices.rowwise().minCoeff();
+  const Vec3 high = bounds.vertices.rowwise().maxCoeff();
+  ViewPoint point = view_from(towards, 0.5 * (low + high));
+  point.half_width_mm = 0.5 * (high - low).norm() / std::sqrt(2.0) + kMargin_mm;
+  SurfaceView picture(point);
+  picture.draw_surface(view.brain, triangle_colours(view));
+  picture.draw_through(view.tumour, palette::kOrange, 0.75);
+  if (!view.roles.empty()) {
+    const Vec3 gravity = view.config.gravity_direction.normalized();
+    for (const auto& [depth, stroke] : {std::pair{view.fluid_plane_depth_mm, kFluidPlane},
+                                        std::pair{view.slave_plane_depth_mm, kSlavePlane}}) {
+      for (const auto& line : section_polylines(view.brain, gravity, depth)) {
+        picture.draw_on_surface(line, stroke);
+      }
+    }
+  }
+  picture.draw_axes();
+  picture.draw_gravity(view.config.gravity_direction.normalized());
+  return picture;
+}
+
+namespace fs = std::filesystem;
 
 std::string summary_text(const PreviewSummary& summary) {
   std::string text;
@@ -26,6 +139,62 @@ std::string summary_text(const PreviewSummary& summary) {
   for (const std::string& line : summary.doubts) text += "look again: " + line + "\n";
   for (const std::string& line : summary.problems) text += "cannot be prepared: " + line + "\n";
   return text;
+}
+
+// Axial, coronal and sagittal plane through a point, mm RAS. place: what is there, for the title.
+cv::Mat slices_picture(const CaseView& view, const Vec3& through, const std::string& place) {
+  Sheet sheet;
+  sheet.title = "Case " + view.config.case_id + ": planes through the " + place;
+  sheet.subtitle = problem_text(view);
+  if (sheet.subtitle.empty()) sheet.subtitle = "at " + place_text(through) + "; radiological view";
+  add_role_legend(view, sheet);
+  sheet.legend.push_back({"tumour", kTumour});
+  for (const auto& [plane, name, letter] :
+       {std::tuple{Plane::kAxial, "axial", "S"}, std::tuple{Plane::kCoronal, "coronal", "A"},
+        std::tuple{Plane::kSagittal, "sagittal", "R"}}) {
+    const SliceWindow window = window_of(view, plane, through);
+    SlicePanel panel(window);
+    if (view.background) panel.draw_mri(*view.background, 0.8);
+    if (view.roles.empty()) {
+      panel.draw_section(view.brain, {palette::kPale, 4, 0.0});
+    } else {
+      for (const RoleStyle& style : kRoles) {
+        panel.draw_section(part_with_role(view, style.role), {style.colour, 5, 0.0});
+      }
+    }
+    panel.draw_section(view.tumour, kTumour);
+    panel.draw_orientation(20.0);
+    panel.draw_gravity(view.config.gravity_direction.normalized());
+    sheet.panels.push_back(
+        {std::string(name) + ", " + letter + " = " + fixed_decimals(window.offset_mm, 1) + " mm",
+         panel.image()});
+  }
+  return compose(sheet);
+}
+
+// As seen through the opening, from the tumour's side, and from the front. With the fluid plane and
+// the second plane (the paper's section 2.6). Precondition: the brain has a surface.
+cv::Mat surface_picture(const CaseView& view) {
+  Sheet sheet;
+  sheet.title = "Case " + view.config.case_id + ": surface of the brain";
+  sheet.subtitle = problem_text(view);
+  if (sheet.subtitle.empty())
+    sheet.subtitle =
+        "the tumour shines through; arrows R, A, S point to the patient's right, front and top";
+  add_role_legend(view, sheet);
+  sheet.legend.push_back({"tumour", {palette::kOrange, 10, 0.0}});
+  if (!view.roles.empty()) {
+    sheet.legend.push_back({"fluid plane", kFluidPlane});
+    sheet.legend.push_back({"second plane", kSlavePlane});
+  }
+  const auto opening = opening_of(view);
+  const Vec3 side = centre_of(view.tumour).x() < 0.0 ? Vec3(-Vec3::UnitX()) : Vec3(Vec3::UnitX());
+  if (opening)
+    sheet.panels.push_back({"from the opening", surface_from(view, opening->normal).image()});
+  sheet.panels.push_back({side.x() > 0.0 ? "from the patient's right" : "from the patient's left",
+                          surface_from(view, side).image()});
+  sheet.panels.push_back({"from the front", surface_from(view, Vec3::UnitY()).image()});
+  return compose(sheet);
 }
 
 }  // namespace
@@ -47,11 +216,11 @@ Result<PreviewSummary> write_preview(const fs::path& case_file, const fs::path& 
     pictures.emplace_back("slices-craniotomy.png",
                           slices_picture(*view, opening->centre, "craniotomy's centre"));
   }
-  if (view->brain.num_vertices() > 0) {
-    pictures.emplace_back("surface.png", surface_picture(*view));
-  }
+  if (view->brain.num_vertices() > 0) pictures.emplace_back("surface.png", surface_picture(*view));
   for (const auto& [name, image] : pictures) {
-    if (Status ok = write_png(image, out / name); !ok) return tl::unexpected(ok.error());
+    const auto png = encode_png((out / name).string(), image);
+    if (!png) return tl::unexpected(png.error());
+    if (Status ok = io::write_file(out / name, *png); !ok) return tl::unexpected(ok.error());
     summary.files.push_back(out / name);
   }
   const fs::path text = out / "preview.txt";

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Pictures of a case before it is prepared, so that a wrong side or a wrong axis is seen before
-// surgery.
+// surgery: planes with outlines on the MRI, and the surface of the brain from outside.
 //
 // DIR/slices-tumour.png      three planes through the tumour's centre
 // DIR/slices-craniotomy.png  three planes through the craniotomy's centre, when it has nodes
 // DIR/surface.png            the brain as seen through the opening, from a side and from the front
 // DIR/preview.txt            the facts, doubts and problems of case_view.hpp, a line each
+//
+// Outlines and surfaces show what a node of the brain's surface is to the mechanics. Whatever a
+// case lacks is not drawn; its first problem is in the subtitle.
 #pragma once
 
 #include <filesystem>

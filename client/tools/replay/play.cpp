@@ -4,6 +4,11 @@
 #include <algorithm>
 #include <string>
 
+#include "client/lib/client.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/wire/convert.hpp"
+
 namespace brainshift::client {
 namespace {
 
@@ -39,9 +44,7 @@ class Player {
     const std::size_t plays = session_.observations.size();
     for (std::size_t i = 0; i < plays && !lost_; ++i) {
       report(progress_, "replay", static_cast<double>(i) / static_cast<double>(plays));
-      if (options_.speed == Speed::kRecorded) {
-        receive_until([] { return false; }, start + due(i));
-      }
+      if (options_.speed == Speed::kRecorded) receive_until([] { return false; }, start + due(i));
       if (!lost_) submit(i);
       if (options_.speed == Speed::kMax) wait_for_all();
     }
@@ -192,6 +195,11 @@ class Player {
 
 }  // namespace
 
+DaemonLink link_to(Client& client) {
+  return {[&client](const Observation& observation) { return client.submit(observation); },
+          [&client](std::chrono::milliseconds timeout) { return client.next_update(timeout); }};
+}
+
 std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
                                 std::size_t index, int cycle) {
   const std::uint64_t first = recording.front().observation.sequence;
@@ -210,6 +218,51 @@ Observation for_replay(Observation recorded) {
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress) {
   return Player(link, recording, options, progress).run();
+}
+
+Result<ResumePoint> read_resume_point(const std::filesystem::path& journal) {
+  const auto file = io::SurgeryFile::open_damaged(journal);
+  if (!file) return tl::unexpected(file.error());
+  ResumePoint point;
+  point.meta = file->meta();
+  const Status whole = file->visit([&](const io::SurgeryRecord& record) -> Status {
+    if (record.kind == io::RecordKind::kObservation) {
+      const auto observation = wire::decode_observation(record.payload);
+      if (!observation) {
+        return io::file_error(
+            ErrorCode::kUnreadable, journal,
+            "observation " + std::to_string(record.sequence) + ": " + observation.error().message);
+      }
+      point.last[observation->source] = record.sequence;
+    }
+    if (record.kind == io::RecordKind::kUpdate) point.last_update = record.sequence;
+    ++point.records;
+    return {};
+  });
+  if (!whole) point.broken = whole.error();
+  return point;
+}
+
+std::vector<RecordedObservation> remaining(const std::vector<RecordedObservation>& recording,
+                                           const ResumePoint& point) {
+  std::vector<RecordedObservation> left;
+  for (const RecordedObservation& recorded : recording) {
+    const auto last = point.last.find(recorded.observation.source);
+    if (last != point.last.end() && recorded.observation.sequence < last->second) continue;
+    left.push_back(recorded);
+  }
+  return left;
+}
+
+std::string describe(const ResumePoint& point) {
+  if (point.last.empty()) return "begins anew: no observation is recorded";
+  std::string text;
+  for (const auto& [source, sequence] : point.last) {
+    text += text.empty() ? "goes on after observation " : " and ";
+    text += std::to_string(sequence) + " of " + source;
+  }
+  if (point.last_update > 0) text += ", update " + std::to_string(point.last_update);
+  return text;
 }
 
 }  // namespace brainshift::client

@@ -9,17 +9,23 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/io/recording/surgery_record.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
 #include "common/wire/convert.hpp"
 
 namespace brainshift::client {
+
+class Client;
 
 // What play() needs of a daemon: Client's calls of the same names, or a test's own.
 struct DaemonLink {
@@ -27,6 +33,8 @@ struct DaemonLink {
   // Blocks up to the timeout; kUnavailable when it has passed.
   std::function<Result<UpdateMessage>(std::chrono::milliseconds)> next_update;
 };
+// Keeps a reference to the client.
+DaemonLink link_to(Client& client);
 
 struct RecordedObservation {
   std::int64_t recorded_ns = 0;  // monotonic clock of the recording
@@ -90,5 +98,29 @@ std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recordin
 // observations are not sent and carry the same error.
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress = {});
+
+// Where a surgery that was interrupted goes on: after the last observation that its journal holds.
+//
+// A session that starts after a crash knows no observation. What an estimate depends on is the
+// newest observation of every source (common/pipeline/evidence.hpp), so the last recorded one of
+// each source is sent again, and then all that came after it.
+struct ResumePoint {
+  io::SurgeryMeta meta;
+  std::uint64_t records = 0;                  // in the valid prefix
+  std::map<std::string, std::uint64_t> last;  // by source: sequence of the last observation
+  std::uint64_t last_update = 0;              // its sequence; 0: none
+  std::optional<Error> broken;                // what ended the valid prefix
+};
+
+// From the valid prefix of a journal, closed or not. kNotFound or kUnreadable when nothing of it
+// can be read.
+Result<ResumePoint> read_resume_point(const std::filesystem::path& journal);
+
+// What is left to send of a recording, in its order.
+std::vector<RecordedObservation> remaining(const std::vector<RecordedObservation>& recording,
+                                           const ResumePoint& point);
+
+// "goes on after observation 12 of ius and 3 of camera, update 14"
+std::string describe(const ResumePoint& point);
 
 }  // namespace brainshift::client

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/replay/replay.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 #include <set>
 
 #include "client/lib/client.hpp"
-#include "client/tools/replay/resume.hpp"
-#include "client/tools/replay/run_unit.hpp"
+#include "client/tools/replay/play.hpp"
 #include "client/tools/replay/score.hpp"
+#include "common/contact/forward_model.hpp"
+#include "common/io/config/config_file.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/linalg/openblas.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -20,11 +24,7 @@ namespace fs = std::filesystem;
 
 struct Surgery {
   io::SurgeryFile file;
-  std::string case_id;
-  std::string model_id;
-  std::string case_file;
-  std::string scenario;
-  std::optional<std::uint64_t> seed;
+  io::SurgeryMeta meta;  // the scenario is the file's name where none is recorded
   std::vector<RecordedObservation> observations;
   std::vector<std::string> notes;  // what is remarkable about the files
 };
@@ -37,7 +37,7 @@ Status check_given(const fs::path& path, const char* key, const std::string& val
 Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
                                                            const fs::path& path) {
   const auto records = file.records(io::RecordKind::kObservation);
-  if (!records) return tl::unexpected<Error>(records.error());
+  if (!records) return tl::unexpected(records.error());
   std::vector<RecordedObservation> observations;
   for (const io::SurgeryRecord& record : *records) {
     auto observation = wire::decode_observation(record.payload);
@@ -79,7 +79,7 @@ Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
               std::vector<RecordedObservation>& observations, std::vector<std::string>& notes) {
   if (options.resume.empty()) return {};
   const auto point = read_resume_point(options.resume);
-  if (!point) return tl::unexpected<Error>(point.error());
+  if (!point) return tl::unexpected(point.error());
   if (point->meta.model_id != meta.model_id) {
     return io::file_error(ErrorCode::kInvalidArgument, options.resume,
                           "meta.model_id is \"" + point->meta.model_id + "\", that of " +
@@ -94,32 +94,28 @@ Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
 Result<Surgery> open_surgery(const ReplayOptions& options) {
   const fs::path& path = options.surgery;
   auto file = io::SurgeryFile::open(path);
-  if (!file) return tl::unexpected<Error>(file.error());
+  if (!file) return tl::unexpected(file.error());
   const io::SurgeryState& state = file->state();
   std::vector<std::string> notes;
   if (!state.closed) notes.push_back(path.string() + ": " + describe(state));
-  const io::SurgeryMeta meta = file->meta();
+  io::SurgeryMeta meta = file->meta();
   if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
   if (Status ok = check_given(path, "model_id", meta.model_id); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
   auto observations = read_observations(*file, path);
-  if (!observations) return tl::unexpected<Error>(observations.error());
+  if (!observations) return tl::unexpected(observations.error());
   if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
   if (Status ok = resume(options, meta, *observations, notes); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
 
-  const std::string scenario = meta.scenario.empty() ? path.stem().string() : meta.scenario;
-  Surgery surgery{
-      std::move(*file), meta.case_id, meta.model_id, meta.case_file, scenario, meta.seed, {}, {}};
-  surgery.observations = std::move(*observations);
-  surgery.notes = std::move(notes);
-  return surgery;
+  if (meta.scenario.empty()) meta.scenario = path.stem().string();
+  return Surgery{std::move(*file), std::move(meta), std::move(*observations), std::move(notes)};
 }
 
 // Its status, when it serves the surgery's case and model.
@@ -136,10 +132,10 @@ Result<DaemonStatus> check_daemon(Client& client, const Surgery& surgery,
                                                  recorded + "\", but the daemon at " +
                                                  options.endpoint + " serves \"" + served + "\"");
   };
-  if (status->case_id != surgery.case_id)
-    return differs("case_id", surgery.case_id, status->case_id);
-  if (status->model_id != surgery.model_id) {
-    return differs("model_id", surgery.model_id, status->model_id);
+  if (status->case_id != surgery.meta.case_id)
+    return differs("case_id", surgery.meta.case_id, status->case_id);
+  if (status->model_id != surgery.meta.model_id) {
+    return differs("model_id", surgery.meta.model_id, status->model_id);
   }
   return status;
 }
@@ -155,21 +151,21 @@ struct Session {
 Result<Session> start_session(const Surgery& surgery, const ReplayOptions& options,
                               Boundary boundary) {
   auto client = Client::connect(options.endpoint, {.keys = options.keys});
-  if (!client) return tl::unexpected<Error>(client.error());
+  if (!client) return tl::unexpected(client.error());
   auto daemon = check_daemon(*client, surgery, options);
-  if (!daemon) return tl::unexpected<Error>(daemon.error());
-  auto info = client->start_session({.case_id = surgery.case_id,
+  if (!daemon) return tl::unexpected(daemon.error());
+  auto info = client->start_session({.case_id = surgery.meta.case_id,
                                      .method = options.method,
                                      .boundary = boundary,
                                      .publish_iterates = options.repeat == 1,
                                      .takeover = options.takeover,
                                      .recorded_clock = true});
-  if (!info) return tl::unexpected<Error>(info.error());
+  if (!info) return tl::unexpected(info.error());
   auto model = client->model();
-  if (!model) return tl::unexpected<Error>(model.error());
+  if (!model) return tl::unexpected(model.error());
   // Every update counts here, and every iterate.
   if (Status ok = client->subscribe(Subscription::kMaxWindow); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
   return Session{std::move(*client), std::move(*daemon), std::move(*info), std::move(*model)};
 }
@@ -188,13 +184,13 @@ Status write_fields(const fs::path& path, const BrainModel& model, const Points&
 RunReport describe_run(const Surgery& surgery, const Session& session, const ReplayOptions& options,
                        Boundary boundary) {
   RunReport run;
-  run.case_id = surgery.case_id;
-  run.scenario = surgery.scenario;
+  run.case_id = surgery.meta.case_id;
+  run.scenario = surgery.meta.scenario;
   run.method = to_string(options.method);
   run.boundary = to_string(boundary);
-  run.seed = surgery.seed;
-  run.model_id = surgery.model_id;
-  run.case_file = surgery.case_file;
+  run.seed = surgery.meta.seed;
+  run.model_id = surgery.meta.model_id;
+  run.case_file = surgery.meta.case_file;
   run.surgery_file = options.surgery.string();
   run.mesh = {session.info.nodes, session.info.tets, session.info.slaves};
   run.prepare_s = session.info.prepare_s;
@@ -213,7 +209,7 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
                     std::to_string(model.mesh.num_nodes()));
   }
   const auto truth = read_truth(surgery.file, played.last_recorded_sequence, model);
-  if (!truth) return tl::unexpected<Error>(truth.error());
+  if (!truth) return tl::unexpected(truth.error());
   describe(model, update.estimate, run);
   run.left_out = update.left_out;
   run.sources = update.estimate.sources;
@@ -239,24 +235,21 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
                                Boundary boundary, const Progress& progress) {
   report(progress, "prepare " + std::string(to_string(boundary)), 0.0);
   auto session = start_session(surgery, options, boundary);
-  if (!session) return tl::unexpected<Error>(session.error());
+  if (!session) return tl::unexpected(session.error());
   report(progress, "prepare " + std::string(to_string(boundary)), 1.0);
 
-  const DaemonLink link{
-      [&](const Observation& observation) { return session->client.submit(observation); },
-      [&](std::chrono::milliseconds timeout) { return session->client.next_update(timeout); }};
   const PlayOptions play_options{session->info.session_id, options.speed, options.timeout,
                                  options.repeat};
   const std::string stage = "replay " + std::string(to_string(boundary));
   const PlayedSession played =
-      play(link, surgery.observations, play_options,
+      play(link_to(session->client), surgery.observations, play_options,
            [&](std::string_view, double fraction) { report(progress, stage, fraction); });
 
   RunReport run = describe_run(surgery, *session, options, boundary);
   summarise(played, run);
   report(progress, "measure " + run.boundary, 0.0);
   if (const auto unit = measure_run_unit(options.endpoint, session->daemon, session->model,
-                                         surgery.case_file, boundary)) {
+                                         surgery.meta.case_file, boundary)) {
     run.factor_s = unit->factor_s;
     run.full_solve_ms = unit->full_solve_ms;
   } else if (options.on_note) {
@@ -265,7 +258,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
   report(progress, "measure " + run.boundary, 1.0);
   if (!options.latency_csv.empty()) {
     if (Status ok = io::write_file(csv_path(options, boundary), latency_csv(played)); !ok) {
-      return tl::unexpected<Error>(ok.error());
+      return tl::unexpected(ok.error());
     }
   }
   if (played.last) {
@@ -273,7 +266,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
         options.report.parent_path() /
         (options.report.stem().string() + "-" + run.scenario + "-" + run.boundary + ".vtu");
     if (Status ok = evaluate(surgery, session->model, played, field_file, run); !ok) {
-      return tl::unexpected<Error>(ok.error());
+      return tl::unexpected(ok.error());
     }
   }
   return run;
@@ -303,12 +296,19 @@ Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
   return {};
 }
 
+bool is_local(const std::string& endpoint) {
+  for (const char* start : {"ipc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"}) {
+    if (endpoint.rfind(start, 0) == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Status replay(const ReplayOptions& options, const Progress& progress,
               const std::function<void(const RunReport&)>& on_run) {
   const auto surgery = open_surgery(options);
-  if (!surgery) return tl::unexpected<Error>(surgery.error());
+  if (!surgery) return tl::unexpected(surgery.error());
   if (Status ok = check_repeat(options, *surgery); !ok) return ok;
   for (const std::string& note : surgery->notes) {
     if (options.on_note) options.on_note(note);
@@ -316,7 +316,7 @@ Status replay(const ReplayOptions& options, const Progress& progress,
   std::vector<RunReport> runs;
   for (const Boundary boundary : options.boundaries) {
     auto run = run_boundary(*surgery, options, boundary, progress);
-    if (!run) return tl::unexpected<Error>(run.error());
+    if (!run) return tl::unexpected(run.error());
     if (on_run) on_run(*run);
     runs.push_back(std::move(*run));
   }
@@ -330,6 +330,24 @@ Status replay(const ReplayOptions& options, const Progress& progress,
                                               run.boundary + " boundary" + cause);
   }
   return {};
+}
+
+Result<RunUnit> measure_run_unit(const std::string& endpoint, const DaemonStatus& daemon,
+                                 const BrainModel& model, const std::filesystem::path& case_file,
+                                 Boundary boundary) {
+  if (!is_local(endpoint)) {
+    return fail(ErrorCode::kUnavailable, endpoint + ": the daemon may be on another machine");
+  }
+  if (const std::string own = linalg::blas_kernel(); own != daemon.blas_kernel) {
+    return fail(ErrorCode::kUnavailable,
+                fmt::format("OpenBLAS kernel {} here, {} in the daemon", own, daemon.blas_kernel));
+  }
+  const auto config = io::read_case_config(case_file);
+  if (!config) return tl::unexpected(config.error());
+  linalg::use_single_threaded_blas();
+  const auto forward = contact::ForwardModel::build(model, *config, boundary);
+  if (!forward) return tl::unexpected(forward.error());
+  return RunUnit{forward->factor().factor_seconds(), contact::measure_full_solve_ms(*forward)};
 }
 
 }  // namespace brainshift::client

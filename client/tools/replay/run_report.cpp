@@ -31,7 +31,7 @@ void visit(A& a, LatencyPercentiles& v) {
   a("p50", v.p50), a("p95", v.p95), a("p99", v.p99), a("max", v.max);
 }
 template <typename A>
-void visit(A& a, StageMedians& v) {
+void visit(A& a, StageTimings& v) {
   a("register", v.register_ms), a("invert", v.invert_ms), a("rebuild", v.rebuild_ms);
   a("encode", v.encode_ms), a("journal", v.journal_ms);
 }

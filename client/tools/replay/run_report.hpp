@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// RunReport: what one run (scenario x method x boundary) of a replay
-// showed; one object of report.json.
+// RunReport: what one run (scenario x method x boundary) of a replay showed; one object of
+// report.json.
 //
-// The keys are those of visit() in run_report.cpp, most of them the names below.
-// A value that does not apply (no truth recorded, no uncertainty computed, no
-// update) is nullopt here and null in the file; a number that is not finite is
-// null too. Readers ignore unknown keys, because newer writers may add some.
-// Lengths are mm, times ms or s as the name says, angles degrees, shares percent.
+// The keys are those of visit() in run_report.cpp, most of them the names below. A value that does
+// not apply (no truth recorded, no uncertainty computed, no update) is nullopt here and null in the
+// file; a number that is not finite is null too. Readers ignore unknown keys, because newer writers
+// may add some. Lengths are mm, times ms or s as the name says, angles degrees, shares percent.
 #pragma once
 
 #include <cstdint>
@@ -34,15 +33,6 @@ struct LatencyPercentiles {
   double p95 = 0.0;
   double p99 = 0.0;
   double max = 0.0;
-};
-
-// Median per stage over the final updates, ms.
-struct StageMedians {
-  double register_ms = 0.0;
-  double invert_ms = 0.0;
-  double rebuild_ms = 0.0;
-  double encode_ms = 0.0;
-  double journal_ms = 0.0;
 };
 
 // mm; see score.hpp for the definition of each.
@@ -127,7 +117,7 @@ struct RunReport {
   std::optional<double> prepare_s;
   std::optional<double> factor_s;  // as full_solve_ms
   std::optional<std::uint64_t> model_bytes;
-  std::optional<double> full_solve_ms;  // run_unit.hpp; null where it cannot be measured
+  std::optional<double> full_solve_ms;  // RunUnit; null where it cannot be measured
 
   int updates = 0;     // final updates received
   int superseded = 0;  // observations dropped by the daemon in favour of newer ones
@@ -138,7 +128,7 @@ struct RunReport {
   std::optional<LatencyPercentiles> latency_ms;  // message sent -> final update received
   std::optional<double> cold_ms;                 // the first of them
   std::optional<double> first_iterate_ms;        // median; message sent -> first iterate received
-  std::optional<StageMedians> stages_ms;
+  std::optional<StageTimings> stages_ms;         // medians over the final updates
 
   RunErrors error_mm;
   std::optional<double> recovery_pct;

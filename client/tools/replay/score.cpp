@@ -60,7 +60,7 @@ Status score_craniotomy(const BrainModel& model, const io::SurgeryTruth& truth,
         truth.displacement.col(node_of_vertex[v]);
   }
   const auto surface = geometry::ClosestPointIndex::build(deformed);
-  if (!surface) return tl::unexpected<Error>(surface.error());
+  if (!surface) return tl::unexpected(surface.error());
   const Points undeformed = at_points(model.mesh.nodes, *points);
   using registration::mismatch;
   using registration::signed_projection_distance;
@@ -141,9 +141,9 @@ Result<std::optional<io::SurgeryTruth>> read_truth(const io::SurgeryFile& surger
   Result<io::SurgeryTruth> truth = surgery.read_truth(observation_sequence);
   if (!truth && truth.error().code == ErrorCode::kNotFound)
     return std::optional<io::SurgeryTruth>();
-  if (!truth) return tl::unexpected<Error>(truth.error());
+  if (!truth) return tl::unexpected(truth.error());
   if (Status ok = check_truth(*truth, model.mesh.num_nodes()); !ok) {
-    return tl::unexpected<Error>(ok.error());
+    return tl::unexpected(ok.error());
   }
   return std::optional<io::SurgeryTruth>(std::move(*truth));
 }

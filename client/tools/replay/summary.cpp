@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/replay/replay.hpp"
+
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "client/tools/replay/replay.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -63,42 +64,36 @@ void summarise(const PlayedSession& session, RunReport& run) {
   run.latency_ms = LatencyPercentiles{percentile(latency, 50), percentile(latency, 95),
                                       percentile(latency, 99), percentile(latency, 100)};
   if (!first_iterate.empty()) run.first_iterate_ms = percentile(first_iterate, 50);
-  const auto median = [&timings](double StageTimings::*stage) {
+  run.stages_ms.emplace();
+  for (const auto stage :
+       {&StageTimings::register_ms, &StageTimings::invert_ms, &StageTimings::rebuild_ms,
+        &StageTimings::encode_ms, &StageTimings::journal_ms}) {
     std::vector<double> values;
     for (const StageTimings& t : timings) values.push_back(t.*stage);
-    return percentile(values, 50);
-  };
-  run.stages_ms = StageMedians{median(&StageTimings::register_ms), median(&StageTimings::invert_ms),
-                               median(&StageTimings::rebuild_ms), median(&StageTimings::encode_ms),
-                               median(&StageTimings::journal_ms)};
+    *run.stages_ms.*stage = percentile(values, 50);
+  }
 }
 
 std::string summary_line(const RunReport& run) {
-  std::string line = run.scenario + ", " + run.method + ", " + run.boundary + ": " +
-                     std::to_string(run.updates) + (run.updates == 1 ? " update" : " updates");
+  std::string line = fmt::format("{}, {}, {}: {} update{}", run.scenario, run.method, run.boundary,
+                                 run.updates, run.updates == 1 ? "" : "s");
   if (run.quality) {
     const QualityCounts& counts = run.quality->counts;
-    const std::pair<int, const char*> verdicts[] = {{counts.good, "good"},
-                                                    {counts.caution, "with caution"},
-                                                    {counts.unusable, "unusable"},
-                                                    {counts.not_judged, "not judged"}};
-    std::string list;
-    for (const auto& [count, words] : verdicts) {
-      if (count > 0) list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + words;
+    std::vector<std::string> verdicts, flags;
+    for (const auto& [count, words] :
+         {std::pair{counts.good, "good"}, std::pair{counts.caution, "with caution"},
+          std::pair{counts.unusable, "unusable"}, std::pair{counts.not_judged, "not judged"}}) {
+      if (count > 0) verdicts.push_back(fmt::format("{} {}", count, words));
     }
-    line += " (" + list + ")";
-    std::string flags;
     for (const auto& [flag, count] : run.quality->flags) {
-      flags += (flags.empty() ? "; " : ", ") + flag + " " + std::to_string(count);
+      flags.push_back(fmt::format("{} {}", flag, count));
     }
-    line += flags;
+    line += fmt::format(" ({})", fmt::join(verdicts, ", "));
+    if (!flags.empty()) line += fmt::format("; {}", fmt::join(flags, ", "));
   }
-  if (!run.failures.empty()) line += "; " + std::to_string(run.failures.size()) + " failed";
-  if (run.recovery_pct) {
-    char text[64];
-    std::snprintf(text, sizeof text, "; %.1f %% recovered at the tumour", *run.recovery_pct);
-    line += text;
-  }
+  if (!run.failures.empty()) line += fmt::format("; {} failed", run.failures.size());
+  if (run.recovery_pct)
+    line += fmt::format("; {:.1f} % recovered at the tumour", *run.recovery_pct);
   return line;
 }
 
@@ -117,6 +112,26 @@ std::vector<TracePoint> trace_of(
     trace.push_back(point);
   }
   return trace;
+}
+
+std::string latency_csv(const PlayedSession& session) {
+  std::string text =
+      "update,observation_sequence,latency_ms,register_ms,invert_ms,rebuild_ms,encode_ms,active,"
+      "contact_iterations,status\n";
+  std::size_t update = 0;
+  for (const PlayedObservation& observation : session.observations) {
+    text += fmt::format("{},{},", ++update, observation.sequence);
+    if (observation.latency_ms) {
+      const StageTimings& t = observation.timings;  // to a tenth of a microsecond
+      text += fmt::format("{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{}\n", *observation.latency_ms,
+                          t.register_ms, t.invert_ms, t.rebuild_ms, t.encode_ms, observation.active,
+                          observation.contact_iterations, to_string(observation.status));
+    } else {
+      text += fmt::format(",,,,,,,{}\n",
+                          observation.error ? to_string(observation.error->code) : "superseded");
+    }
+  }
+  return text;
 }
 
 }  // namespace brainshift::client

@@ -5,7 +5,7 @@
 // decisions, each one after the former was answered; the others are not sent.
 //
 // Updates must agree bit for bit when the daemon's build, machine type and BLAS kernel are those
-// of the journal, else within rounding (compare_updates.hpp).
+// of the journal, else within rounding.
 #pragma once
 
 #include <chrono>
@@ -16,13 +16,32 @@
 #include <vector>
 
 #include "client/lib/client.hpp"
-#include "client/tools/replay/compare_updates.hpp"
 #include "client/tools/replay/play.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
+
+enum class Agreement {
+  kBitForBit,      // same build, machine type and BLAS kernel
+  kWithinRounding  // anything else: fields within kRounding_mm and one step of a 32-bit float
+};
+// What other instructions do to the last digits of a field (docs/conventions.md). Fields travel as
+// 32-bit floats, which may round to the neighbour.
+inline constexpr double kRounding_mm = 1e-9;
+
+struct UpdateComparison {
+  std::vector<std::string> differences;  // one clause each; empty: the updates agree
+  double displacement_mm = 0.0;          // greatest difference of a node's component
+};
+
+// Compares what was estimated and judged: error, status, quality, field, standard deviations,
+// contact and, bit for bit, forces, misfits, alignment, strengths, sources and omissions too.
+// Numbers, times and the omission of the journal belong to a session and are not compared.
+UpdateComparison compare_updates(const UpdateMessage& recorded, const UpdateMessage& replayed,
+                                 Agreement agreement);
 
 struct Verification {
   Agreement agreement = Agreement::kBitForBit;

@@ -33,4 +33,26 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs);
 std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<ReportedRun>& runs,
                                   const Head& head);
 
+// The MRI slice as it was, as the estimate moves it, and as the truth does: pictures of one size
+// that the page lays on each other.
+//
+// A pixel at x in the deformed head shows the image at X with X + u(X) = x: X is found in the mesh
+// whose nodes are moved by u. Where the moved brain has left a place it is black; outside the
+// brain the image is as it was.
+struct SlidePosition {
+  std::string label;  // "before", "estimate", "truth"
+  cv::Mat image;      // 8-bit BGR
+};
+
+struct Slide {
+  std::string file_name;  // unique in the report; "-LABEL.png" is added for each position
+  std::string caption;    // plain text
+  std::vector<SlidePosition> positions;
+};
+
+// Axial and coronal, through the tumour's centre; two positions where no truth is recorded. Of the
+// group's run with contact, or else of the fixed one. Empty without a field or an MRI.
+std::vector<Slide> warped_slices(const RunGroup& group, const std::vector<ReportedRun>& runs,
+                                 const Head& head);
+
 }  // namespace brainshift::client

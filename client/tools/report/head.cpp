@@ -24,13 +24,13 @@ Vec3 mean_of(const Points& points) {
 
 Result<Head> load_head(const std::filesystem::path& case_file, const Progress& progress) {
   auto patient = patient::read_patient(case_file, progress);
-  if (!patient) return tl::unexpected<Error>(patient.error());
+  if (!patient) return tl::unexpected(patient.error());
   BrainModel& model = patient->model;
 
   Head head;
   if (!patient->config.mri.empty()) {
     auto mri = io::read_nifti(patient->config.mri);
-    if (!mri) return tl::unexpected<Error>(mri.error());
+    if (!mri) return tl::unexpected(mri.error());
     head.mri = std::move(*mri);
   }
   Points craniotomy(3, static_cast<Eigen::Index>(model.craniotomy.size()));
@@ -47,7 +47,7 @@ Result<Head> load_head(const std::filesystem::path& case_file, const Progress& p
 
 Result<RunField> load_field(const std::filesystem::path& path) {
   auto file = io::read_vtu(path);
-  if (!file) return tl::unexpected<Error>(file.error());
+  if (!file) return tl::unexpected(file.error());
   const auto find = [&](const char* name) -> const Eigen::MatrixXd* {
     for (const io::NodeField& field : file->node_fields) {
       if (field.name == name) return &field.values;
@@ -92,8 +92,7 @@ std::vector<RunGroup> group_runs(const std::vector<ReportedRun>& runs) {
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const RunReport& run = runs[i].report;
     const auto open = std::find_if(groups.begin(), groups.end(), [&](RunGroup& group) {
-      const std::size_t other = group.contact ? *group.contact : *group.fixed;
-      return !slot_of(group, run) && same_run_but_boundary(runs[other].report, run);
+      return !slot_of(group, run) && same_run_but_boundary(runs[group.any()].report, run);
     });
     if (open != groups.end()) {
       slot_of(*open, run) = i;

@@ -48,6 +48,8 @@ struct RunGroup {
   std::string name;  // unique among the groups, fit for file names
   std::optional<std::size_t> contact;
   std::optional<std::size_t> fixed;
+
+  std::size_t any() const { return contact ? *contact : *fixed; }
 };
 // In order of appearance; a second run of the same kind opens another group.
 std::vector<RunGroup> group_runs(const std::vector<ReportedRun>& runs);

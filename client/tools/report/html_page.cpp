@@ -6,8 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "client/tools/report/escape_html.hpp"
-#include "client/tools/report/verdict.hpp"
+#include "client/tools/report/html_table.hpp"
 #include "common/io/files/binary_codec.hpp"
 
 namespace brainshift::client {
@@ -75,7 +74,7 @@ std::string scenario_list(const std::vector<ReportedRun>& runs,
                           const std::vector<RunGroup>& groups) {
   std::string html = "<ul>\n";
   for (const RunGroup& group : groups) {
-    const RunReport& run = runs[group.contact ? *group.contact : *group.fixed].report;
+    const RunReport& run = runs[group.any()].report;
     html += "<li><strong>" + escape_html(run.scenario) + "</strong>: case " +
             escape_html(run.case_id) + ", method " + escape_html(run.method);
     if (run.seed) html += ", seed " + std::to_string(*run.seed);

@@ -33,7 +33,18 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
                       const std::vector<PagePicture>& pictures,
                       const std::vector<PageSlide>& slides = {});
 
-// The page's parts, as HTML.
+// How the page opens: what the runs come to in a sentence of plain text.
+//
+// The sentence speaks of the runs with the contact boundary condition and the default method
+// (condensed) that moved a tumour; without such runs of those with contact, without these of all.
+// It says the motion of the tumour that was recovered (recovery_pct; the least by name), the time
+// of an update over one solve (latency_ms.p50 / full_solve_ms), and how many updates were unusable,
+// each beside the paper's figure. What no run has measured is left out of it.
+std::string verdict(const std::vector<ReportedRun>& runs);
+
+// The page's parts, as HTML. First a table that fits the window: a line per run, twelve columns
+// with their units, the paper's figures as the last lines.
+std::string summary_table(const std::vector<ReportedRun>& runs);
 std::string error_table(const std::vector<ReportedRun>& runs);  // beside the paper's values
 // Verdicts and flags of each run's updates; strengths of the prior of the last usable one.
 std::string quality_table(const std::vector<ReportedRun>& runs);

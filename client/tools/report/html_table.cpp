@@ -4,9 +4,22 @@
 #include <cmath>
 #include <cstdio>
 
-#include "client/tools/report/escape_html.hpp"
-
 namespace brainshift::client {
+
+std::string escape_html(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&': escaped += "&amp;"; break;
+      case '<': escaped += "&lt;"; break;
+      case '>': escaped += "&gt;"; break;
+      case '"': escaped += "&quot;"; break;
+      case '\'': escaped += "&#39;"; break;
+      default: escaped += c;
+    }
+  }
+  return escaped;
+}
 
 std::string number(double value, int decimals) {
   if (!std::isfinite(value)) return kNothing;

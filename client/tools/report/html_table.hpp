@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of the page with a column per run, and the text of their numbers.
-// Private to client/report.
+// Tables of the page with a column per run, and the text of their numbers. Private to
+// client/report.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/tools/report/head.hpp"
 #include "common/core/statistics.hpp"
 
 namespace brainshift::client {
+
+// Text of reports and case files inside an HTML page: with &, <, >, " and ' replaced by their
+// entities.
+std::string escape_html(std::string_view text);
 
 inline const std::string kNothing = "&ndash;";  // a value that there is not
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/tools/report/verdict.hpp"
+#include "client/tools/report/html_page.hpp"
 
 #include <algorithm>
 #include <functional>
 #include <optional>
 
-#include "client/tools/report/escape_html.hpp"
 #include "client/tools/report/html_table.hpp"
 #include "client/tools/report/paper_values.hpp"
 

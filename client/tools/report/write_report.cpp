@@ -2,13 +2,11 @@
 #include "client/tools/report/write_report.hpp"
 
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 
 #include "client/tools/pictures/canvas.hpp"
 #include "client/tools/report/figures.hpp"
 #include "client/tools/report/head.hpp"
 #include "client/tools/report/html_page.hpp"
-#include "client/tools/report/warped_slices.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
@@ -22,13 +20,13 @@ Result<std::vector<ReportedRun>> load_runs(const ReportOptions& options) {
   std::vector<ReportedRun> runs;
   for (const fs::path& path : options.reports) {
     auto reports = read_reports(path);
-    if (!reports) return tl::unexpected<Error>(reports.error());
+    if (!reports) return tl::unexpected(reports.error());
     for (RunReport& report : *reports) {
       ReportedRun run{std::move(report), std::nullopt};
       if (!run.report.field_file.empty()) {
         const fs::path file = path.parent_path() / run.report.field_file;
         auto field = load_field(file);
-        if (!field) return tl::unexpected<Error>(field.error());
+        if (!field) return tl::unexpected(field.error());
         run.field = std::move(*field);
         run.report.field_file =
             fs::absolute(file).lexically_proximate(fs::absolute(options.out)).string();
@@ -52,7 +50,7 @@ Result<std::map<std::string, Head>> load_heads(const std::vector<ReportedRun>& r
     const std::string& file = run.report.case_file;
     if (!run.field || file.empty() || heads.contains(file)) continue;
     auto head = load_head(file, progress);
-    if (!head) return tl::unexpected<Error>(head.error());
+    if (!head) return tl::unexpected(head.error());
     if (!run.report.model_id.empty() && head->model_id != run.report.model_id) {
       // Outlines and gravity of another model on these fields would look right and be wrong.
       return fail(ErrorCode::kInvalidArgument,
@@ -80,22 +78,13 @@ std::vector<Figure> draw_figures(const std::vector<ReportedRun>& runs,
         figures.push_back(convergence_figure(group, runs[*index].report));
       }
     }
-    const auto head =
-        heads.find(runs[group.contact ? *group.contact : *group.fixed].report.case_file);
+    const auto head = heads.find(runs[group.any()].report.case_file);
     if (head == heads.end()) continue;
     for (Figure& figure : slice_figures(group, runs, head->second))
       figures.push_back(std::move(figure));
   }
   report(progress, "draw", 1.0);
   return figures;
-}
-
-Result<std::string> encode_png(const std::string& file_name, const cv::Mat& image) {
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
-    return fail(ErrorCode::kInternal, file_name + ": cannot be encoded as PNG");
-  }
-  return std::string(bytes.begin(), bytes.end());
 }
 
 // Writes the pictures of every position, too.
@@ -105,8 +94,7 @@ Result<std::vector<PageSlide>> write_slides(const std::vector<ReportedRun>& runs
                                             const fs::path& out) {
   std::vector<PageSlide> slides;
   for (const RunGroup& group : groups) {
-    const auto head =
-        heads.find(runs[group.contact ? *group.contact : *group.fixed].report.case_file);
+    const auto head = heads.find(runs[group.any()].report.case_file);
     if (head == heads.end()) continue;
     for (const Slide& slide : warped_slices(group, runs, head->second)) {
       PageSlide page;
@@ -114,7 +102,7 @@ Result<std::vector<PageSlide>> write_slides(const std::vector<ReportedRun>& runs
       for (const SlidePosition& position : slide.positions) {
         const std::string name = slide.file_name + "-" + position.label + ".png";
         auto png = encode_png(name, position.image);
-        if (!png) return tl::unexpected<Error>(png.error());
+        if (!png) return tl::unexpected(png.error());
         if (Status ok = io::write_file(out / name, *png); !ok) return tl::unexpected(ok.error());
         page.positions.push_back({position.label, std::move(*png)});
         page.width = position.image.cols;
@@ -130,9 +118,9 @@ Result<std::vector<PageSlide>> write_slides(const std::vector<ReportedRun>& runs
 
 Status write_report(const ReportOptions& options, const Progress& progress) {
   const auto runs = load_runs(options);
-  if (!runs) return tl::unexpected<Error>(runs.error());
+  if (!runs) return tl::unexpected(runs.error());
   const auto heads = load_heads(*runs, progress);
-  if (!heads) return tl::unexpected<Error>(heads.error());
+  if (!heads) return tl::unexpected(heads.error());
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error || !fs::is_directory(options.out)) {
@@ -144,13 +132,13 @@ Status write_report(const ReportOptions& options, const Progress& progress) {
   std::vector<PagePicture> pictures;
   for (const Figure& figure : draw_figures(*runs, groups, *heads, progress)) {
     auto png = encode_png(figure.file_name, figure.image);
-    if (!png) return tl::unexpected<Error>(png.error());
+    if (!png) return tl::unexpected(png.error());
     if (Status ok = io::write_file(options.out / figure.file_name, *png); !ok) return ok;
     pictures.push_back({std::move(*png), figure.caption, figure.image.cols / kPixelRatio,
                         figure.image.rows / kPixelRatio});
   }
   const auto slides = write_slides(*runs, groups, *heads, options.out);
-  if (!slides) return tl::unexpected<Error>(slides.error());
+  if (!slides) return tl::unexpected(slides.error());
   if (Status ok =
           io::write_file(options.out / "report.html", html_page(*runs, groups, pictures, *slides));
       !ok)

@@ -6,7 +6,7 @@
 //
 //   mesh          another mesh of the same head, with quadratic elements (other_mesh.hpp)
 //   gap           between brain and skull, from kLeastGap_mm to kMostGap_mm, uniform there, varying
-//                 over kGapLength_mm (truth_forward.hpp); the estimate believes the case's
+//                 over kGapLength_mm (truth.hpp); the estimate believes the case's
 //   penalty       of contact, kPenaltyFactor times the case's, or that part of it
 //   stiffness     of tumour, grey and white matter and ventricles, and within them at several
 //                 lengths (vary_tissues in stiffness.hpp); takes the place of a scenario's own

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/twin/scenario.hpp"
 
+#include <fmt/format.h>
+
 namespace brainshift::client {
 
 namespace {
@@ -133,11 +135,15 @@ Scenario retraction() {
   return scenario;
 }
 
-// What the five patients share: the paper's instruments, and Table 3's initial misfit.
-Scenario patient(const char* name, double misfit_mm, const char* description) {
+// A patient of the paper: its instruments, and Table 3's initial misfit.
+Scenario patient(int number, double misfit_mm, double fluid_level_mm, const Swelling& swelling,
+                 const char* what) {
   Scenario scenario;
-  scenario.name = name;
-  scenario.description = description;
+  scenario.name = "patient-" + std::to_string(number);
+  scenario.description =
+      fmt::format("{} of the paper's patient {}; case patient-{}", what, number, number);
+  scenario.fluid_levels_mm = {fluid_level_mm};
+  scenario.swelling = swelling;
   scenario.measurement = Measurement::kProbeSections;
   scenario.sparse_points = 0;
   scenario.interval_s = 300.0;
@@ -146,57 +152,22 @@ Scenario patient(const char* name, double misfit_mm, const char* description) {
   return scenario;
 }
 
-// The exposed cortex contracts fully; the brain moves along gravity (10 degrees).
-Scenario patient_1() {
-  Scenario scenario = patient("patient-1", 4.8, "sag of the paper's patient 1; case patient-1");
-  scenario.fluid_levels_mm = {55.0};
-  return scenario;
-}
-
-// It distends fully; the brain moves against gravity (140 degrees).
-Scenario patient_2() {
-  Scenario scenario =
-      patient("patient-2", 5.9, "distension of the paper's patient 2; case patient-2");
-  scenario.fluid_levels_mm = {0.0};
-  scenario.swelling = {0.5, 60.0, 30.0};
-  return scenario;
-}
-
-// It moves along itself (105 degrees to gravity).
-Scenario patient_3() {
-  Scenario scenario =
-      patient("patient-3", 6.1, "tangential motion of the paper's patient 3; case patient-3");
-  scenario.fluid_levels_mm = {10.0};
-  scenario.swelling = {0.5, 45.0, 5.0, Vec3(-15.0, -26.0, 0.0)};
-  return scenario;
-}
-
-// Two fifths of it contract, the rest distends (93 degrees).
-Scenario patient_4() {
-  Scenario scenario =
-      patient("patient-4", 4.0, "partial sag of the paper's patient 4; case patient-4");
-  scenario.fluid_levels_mm = {40.0};
-  scenario.swelling = {0.25, 45.0, 10.0, Vec3(15.0, 26.0, 0.0)};
-  return scenario;
-}
-
-// It distends a little (141 degrees).
-Scenario patient_5() {
-  Scenario scenario =
-      patient("patient-5", 3.6, "slight distension of the paper's patient 5; case patient-5");
-  scenario.fluid_levels_mm = {0.0};
-  scenario.swelling = {0.5, 50.0, 25.0};
-  return scenario;
-}
-
 }  // namespace
 
 const std::vector<Scenario>& all_scenarios() {
   static const std::vector<Scenario> scenarios = {
-      paper(),       paper_icp(), distension(),       sag_progress(),
-      no_contact(),  joint_sag(), joint_distension(), joint_tangential(),
-      joint_mixed(), resection(), retraction(),       patient_1(),
-      patient_2(),   patient_3(), patient_4(),        patient_5()};
+      paper(), paper_icp(), distension(), sag_progress(), no_contact(), joint_sag(),
+      joint_distension(), joint_tangential(), joint_mixed(), resection(), retraction(),
+      // The exposed cortex contracts fully; the brain moves along gravity (10 degrees).
+      patient(1, 4.8, 55.0, {}, "sag"),
+      // It distends fully; the brain moves against gravity (140 degrees).
+      patient(2, 5.9, 0.0, {0.5, 60.0, 30.0}, "distension"),
+      // It moves along itself (105 degrees to gravity).
+      patient(3, 6.1, 10.0, {0.5, 45.0, 5.0, Vec3(-15.0, -26.0, 0.0)}, "tangential motion"),
+      // Two fifths of it contract, the rest distends (93 degrees).
+      patient(4, 4.0, 40.0, {0.25, 45.0, 10.0, Vec3(15.0, 26.0, 0.0)}, "partial sag"),
+      // It distends a little (141 degrees).
+      patient(5, 3.6, 0.0, {0.5, 50.0, 25.0}, "slight distension")};
   return scenarios;
 }
 

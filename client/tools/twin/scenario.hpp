@@ -4,7 +4,7 @@
 // A surgery is a series of moments. Every instrument makes one observation at
 // each of them. The brain is in equilibrium (drained, common/fem/elasticity.hpp)
 // under gravity, with the fluid at the moment's level, and under one swelling, one volume change
-// and one spatula (retraction.hpp) that do not change. Part of the tumour may be gone
+// and one spatula (load.hpp) that do not change. Part of the tumour may be gone
 // (resection.hpp). Each moment has its own truth, points and noise.
 #pragma once
 
@@ -15,7 +15,6 @@
 
 #include "client/tools/twin/load.hpp"
 #include "client/tools/twin/resection.hpp"
-#include "client/tools/twin/retraction.hpp"
 
 namespace brainshift::client {
 

@@ -49,21 +49,6 @@ io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::p
   return meta;
 }
 
-std::vector<ScenarioInfo> scenarios() {
-  std::vector<ScenarioInfo> infos;
-  for (const Scenario& scenario : all_scenarios())
-    infos.push_back({scenario.name, scenario.description});
-  return infos;
-}
-
-std::vector<ScenarioInfo> adverse_ingredients() {
-  std::vector<ScenarioInfo> infos;
-  for (const IngredientInfo& info : all_ingredients()) {
-    infos.push_back({info.name, info.description});
-  }
-  return infos;
-}
-
 Status simulate(const SimulateOptions& options, const Progress& progress) {
   const Scenario* scenario = find_scenario(options.scenario);
   if (scenario == nullptr) {

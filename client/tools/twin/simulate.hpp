@@ -23,13 +23,6 @@
 
 namespace brainshift::client {
 
-struct ScenarioInfo {
-  std::string name;
-  std::string description;  // one line
-};
-std::vector<ScenarioInfo> scenarios();
-std::vector<ScenarioInfo> adverse_ingredients();
-
 struct SimulateOptions {
   std::filesystem::path case_file;
   std::string scenario;
@@ -40,8 +33,8 @@ struct SimulateOptions {
 
 // The surgery file calls the scenario NAME, or NAME+INGREDIENT+... or NAME+all.
 // kNotFound for an unknown scenario or ingredient; the sentence lists the known ones.
-// kInvalidArgument when an ingredient does nothing (effects.hpp). kWriteFailed when `out` exists or
-// cannot be written. Other errors: of reading the case, building its model, and play_scenario.
+// kInvalidArgument when an ingredient does nothing (truth_load.hpp). kWriteFailed when `out` exists
+// or cannot be written. Other errors: of reading the case, building its model, and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 
 // What a surgery file says of a simulated surgery of this model, made now by `software`. The case

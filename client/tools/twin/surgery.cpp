@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "client/tools/twin/effects.hpp"
 #include "client/tools/twin/measure.hpp"
 #include "client/tools/twin/truth_load.hpp"
 #include "common/registration/surface_distances.hpp"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// TruthSolver: K u = b with penalty contact, for one load after the other of a surgery.
+// What the brain of a surgery does under a load: its forward model, and TruthSolver, which solves
+// K u = b with penalty contact for one load after the other.
 //
 // It solves the same penalty equations as contact::solve_with_contact (paper section 2.4): solve
 // for the active set, take the slaves that penetrate as the next set, until the set repeats. The
@@ -9,9 +10,11 @@
 // equations wherever the search began.
 #pragma once
 
+#include "client/tools/twin/truth_brain.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/contact/penalised_system.hpp"
 #include "common/core/error.hpp"
+#include "common/core/progress.hpp"
 
 namespace brainshift::client {
 
@@ -45,5 +48,16 @@ class TruthSolver final : public TruthSource {
  private:
   contact::WoodburySystem system_;
 };
+
+// The forward model of the brain with contact. On the case's own mesh and gap that of
+// contact::ForwardModel::build. Otherwise
+//   nodes     a middle of an edge between two boundary nodes is free where both ends are, fixed
+//             along the normal where one end is, else a slave
+//   slaves    the case's; of quadratic elements the middles alone. The penalty is spread so that
+//             the skull is as stiff by area as the case's.
+//   gap       with gap_seed 0.5 to 4 mm, uniform, along each slave's contact normal; it takes the
+//             place of the case's
+// Errors as contact::ForwardModel.
+Result<contact::ForwardModel> truth_forward(const TruthBrain& brain, const Progress& progress = {});
 
 }  // namespace brainshift::client

@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "client/tools/twin/gaussian_field.hpp"
 #include "client/tools/twin/stiffness.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/geometry/tet_locator.hpp"

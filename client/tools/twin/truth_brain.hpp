@@ -11,10 +11,8 @@
 #include "client/tools/twin/other_mesh.hpp"
 #include "client/tools/twin/scenario.hpp"
 #include "common/configuration/case_config.hpp"
-#include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
-#include "common/core/progress.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/brain_model.hpp"
 
@@ -45,16 +43,5 @@ bool keeps_the_brain(const Scenario& scenario);
 Result<TruthBrain> truth_brain(const BrainModel& model, const CaseConfig& config,
                                const Scenario& scenario, std::uint64_t seed,
                                const BrainModel* other = nullptr);
-
-// The forward model of the brain with contact. On the case's own mesh and gap that of
-// contact::ForwardModel::build. Otherwise
-//   nodes     a middle of an edge between two boundary nodes is free where both ends are, fixed
-//             along the normal where one end is, else a slave
-//   slaves    the case's; of quadratic elements the middles alone. The penalty is spread so that
-//             the skull is as stiff by area as the case's.
-//   gap       with gap_seed 0.5 to 4 mm, uniform, along each slave's contact normal; it takes the
-//             place of the case's
-// Errors as contact::ForwardModel.
-Result<contact::ForwardModel> truth_forward(const TruthBrain& brain, const Progress& progress = {});
 
 }  // namespace brainshift::client

@@ -22,7 +22,6 @@
 #include <vector>
 
 #include "client/tools/volume/field_grid.hpp"
-#include "client/tools/volume/outside_taper.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 #include "common/geometry/tet_locator.hpp"

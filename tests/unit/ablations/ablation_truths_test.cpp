@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/ablations/ablation_truths.hpp"
+#include "tests/ablations/ablation_patient.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <set>
 
 #include "client/tools/twin/scenario.hpp"
-#include "tests/evidence/evidence_truths.hpp"
+#include "tests/evidence/patient_twin.hpp"
 
 namespace brainshift::ablations {
 namespace {

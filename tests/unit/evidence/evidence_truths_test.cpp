@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/evidence/evidence_truths.hpp"
+#include "tests/evidence/patient_twin.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tests/evidence/landmark_maps.hpp"
+#include "tests/evidence/landmark_study.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

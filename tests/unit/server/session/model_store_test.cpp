@@ -6,7 +6,7 @@
 
 #include <utility>
 
-#include "common/fem/gravity.hpp"
+#include "common/fem/body_loads.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/pipeline/scene.hpp"
 #include "tests/support/toy_patient.hpp"

@@ -1,16 +1,209 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The whole of it runs in tests/integration/test_bridge.py.
-#include "client/tools/bridge/bridge.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "client/tools/bridge/bridge.hpp"
+#include "client/tools/bridge/hub.hpp"
+#include "tests/support/igtl_peer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::client {
 namespace {
 
+using test_support::IgtlListener;
+using test_support::IgtlPeer;
 using testing::HasSubstr;
+
+PicturePtr picture(std::uint64_t sequence, int side = 4) {
+  auto rest = std::make_shared<Rest>();
+  rest->geometry.dims = {side, side, side};
+  rest->with_sd = false;
+  auto made = std::make_shared<Picture>();
+  made->rest = rest;
+  made->state.sequence = sequence;
+  made->state.blank = false;
+  made->state.currency = Currency::kCurrent;
+  made->u.assign(static_cast<std::size_t>(3 * side * side * side), static_cast<float>(sequence));
+  return made;
+}
+
+class HubOnLoopback : public testing::Test {
+ protected:
+  void serve(HubOptions options = {}) {
+    options.listen = {"127.0.0.1", 0};
+    hub = Hub::open(
+              options,
+              [this](const std::string& sentence) {
+                const std::lock_guard lock(mutex);
+                told.push_back(sentence);
+              },
+              [this](igtl::Message&& message) { received.set_value(std::move(message)); })
+              .value();
+    thread = std::thread([this] { EXPECT_TRUE(hub->run(stop_descriptor)); });
+  }
+  void end() {
+    const std::uint64_t one = 1;
+    ASSERT_EQ(::write(stop_descriptor, &one, sizeof one), 8);
+    thread.join();
+  }
+  void TearDown() override {
+    if (thread.joinable()) end();
+    ::close(stop_descriptor);
+  }
+  IgtlPeer client() { return IgtlPeer::connect(hub->address().port); }
+  void post(std::uint64_t sequence) { hub->post(picture(sequence), Broadcast::Part::kWhole); }
+
+  int stop_descriptor = eventfd(0, EFD_CLOEXEC);
+  std::unique_ptr<Hub> hub;
+  std::thread thread;
+  std::mutex mutex;
+  std::vector<std::string> told;
+  std::promise<igtl::Message> received;
+};
+
+float first_voxel(const std::optional<test_support::Received>& image) {
+  if (!image) return -1.0F;
+  return std::get<std::vector<float>>(std::get<igtl::Image>(image->message.content).voxels)[0];
+}
+
+TEST_F(HubOnLoopback, EveryClientGetsWhatIsPostedAndANewOneWhatStands) {
+  serve();
+  IgtlPeer first = client();
+  post(1);
+  EXPECT_EQ(first_voxel(first.receive_from("brainshift_u")), 1.0F);
+  IgtlPeer second = client();
+  EXPECT_EQ(first_voxel(second.receive_from("brainshift_u")), 1.0F);
+  post(2);
+  EXPECT_EQ(first_voxel(first.receive_from("brainshift_u")), 2.0F);
+  EXPECT_EQ(first_voxel(second.receive_from("brainshift_u")), 2.0F);
+  EXPECT_EQ(hub->peers(), 2);
+}
+
+TEST_F(HubOnLoopback, AnswersRequestsInTheClientsVersion) {
+  serve();
+  post(1);
+  IgtlPeer old = client();
+  ASSERT_TRUE(old.receive_from("brainshift_u"));
+  igtl::Envelope envelope;
+  envelope.device = "asks";
+  old.send(envelope, igtl::StatusRequest{});
+  const auto status = old.receive();
+  ASSERT_TRUE(status);
+  EXPECT_EQ(status->header.version, 1);
+  EXPECT_EQ(std::get<igtl::StatusReport>(status->message.content).code, igtl::kStatusOk);
+  old.send(envelope, igtl::CapabilityRequest{});
+  const auto can = old.receive();
+  ASSERT_TRUE(can);
+  EXPECT_THAT(std::get<igtl::Capability>(can->message.content).types, testing::Contains("IMAGE"));
+
+  IgtlPeer modern = client();
+  envelope.version = 2;
+  modern.send(envelope, igtl::StatusRequest{});
+  for (int i = 0; i < 20; ++i) {
+    const auto message = modern.receive();
+    ASSERT_TRUE(message);
+    if (message->header.version == 2) return;
+  }
+  FAIL() << "never version 2";
+}
+
+TEST_F(HubOnLoopback, BlanksBeforeItEnds) {
+  serve();
+  post(1);
+  IgtlPeer viewer = client();
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 1.0F);
+  end();
+  const auto status = viewer.receive_from("brainshift");
+  ASSERT_TRUE(status);
+  EXPECT_EQ(std::get<igtl::StatusReport>(status->message.content).text, "the bridge has ended");
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 0.0F);
+}
+
+// A client that does not read keeps the hub for the second that a goodbye may take.
+TEST_F(HubOnLoopback, WhatIsPostedAfterTheGoodbyeDoesNotReplaceIt) {
+  serve();
+  const IgtlPeer stalled = IgtlPeer::connect(hub->address().port, 4096);
+  IgtlPeer viewer = client();
+  hub->post(picture(1, 96), Broadcast::Part::kWhole);  // 11 MB: more than sockets hold
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 1.0F);
+  const std::uint64_t one = 1;
+  ASSERT_EQ(::write(stop_descriptor, &one, sizeof one), 8);
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 0.0F);
+  post(2);
+  while (const auto later = viewer.receive()) EXPECT_NE(later->header.device, "brainshift_u");
+  thread.join();
+}
+
+TEST_F(HubOnLoopback, TurnsAwayMoreClientsThanItHasRoomFor) {
+  HubOptions options;
+  options.max_peers = 1;
+  serve(options);
+  post(1);
+  IgtlPeer first = client();
+  ASSERT_TRUE(first.receive_from("brainshift_u"));
+  IgtlPeer second = client();
+  EXPECT_FALSE(second.receive());
+  post(2);
+  EXPECT_EQ(first_voxel(first.receive_from("brainshift_u")), 2.0F);
+}
+
+TEST_F(HubOnLoopback, AClientThatTalksNonsenseIsClosedAndTheOthersGoOn) {
+  serve();
+  IgtlPeer good = client();
+  IgtlPeer bad = client();
+  bad.send(std::string(200, 'x'));
+  EXPECT_FALSE(bad.receive());
+  post(1);
+  EXPECT_EQ(first_voxel(good.receive_from("brainshift_u")), 1.0F);
+}
+
+TEST_F(HubOnLoopback, HandsOnWhatItsClientsSend) {
+  HubOptions options;
+  options.from_peers.wanted = {"POINT"};
+  serve(options);
+  IgtlPeer slicer = client();
+  igtl::Envelope envelope;
+  envelope.version = 2;
+  envelope.device = "TumourNow";
+  igtl::PointList list;
+  list.points.resize(2);
+  slicer.send(envelope, list);
+  EXPECT_EQ(received.get_future().get().envelope.device, "TumourNow");
+}
+
+// The bridge as a client: it asks in version 2 first, and comes back after the server has gone.
+TEST_F(HubOnLoopback, AsksAServerForVersionTwoAndConnectsAnew) {
+  IgtlListener plus;
+  HubOptions options;
+  options.from = Address{"127.0.0.1", plus.port()};
+  options.from_upstream.wanted = {"TRANSFORM"};
+  serve(options);
+  {
+    IgtlPeer server = plus.accept();
+    const auto greeting = server.receive();
+    ASSERT_TRUE(greeting);
+    EXPECT_EQ(greeting->header.version, 2);
+    EXPECT_EQ(greeting->header.type, "GET_STATUS");
+  }
+  IgtlPeer server = plus.accept();
+  EXPECT_EQ(server.receive()->header.type, "GET_STATUS");
+  igtl::Envelope envelope;
+  envelope.version = 2;
+  envelope.device = "ProbeToTracker";
+  server.send(envelope, igtl::Transform{});
+  EXPECT_EQ(received.get_future().get().envelope.device, "ProbeToTracker");
+  const std::lock_guard lock(mutex);
+  EXPECT_THAT(told, testing::Contains(HasSubstr(": connected")));
+  EXPECT_THAT(told, testing::Contains(HasSubstr("trying again")));
+}
 
 std::string refusal(const BridgeOptions& options) {
   const auto bridge = Bridge::open(options, [](const std::string&) {});
@@ -82,4 +275,7 @@ TEST(Bridge, APortThatIsTakenIsNamed) {
 }
 
 }  // namespace
+
+// The whole of it runs in tests/integration/bridge_test.cpp.
+
 }  // namespace brainshift::client

@@ -23,7 +23,7 @@ using testing::HasSubstr;
 class ExportJournal : public SmallJournal {
  protected:
   io::SurgeryFile open() const { return std::move(*io::SurgeryFile::open(path)); }
-  FieldSeries series() const {
+  fs::path model_file() const {
     io::ModelFile file;
     file.config = io::parse_case_config(R"(case_id: toy
 images: {brain: mask.nii}
@@ -36,7 +36,7 @@ brainstem: {centre_mm: [30, 30, 0]}
     file.model = model;
     const Status written = io::write_model(folder / "m.h5", file);
     EXPECT_TRUE(written) << written.error().message;
-    return {folder / "m.h5", folder / "fields"};
+    return folder / "m.h5";
   }
 };
 
@@ -95,14 +95,16 @@ TEST_F(ExportJournal, ABrokenFileGivesNoTable) {
 
 TEST_F(ExportJournal, TheSeriesHasAFieldPerUsableUpdateAndAListByTime) {
   write(path, 2);
-  const FieldSeries to = series();
-  const auto fields = write_field_series(open(), path, to);
+  const auto recorded = recorded_model(open(), path, model_file());
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  const fs::path to = folder / "fields";
+  const auto fields = write_field_series(open(), path, *recorded, to);
   ASSERT_TRUE(fields) << fields.error().message;
   EXPECT_EQ(*fields, 2);
-  const std::string list = test_support::content_of(to.folder / "a.pvd");
+  const std::string list = test_support::content_of(to / "a.pvd");
   EXPECT_THAT(list, HasSubstr("timestep=\"0.250000\" file=\"a-000001.vtu\""));
   EXPECT_THAT(list, HasSubstr("timestep=\"1.250000\" file=\"a-000002.vtu\""));
-  const auto read = io::read_vtu(to.folder / "a-000002.vtu");
+  const auto read = io::read_vtu(to / "a-000002.vtu");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->mesh.num_nodes(), model.mesh.num_nodes());
   ASSERT_EQ(read->node_fields.size(), 2u);
@@ -126,7 +128,7 @@ std::vector<float> floats(hid_t file, const std::string& name) {
 TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
   write(path, 2);
   const fs::path out = folder / "fields.h5";
-  const auto fields = write_field_file(open(), path, series().model, out);
+  const auto fields = write_field_file(open(), path, model, out);
   ASSERT_TRUE(fields) << fields.error().message;
   EXPECT_EQ(*fields, 2);
   const hid_t file = H5Fopen(out.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -151,9 +153,8 @@ TEST_F(ExportJournal, AFileIsNotLeftBehindHalfWritten) {
     ASSERT_TRUE(file->append(observation(1, "ius")));
     ASSERT_TRUE(file->close());
   }
-  const fs::path model_file = series().model;
   const auto before = std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator());
-  const auto fields = write_field_file(open(), path, model_file, folder / "fields.h5");
+  const auto fields = write_field_file(open(), path, model, folder / "fields.h5");
   ASSERT_FALSE(fields);
   EXPECT_EQ(fields.error().code, ErrorCode::kEmptySet);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator()), before);
@@ -163,10 +164,10 @@ TEST_F(ExportJournal, AnotherModelIsRefused) {
   auto file = io::SurgeryFile::create(path, {.model_id = "other"});
   ASSERT_TRUE(file);
   ASSERT_TRUE(file->append(update(1, 1)));
-  const auto fields = write_field_series(*file, path, series());
-  ASSERT_FALSE(fields);
-  EXPECT_EQ(fields.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(fields.error().message, HasSubstr("\"other\""));
+  const auto recorded = recorded_model(*file, path, model_file());
+  ASSERT_FALSE(recorded);
+  EXPECT_EQ(recorded.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(recorded.error().message, HasSubstr("\"other\""));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ RunReport full_run() {
   run.updates = 2;
   run.latency_ms = LatencyPercentiles{1, 2, 3, 4};
   run.cold_ms = 4.0;
-  run.stages_ms = StageMedians{0.5, 100, 0, 1, 0.25};
+  run.stages_ms = StageTimings{0.5, 100, 0, 1, 0.25};
   run.error_mm.initial = MeanStd{2.9, 0.67};
   run.error_mm.cross = MeanStd{0.11, 0.07};
   run.recovery_pct = 96.2;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "client/tools/report/html_page.hpp"
-#include "client/tools/report/escape_html.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "client/tools/report/html_page.hpp"
+#include "client/tools/report/html_table.hpp"
 #include "tests/unit/client/tools/report/small_run.hpp"
 
 namespace brainshift::client {
@@ -54,5 +57,186 @@ TEST(Html, ASlideHasAButtonAndAnImagePerPositionAndShowsTheEstimateFirst) {
   EXPECT_THAT(page, Not(HasSubstr("http")));
 }
 
+RunReport doubtful_run() {
+  RunReport run = small_run("contact");
+  run.quality = RunQuality{"unusable",
+                           "caution",
+                           "the time <ran> out",
+                           {5, 2, 1, 0},
+                           {{"deadline", 2}, {"inverted_elements", 1}, {"invented_later", 4}}};
+  run.prior_strengths = {{"along_gravity", 1.25, 0.25, false}, {"other", 3.0, 0.0, true}};
+  run.hypotheses = {{{{"along_gravity", 2.5}, {"other", 3.0}}, 0.6},
+                    {{{"along_gravity", 0.0}, {"other", 0.0}}, 0.3},
+                    {{{"along_gravity", 1.0}, {"other", 1.0}}, 0.08},
+                    {{{"along_gravity", 9.0}, {"other", 9.0}}, 0.02}};
+  return run;
+}
+
+TEST(QualityTable, TellsVerdictsByWordAndSignBesideTheColour) {
+  const std::string table =
+      quality_table({{doubtful_run(), std::nullopt}, {small_run("fixed"), std::nullopt}});
+  EXPECT_THAT(table, HasSubstr("<th>worst update</th><td><span class=\"verdict unusable\">&#10005; "
+                               "unusable</span></td><td><span class=\"verdict good\">&#10003; "
+                               "good</span></td>"));
+  EXPECT_THAT(table, HasSubstr("&#9651; caution"));
+  EXPECT_THAT(table, HasSubstr("<td>5 / 2 / 1</td><td>1 / 0 / 0</td>"));
+  EXPECT_THAT(table, HasSubstr("the time &lt;ran&gt; out"));
+}
+
+TEST(QualityTable, HasARowPerFlagThatOccursWithItsSentence) {
+  const std::string table =
+      quality_table({{doubtful_run(), std::nullopt}, {small_run("fixed"), std::nullopt}});
+  EXPECT_THAT(table, HasSubstr("the time ran out before the inversion settled "
+                               "<code>deadline</code></th><td>2</td><td>0</td>"));
+  EXPECT_THAT(table, HasSubstr("<code>inverted_elements</code></th><td>1</td><td>0</td>"));
+  EXPECT_THAT(table, HasSubstr("<code>invented_later</code></th><td>4</td><td>0</td>"));
+  EXPECT_THAT(table, Not(HasSubstr("not_finite")));
+}
+
+TEST(QualityTable, ShowsStrengthsAndTheMostProbableHypotheses) {
+  const std::string table = quality_table({{doubtful_run(), std::nullopt}});
+  EXPECT_THAT(table, HasSubstr("<th>strength of the prior: along_gravity</th>"
+                               "<td>1.25 (absent: 25 %)</td>"));
+  EXPECT_THAT(table, HasSubstr("<td>3.00, at its bound</td>"));
+  EXPECT_THAT(table, HasSubstr("60 %: along_gravity&nbsp;2.50, other&nbsp;3.00<br>30 %: nothing<br>"
+                               "8 %: along_gravity&nbsp;1.00, other&nbsp;1.00</td>"));
+  EXPECT_THAT(table, Not(HasSubstr("9.00")));
+}
+
+TEST(QualityTable, OfAReportWithoutQualityHasDashes) {
+  RunReport old = small_run("contact");
+  old.quality.reset();
+  const std::string table = quality_table({{old, std::nullopt}});
+  EXPECT_THAT(table, HasSubstr("<th>worst update</th><td>&ndash;</td>"));
+}
+
+TEST(QualityTable, StandsOnThePageInBothSchemes) {
+  const ReportedRun run{doubtful_run(), std::nullopt};
+  const std::string page = html_page({run}, group_runs({run}), {});
+  EXPECT_THAT(page, HasSubstr("<h2>Quality of the fields</h2>"));
+  for (const char* colour : {"--good:", "--caution:", "--unusable:"}) {
+    const auto light = page.find(colour);
+    ASSERT_NE(light, std::string::npos);
+    EXPECT_GT(page.find(colour, light + 1), page.find("prefers-color-scheme: dark"));
+    EXPECT_NE(page.find(colour, light + 1), std::string::npos);
+  }
+}
+
+std::vector<ReportedRun> one(RunReport run) { return {{std::move(run), std::nullopt}}; }
+
+// How often `part` occurs in `text`.
+int count(const std::string& text, const std::string& part) {
+  int found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++found;
+  return found;
+}
+
+TEST(ErrorTable, HasAColumnPerRunAndThreeOfThePaper) {
+  std::vector<ReportedRun> runs = one(small_run("contact"));
+  runs.push_back({small_run("fixed"), std::nullopt});
+  const std::string table = error_table(runs);
+  const std::string heading = table.substr(0, table.find("</tr>"));
+  EXPECT_EQ(count(heading, "<th>"), 3) << "the empty corner and two runs";
+  EXPECT_EQ(count(heading, "<th class=\"paper\">"), 3);
+}
+
+TEST(SourceTable, HasARowPerInstrumentAndMarksContradictions) {
+  RunReport run = small_run("contact");
+  EXPECT_EQ(source_table(one(run)), "");
+  run.sources = {{"ius", 41, 2.0, 200, 3, 31.5, 28.75, 0.125, true}, {"tracks", 42, 0.0, 20}};
+  run.sources[1].consistent = false;
+  const std::string table = source_table(one(run));
+  EXPECT_EQ(count(table, "<tr>"), 1 + 2);
+  EXPECT_THAT(table, HasSubstr("<td>ius</td><td>41</td><td>2</td><td>200</td><td>3</td>"
+                               "<td>31.5 / 28.8</td><td>0.1250</td><td>yes</td>"));
+  EXPECT_EQ(count(table, "<strong>no</strong>"), 1);
+}
+
+TEST(LeftOutList, NamesEachOmissionOnce) {
+  const std::vector<ReportedRun> runs = {{small_run("contact"), std::nullopt},
+                                         {small_run("fixed"), std::nullopt}};
+  const std::string list = left_out_list(runs);
+  EXPECT_EQ(count(list, "<li>"), 1);
+  EXPECT_THAT(list, HasSubstr("pressure"));
+  EXPECT_THAT(list, HasSubstr("0.02 %"));
+  RunReport complete = small_run("contact");
+  complete.left_out.clear();
+  EXPECT_EQ(left_out_list(one(complete)), "");
+}
+
+TEST(FailureList, IsEmptyWithoutFailuresAndEscapesTheirText) {
+  RunReport run = small_run("contact");
+  EXPECT_EQ(failure_list(one(run)), "");
+  run.failures = {{3, "unavailable", "no <update> in time"}};
+  const std::string list = failure_list(one(run));
+  EXPECT_THAT(list, HasSubstr("observation 3: no &lt;update&gt; in time (unavailable)"));
+  EXPECT_THAT(list, Not(HasSubstr("<update>")));
+}
+
+ReportedRun condensed(const char* scenario, double recovered) {
+  ReportedRun run{small_run("contact"), std::nullopt};
+  run.report.scenario = scenario;
+  run.report.method = "condensed";
+  run.report.recovery_pct = recovered;
+  run.report.latency_ms = LatencyPercentiles{90.0, 91.0, 92.0, 93.0};
+  run.report.full_solve_ms = 30.0;
+  return run;
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+  return found;
+}
+
+TEST(Verdict, NamesTheRangeAndTheLeastBesideThePaper) {
+  ReportedRun worst = condensed("joint-mixed", 81.5);
+  worst.report.latency_ms->p50 = 150.0;
+  const std::string text = verdict({condensed("paper", 97.25), worst, condensed("sag", 90.0)});
+  EXPECT_THAT(text, HasSubstr("method condensed recovered 81.5 to 97.2 %"));
+  EXPECT_THAT(text, HasSubstr("least in joint-mixed: 2.00 mm before, 0.12 mm after"));
+  EXPECT_THAT(text, HasSubstr("85 % in its five patients"));
+  EXPECT_THAT(text, HasSubstr("90 to 150 ms, 3.0 to 5.0 times one solve"));
+  EXPECT_THAT(text, HasSubstr("none of 3 updates was unusable"));
+}
+
+TEST(Verdict, SpeaksOfTheDefaultMethodWithContactWhereThereIsOne) {
+  ReportedRun fixed = condensed("fixed-run", 10.0);
+  fixed.report.boundary = "fixed";
+  ReportedRun paper = condensed("paper-run", 20.0);
+  paper.report.method = "paper";
+  EXPECT_THAT(verdict({fixed, paper, condensed("sag", 90.0)}), HasSubstr("recovered 90.0 %"));
+  EXPECT_THAT(verdict({fixed, paper}), HasSubstr("method paper recovered 20.0 %"));
+  EXPECT_THAT(verdict({fixed}),
+              HasSubstr("Without brain-skull contact, method condensed recovered 10.0 %"));
+}
+
+TEST(Verdict, SaysWhatIsUnknownAndWhatIsUnusable) {
+  ReportedRun run = condensed("live", 0.0);
+  run.report.recovery_pct.reset();
+  run.report.latency_ms.reset();
+  run.report.updates = 4;
+  run.report.quality->counts.unusable = 2;
+  const std::string text = verdict({run});
+  EXPECT_THAT(text, HasSubstr("because no truth was recorded"));
+  EXPECT_THAT(text, HasSubstr("2 of 4 updates were unusable"));
+  EXPECT_THAT(text, Not(HasSubstr("ms")));
+  run.report.updates = 0;
+  EXPECT_THAT(verdict({run}), HasSubstr("no update came"));
+}
+
+TEST(SummaryTable, HasALinePerRunAndThePapers) {
+  ReportedRun odd = condensed("<b>odd</b>", 50.0);
+  const std::string html = summary_table({condensed("paper", 97.0), odd});
+  EXPECT_EQ(count_of(html, "<tr>") + count_of(html, "<tr class"), 1u + 2u + 3u);
+  EXPECT_THAT(html, HasSubstr("&lt;b&gt;odd"));
+  EXPECT_THAT(html, Not(HasSubstr("<b>odd")));
+  // As many cells in every line as the heading has.
+  const std::size_t columns = count_of(html.substr(0, html.find("</thead>")), "<th>");
+  EXPECT_EQ(count_of(html, "<td>"), 5u * (columns - 1));
+}
+
 }  // namespace
+
 }  // namespace brainshift::client

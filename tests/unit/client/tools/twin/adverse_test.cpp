@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adverse ingredients on the toy patient, all but the other mesh (other_mesh_test.cpp).
+// Adverse ingredients on the toy patient, all but the other mesh (truth_brain_test.cpp).
 #include "client/tools/twin/adverse.hpp"
 
 #include <gmock/gmock.h>
@@ -7,7 +7,6 @@
 
 #include <numbers>
 
-#include "client/tools/twin/effects.hpp"
 #include "client/tools/twin/measure.hpp"
 #include "client/tools/twin/surgery.hpp"
 #include "client/tools/twin/truth_load.hpp"

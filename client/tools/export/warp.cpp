@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/export/warp.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "common/core/thread_team.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/geometry/tet_locator.hpp"
+
+namespace brainshift::client {
+namespace {
+
+bool holds(const VoxelImage& image, const Vec3& index) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int voxels = image.dims[static_cast<std::size_t>(axis)];
+    if (!(index[axis] >= -0.5 && index[axis] < voxels - 0.5)) return false;
+  }
+  return true;
+}
+
+double finite_or_zero(float value) { return std::isfinite(value) ? value : 0.0; }
+
+// Precondition: holds(image, index).
+double interpolated(const VoxelImage& image, const Vec3& index) {
+  int low[3], high[3];
+  double part[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int last = image.dims[static_cast<std::size_t>(axis)] - 1;
+    const double place = std::clamp(index[axis], 0.0, static_cast<double>(last));
+    low[axis] = static_cast<int>(place);
+    high[axis] = std::min(low[axis] + 1, last);
+    part[axis] = place - low[axis];
+  }
+  double value = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1.0;
+    int at[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool upper = ((corner >> axis) & 1) != 0;
+      weight *= upper ? part[axis] : 1.0 - part[axis];
+      at[axis] = upper ? high[axis] : low[axis];
+    }
+    value += weight * finite_or_zero(image.at(at[0], at[1], at[2]));
+  }
+  return value;
+}
+
+DeformedSurface moved(TriangleSurface surface, const Points& u, const VecX& sd_mm) {
+  DeformedSurface out;
+  out.surface = std::move(surface);
+  out.surface.vertices += u;
+  out.vertex_fields.push_back({"displacement_mm", u});
+  if (sd_mm.size() > 0) out.vertex_fields.push_back({"sd_mm", sd_mm.transpose()});
+  return out;
+}
+
+}  // namespace
+
+Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::DisplacementField& field) {
+  if (Status ok = validate(field); !ok) return tl::unexpected(ok.error());
+  if (field.direction != io::FieldDirection::kResampling) {
+    return fail(ErrorCode::kInvalidArgument,
+                "an image is warped by a field of direction resampling, not modeling");
+  }
+  const io::VoxelGrid& grid = field.grid;
+  io::ScalarVolume warped{grid, std::vector<float>(grid.num_voxels(), 0.0F), field.note};
+  const AffineTransform T_voxel_ras(image.T_ras_voxel.inverse(Eigen::Affine));
+  std::atomic<bool> any{false};
+  ThreadTeam team;
+  team.split(grid.dims[2], [&](long begin, long end) {
+    bool found = false;
+    for (int k = static_cast<int>(begin); k < end; ++k) {
+      for (int j = 0; j < grid.dims[1]; ++j) {
+        for (int i = 0; i < grid.dims[0]; ++i) {
+          const std::size_t voxel = grid.index(i, j, k);
+          const float* v = field.ras_mm.data() + 3 * voxel;
+          const Vec3 index = T_voxel_ras * (grid.voxel_mm(i, j, k) + Vec3(v[0], v[1], v[2]));
+          if (!holds(image, index)) continue;
+          found = true;
+          warped.values[voxel] = static_cast<float>(interpolated(image, index));
+        }
+      }
+    }
+    if (found) any = true;
+  });
+  if (!any) {
+    return fail(ErrorCode::kInvalidArgument,
+                "no voxel of the grid lies in the image: are both in the patient's RAS frame?");
+  }
+  return warped;
+}
+
+DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+  const geometry::TetLocator locator(model.mesh);
+  Points at_vertices(3, model.tumour.num_vertices());
+  VecX sd(sd_mm.size() > 0 ? model.tumour.num_vertices() : 0);
+  for (int v = 0; v < model.tumour.num_vertices(); ++v) {
+    const auto at = locator.locate(model.tumour.vertices.col(v));
+    at_vertices.col(v) = geometry::value_at(at, u);
+    if (sd.size() > 0) sd[v] = geometry::value_at(at, sd_mm);
+  }
+  return moved(model.tumour, at_vertices, sd);
+}
+
+DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+  std::vector<NodeIndex> node_of_vertex;
+  TriangleSurface surface = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  Points at_vertices(3, surface.num_vertices());
+  VecX sd(sd_mm.size() > 0 ? surface.num_vertices() : 0);
+  for (int v = 0; v < surface.num_vertices(); ++v) {
+    const NodeIndex node = node_of_vertex[static_cast<std::size_t>(v)];
+    at_vertices.col(v) = u.col(node);
+    if (sd.size() > 0) sd[v] = sd_mm[node];
+  }
+  return moved(std::move(surface), at_vertices, sd);
+}
+
+}  // namespace brainshift::client
