@@ -2,6 +2,7 @@
 #include "common/core/small_matrices.hpp"
 
 #include <Eigen/Dense>
+#include <limits>
 
 namespace brainshift {
 namespace {
@@ -31,7 +32,14 @@ SingularValues singular_values(const Mat3& A) {
 }
 
 Mat3 least_norm_solution(const Mat3& A, const Mat3& B) {
-  return A.completeOrthogonalDecomposition().solve(B);
+  const SymmetricEigen<3> eigen = symmetric_eigen(A);
+  const double rounding = 3.0 * std::numeric_limits<double>::epsilon() * eigen.values[2];
+  Mat3 X = Mat3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (!(eigen.values[k] > rounding)) continue;
+    X += eigen.vectors.col(k) * ((eigen.vectors.col(k).transpose() * B) / eigen.values[k]);
+  }
+  return X;
 }
 
 Mat6 symmetric_inverse(const Mat6& A) { return A.ldlt().solve(Mat6::Identity()); }

@@ -33,7 +33,8 @@ struct SingularValues {
 };
 SingularValues singular_values(const Mat3& A);
 
-// The X of least norm among those that minimise |A X - B|; A may be singular.
+// The X of least norm among those that minimise |A X - B|. A is symmetric positive semidefinite;
+// eigenvalues below its rounding, 3 eps of the largest, count as zero.
 Mat3 least_norm_solution(const Mat3& A, const Mat3& B);
 
 // Of a symmetric positive definite matrix, by LDL^T.

@@ -27,9 +27,9 @@ inline CaseInputs ball_case() {
   config.craniotomy.long_axis_direction = Vec3(0, 0, 3);
   config.brainstem = {kBallCentre + Vec3(0, 0, -50), 16.0};
   config.gravity_direction = Vec3(-1, 0, 0);
-  inputs.brain = geometry::testing::binary_balls(
-      geometry::testing::empty_image(56, kBallCentre + Vec3(0.4, 0.3, -0.2),
-                                     geometry::testing::oblique_left_handed(2.0)),
+  inputs.brain = geometry::balls::binary_balls(
+      geometry::balls::empty_image(56, kBallCentre + Vec3(0.4, 0.3, -0.2),
+                                   geometry::balls::oblique_left_handed(2.0)),
       {{kBallCentre, kBallRadius_mm}});
   return inputs;
 }

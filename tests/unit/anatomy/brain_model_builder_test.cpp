@@ -205,8 +205,8 @@ TEST(BrainModelBuilder, LabelVolumeGivesTheSurfaceOfItsLargestPart) {
   inputs.config.tumour = TumourLabel{"labels.nii", 3};
   const Vec3 centre = kBallCentre + Vec3(20, 5, 0);
   auto image =
-      geometry::testing::binary_balls(geometry::testing::empty_image(60, centre, Mat3::Identity()),
-                                      {{centre, 12.0}, {centre + Vec3(22, 0, 0), 4.0}});
+      geometry::balls::binary_balls(geometry::balls::empty_image(60, centre, Mat3::Identity()),
+                                    {{centre, 12.0}, {centre + Vec3(22, 0, 0), 4.0}});
   for (float& v : image.values) v *= 3.0f;
   image.values[0] = 2.0f;  // another label
   inputs.tumour_labels = image;
@@ -215,7 +215,7 @@ TEST(BrainModelBuilder, LabelVolumeGivesTheSurfaceOfItsLargestPart) {
   for (int v = 0; v < tumour.num_vertices(); ++v)
     EXPECT_NEAR((tumour.vertices.col(v) - centre).norm(), 12.0, 0.5);  // half a voxel
   // Smoothing shrinks the radius by sigma^2 / r = 0.08 mm, 2 % of the volume.
-  EXPECT_NEAR(geometry::enclosed_volume(tumour) / geometry::testing::ball_volume(12.0), 0.98, 0.02);
+  EXPECT_NEAR(geometry::enclosed_volume(tumour) / geometry::balls::ball_volume(12.0), 0.98, 0.02);
 }
 
 TEST(BrainModelBuilder, AGivenTumourSurfaceIsTurnedOutwards) {

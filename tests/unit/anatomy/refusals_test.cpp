@@ -115,15 +115,15 @@ TEST(Refusals, ATumourOutsideTheBrain) {
 TEST(Refusals, ALabelThatNoVoxelHas) {
   CaseInputs inputs = box_case();
   inputs.config.tumour = TumourLabel{"labels.nii", 4};
-  inputs.tumour_labels = geometry::testing::binary_balls(
-      geometry::testing::empty_image(9, kBallCentre, Mat3::Identity()), {{kBallCentre, 3.0}});
+  inputs.tumour_labels = geometry::balls::binary_balls(
+      geometry::balls::empty_image(9, kBallCentre, Mat3::Identity()), {{kBallCentre, 3.0}});
   expect_refused(inputs, ErrorCode::kEmptySet, {"tumour.label_volume.label = 4", "'labels.nii'"});
 }
 
 TEST(Refusals, ALabelTooSmallForASurface) {
   CaseInputs inputs = box_case();
   inputs.config.tumour = TumourLabel{"labels.nii", 1};
-  inputs.tumour_labels = geometry::testing::empty_image(9, kBallCentre, Mat3::Identity());
+  inputs.tumour_labels = geometry::balls::empty_image(9, kBallCentre, Mat3::Identity());
   inputs.tumour_labels->values[364] = 1.0f;  // one voxel, smoothed away
   expect_refused(inputs, ErrorCode::kEmptySet, {"tumour.label_volume.label = 1", "too small"});
 }

@@ -9,7 +9,7 @@
 
 #include "common/core/mesh.hpp"
 
-namespace brainshift::geometry::testing {
+namespace brainshift::geometry::balls {
 
 struct Ball {
   Vec3 centre = Vec3::Zero();
@@ -65,4 +65,4 @@ inline Mat3 oblique_left_handed(double spacing) {
 
 inline double ball_volume(double radius) { return 4.0 / 3.0 * M_PI * radius * radius * radius; }
 
-}  // namespace brainshift::geometry::testing
+}  // namespace brainshift::geometry::balls

@@ -189,7 +189,7 @@ TEST(GaussianSmooth, TurnsAStepIntoTheNormalDistribution) {
 
 TEST(GaussianSmooth, AnImpulseSpreadsByMillimetresNotVoxels) {
   VoxelImage image = image_of(41, 41, 21);
-  image.T_ras_voxel.linear() = testing::oblique_left_handed(1.0) * Vec3(0.8, 1.0, 2.0).asDiagonal();
+  image.T_ras_voxel.linear() = balls::oblique_left_handed(1.0) * Vec3(0.8, 1.0, 2.0).asDiagonal();
   voxel(image, 20, 20, 10) = 1.0f;
   const VoxelImage smooth = gaussian_smooth(image, 2.0);
   EXPECT_NEAR(sum(smooth), 1.0, 1e-5);
@@ -232,7 +232,7 @@ TEST(GaussianSmooth, AWidthBeyondTheImageIsFinite) {
 }
 
 TEST(Interpolator, ReproducesLinearFunctionsInAnObliqueFrame) {
-  VoxelImage image = testing::empty_image(9, Vec3(10, -20, 30), testing::oblique_left_handed(1.7));
+  VoxelImage image = balls::empty_image(9, Vec3(10, -20, 30), balls::oblique_left_handed(1.7));
   const auto linear = [](const Vec3& x) { return 0.3 * x[0] - 0.7 * x[1] + 0.2 * x[2] + 5.0; };
   for (int k = 0; k < 9; ++k)
     for (int j = 0; j < 9; ++j)

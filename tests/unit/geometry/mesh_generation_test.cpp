@@ -18,7 +18,7 @@
 namespace brainshift::geometry {
 namespace {
 
-using testing::Ball;
+using balls::Ball;
 
 SizingField uniform(double edge) {
   return [edge](const Vec3&) { return edge; };
@@ -27,9 +27,9 @@ SizingField uniform(double edge) {
 // A ball of radius 20 mm, off the origin, in an oblique left-handed frame with 1.5 mm voxels.
 const Ball kBall{Vec3(30, -10, 45), 20.0};
 VoxelImage ball_mask() {
-  return testing::soft_balls(testing::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2),
-                                                  testing::oblique_left_handed(1.5)),
-                             {kBall}, 6.0);
+  return balls::soft_balls(balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2),
+                                              balls::oblique_left_handed(1.5)),
+                           {kBall}, 6.0);
 }
 
 TetMesh meshed(const VoxelImage& mask, const SizingField& edge) {
@@ -60,8 +60,8 @@ TEST(MeshMask, VolumeIsTheBallsLessTheSagOfItsFacets) {
   const double volume = mesh_quality(mesh).volume_mm3;
   // A facet with circumradius c = edge / sqrt(3) sags by c^2 / (2 r); the whole surface by less.
   const double sag = 4.0 * 4.0 / 3.0 / (2.0 * kBall.radius);
-  EXPECT_LT(volume, testing::ball_volume(kBall.radius) * 1.002);
-  EXPECT_GT(volume, testing::ball_volume(kBall.radius) * (1.0 - 3.0 * sag / kBall.radius));
+  EXPECT_LT(volume, balls::ball_volume(kBall.radius) * 1.002);
+  EXPECT_GT(volume, balls::ball_volume(kBall.radius) * (1.0 - 3.0 * sag / kBall.radius));
 }
 
 TEST(MeshMask, SurfaceIsAClosedSphere) {
@@ -147,8 +147,8 @@ TEST(MeshMask, NeighboursInSpaceAreNeighboursInMemory) {
 TEST(MeshMask, KeepsOnlyTheLargestPart) {
   const Ball large{Vec3(-12, 0, 0), 14.0};
   const Ball small{Vec3(16, 0, 0), 8.0};
-  const VoxelImage mask = testing::soft_balls(
-      testing::empty_image(48, Vec3::Zero(), 1.5 * Mat3::Identity()), {large, small}, 3.0);
+  const VoxelImage mask = balls::soft_balls(
+      balls::empty_image(48, Vec3::Zero(), 1.5 * Mat3::Identity()), {large, small}, 3.0);
   const TetMesh mesh = meshed(mask, uniform(4.0));
   EXPECT_TRUE(check_mesh(mesh));
   const Points offsets = mesh.nodes.colwise() - large.centre;
@@ -156,7 +156,7 @@ TEST(MeshMask, KeepsOnlyTheLargestPart) {
 }
 
 TEST(MeshMask, ADomainThatFillsTheImageIsClosedAtItsBorder) {
-  VoxelImage mask = testing::empty_image(12, Vec3(5, 5, 5), 2.0 * Mat3::Identity());
+  VoxelImage mask = balls::empty_image(12, Vec3(5, 5, 5), 2.0 * Mat3::Identity());
   std::fill(mask.values.begin(), mask.values.end(), 1.0f);
   const TetMesh mesh = meshed(mask, uniform(4.0));
   EXPECT_TRUE(is_closed(boundary_surface(mesh)));
@@ -166,7 +166,7 @@ TEST(MeshMask, ADomainThatFillsTheImageIsClosedAtItsBorder) {
 }
 
 TEST(MeshMask, OneVoxelIsADomainToo) {
-  VoxelImage mask = testing::empty_image(5, Vec3::Zero(), 10.0 * Mat3::Identity());
+  VoxelImage mask = balls::empty_image(5, Vec3::Zero(), 10.0 * Mat3::Identity());
   mask.values[62] = 1.0f;
   const TetMesh mesh = meshed(mask, uniform(4.0));
   EXPECT_TRUE(is_closed(boundary_surface(mesh)));
@@ -182,7 +182,7 @@ TEST(MeshMask, AnEdgeLongerThanTheDomainGivesAMeshOrASentence) {
 }
 
 TEST(MeshMask, AnEmptyDomainIsAnError) {
-  VoxelImage mask = testing::empty_image(5, Vec3::Zero(), Mat3::Identity());
+  VoxelImage mask = balls::empty_image(5, Vec3::Zero(), Mat3::Identity());
   std::fill(mask.values.begin(), mask.values.end(), 0.5f);  // nowhere above the level
   for (const VoxelImage& image : {mask, VoxelImage{}}) {
     const auto mesh = mesh_mask(image, uniform(4.0));
