@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
 
+#include "common/core/thread_team.hpp"
 #include "common/linalg/blas.hpp"
 
 namespace brainshift::linalg {
