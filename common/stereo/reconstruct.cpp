@@ -22,7 +22,7 @@ constexpr double kMinBlockFill = 0.5;
 
 Status check(const ReconstructOptions& options, const RigidTransform& T_ras_camera) {
   const auto refuse = [](const char* name, double value, const char* must) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be {}", name, value, must));
+    return invalid(fmt::format("{} = {}: must be {}", name, value, must));
   };
   if (!(options.spacing_mm > 0.0) || !std::isfinite(options.spacing_mm))
     return refuse("spacing_mm", options.spacing_mm, "finite and > 0");

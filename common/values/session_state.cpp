@@ -23,7 +23,7 @@ Status check_range(std::string_view name, double value, double lowest, bool incl
   if (above && value <= highest) return {};
   std::string bound = inclusive ? "[" : "(";
   bound += text(lowest) + ", " + text(highest) + "]";
-  return fail(ErrorCode::kInvalidArgument, named + ": must be in " + bound);
+  return invalid(named + ": must be in " + bound);
 }
 
 Status validate(const Region& region) {

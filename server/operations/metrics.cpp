@@ -299,7 +299,7 @@ MetricsExporter::~MetricsExporter() = default;
 
 Result<MetricsExporter> MetricsExporter::listen(const std::string& endpoint, Ask ask) {
   const auto refuse = [&](const std::string& reason) {
-    return fail(ErrorCode::kInvalidArgument, "metrics.endpoint = " + endpoint + ": " + reason);
+    return invalid("metrics.endpoint = " + endpoint + ": " + reason);
   };
   const auto address = address_of(endpoint);
   if (!address) return refuse("must be HOST:PORT with an address in numbers");

@@ -30,9 +30,7 @@ Result<PlusTransform> read_transform(const pugi::xml_node& node) {
   tracking::FramePair& frames = transform.link.frames;
   frames.from = node.attribute("From").value();
   frames.to = node.attribute("To").value();
-  if (frames.from.empty() || frames.to.empty()) {
-    return unreadable("a Transform without From or To");
-  }
+  if (frames.from.empty() || frames.to.empty()) return unreadable("a Transform without From or To");
   const std::string name = "Transform " + frames.name();
   const auto numbers = parse_numbers<16>(node.attribute("Matrix").value());
   if (!numbers) return unreadable(name + ": Matrix is not 16 numbers");
@@ -40,9 +38,7 @@ Result<PlusTransform> read_transform(const pugi::xml_node& node) {
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
   const bool scales = tracking::is_image_frame(frames.from) || tracking::is_image_frame(frames.to);
   const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
-  if (!usable) {
-    return unreadable(name + ": Matrix " + usable.error().message);
-  }
+  if (!usable) return unreadable(name + ": Matrix " + usable.error().message);
   if (scales) {
     transform.link.T_to_from.matrix() = matrix;
   } else {

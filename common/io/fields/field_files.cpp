@@ -163,7 +163,7 @@ Result<GzipOutput> begin(const fs::path& path, const nifti_1_header& header) {
   const std::string name = path.filename().string();
   const bool compressed = name.ends_with(".nii.gz");
   if (!compressed && !name.ends_with(".nii")) {
-    return file_error(ErrorCode::kUnreadable, path, "must end in .nii or .nii.gz");
+    return unreadable(path, "must end in .nii or .nii.gz");
   }
   auto file = GzipOutput::create(path, {}, compressed);
   if (!file) return file;
@@ -241,9 +241,7 @@ Status write_nifti(const fs::path& path, const ScalarVolume& volume) {
 
 Status write_nrrd(const fs::path& path, const DisplacementField& field) {
   if (Status ok = validate(field); !ok) return file_error(path, ok.error());
-  if (path.extension() != ".nrrd") {
-    return file_error(ErrorCode::kUnreadable, path, "must end in .nrrd");
-  }
+  if (path.extension() != ".nrrd") return unreadable(path, "must end in .nrrd");
   auto file = GzipOutput::create(path, nrrd_header_of(field), true);
   if (!file) return tl::unexpected(file.error());
   const std::size_t slice = 3 * grid_size({field.grid.dims[0], field.grid.dims[1], 1});

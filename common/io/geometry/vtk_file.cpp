@@ -388,9 +388,7 @@ GroupedMesh read_grouped(const VtkXmlFile& file) {
                     std::to_string(cells.size(cell)) + " vertices: must have " +
                     std::to_string(vertices));
     }
-    for (int k = 0; k < vertices; ++k) {
-      (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
-    }
+    for (int k = 0; k < vertices; ++k) (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
     if (labels.empty()) continue;
     (tetra ? mesh.labels : result.triangle_labels).push_back(static_cast<int>(labels[cell]));
   }

@@ -143,12 +143,12 @@ struct CheckpointFile::Impl {
 // Header read, or written where there is none of this key; what is no whole block cut off.
 Status CheckpointFile::Impl::start(std::uint64_t key) {
   const off_t size = ::lseek(file.get(), 0, SEEK_END);
-  if (size < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be read");
+  if (size < 0) return unreadable(path, "cannot be read");
   FileHeader found{};
   const std::size_t known = std::min(static_cast<std::size_t>(size), sizeof kCheckpointMagic);
   if (!read_at(file.get(), &found, std::min(static_cast<std::size_t>(size), sizeof found), 0) ||
       std::memcmp(found.magic, kCheckpointMagic, known) != 0) {
-    return file_error(ErrorCode::kUnreadable, path, "is there but is no checkpoint file");
+    return unreadable(path, "is there but is no checkpoint file");
   }
   FileHeader header{};
   std::memcpy(header.magic, kCheckpointMagic, sizeof kCheckpointMagic);
@@ -239,13 +239,12 @@ Status CheckpointFile::Impl::read(int index, Matrix& out) const {
   for (Eigen::Index i = 0; i < pieces.count; ++i) {
     Scalar* piece = out.data() + i * out.outerStride();
     if (!read_at(file.get(), piece, pieces.bytes, block.payload_at + pieces.from(i))) {
-      return file_error(ErrorCode::kUnreadable, path,
-                        "block " + std::to_string(index) + " cannot be read");
+      return unreadable(path, "block " + std::to_string(index) + " cannot be read");
     }
     crc = crc32_of(piece, pieces.bytes, crc);
   }
   if (crc == header.payload_crc) return {};
-  return file_error(ErrorCode::kUnreadable, path,
+  return unreadable(path,
                     "block " + std::to_string(index) + " was altered while the file was open");
 }
 
@@ -310,8 +309,7 @@ Status CheckpointFile::read_columns(int index, Eigen::Index first, Eigen::Matrix
               block->payload_at + begin * header.rows * sizeof(float))) {
     return {};
   }
-  return file_error(ErrorCode::kUnreadable, impl_->path,
-                    "block " + std::to_string(index) + " cannot be read");
+  return unreadable(impl_->path, "block " + std::to_string(index) + " cannot be read");
 }
 
 Status CheckpointFile::remove() {

@@ -54,10 +54,9 @@ Result<std::vector<std::string>> check_inputs(const std::vector<InputFile>& inpu
     }
     const Result<FileChecksum> now = checksum_now(input);
     if (now && now->bytes == input.bytes && now->crc32 == input.crc32) continue;
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         input.key + ": " + input.path.string() +
-            " has changed since the model was prepared from it: run brainshiftd prepare again");
+        " has changed since the model was prepared from it: run brainshiftd prepare again");
   }
   return notes;
 }

@@ -123,9 +123,7 @@ Result<std::vector<ultrasound::Contour>> contours_of_json(const std::string& con
   for (std::size_t i = 0; i < list->size(); ++i) {
     ultrasound::Contour contour;
     const std::string problem = read_entry((*list)[i], contour);
-    if (!problem.empty()) {
-      return unreadable(fmt::format("contours[{}]: {}", i, problem));
-    }
+    if (!problem.empty()) return unreadable(fmt::format("contours[{}]: {}", i, problem));
     contours.push_back(std::move(contour));
   }
   if (contours.empty()) return fail(ErrorCode::kEmptySet, "holds no contour");
