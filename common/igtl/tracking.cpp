@@ -71,9 +71,7 @@ Result<Transform> decode_transform(std::string_view content) {
   }
   ByteReader reader(content);
   const Transform transform{take_matrix(reader)};
-  if (const Status status = validate(transform); !status) {
-    return malformed(status.error().message);
-  }
+  if (const Status status = validate(transform); !status) return malformed(status.error().message);
   return transform;
 }
 
