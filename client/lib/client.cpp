@@ -25,9 +25,8 @@ Status check_range(const char* name, milliseconds value) {
   // ZeroMQ takes milliseconds as int and three heartbeats make a timeout.
   constexpr milliseconds limit(std::numeric_limits<int>::max() / 4);
   if (value > milliseconds(0) && value <= limit) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              std::string(name) + " = " + std::to_string(value.count()) + " ms: must be in [1, " +
-                  std::to_string(limit.count()) + "]");
+  return invalid(std::string(name) + " = " + std::to_string(value.count()) +
+                 " ms: must be in [1, " + std::to_string(limit.count()) + "]");
 }
 
 Status validate(const ClientOptions& options) {
@@ -73,9 +72,6 @@ struct Client::Impl {
   // nor for the answer: without a connection field_status() tells in time. kUnavailable when the
   // connection was found to be lost.
   Status renew();
-  tl::unexpected<Error> lost() const {
-    return fail(ErrorCode::kUnavailable, "lost the connection to " + dealer->endpoint());
-  }
   Deadline next_renewal() const;
   // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
   // said what is newest.
@@ -98,9 +94,8 @@ struct Client::Impl {
 Result<std::string> Client::Impl::request(MessageType type, const std::string& payload,
                                           MessageType reply_type, milliseconds timeout) {
   if (payload.size() > wire::kMaxPayloadBytes) {
-    return fail(ErrorCode::kInvalidArgument, "request of " + std::to_string(payload.size()) +
-                                                 " bytes: must be at most " +
-                                                 std::to_string(wire::kMaxPayloadBytes));
+    return invalid("request of " + std::to_string(payload.size()) + " bytes: must be at most " +
+                   std::to_string(wire::kMaxPayloadBytes));
   }
   const Deadline deadline = deadline_after(timeout);
   const std::uint64_t id = ++last_request_id;
@@ -201,8 +196,8 @@ Status Client::Impl::renew() {
   acknowledged = subscription->received;
   static_cast<void>(dealer->send(
       encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), now));
-  if (notice_losses()) return lost();
-  return {};
+  if (!notice_losses()) return {};
+  return fail(ErrorCode::kUnavailable, "lost the connection to " + dealer->endpoint());
 }
 
 Deadline Client::Impl::next_renewal() const {
@@ -287,9 +282,8 @@ Result<BrainModel> Client::model() {
 
 Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   if (window < 1 || window > Subscription::kMaxWindow) {
-    return fail(ErrorCode::kInvalidArgument, "window = " + std::to_string(window) +
-                                                 ": must be in [1, " +
-                                                 std::to_string(Subscription::kMaxWindow) + "]");
+    return invalid("window = " + std::to_string(window) + ": must be in [1, " +
+                   std::to_string(Subscription::kMaxWindow) + "]");
   }
   if (Status status = validate(choice); !status) return status;
   Impl& self = *impl_;

@@ -84,9 +84,7 @@ FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::u
   if (shown->second < state.newest_usable) {
     return {Currency::kSuperseded, "a newer field is on its way", age_s};
   }
-  if (state.newest_update > shown->second) {
-    return {Currency::kDegraded, state.reason, age_s};
-  }
+  if (state.newest_update > shown->second) return {Currency::kDegraded, state.reason, age_s};
   return {Currency::kCurrent, {}, age_s};
 }
 
