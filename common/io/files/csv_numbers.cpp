@@ -13,6 +13,13 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+std::optional<std::string_view> assigned_value(std::string_view line, std::string_view name) {
+  if (!line.starts_with(name)) return std::nullopt;
+  line = trimmed(line.substr(name.size()));
+  if (!line.starts_with('=')) return std::nullopt;
+  return trimmed(line.substr(1));
+}
+
 bool parse_number(std::string_view text, double& number) {
   text = trimmed(text);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

@@ -2,6 +2,7 @@
 // Cells of the small .csv files that people write by hand.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,8 @@ namespace brainshift::io {
 
 // Without blanks at either end.
 std::string_view trimmed(std::string_view text);
+// The VALUE of a line "NAME = VALUE", trimmed; none for any other line.
+std::optional<std::string_view> assigned_value(std::string_view line, std::string_view name);
 // The whole text is one finite number.
 bool parse_number(std::string_view text, double& number);
 // Between commas, trimmed; at least one.

@@ -14,12 +14,13 @@ namespace {
 constexpr int kTetrahedron = 4;
 constexpr int kTriangle = 2;
 
-// Vertices per element type; 0 for a type this reader does not know.
+// Vertices per element type.
 int vertices_of_type(std::int64_t type) {
   // Types 1 to 31 of the reference manual.
   constexpr int kVertices[] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
                                8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
-  return type >= 1 && type <= 31 ? kVertices[type] : 0;
+  if (type < 1 || type > 31) refuse_format("element type " + std::to_string(type) + " is unknown");
+  return kVertices[type];
 }
 
 // Numbers, lines and sections.
@@ -218,12 +219,6 @@ void Reader::add_element(std::int64_t type, const std::vector<std::int64_t>& tag
   }
 }
 
-int checked_vertices(std::int64_t type) {
-  const int vertices = vertices_of_type(type);
-  if (vertices == 0) refuse_format("element type " + std::to_string(type) + " is unknown");
-  return vertices;
-}
-
 void Reader::read_elements_2() {
   const std::int64_t count = cursor_.checked(cursor_.text_number<std::int64_t>());
   if (cursor_.binary()) cursor_.line();
@@ -250,7 +245,7 @@ void Reader::read_elements_2() {
         const int tag = cursor_.integer();
         if (k == 0) physical = tag;
       }
-      vertices.resize(static_cast<std::size_t>(checked_vertices(type)));
+      vertices.resize(static_cast<std::size_t>(vertices_of_type(type)));
       for (std::int64_t& vertex : vertices) vertex = cursor_.integer();
       add_element(type, vertices, physical);
     }
@@ -267,7 +262,7 @@ void Reader::read_elements_4() {
     const int type = cursor_.integer();
     const std::int64_t count = cursor_.checked(cursor_.size());
     const auto physical = physical_of_volume_.find(entity);
-    vertices.resize(static_cast<std::size_t>(checked_vertices(type)));
+    vertices.resize(static_cast<std::size_t>(vertices_of_type(type)));
     for (std::int64_t i = 0; i < count; ++i) {
       cursor_.size();  // element tag
       for (std::int64_t& vertex : vertices) vertex = cursor_.size();

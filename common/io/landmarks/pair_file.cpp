@@ -133,12 +133,9 @@ bool parse_tag(std::string_view text, NamedPairs& pairs) {
 
 // The value of "NAME = VALUE", with or without the semicolon behind it.
 std::optional<std::string_view> value_of(std::string_view line, std::string_view name) {
-  if (!line.starts_with(name)) return std::nullopt;
-  line = trimmed(line.substr(name.size()));
-  if (!line.starts_with('=')) return std::nullopt;
-  line = trimmed(line.substr(1));
-  if (line.ends_with(';')) line = trimmed(line.substr(0, line.size() - 1));
-  return line;
+  auto value = assigned_value(line, name);
+  if (value && value->ends_with(';')) value = trimmed(value->substr(0, value->size() - 1));
+  return value;
 }
 
 Result<NamedPairs> parse_tag_file(const std::string& content) {
@@ -191,12 +188,10 @@ Result<Index> index_of(const NamedPoints& list, const char* what) {
   Index index;
   for (std::size_t i = 0; i < list.names.size(); ++i) {
     if (list.names[i].empty()) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("point {} of the {} list has no name", i + 1, what));
+      return invalid(fmt::format("point {} of the {} list has no name", i + 1, what));
     }
     if (!index.emplace(list.names[i], i).second) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("the {} list has two points called \"{}\"", what, list.names[i]));
+      return invalid(fmt::format("the {} list has two points called \"{}\"", what, list.names[i]));
     }
   }
   return index;
@@ -237,12 +232,12 @@ Result<NamedPairs> pair_by_name(const NamedPoints& first, const NamedPoints& sec
 Result<NamedPairs> read_pairs(const fs::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".json" || extension == ".fcsv") {
-    return file_error(ErrorCode::kUnreadable, path,
+    return unreadable(path,
                       "holds where the landmarks were at one time: a second file must say where "
                       "they were found during surgery");
   }
   if (extension != ".csv" && extension != ".tag") {
-    return file_error(ErrorCode::kUnreadable, path, "landmarks must be a .csv or .tag file");
+    return unreadable(path, "landmarks must be a .csv or .tag file");
   }
   return parse_file(path, [&](const std::string& content) {
     return extension == ".csv" ? parse_csv(content) : parse_tag_file(content);

@@ -75,16 +75,6 @@ std::size_t column_of(const std::vector<std::string>& columns, const char* name)
                                   columns.begin());
 }
 
-// The value behind "NAME =" in a comment line, if it is one of that name.
-std::optional<std::string> setting(std::string_view line, std::string_view name) {
-  line.remove_prefix(1);  // '#'
-  line = trimmed(line);
-  if (!line.starts_with(name)) return std::nullopt;
-  line = trimmed(line.substr(name.size()));
-  if (!line.starts_with('=')) return std::nullopt;
-  return std::string(trimmed(line.substr(1)));
-}
-
 Result<NamedPoints> parse_markups_json(const std::string& content) {
   const json document = json::parse(content, nullptr, false);
   const auto list = document.is_object() ? document.find("markups") : document.end();
@@ -125,8 +115,9 @@ Result<NamedPoints> parse_fcsv(const std::string& content) {
     const std::string_view text = trimmed(line);
     if (text.empty()) continue;
     if (text.front() == '#') {
-      if (const auto value = setting(text, "CoordinateSystem")) system = *value;
-      if (const auto value = setting(text, "columns")) columns = quoted_cells_of(*value);
+      const std::string_view comment = trimmed(text.substr(1));
+      if (const auto value = assigned_value(comment, "CoordinateSystem")) system = *value;
+      if (const auto value = assigned_value(comment, "columns")) columns = quoted_cells_of(*value);
       continue;
     }
     const auto signs = signs_to_ras(system);
@@ -255,8 +246,7 @@ Points columns_of(const std::vector<Vec3>& points) {
 Result<NamedPoints> read_points(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".json" && extension != ".fcsv" && extension != ".csv") {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "points must be a .mrk.json, .fcsv or .csv file");
+    return unreadable(path, "points must be a .mrk.json, .fcsv or .csv file");
   }
   return parse_file(path, [&](const std::string& content) {
     return extension == ".json"   ? parse_markups_json(content)

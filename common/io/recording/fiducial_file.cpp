@@ -9,6 +9,7 @@
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/landmarks/point_file.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -38,14 +39,6 @@ bool take_row(const std::vector<std::string_view>& cells, Rows& rows) {
   return true;
 }
 
-Points columns(const std::vector<Vec3>& points) {
-  Points matrix(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
-  }
-  return matrix;
-}
-
 }  // namespace
 
 Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
@@ -69,9 +62,9 @@ Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
                         line, row.substr(0, 60)));
       }
     }
-    auto fit = rows.single
-                   ? registration::match_fiducials(columns(rows.reference), columns(rows.ras))
-                   : registration::register_fiducials(columns(rows.reference), columns(rows.ras));
+    const Points reference = columns_of(rows.reference), ras = columns_of(rows.ras);
+    auto fit = rows.single ? registration::match_fiducials(reference, ras)
+                           : registration::register_fiducials(reference, ras);
     if (!fit) return tl::unexpected(fit.error());
     return FiducialFile{std::move(*fit), rows.single};
   });
