@@ -44,15 +44,9 @@ Status validate(const Region& region) {
 }  // namespace
 
 std::string_view to_string(SessionPhase phase) {
-  switch (phase) {
-    case SessionPhase::kEmpty: return "empty";
-    case SessionPhase::kPreparing: return "preparing";
-    case SessionPhase::kReady: return "ready";
-    case SessionPhase::kTracking: return "tracking";
-    case SessionPhase::kDegraded: return "degraded";
-    case SessionPhase::kClosed: return "closed";
-  }
-  return "unknown";
+  static constexpr std::string_view kNames[] = {"empty",    "preparing", "ready",
+                                                "tracking", "degraded",  "closed"};
+  return enum_name<SessionPhase::kClosed>(phase, kNames);
 }
 
 bool RecordingState::holds(std::string_view source, std::uint64_t sequence) const {
