@@ -27,8 +27,7 @@ constexpr std::chrono::milliseconds kTurnInterval{100};
 constexpr std::size_t kMostParts = ZmtpStream::Bounds{}.parts;
 
 Bytes error_frame(std::uint64_t request_id, const Error& error) {
-  return std::make_shared<const std::string>(
-      wire::encode_frame(wire::MessageType::kErrorReply, request_id, wire::encode(error)));
+  return framed(wire::MessageType::kErrorReply, request_id, wire::encode(error));
 }
 
 Roles roles_of(const RouterOptions& options) {
@@ -186,8 +185,7 @@ void Router::Impl::answer(const Incoming& incoming) {
     answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
   }
   if (!answer) return;
-  reply(incoming.peer, std::make_shared<const std::string>(
-                           wire::encode_frame(answer->type, frame->request_id, answer->payload)));
+  reply(incoming.peer, framed(answer->type, frame->request_id, answer->payload));
   if (answer->subscription) subscribe(incoming.peer, *answer);
 }
 
