@@ -47,12 +47,15 @@ std::string range_of(const Limits& limits, const char* word) {
 
 }  // namespace
 
-void KeyChecker::check(bool ok, const std::string& key, double value,
-                       const std::string& constraint) {
-  if (ok || !message_.empty()) return;
+std::string must_be(const std::string& key, double value, const std::string& constraint) {
   std::ostringstream text;
   text << key << " = " << value << ": must be " << constraint;
-  message_ = text.str();
+  return text.str();
+}
+
+void KeyChecker::check(bool ok, const std::string& key, double value,
+                       const std::string& constraint) {
+  if (!ok && message_.empty()) message_ = must_be(key, value, constraint);
 }
 
 void KeyChecker::check(const std::string& key, double value, const Limits& limits) {

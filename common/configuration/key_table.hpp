@@ -126,6 +126,9 @@ class KeyWalker {
   std::string prefix_;
 };
 
+// "KEY = VALUE: must be CONSTRAINT", the value with six digits.
+std::string must_be(const std::string& key, double value, const std::string& constraint);
+
 // Compares every value with its limits and keeps the first violation.
 class KeyChecker : public KeyWalker<KeyChecker> {
  public:

@@ -2,7 +2,8 @@
 #include "common/configuration/problem_spec.hpp"
 
 #include <algorithm>
-#include <sstream>
+
+#include "common/configuration/key_table.hpp"
 
 namespace brainshift {
 namespace {
@@ -13,10 +14,7 @@ constexpr double kMaxPoissonRatio = 0.4999;
 class Checks {
  public:
   void that(bool holds, const std::string& key, double value, const std::string& constraint) {
-    if (holds || !status_) return;
-    std::ostringstream text;
-    text << key << " = " << value << ": must be " << constraint;
-    refuse(text.str());
+    if (!holds && status_) refuse(must_be(key, value, constraint));
   }
   void that(bool holds, const std::string& message) {
     if (!holds && status_) refuse(message);

@@ -2,8 +2,8 @@
 #include "common/configuration/stereo_calibration.hpp"
 
 #include <cmath>
-#include <sstream>
 
+#include "common/configuration/key_table.hpp"
 #include "common/core/rigid_motion.hpp"
 
 namespace brainshift {
@@ -16,9 +16,7 @@ constexpr int kMaxPicture = 16384;
 constexpr double kRigidTolerance = 1e-4;
 
 tl::unexpected<Error> refuse(const std::string& key, double value, const std::string& constraint) {
-  std::ostringstream text;
-  text << key << " = " << value << ": must be " << constraint;
-  return invalid(text.str());
+  return invalid(must_be(key, value, constraint));
 }
 
 Status check_camera(const std::string& name, const CameraIntrinsics& camera,

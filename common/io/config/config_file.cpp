@@ -66,10 +66,8 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   void operator()(const Key& key, const fs::path& value, Need = Need::kOptional) {
     line(key, quoted(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
   }
-  void operator()(const Key& key, const std::optional<fs::path>& value) {
-    if (value) (*this)(key, *value);
-  }
-  void operator()(const Key& key, const std::optional<std::string>& value) {
+  template <typename T>
+  void operator()(const Key& key, const std::optional<T>& value) {
     if (value) (*this)(key, *value);
   }
   template <typename T, typename W, std::size_t N>
