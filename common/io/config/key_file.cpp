@@ -255,11 +255,9 @@ Result<KeyPair> read_secret_key(const fs::path& path) {
 }
 
 Result<std::string> read_public_key(const fs::path& path) {
-  const auto text = read_guarded(path, 0, {});
-  if (!text) return tl::unexpected(text.error());
-  auto fields = key_fields(path, *text);
-  if (!fields) return tl::unexpected(fields.error());
-  return (*fields)["public"];
+  return read_guarded(path, 0, {})
+      .and_then([&](const std::string& text) { return key_fields(path, text); })
+      .map([](std::map<std::string, std::string> fields) { return fields["public"]; });
 }
 
 Result<std::vector<AllowedKey>> read_allow_list(const fs::path& path) {

@@ -21,9 +21,7 @@ FileChecksum case_checksum(const CaseConfig& config) {
 // A case that cannot be read any more differs from the one that could.
 Result<FileChecksum> checksum_now(const InputFile& input) {
   if (input.key != kCase) return file_checksum(input.path);
-  Result<CaseConfig> config = read_case_config(input.path);
-  if (!config) return tl::unexpected(config.error());
-  return case_checksum(*config);
+  return read_case_config(input.path).map(case_checksum);
 }
 
 }  // namespace
