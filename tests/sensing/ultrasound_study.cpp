@@ -160,12 +160,8 @@ Sweep read_sweep(const fs::path& recording, const fs::path& config,
                  const std::string& image_frame) {
   Sweep sweep{
       value_or_exit(io::read_sequence(recording)), value_or_exit(io::read_plus_config(config)), {}};
-  std::vector<tracking::ConstantLink> constants;
-  for (const io::PlusTransform& transform : sweep.config.transforms) {
-    constants.push_back(transform.link);
-  }
-  sweep.chain =
-      value_or_exit(tracking::evaluate_chain(sweep.recording, constants, image_frame, "Reference"));
+  sweep.chain = value_or_exit(
+      tracking::evaluate_chain(sweep.recording, sweep.config.transforms, image_frame, "Reference"));
   std::string links;
   for (const std::string& link : sweep.chain.links) links += " " + link;
   fmt::print("{}: {} frames of {} x {} px, {} used, chain{}\n", recording.filename().string(),

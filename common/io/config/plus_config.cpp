@@ -25,9 +25,9 @@ std::optional<std::array<double, N>> parse_numbers(const char* text) {
   return numbers;
 }
 
-Result<PlusTransform> read_transform(const pugi::xml_node& node) {
-  PlusTransform transform;
-  tracking::FramePair& frames = transform.link.frames;
+Result<tracking::ConstantLink> read_transform(const pugi::xml_node& node) {
+  tracking::ConstantLink link;
+  tracking::FramePair& frames = link.frames;
   frames.from = node.attribute("From").value();
   frames.to = node.attribute("To").value();
   if (frames.from.empty() || frames.to.empty()) return unreadable("a Transform without From or To");
@@ -40,15 +40,11 @@ Result<PlusTransform> read_transform(const pugi::xml_node& node) {
   const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
   if (!usable) return unreadable(name + ": Matrix " + usable.error().message);
   if (scales) {
-    transform.link.T_to_from.matrix() = matrix;
+    link.T_to_from.matrix() = matrix;
   } else {
-    transform.link.T_to_from = nearest_rigid(matrix);
+    link.T_to_from = nearest_rigid(matrix);
   }
-  if (const auto error = parse_numbers<1>(node.attribute("Error").value())) {
-    transform.error = error->front();
-  }
-  transform.date = node.attribute("Date").value();
-  return transform;
+  return link;
 }
 
 Status read_reconstruction(const pugi::xml_node& node, PlusConfig& config) {

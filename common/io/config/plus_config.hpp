@@ -3,7 +3,7 @@
 // reconstructed.
 //
 //   PlusConfiguration / CoordinateDefinitions / Transform
-//       From, To, Matrix (16 numbers, row by row), Error, Date
+//       From, To, Matrix (16 numbers, row by row)
 //   PlusConfiguration / VolumeReconstruction
 //       ClipRectangleOrigin, ClipRectangleSize (pixels), OutputSpacing
 //
@@ -15,7 +15,6 @@
 #include <array>
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -24,19 +23,13 @@
 
 namespace brainshift::io {
 
-struct PlusTransform {
-  tracking::ConstantLink link;
-  std::optional<double> error;  // as the calibration reported it; mm by PLUS's convention
-  std::string date;
-};
-
 struct ClipRectangle {
   std::array<int, 2> origin_px{0, 0};
   std::array<int, 2> size_px{0, 0};
 };
 
 struct PlusConfig {
-  std::vector<PlusTransform> transforms;
+  std::vector<tracking::ConstantLink> transforms;
   std::optional<ClipRectangle> clip;
   std::optional<Vec3> output_spacing_mm;
 };
