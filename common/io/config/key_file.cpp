@@ -57,20 +57,6 @@ Result<std::string> read_guarded(const fs::path& path, mode_t forbidden,
   return read_file(path);
 }
 
-// Every line that is no comment, with its number; without spaces at its ends.
-std::vector<std::pair<int, std::string>> content_lines(const std::string& text) {
-  std::vector<std::pair<int, std::string>> lines;
-  std::istringstream in(text);
-  int number = 0;
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    const std::string_view content = trimmed(line);
-    if (content.empty() || content.front() == '#') continue;
-    lines.emplace_back(number, content);
-  }
-  return lines;
-}
-
 tl::unexpected<Error> line_error(const fs::path& path, int line, const std::string& message) {
   return invalid(fmt::format("{}:{}: {}", path.string(), line, message));
 }

@@ -68,14 +68,10 @@ std::optional<Columns> columns_of_size(std::size_t cells) {
 }
 
 Result<NamedPairs> parse_csv(const std::string& content) {
-  std::istringstream lines(content);
-  std::string line;
   std::optional<Columns> columns;
   std::size_t expected = 0;
   NamedPairs pairs;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    const std::string_view text = trimmed(line);
-    if (text.empty() || text.front() == '#') continue;
+  for (const auto& [number, text] : content_lines(content)) {
     const auto cells = quoted_cells_of(text);
     const bool first = expected == 0;
     const bool heading = first && !has_number(cells);
@@ -85,10 +81,9 @@ Result<NamedPairs> parse_csv(const std::string& content) {
       if (!columns) columns = columns_of_size(cells.size());
     }
     if (!columns) {
-      return unreadable(
-          fmt::format("line {}: \"{}\" must be 6 numbers (before x, y, z, during x, y, z), a name "
-                      "and 6 numbers, or a heading with x_before, ..., z_during",
-                      number, text.substr(0, 60)));
+      return bad_line(number, text,
+                      "must be 6 numbers (before x, y, z, during x, y, z), a name and 6 numbers, "
+                      "or a heading with x_before, ..., z_during");
     }
     if (heading) continue;
     std::array<double, 6> values{};
@@ -97,9 +92,8 @@ Result<NamedPairs> parse_csv(const std::string& content) {
       good = parse_number(cells[columns->at[i]], values[i]);
     }
     if (!good) {
-      return unreadable(
-          fmt::format("line {}: \"{}\" must have {} cells, six of them finite numbers", number,
-                      text.substr(0, 60), expected));
+      return bad_line(number, text,
+                      fmt::format("must have {} cells, six of them finite numbers", expected));
     }
     pairs.add(columns->name ? cells[*columns->name] : std::string(),
               Vec3(values[0], values[1], values[2]), Vec3(values[3], values[4], values[5]));
@@ -147,9 +141,7 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
   for (int number = 1; std::getline(lines, line); ++number) {
     std::string_view text = trimmed(line);
     if (text.empty() || text.front() == '%' || text.front() == '#') continue;
-    const auto refuse = [&](const char* what) {
-      return unreadable(fmt::format("line {}: \"{}\" {}", number, text.substr(0, 60), what));
-    };
+    const auto refuse = [&](const char* what) { return bad_line(number, text, what); };
     if (at == At::kStart) {
       if (text != kMagic) return unreadable("is no MNI tag point file");
       at = At::kHeader;
