@@ -220,15 +220,15 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta&
 }
 
 Result<SurgeryFile> SurgeryFile::open(const fs::path& path) {
-  auto impl = Impl::open(path, Access::kRead);
-  if (!impl) return tl::unexpected(impl.error());
-  return SurgeryFile(std::move(*impl));
+  return Impl::open(path, Access::kRead).map([](std::unique_ptr<Impl> impl) {
+    return SurgeryFile(std::move(impl));
+  });
 }
 
 Result<SurgeryFile> SurgeryFile::open_damaged(const fs::path& path) {
-  auto impl = Impl::open(path, Access::kReadDamaged);
-  if (!impl) return tl::unexpected(impl.error());
-  return SurgeryFile(std::move(*impl));
+  return Impl::open(path, Access::kReadDamaged).map([](std::unique_ptr<Impl> impl) {
+    return SurgeryFile(std::move(impl));
+  });
 }
 
 Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
