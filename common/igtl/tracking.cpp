@@ -30,8 +30,6 @@ Eigen::Matrix4d to_matrix(const Matrix34f& transform) {
   return matrix;
 }
 
-Matrix34f from_matrix(const Eigen::Matrix4d& matrix) { return matrix.topRows<3>().cast<float>(); }
-
 Status validate(const Transform& transform) {
   if (!transform.matrix.allFinite()) {
     return fail(ErrorCode::kNotFinite, "a number of the transform is not finite");

@@ -7,9 +7,9 @@
 namespace brainshift::fuzz {
 
 void run(std::string_view bytes) {
-  const auto config = io::read_plus_config(scratch_file("device.xml", bytes));
-  if (!config) return;
-  for (const tracking::ConstantLink& link : config->transforms) {
+  const auto links = io::read_plus_config(scratch_file("device.xml", bytes));
+  if (!links) return;
+  for (const tracking::ConstantLink& link : *links) {
     require(link.T_to_from.matrix().allFinite(), "a transform goes somewhere");
   }
 }

@@ -48,8 +48,7 @@ Status check_one_case(const fs::path& case_file, const fs::path& model) {
 
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {
   if (device.empty()) return std::vector<tracking::ConstantLink>{};
-  return io::read_plus_config(device).map(
-      [](io::PlusConfig config) { return std::move(config.transforms); });
+  return io::read_plus_config(device);
 }
 
 Status check_new(const fs::path& out) {
