@@ -27,9 +27,9 @@ SizingField uniform(double edge) {
 // A ball of radius 20 mm, off the origin, in an oblique left-handed frame with 1.5 mm voxels.
 const Ball kBall{Vec3(30, -10, 45), 20.0};
 VoxelImage ball_mask() {
-  return balls::soft_balls(balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2),
-                                              balls::oblique_left_handed(1.5)),
-                           {kBall}, 6.0);
+  return balls::soft_balls(
+      balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2), balls::oblique_left_handed(1.5)),
+      {kBall}, 6.0);
 }
 
 TetMesh meshed(const VoxelImage& mask, const SizingField& edge) {

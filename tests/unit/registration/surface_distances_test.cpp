@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
@@ -15,6 +14,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/registration/alignment_data.hpp"
 #include "common/registration/icp.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::registration {
@@ -236,7 +236,7 @@ Amplitude dilation_shown_by(const SparseData& data) {
     const VecX rows = rows_of(column);
     covariance += rows * rows.transpose();
   }
-  const VecX whitened = covariance.ldlt().solve(signal);
+  const VecX whitened = test_support::solve_positive(covariance, signal);
   return {whitened.dot(seen) / whitened.dot(signal), 1.0 / std::sqrt(whitened.dot(signal))};
 }
 
@@ -332,7 +332,7 @@ VecX toy_inversion(const SparseData& data) {
     normal += weight * row * row.transpose();
     right += weight * n.dot(data.displacements.col(i)) * row;
   }
-  return normal.ldlt().solve(right);
+  return test_support::solve_positive(normal, right);
 }
 
 TEST(TumourDistances, AndAnInversionInTurnFindTheDeformedSurfaceAndSettle) {
