@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::server {
@@ -17,9 +18,8 @@ using testing::MatchesRegex;
 
 TEST(Listener, TellsThePortThatItTook) {
   for (const char* endpoint : {"tcp://127.0.0.1:*", "tcp://127.0.0.1:0", "tcp://lo:*"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_TRUE(listener) << listener.error().message;
-    EXPECT_THAT(listener->endpoint(), MatchesRegex("tcp://127\\.0\\.0\\.1:[1-9][0-9]+"));
+    const auto listener = value_or_fail(Listener::open(endpoint));
+    EXPECT_THAT(listener.endpoint(), MatchesRegex("tcp://127\\.0\\.0\\.1:[1-9][0-9]+"));
   }
 }
 
@@ -27,10 +27,8 @@ TEST(Listener, WhatIsNoEndpointIsRefusedByName) {
   for (const char* endpoint : {"", "nonsense", "ftp://127.0.0.1:1", "tcp://127.0.0.1", "tcp://:5",
                                "tcp://127.0.0.1:", "tcp://127.0.0.1:99999", "tcp://127.0.0.1:-1",
                                "tcp://127.0.0.1:80x", "ipc://"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_FALSE(listener) << endpoint;
-    EXPECT_EQ(listener.error().code, ErrorCode::kInvalidArgument) << endpoint;
-    EXPECT_THAT(listener.error().message, HasSubstr(endpoint));
+    EXPECT_THAT(refusal_of(Listener::open(endpoint), ErrorCode::kInvalidArgument),
+                HasSubstr(endpoint));
   }
 }
 
