@@ -56,9 +56,8 @@ TEST(PartsFrom, KeepTheOrderAndHaveTheDefault) {
 }
 
 TEST(PartsFrom, NameWhatIsUnknownAndWhatIsKnown) {
-  const std::string refusal = refusal_of(parts_from({"fixed", "no-luck"}), ErrorCode::kNotFound);
-  EXPECT_THAT(refusal, HasSubstr("no-luck"));
-  EXPECT_THAT(refusal, HasSubstr("low-rank"));
+  EXPECT_THAT(refusal_of(parts_from({"fixed", "no-luck"}), ErrorCode::kNotFound),
+              testing::AllOf(HasSubstr("no-luck"), HasSubstr("low-rank")));
 }
 
 }  // namespace

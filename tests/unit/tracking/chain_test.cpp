@@ -103,9 +103,8 @@ TEST(Chain, ALinkAbsentForTooLongIsTooOld) {
 TEST(Chain, WithoutConnectionNamesTheFrames) {
   Recording broken = recording();
   broken.links.pop_back();
-  const std::string refusal = sentence_of(evaluate_chain(broken, constants(), "Image", "Ras"));
-  EXPECT_THAT(refusal, HasSubstr("no chain from Image to Ras"));
-  EXPECT_THAT(refusal, HasSubstr("Reference"));
+  EXPECT_THAT(sentence_of(evaluate_chain(broken, constants(), "Image", "Ras")),
+              testing::AllOf(HasSubstr("no chain from Image to Ras"), HasSubstr("Reference")));
 }
 
 TEST(Chain, OptionsOutOfRangeAreNamed) {

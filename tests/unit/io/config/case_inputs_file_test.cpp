@@ -36,9 +36,8 @@ class CaseInputsFile : public testing::Test {
     config_.mri = folder_ / "t1.nii";
   }
   void expect_blame(ErrorCode code, const std::string& key, const std::string& file) {
-    const std::string refusal = refusal_of(load_case_inputs(config_), code);
-    EXPECT_THAT(refusal, StartsWith(key + ": "));
-    EXPECT_THAT(refusal, HasSubstr(file));
+    EXPECT_THAT(refusal_of(load_case_inputs(config_), code),
+                testing::AllOf(StartsWith(key + ": "), HasSubstr(file)));
   }
   TemporaryFolder folder_;
   CaseConfig config_;

@@ -256,10 +256,8 @@ TEST(SurfaceSpace, ModelThatSaysLpsIsTurnedIntoRas) {
 TEST(SurfaceSpace, AnotherSpaceIsRefusedByFileAndValue) {
   const TemporaryFolder folder;
   for (const auto& [file, text] : slicer_files()) {
-    const std::string refusal =
-        refusal_of(read_surface(folder.write(file, with_heading(file, text, "LAS"))));
-    EXPECT_THAT(refusal, HasSubstr(file));
-    EXPECT_THAT(refusal, HasSubstr("SPACE is 'LAS': must be RAS or LPS"));
+    EXPECT_THAT(refusal_of(read_surface(folder.write(file, with_heading(file, text, "LAS")))),
+                testing::AllOf(HasSubstr(file), HasSubstr("SPACE is 'LAS': must be RAS or LPS")));
   }
 }
 

@@ -60,10 +60,9 @@ class SurgeryFileTest : public ::testing::Test {
     ASSERT_TRUE(file.close());
   }
   void expect_open_refused(ErrorCode code, const std::string& text) {
-    const std::string refusal = refusal_of(SurgeryFile::open(path), code);
-    EXPECT_THAT(refusal, HasSubstr(path.string()));
-    EXPECT_THAT(refusal, HasSubstr(text));
-    EXPECT_EQ(refusal.find('\n'), std::string::npos);
+    EXPECT_THAT(refusal_of(SurgeryFile::open(path), code),
+                testing::AllOf(HasSubstr(path.string()), HasSubstr(text),
+                               testing::Not(testing::HasSubstr("\n"))));
   }
   // Runs SQL on the file behind SurgeryFile's back.
   void tamper(const char* sql) {

@@ -40,10 +40,9 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
     SCOPED_TRACE(row.says);
     Observation observation = landmarks(2);
     row.spoil(observation);
-    const std::string refusal =
-        refusal_of(check_observation(observation, kCase, running), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(refusal, HasSubstr(row.says));
-    EXPECT_THAT(refusal, testing::Not(HasSubstr("\n")));
+    EXPECT_THAT(
+        refusal_of(check_observation(observation, kCase, running), ErrorCode::kInvalidArgument),
+        testing::AllOf(HasSubstr(row.says), testing::Not(HasSubstr("\n"))));
   }
 }
 

@@ -140,10 +140,9 @@ class MalformedReport : public testing::TestWithParam<BadReport> {};
 TEST_P(MalformedReport, IsRefusedInOneLineNamingTheKey) {
   json runs = json::parse(to_json({full_run()}));
   runs[json::json_pointer(GetParam().pointer)] = json::parse(GetParam().value);
-  const std::string refusal = refusal_of(from_json(runs.dump(), "R.json"), ErrorCode::kUnreadable);
-  EXPECT_THAT(refusal, HasSubstr("R.json"));
-  EXPECT_THAT(refusal, HasSubstr(GetParam().expected));
-  EXPECT_THAT(refusal, Not(HasSubstr("\n")));
+  EXPECT_THAT(refusal_of(from_json(runs.dump(), "R.json"), ErrorCode::kUnreadable),
+              testing::AllOf(HasSubstr("R.json"), HasSubstr(GetParam().expected),
+                             testing::Not(HasSubstr("\n"))));
 }
 INSTANTIATE_TEST_SUITE_P(
     Keys, MalformedReport,

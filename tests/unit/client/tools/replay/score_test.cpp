@@ -198,9 +198,9 @@ TEST_F(TruthInFile, OfAnotherMeshNamesBothCounts) {
 
 TEST_F(SinkingBox, TruthWithAPointOutsideTheMeshNamesKindAndNode) {
   truth.points["cross"][1] = at_node(nodes);
-  const std::string refusal = refusal_of(check_truth(truth, nodes), ErrorCode::kUnreadable);
-  EXPECT_THAT(refusal, testing::HasSubstr("cross 1"));
-  EXPECT_THAT(refusal, testing::HasSubstr(std::to_string(nodes)));
+  EXPECT_THAT(
+      refusal_of(check_truth(truth, nodes), ErrorCode::kUnreadable),
+      testing::AllOf(testing::HasSubstr("cross 1"), testing::HasSubstr(std::to_string(nodes))));
 }
 
 TEST_F(SinkingBox, TruthWithWeightsThatDoNotSumToOneIsRefused) {

@@ -81,9 +81,8 @@ TEST(Ingredients, AreNamedOnceAndNamesAreRead) {
 }
 
 TEST(Ingredients, UnknownRepeatedAndMissingNamesAreRefused) {
-  const std::string refusal = refusal_of(ingredients_from("gap,weather"), ErrorCode::kNotFound);
-  EXPECT_THAT(refusal, HasSubstr("\"weather\""));
-  EXPECT_THAT(refusal, HasSubstr("partial-sweep"));
+  EXPECT_THAT(refusal_of(ingredients_from("gap,weather"), ErrorCode::kNotFound),
+              testing::AllOf(HasSubstr("\"weather\""), HasSubstr("partial-sweep")));
   EXPECT_EQ(ingredients_from("gap,gap").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ingredients_from("gap,").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ingredients_from("").error().code, ErrorCode::kInvalidArgument);
