@@ -98,9 +98,7 @@ struct Viewing {
 };
 
 Eigen::RowVectorXd x_of(const Result<UpdateMessage>& message) {
-  EXPECT_TRUE(message) << message.error().message;
-  return message ? Eigen::RowVectorXd(message->update.estimate.displacement.row(0))
-                 : Eigen::RowVectorXd();
+  return value_or_fail(message).update.estimate.displacement.row(0);
 }
 
 TEST(ClientDelivery, ChangesComeOutAsTheWholeChoiceAndSayWhatTravelled) {

@@ -168,8 +168,9 @@ TEST_P(GmshEncoding, NoTruncationCrashesOrGivesAPartOfTheMesh) {
   const std::string whole = encoding.write(encoding.binary, encoding.swap);
   for (std::size_t size = 0; size + 1 < whole.size(); size += 17) {
     const auto mesh = read_tet_mesh(folder.write("m.msh", whole.substr(0, size)));
-    EXPECT_THAT(refusal_of(mesh, ErrorCode::kUnreadable), HasSubstr("m.msh: ")) << size;
-    EXPECT_EQ(mesh.error().message.find('\n'), std::string::npos);
+    EXPECT_THAT(refusal_of(mesh, ErrorCode::kUnreadable),
+                testing::AllOf(HasSubstr("m.msh: "), testing::Not(testing::HasSubstr("\n"))))
+        << size;
   }
 }
 

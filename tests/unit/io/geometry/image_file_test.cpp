@@ -123,12 +123,10 @@ class ImageFile : public testing::Test {
     testing::internal::CaptureStderr();
     const auto image = read(header, data);
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "the library stays silent";
-    EXPECT_FALSE(image);
-    if (image) return {};
-    EXPECT_EQ(image.error().code, ErrorCode::kUnreadable);
-    EXPECT_THAT(image.error().message, HasSubstr("i.nii: "));
-    EXPECT_EQ(image.error().message.find('\n'), std::string::npos);
-    return image.error().message;
+    const std::string sentence = refusal_of(image);
+    EXPECT_THAT(sentence,
+                testing::AllOf(HasSubstr("i.nii: "), testing::Not(testing::HasSubstr("\n"))));
+    return sentence;
   }
   TemporaryFolder folder_;
 };
@@ -384,8 +382,7 @@ TEST_F(ImageFile, ATruncatedNifti2HeaderIsRefusedInOneLine) {
   testing::internal::CaptureStderr();
   const auto image = read_nifti(folder_.write("two.nii", bytes));
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-  ASSERT_FALSE(image);
-  EXPECT_THAT(image.error().message, HasSubstr("is not a NIfTI image"));
+  EXPECT_THAT(sentence_of(image), HasSubstr("is not a NIfTI image"));
 }
 
 TEST_F(ImageFile, SmallVoxelsAreNotTakenForASingularAffine) {

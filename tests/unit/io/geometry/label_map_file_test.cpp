@@ -126,9 +126,7 @@ TEST(LabelMapFile, EverySpaceBecomesRas) {
 
 TEST(LabelMapFile, ASegmentIsChosenByName) {
   const auto voxels = [](const char* name, int label) {
-    const auto image = read(layered(kThreeSegments), {name, label});
-    EXPECT_TRUE(image) << image.error().message;
-    return image ? image->values : std::vector<float>{};
+    return value_or_fail(read(layered(kThreeSegments), {name, label})).values;
   };
   EXPECT_THAT(voxels("Head", 1), ElementsAre(1, 1, 0, 0));
   EXPECT_THAT(voxels("Mass", 7), ElementsAre(0, 7, 7, 7));

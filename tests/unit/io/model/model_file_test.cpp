@@ -129,8 +129,9 @@ TEST_F(ModelFileTest, EveryFlippedBitIsRefused) {
     put_byte(at, static_cast<char>(intact[at] ^ (1 << (at % 8))));
     const auto read = read_model(path);
     put_byte(at, intact[at]);
-    EXPECT_THAT(refusal_of(read, ErrorCode::kUnreadable), HasSubstr("m.h5: is ")) << "byte " << at;
-    EXPECT_EQ(read.error().message.find('\n'), std::string::npos);
+    EXPECT_THAT(refusal_of(read, ErrorCode::kUnreadable),
+                testing::AllOf(HasSubstr("m.h5: is "), testing::Not(testing::HasSubstr("\n"))))
+        << "byte " << at;
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "HDF5 stays silent";
   EXPECT_TRUE(read_model(path)) << "every byte was put back";

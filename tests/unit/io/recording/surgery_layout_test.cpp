@@ -21,11 +21,7 @@ using ::testing::HasSubstr;
 
 class SurgeryLayout : public ::testing::Test {
  protected:
-  SurgeryState state() const {
-    const auto file = SurgeryFile::open(path);
-    EXPECT_TRUE(file) << file.error().message;
-    return file ? file->state() : SurgeryState{};
-  }
+  SurgeryState state() const { return value_or_fail(SurgeryFile::open(path)).state(); }
   // A process that is killed after its last record.
   void crash_after(std::uint64_t records) const {
     const pid_t child = ::fork();

@@ -16,6 +16,7 @@
 #include <optional>
 #include <random>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/journal/journal_fakes.hpp"
 
@@ -27,14 +28,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 std::vector<std::uint64_t> sequences_in(const fs::path& path) {
+  const auto file = value_or_fail(io::SurgeryFile::open(path));
   std::vector<std::uint64_t> sequences;
-  const auto file = io::SurgeryFile::open(path);
-  EXPECT_TRUE(file) << file.error().message;
-  if (!file) return sequences;
-  const auto records = file->records(io::RecordKind::kObservation);
-  EXPECT_TRUE(records) << records.error().message;
-  if (!records) return sequences;
-  for (const auto& each : *records) sequences.push_back(each.sequence);
+  for (const auto& each : value_or_fail(file.records(io::RecordKind::kObservation))) {
+    sequences.push_back(each.sequence);
+  }
   return sequences;
 }
 

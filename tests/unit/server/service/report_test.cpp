@@ -12,6 +12,7 @@
 #include <string>
 
 #include "common/wire/report.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -26,9 +27,7 @@ class ReportTest : public TransportTest {
  protected:
   static DaemonReport report_of(RawPeer& peer) {
     peer.request(MessageType::kReportRequest);
-    const auto report = wire::decode_report(next(peer, MessageType::kReportReply).payload);
-    EXPECT_TRUE(report) << report.error().message;
-    return report ? *report : DaemonReport{};
+    return value_or_fail(wire::decode_report(next(peer, MessageType::kReportReply).payload));
   }
   // Asks until it holds, for at most 10 s.
   template <typename Condition>

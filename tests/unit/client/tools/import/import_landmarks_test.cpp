@@ -67,10 +67,9 @@ class ImportLandmarks : public testing::Test {
   }
 
   std::string refusal() const {
-    const auto report = import_landmarks(options);
-    EXPECT_FALSE(report);
+    const std::string sentence = sentence_of(import_landmarks(options));
     EXPECT_FALSE(std::filesystem::exists(options.out)) << "something was left behind";
-    return report ? std::string() : report.error().message;
+    return sentence;
   }
 
   TemporaryFolder folder;

@@ -117,10 +117,9 @@ class RegisterPatient : public testing::Test {
     return (T * reference - *options.target).norm();
   }
   std::string refusal() const {
-    const auto report = register_patient(options);
-    EXPECT_FALSE(report);
+    const std::string sentence = sentence_of(register_patient(options));
     EXPECT_FALSE(std::filesystem::exists(options.out)) << "something was left behind";
-    return report ? std::string() : report.error().message;
+    return sentence;
   }
 
   TemporaryFolder folder;
