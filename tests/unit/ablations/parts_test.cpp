@@ -2,7 +2,6 @@
 #include "tests/ablations/parts.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <set>
 

@@ -2,7 +2,6 @@
 #include "tests/benchmarks/csv_table.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>

@@ -2,7 +2,6 @@
 #include "common/igtl/image.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "common/igtl/message.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <set>
 

@@ -2,7 +2,6 @@
 #include "common/igtl/metadata.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"

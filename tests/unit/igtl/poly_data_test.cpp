@@ -2,7 +2,6 @@
 #include "common/igtl/poly_data.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "common/igtl/short_contents.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "common/igtl/stream_reader.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "common/igtl/crc64.hpp"
 #include "tests/support/results.hpp"

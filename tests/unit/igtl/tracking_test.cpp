@@ -2,7 +2,6 @@
 #include "common/igtl/tracking.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "common/pipeline/evidence.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 

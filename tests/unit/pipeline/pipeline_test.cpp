@@ -2,7 +2,6 @@
 #include "common/pipeline/pipeline.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>

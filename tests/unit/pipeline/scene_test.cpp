@@ -2,7 +2,6 @@
 #include "common/pipeline/scene.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"

@@ -3,7 +3,6 @@
 #include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 

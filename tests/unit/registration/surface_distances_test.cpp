@@ -2,7 +2,6 @@
 #include "common/registration/surface_distances.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

@@ -2,7 +2,6 @@
 // From pictures of a known patch to its surface: as near as the disparity's error allows, and
 // facing the camera.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>

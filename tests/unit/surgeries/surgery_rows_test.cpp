@@ -2,7 +2,6 @@
 // Scores of estimates that are made from the truth, so that every figure is known.
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>

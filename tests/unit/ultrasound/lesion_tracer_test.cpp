@@ -2,7 +2,6 @@
 // Synthetic images: a lesion of known outline in multiplicative noise, which is smoothed to the
 // size of speckle.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>

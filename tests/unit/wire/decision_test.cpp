@@ -2,7 +2,6 @@
 #include "common/wire/decision.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "brainshift/v1/decision.pb.h"
 #include "tests/support/results.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a viewer gets to see after it has not read, and after the daemon has been replaced.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <memory>
 #include <mutex>

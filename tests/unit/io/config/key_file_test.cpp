@@ -2,7 +2,6 @@
 #include "common/io/config/key_file.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include "tests/support/refusals.hpp"

@@ -2,7 +2,6 @@
 #include "common/io/recording/record_chain.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
 #include <random>

@@ -3,7 +3,6 @@
 #include "common/io/recording/sqlite_database.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

@@ -2,7 +2,6 @@
 #include "common/io/recording/surgery_file.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/wait.h>

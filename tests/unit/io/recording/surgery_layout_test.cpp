@@ -2,7 +2,6 @@
 #include "common/io/recording/surgery_layout.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

@@ -2,7 +2,6 @@
 #include "server/guard/listener.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <filesystem>
 #include <string>

@@ -2,7 +2,6 @@
 #include "server/journal/journal.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <atomic>
 #include <fstream>

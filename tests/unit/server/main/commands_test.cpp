@@ -2,7 +2,6 @@
 #include "server/main/commands.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "server/main/progress_bar.hpp"
 #include "tests/support/results.hpp"

@@ -2,7 +2,6 @@
 #include "server/security/gate.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <string>
 #include <utility>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Viewers with choices of their own, at a daemon over the real socket.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
 #include "tests/support/results.hpp"

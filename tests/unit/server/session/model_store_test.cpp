@@ -2,7 +2,6 @@
 #include "server/session/model_store.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <utility>
 

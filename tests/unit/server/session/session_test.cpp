@@ -2,7 +2,6 @@
 #include "server/session/session.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <utility>
 #include <vector>

@@ -2,7 +2,6 @@
 #include "server/session/sources.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 #include <string>

@@ -2,7 +2,6 @@
 #include "client/tools/bridge/follower.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <future>

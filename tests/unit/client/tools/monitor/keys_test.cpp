@@ -2,7 +2,6 @@
 #include "client/tools/monitor/keys.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -2,7 +2,6 @@
 #include "client/tools/replay/run_report.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>

@@ -2,7 +2,6 @@
 #include "client/tools/report/write_report.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>

@@ -2,7 +2,6 @@
 #include "client/tools/stereo/pictures.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <zlib.h>
 
 #include "tests/support/results.hpp"

@@ -3,7 +3,6 @@
 #include "client/tools/twin/adverse.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <numbers>
 

@@ -4,7 +4,6 @@
 #include "client/tools/twin/resection.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 #include <set>
