@@ -33,9 +33,8 @@ TEST(Listener, WhatIsNoEndpointIsRefusedByName) {
 
 TEST(Listener, AnAddressThatIsNotHereIsUnavailable) {
   for (const char* endpoint : {"tcp://192.0.2.1:5555", "tcp://no-such-interface0:5555"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_FALSE(listener) << endpoint;
-    EXPECT_EQ(listener.error().code, ErrorCode::kUnavailable) << endpoint;
+    SCOPED_TRACE(endpoint);
+    refusal_of(Listener::open(endpoint), ErrorCode::kUnavailable);
   }
 }
 
@@ -43,8 +42,7 @@ TEST(Listener, TheSocketOfAnIpcPathGoesWithIt) {
   const test_support::TemporaryFolder folder;
   const auto path = folder / "s";
   {
-    const auto listener = Listener::open("ipc://" + path.string());
-    ASSERT_TRUE(listener) << listener.error().message;
+    const auto listener = value_or_fail(Listener::open("ipc://" + path.string()));
     EXPECT_TRUE(std::filesystem::is_socket(path));
   }
   EXPECT_FALSE(std::filesystem::exists(path));

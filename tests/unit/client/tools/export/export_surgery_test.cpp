@@ -245,8 +245,7 @@ TEST_F(ExportSurgery, AnUnusableUpdateSaysSoInEveryNameAndHeader) {
   options.choice = {.sequence = 3};
   expect_refused(ErrorCode::kInvalidArgument, "update 3 is unusable (volume_lost)");
   options.choice.allow_unusable = true;
-  const auto made = export_surgery(options);
-  ASSERT_TRUE(made) << made.error().message;
+  value_or_fail(export_surgery(options));
   for (const std::string& name : names(options.out)) {
     EXPECT_THAT(name, testing::AnyOf(StartsWith("unusable-"), "export.json"));
   }

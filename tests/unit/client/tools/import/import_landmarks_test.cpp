@@ -78,8 +78,7 @@ class ImportLandmarks : public testing::Test {
 
 TEST_F(ImportLandmarks, PairsBecomeOneObservation) {
   options.sd_mm = 0.8;
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
+  value_or_fail(import_landmarks(options));
   const Observation observation = made();
   EXPECT_EQ(observation.case_id, "toy");
   EXPECT_EQ(observation.source, "landmarks");

@@ -207,8 +207,7 @@ TEST_F(RegisterPatient, AListOfPairsNeedsNoOther) {
   options.recording.clear();
   options.ras.clear();
   options.fiducials = folder.write("pairs.csv", text);
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
+  value_or_fail(register_patient(options));
   EXPECT_LT(error_mm(), 1e-5);
 }
 
