@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <memory>
 
 #include "common/core/random.hpp"
@@ -12,6 +11,7 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -127,10 +127,11 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     }
     Eigen::MatrixXd innovation = a * prior * a.transpose();
     innovation.diagonal() += noise;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
     DirectPosterior posterior;
-    posterior.mean = shift + prior * (a.transpose() * solver.solve(d - a * shift));
-    posterior.covariance = prior - prior * a.transpose() * solver.solve(a * prior);
+    posterior.mean =
+        shift + prior * (a.transpose() * test_support::solve_positive(innovation, d - a * shift));
+    posterior.covariance =
+        prior - prior * a.transpose() * test_support::solve_positive(innovation, a * prior);
     return posterior;
   }
 };

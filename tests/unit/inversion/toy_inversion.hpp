@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <memory>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/values/sparse_data.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -77,7 +77,7 @@ inline VecX dense_posterior_mean(const PreparedModel& model, const SparseData& d
     c_at.col(j) = flat(model.forward().solve(model.prior().apply(adjoint)));
   }
   const Eigen::MatrixXd s = a * c_at + covariance;
-  return c_at * s.llt().solve(flat(data.displacements));
+  return c_at * test_support::solve_positive(s, flat(data.displacements));
 }
 
 }  // namespace brainshift::inversion

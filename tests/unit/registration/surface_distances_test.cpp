@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
@@ -14,6 +13,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/registration/alignment_data.hpp"
 #include "common/registration/icp.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -228,7 +228,7 @@ Amplitude dilation_shown_by(const SparseData& data) {
     const VecX rows = rows_of(column);
     covariance += rows * rows.transpose();
   }
-  const VecX whitened = covariance.ldlt().solve(signal);
+  const VecX whitened = test_support::solve_positive(covariance, signal);
   return {whitened.dot(seen) / whitened.dot(signal), 1.0 / std::sqrt(whitened.dot(signal))};
 }
 
@@ -322,7 +322,7 @@ VecX toy_inversion(const SparseData& data) {
     normal += weight * row * row.transpose();
     right += weight * n.dot(data.displacements.col(i)) * row;
   }
-  return normal.ldlt().solve(right);
+  return test_support::solve_positive(normal, right);
 }
 
 TEST(TumourDistances, AndAnInversionInTurnFindTheDeformedSurfaceAndSettle) {

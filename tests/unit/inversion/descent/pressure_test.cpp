@@ -3,12 +3,11 @@
 // elasticity.
 #include <gmock/gmock.h>
 
-#include <Eigen/LU>
-
 #include "common/contact/penalised_system.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
@@ -110,7 +109,7 @@ VecX direct_mean(const PreparedModel& model, const SparseData& data,
                  const contact::ActiveSet& active) {
   const fem::DofMap& dofs = model.forward().dofs();
   const int n = patient()->mesh.num_nodes();
-  const Eigen::MatrixXd inverse = dense_stiffness(model, active).inverse();
+  const Eigen::MatrixXd inverse = test_support::inverse(dense_stiffness(model, active));
   const auto response = [&](const VecX& force) {
     return flat(dofs.expand(
         inverse * dofs.restrict_to(Points(Eigen::Map<const Points>(force.data(), 3, n)))));

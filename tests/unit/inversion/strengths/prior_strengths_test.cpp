@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 
 namespace brainshift::inversion {
@@ -86,10 +86,9 @@ double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
   MatrixXd covariance =
       problem.jacobian * sd.cwiseAbs2().asDiagonal() * problem.jacobian.transpose();
   covariance.diagonal().array() += 1.0;
-  const Eigen::LLT<MatrixXd> factor(covariance);
-  const MatrixXd lower = factor.matrixL();
-  return log_prior - 0.5 * problem.data.dot(factor.solve(problem.data)) -
-         lower.diagonal().array().log().sum();
+  return log_prior -
+         0.5 * problem.data.dot(test_support::solve_positive(covariance, problem.data).col(0)) -
+         test_support::cholesky_factor(covariance).diagonal().array().log().sum();
 }
 
 PriorStrengths fitted(const Problem& problem, bool estimate = true) {
@@ -205,7 +204,7 @@ void expect_moments_of_the_mixture(const Problem& problem, PriorStrengths result
     const VecX sd = prior_sd_with(each.scales, floored, floor);
     MatrixXd inner = sd.asDiagonal() * problem.gram() * sd.asDiagonal();
     inner.diagonal().array() += 1.0;
-    const MatrixXd covariance = sd.asDiagonal() * inner.inverse() * sd.asDiagonal();
+    const MatrixXd covariance = sd.asDiagonal() * test_support::inverse(inner) * sd.asDiagonal();
     const VecX m = covariance * problem.right();
     if (most_probable.size() == 0) most_probable = m;
     mean += each.weight * m;

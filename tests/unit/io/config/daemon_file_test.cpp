@@ -49,7 +49,9 @@ class DaemonFileKeys : public testing::Test {
   auto reading() {
     return [this](const std::string& text) {
       auto config = read(text);
-      if (!config) EXPECT_THAT(config.error().message, HasSubstr((folder_ / "d.yaml").string()));
+      if (!config) {
+        EXPECT_THAT(config.error().message, HasSubstr((folder_ / "d.yaml").string()));
+      }
       return config;
     };
   }

@@ -98,7 +98,9 @@ TEST_F(KeyFiles, ASecretThatOthersMayReadIsRefusedWithItsMode) {
 TEST_F(KeyFiles, WhatIsNoKeyFileIsRefusedWithItsLineAndWithoutItsSecret) {
   const auto read = [this](const std::string& text) {
     auto pair = read_secret_key(secret(text));
-    if (!pair) EXPECT_THAT(pair.error().message, Not(HasSubstr(kSecret)));
+    if (!pair) {
+      EXPECT_THAT(pair.error().message, Not(HasSubstr(kSecret)));
+    }
     return pair;
   };
   expect_refused(read,

@@ -29,7 +29,9 @@ const char* const kGood = R"(<PlusConfiguration version="2.1">
 Result<PlusConfig> read_plus(const std::string& text) {
   const TemporaryFolder folder;
   auto config = read_plus_config(folder.write("device.xml", text));
-  if (!config) EXPECT_THAT(config.error().message, testing::HasSubstr("device.xml: "));
+  if (!config) {
+    EXPECT_THAT(config.error().message, testing::HasSubstr("device.xml: "));
+  }
   return config;
 }
 

@@ -81,7 +81,9 @@ Result<VoxelImage> read(const std::string& content, const LabelChoice& choice = 
 auto reading(const LabelChoice& choice = {}) {
   return [choice](const std::string& content) {
     auto image = read(content, choice);
-    if (!image) EXPECT_THAT(image.error().message, HasSubstr("map.seg.nrrd: "));
+    if (!image) {
+      EXPECT_THAT(image.error().message, HasSubstr("map.seg.nrrd: "));
+    }
     return image;
   };
 }

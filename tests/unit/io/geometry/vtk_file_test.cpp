@@ -251,7 +251,9 @@ class VtuFile : public testing::Test {
   void expect_refusals(std::initializer_list<test_support::BadEdit> cases) {
     const auto read = [this](const std::string& text) {
       auto mesh = read_tet_mesh(folder_.write("m.vtu", text));
-      if (!mesh) EXPECT_THAT(mesh.error().message, HasSubstr("m.vtu: "));
+      if (!mesh) {
+        EXPECT_THAT(mesh.error().message, HasSubstr("m.vtu: "));
+      }
       return mesh;
     };
     expect_edits_refused(read, vtu(VtkEncoding{.name = "", .ascii = true}), cases);

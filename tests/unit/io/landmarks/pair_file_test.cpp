@@ -42,7 +42,9 @@ auto reading_pairs(const std::string& name) {
     const TemporaryFolder folder;
     const auto path = folder.write(name, content);
     auto read = read_pairs(path);
-    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    if (!read) {
+      EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    }
     return read;
   };
 }

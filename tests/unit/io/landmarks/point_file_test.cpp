@@ -52,7 +52,9 @@ auto reading_points(const std::string& name) {
     const TemporaryFolder folder;
     const auto path = folder.write(name, content);
     auto read = read_points(path);
-    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    if (!read) {
+      EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    }
     return read;
   };
 }

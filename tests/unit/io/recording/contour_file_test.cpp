@@ -18,7 +18,9 @@ auto reading_contours(const std::string& name) {
     const TemporaryFolder folder;
     const auto path = folder.write(name, content);
     auto read = read_contours(path, true);
-    if (!read) EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    if (!read) {
+      EXPECT_THAT(read.error().message, testing::StartsWith(path.string() + ": "));
+    }
     return read;
   };
 }
