@@ -12,6 +12,7 @@
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {
@@ -52,9 +53,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
   static CondensedInverter inverter(Boundary boundary, const CondensedOptions& options = {},
                                     const CaseConfig& with = config()) {
     static const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-    auto made = CondensedInverter::build(operators(boundary), locator, with, options);
-    EXPECT_TRUE(made.has_value());
-    return std::move(*made);
+    return value_or_fail(CondensedInverter::build(operators(boundary), locator, with, options));
   }
   // Noisy displacements of the data region's nodes, from a sagging truth with contact.
   static SparseData sagging_data(Boundary boundary, double noise_mm, std::uint64_t seed = 4) {
@@ -63,8 +62,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     const Points load =
         fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                            brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-    const auto truth = model.forward().solve_with_contact(40.0 * load);
-    EXPECT_TRUE(truth.has_value());
+    const auto truth = value_or_fail(model.forward().solve_with_contact(40.0 * load));
     Random random(seed);
     const auto& region = operators(boundary)->region;
     const auto m = static_cast<Eigen::Index>(region.size());
@@ -73,7 +71,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
       const NodeIndex node = region[static_cast<std::size_t>(i)];
       data.positions.col(i) = brain.mesh.nodes.col(node);
       data.displacements.col(i) =
-          truth->displacement.col(node) + noise_mm * random.normal() * random.direction();
+          truth.displacement.col(node) + noise_mm * random.normal() * random.direction();
     }
     return data;
   }

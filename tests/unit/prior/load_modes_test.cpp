@@ -12,6 +12,7 @@
 #include "common/fem/elasticity.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::prior {
@@ -36,9 +37,7 @@ CaseConfig only(double gravity, double tumour, double brain, double weight, doub
 }
 
 LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
-  auto modes = load_modes(patient, config);
-  EXPECT_TRUE(modes.has_value());
-  return std::move(*modes);
+  return value_or_fail(load_modes(patient, config));
 }
 
 TEST(LoadModes, StandInTheOrderOfTheirParts) {
@@ -350,9 +349,7 @@ TEST(LoadModes, ATumourWithoutATetrahedronIsNamed) {
   CaseConfig config = test_support::toy_config();
   config.material.tumour = TissueStiffness{6300.0, 0.45};
   patient.tumour.vertices.colwise() += Vec3(500.0, 0.0, 0.0);
-  const auto modes = load_modes(patient, config);
-  ASSERT_FALSE(modes.has_value());
-  EXPECT_EQ(modes.error().code, ErrorCode::kEmptySet);
+  refusal_of(load_modes(patient, config), ErrorCode::kEmptySet);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {
@@ -31,22 +32,18 @@ CaseConfig drained() {
 }
 
 Estimate condensed_estimate(const PreparedModel& model, const SparseData& data) {
-  auto operators = condense(model);
-  EXPECT_TRUE(operators.has_value()) << operators.error().message;
-  auto inverter = CondensedInverter::build(
-      std::make_shared<const CondensedOperators>(std::move(*operators)),
-      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config(), {});
-  EXPECT_TRUE(inverter.has_value());
+  auto operators = value_or_fail(condense(model));
+  auto inverter = value_or_fail(CondensedInverter::build(
+      std::make_shared<const CondensedOperators>(std::move(operators)),
+      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config(), {}));
   Estimate estimate;
-  const auto status = inverter->update(data, estimate);
+  const auto status = inverter.update(data, estimate);
   EXPECT_TRUE(status.has_value()) << status.error().message;
   return estimate;
 }
 
 Estimate iterated_estimate(const PreparedModel& model, const SparseData& data, Method method) {
-  auto estimate = invert(model, data, method);
-  EXPECT_TRUE(estimate.has_value()) << estimate.error().message;
-  return std::move(*estimate);
+  return value_or_fail(invert(model, data, method));
 }
 
 double relative_difference(const Points& a, const Points& b) {

@@ -9,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -233,9 +234,8 @@ TEST(PriorStrengths, AnotherLinearModelChangesThemOnlyWhereItIsWorthwhile) {
     EXPECT_EQ(result.held(), held);
     ASSERT_EQ(result.refit(two.gram(), two.right(), false), false);
     EXPECT_EQ(result.held(), held) << "loads that nobody descends from again are its own";
-    const auto refitted = result.refit(two.gram(), two.right(), true);
-    ASSERT_TRUE(refitted.has_value());
-    const bool changed = *refitted;
+    const auto refitted = value_or_fail(result.refit(two.gram(), two.right(), true));
+    const bool changed = refitted;
     double gain = 0.0;  // of another strength of one part
     for (const std::size_t g : kPresent) {
       for (const double strength : kStrengths) {
@@ -255,9 +255,8 @@ TEST(PriorStrengths, AnotherLinearModelChangesThemOnlyWhereItIsWorthwhile) {
     Random random(seed);
     for (double& value : again.data) value += 0.7 * random.normal();
     PriorStrengths result = fitted(one);
-    const auto changed = result.refit(again.gram(), again.right(), true);
-    ASSERT_TRUE(changed.has_value());
-    stayed += !*changed && fitted(again).held() != result.held() ? 1 : 0;
+    const auto changed = value_or_fail(result.refit(again.gram(), again.right(), true));
+    stayed += !changed && fitted(again).held() != result.held() ? 1 : 0;
   }
   EXPECT_GT(stayed, 0) << "the test shows nothing";
 }

@@ -10,7 +10,6 @@ namespace brainshift::io {
 namespace {
 
 using test_support::expect_edits_refused;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 
 const char* const kGood = R"(<PlusConfiguration version="2.1">
@@ -37,19 +36,18 @@ Result<PlusConfig> read_plus(const std::string& text) {
 }
 
 TEST(PlusConfig, ReadsTransformsAndReconstruction) {
-  const auto config = read_plus(kGood);
-  ASSERT_TRUE(config) << config.error().message;
-  ASSERT_EQ(config->transforms.size(), 2U);
-  const PlusTransform& image = config->transforms[0];
+  const auto config = value_or_fail(read_plus(kGood));
+  ASSERT_EQ(config.transforms.size(), 2U);
+  const PlusTransform& image = config.transforms[0];
   EXPECT_EQ(image.link.frames.name(), "ImageToProbe");
   EXPECT_TRUE((image.link.T_to_from * Vec3(10, 20, 0)).isApprox(Vec3(2, 6, 3)));
   EXPECT_EQ(image.error, 0.508);
   EXPECT_EQ(image.date, "2011.08.19 14:11:53");
-  EXPECT_FALSE(config->transforms[1].error);
-  ASSERT_TRUE(config->clip);
-  EXPECT_THAT(config->clip->origin_px, testing::ElementsAre(167, 62));
-  EXPECT_THAT(config->clip->size_px, testing::ElementsAre(495, 488));
-  EXPECT_EQ(*config->output_spacing_mm, Vec3(0.5, 0.5, 0.4));
+  EXPECT_FALSE(config.transforms[1].error);
+  ASSERT_TRUE(config.clip);
+  EXPECT_THAT(config.clip->origin_px, testing::ElementsAre(167, 62));
+  EXPECT_THAT(config.clip->size_px, testing::ElementsAre(495, 488));
+  EXPECT_EQ(*config.output_spacing_mm, Vec3(0.5, 0.5, 0.4));
 }
 
 TEST(PlusConfig, NamesTransformAndAttributeThatAreWrong) {
