@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "common/core/types.hpp"
@@ -29,6 +31,18 @@ struct TriangleSurface {
 
   int num_vertices() const { return static_cast<int>(vertices.cols()); }
   int num_triangles() const { return static_cast<int>(triangles.cols()); }
+};
+
+// A tetrahedral mesh with the names that its file gives to regions and surfaces.
+// The volume labels are mesh.labels. Triangles have labels of their own (0: none); a triangle
+// that belongs to several groups is listed once per group. Names map to labels. A label without a
+// name is called by its number.
+struct GroupedMesh {
+  TetMesh mesh;
+  Eigen::Matrix<int, 3, Eigen::Dynamic> triangles;  // mesh nodes, in either orientation
+  std::vector<int> triangle_labels;
+  std::map<std::string, int> volume_names;
+  std::map<std::string, int> surface_names;
 };
 
 // Of a regular grid: how many nodes or voxels it has, and the place of (i, j, k) among its values,

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/configuration/problem_spec.hpp"
-#include "common/core/grouped_mesh.hpp"
+#include "common/core/mesh.hpp"
 #include "common/forward/forward_problem.hpp"
 
 namespace brainshift::forward {

@@ -39,9 +39,10 @@ class Evidence {
   // they are not used, for Update::left_out; empty when there was none.
   std::vector<Omission> drop_quarantined(const std::string& source, std::int64_t now_ns);
 
-  // Precondition: the source has observed, and was not dropped.
-  const RegisteredObservation& newest(const std::string& source) const {
-    return newest_.at(source);
+  // nullptr: the source has not observed, or was dropped.
+  const RegisteredObservation* newest(const std::string& source) const {
+    const auto found = newest_.find(source);
+    return found == newest_.end() ? nullptr : &found->second;
   }
 
  private:

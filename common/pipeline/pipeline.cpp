@@ -71,10 +71,11 @@ Result<Update> Pipeline::run(const Observation& observation, const RunOptions& o
     evidence_.quarantine(observation.source);
   }
   for (SourceSummary& summary : estimate.sources) {
-    const RegisteredObservation& used = evidence_.newest(summary.source);
-    summary.observation_sequence = used.sequence;
-    summary.outliers += used.outliers;
-    summary.age_s = 1e-9 * static_cast<double>(observation.acquired_ns - used.acquired_ns);
+    const RegisteredObservation* used = evidence_.newest(summary.source);
+    if (used == nullptr) continue;
+    summary.observation_sequence = used->sequence;
+    summary.outliers += used->outliers;
+    summary.age_s = 1e-9 * static_cast<double>(observation.acquired_ns - used->acquired_ns);
   }
   if (const auto errors = inverter_->omission_errors()) {
     append(inversion_omissions(config_, update.boundary, *errors, estimate.contact.active), update);

@@ -114,9 +114,7 @@ class AblatedPatient {
     CaseConfig config = plan_.config;
     config.condensed.deadline_ms = evidence::kNoDeadline_ms;
     if (own) part.variant.change(config);
-    bench::MeshWish wish;
-    wish.name = config.case_id;
-    wish.thousand_nodes = plan_.thousand_nodes;
+    const bench::MeshWish wish{config.case_id, plan_.thousand_nodes};
     auto head = bench::make_head(std::move(config), wish);
     if (!head) return tl::unexpected(head.error());
     stage.emplace(std::move(*head), plan_.patient);

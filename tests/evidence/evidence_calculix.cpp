@@ -60,9 +60,7 @@ Result<Twin> make_twin(const Arguments& arguments) {
   const std::string name = "patient-" + std::to_string(arguments.patient);
   auto config = surgeries::read_head(arguments.cases / (name + ".yaml"));
   if (!config) return tl::unexpected(config.error());
-  bench::MeshWish wish;
-  wish.name = name;
-  wish.thousand_nodes = arguments.thousand_nodes;
+  const bench::MeshWish wish{name, arguments.thousand_nodes};
   if (Status ok = bench::scale_edges(*config, wish); !ok) return tl::unexpected(ok.error());
   const auto inputs = io::load_case_inputs(*config);
   if (!inputs) return tl::unexpected(inputs.error());

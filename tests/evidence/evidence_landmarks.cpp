@@ -49,9 +49,7 @@ Status run(const Arguments& arguments) {
   if (!pairs) return tl::unexpected(pairs.error());
   const auto config = surgeries::read_head(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
-  bench::MeshWish wish;
-  wish.name = config->case_id;
-  wish.thousand_nodes = arguments.thousand_nodes;
+  const bench::MeshWish wish{config->case_id, arguments.thousand_nodes};
   const auto head = bench::make_head(*config, wish);
   if (!head) return tl::unexpected(head.error());
   const Stopwatch watch;

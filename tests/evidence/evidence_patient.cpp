@@ -60,9 +60,7 @@ class Patient {
 }  // namespace
 
 Status play_patient(const PatientPlan& plan, surgeries::RowFile& rows, const Told& told) {
-  bench::MeshWish wish;
-  wish.name = plan.config.case_id;
-  wish.thousand_nodes = plan.thousand_nodes;
+  const bench::MeshWish wish{plan.config.case_id, plan.thousand_nodes};
   CaseConfig config = plan.config;
   config.condensed.deadline_ms = kNoDeadline_ms;
   const auto head = bench::make_head(config, wish);

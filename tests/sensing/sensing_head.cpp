@@ -15,9 +15,7 @@ Result<bench::Head> make_default_head(double thousand_nodes) {
   linalg::use_single_threaded_blas();
   auto config = io::read_case_config(BRAINSHIFT_DEFAULT_CASE);
   if (!config) return tl::unexpected(config.error());
-  bench::MeshWish wish;
-  wish.name = "sensing";
-  wish.thousand_nodes = thousand_nodes;
+  const bench::MeshWish wish{"sensing", thousand_nodes};
   auto head = bench::make_head(std::move(*config), wish);
   if (head) {
     std::printf("head: %d nodes, %zu slaves, prepared in %.1f s\n", head->model->mesh.num_nodes(),

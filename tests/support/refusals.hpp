@@ -9,18 +9,9 @@
 #include <string>
 
 #include "common/core/error.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::test_support {
-
-// The sentence with which something was refused, by an error of this code; "" and a failure
-// otherwise.
-template <typename T>
-std::string refusal_of(const Result<T>& result, ErrorCode code = ErrorCode::kUnreadable) {
-  EXPECT_FALSE(result);
-  if (result) return {};
-  EXPECT_EQ(to_string(result.error().code), to_string(code)) << result.error().message;
-  return result.error().message;
-}
 
 // `text` with the first `from` in it replaced.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {

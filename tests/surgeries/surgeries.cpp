@@ -73,9 +73,7 @@ Status run_place(const Arguments& arguments, const CaseConfig& config, const Tet
   if (!patient) return tl::unexpected(patient.error());
   const auto& tumour = std::get<TumourEllipsoid>(patient->tumour);
   const Stopwatch watch;
-  bench::MeshWish wish;
-  wish.name = patient->case_id;
-  wish.thousand_nodes = arguments.thousand_nodes;
+  const bench::MeshWish wish{patient->case_id, arguments.thousand_nodes};
   const auto head = bench::make_head(*patient, wish);
   if (!head) return tl::unexpected(head.error());
   std::fprintf(stderr,

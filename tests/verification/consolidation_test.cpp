@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "common/linalg/cholesky.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/study_record.hpp"
 #include "tests/verification/poro_column.hpp"
 
@@ -69,16 +70,15 @@ Course centre_course(int cells, double poisson_ratio) {
   dofs.finalise();
   BiotLoad load;
   load.force = pressure_load(make_space(mesh, Element::kP1), faces_of(mesh, drained), kLoad);
-  auto stepper =
-      BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs, drained);
-  EXPECT_TRUE(stepper.has_value());
+  auto stepper = value_or_fail(
+      BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs, drained));
   BiotState state = BiotState::at_rest(mesh.num_nodes());
   const double scale_s = kRadius * kRadius / consolidation_coefficient(material);
   const std::string name = std::to_string(cells) + " cells";
   Course course;
   double time = 0.0;
   for (const double until : {0.005, 0.02, 0.04, 0.07, 0.12, 0.2, 0.35}) {
-    advance(*stepper, state, load, (until - time) / 30.0 * scale_s, 30);
+    advance(stepper, state, load, (until - time) / 30.0 * scale_s, 30);
     time = until;
     const double centre = state.pressure[0] / kLoad;
     const double exact = cryer_series(poisson_ratio, time);
@@ -167,10 +167,8 @@ class Slab {
       if (x[1] == 0.0 && x[2] == 0.0) axis_.push_back(n);
     }
     dofs.finalise();
-    auto built =
-        BiotStepper::build(mesh_, MaterialMap::uniform(material, mesh_.num_tets()), dofs, drained);
-    EXPECT_TRUE(built.has_value());
-    stepper_.push_back(std::move(*built));
+    stepper_.push_back(value_or_fail(BiotStepper::build(
+        mesh_, MaterialMap::uniform(material, mesh_.num_tets()), dofs, drained)));
     state_ = BiotState::at_rest(mesh_.num_nodes());
   }
 
@@ -390,21 +388,21 @@ TEST(Terzaghi, LongAfterTheLoadItIsDrainedElasticity) {
   dofs.finalise();
   BiotLoad load;
   load.force = Points::Constant(3, mesh.num_nodes(), 1e-4);
-  auto stepper = BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs,
-                                    test_support::nodes_where(mesh, surface));
-  ASSERT_TRUE(stepper.has_value());
+  auto stepper =
+      value_or_fail(BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs,
+                                       test_support::nodes_where(mesh, surface)));
   const double relaxation_s = 100.0 / consolidation_coefficient(material);
-  const auto late = stepper->step(BiotState::at_rest(mesh.num_nodes()), load, 1e10 * relaxation_s);
-  ASSERT_TRUE(late.has_value()) << late.error().message;
-  EXPECT_EQ(stepper->diagnostics().stabilised_tets, 0);
+  const auto late =
+      value_or_fail(stepper.step(BiotState::at_rest(mesh.num_nodes()), load, 1e10 * relaxation_s));
+  EXPECT_EQ(stepper.diagnostics().stabilised_tets, 0);
   const auto factor =
       linalg::SparseCholesky::factorise(assemble_stiffness(mesh, material.elastic, dofs));
   const Points drained = dofs.expand(factor->solve(dofs.restrict_to(load.force)));
   const double difference =
-      (late->displacement - drained).cwiseAbs().maxCoeff() / drained.cwiseAbs().maxCoeff();
+      (late.displacement - drained).cwiseAbs().maxCoeff() / drained.cwiseAbs().maxCoeff();
   EXPECT_TRUE(record_check("drained-limit", "difference to drained elasticity at 1e10 R^2/c_v",
                            difference, "<= 1e-9", difference <= 1e-9, "common/fem/elasticity.hpp"));
-  EXPECT_LT(late->pressure.cwiseAbs().maxCoeff(), 1e-9 * kPressedLoad);
+  EXPECT_LT(late.pressure.cwiseAbs().maxCoeff(), 1e-9 * kPressedLoad);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "common/fem/space_elasticity.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::fem {
 
@@ -60,21 +61,15 @@ struct Column {
     load.force = pressure_load(make_space(mesh, Element::kP1), faces_of(mesh, top), q);
   }
   BiotStepper stepper(const PoroMaterial& material, const BiotOptions& options = {}) const {
-    auto built = BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()), dofs,
-                                    top, options);
-    EXPECT_TRUE(built.has_value());
-    return std::move(*built);
+    return value_or_fail(BiotStepper::build(mesh, MaterialMap::uniform(material, mesh.num_tets()),
+                                            dofs, top, options));
   }
 };
 
 // `steps` equal steps of dt under a constant load.
 inline void advance(BiotStepper& stepper, BiotState& state, const BiotLoad& load, double dt_s,
                     int steps) {
-  for (int i = 0; i < steps; ++i) {
-    auto next = stepper.step(state, load, dt_s);
-    ASSERT_TRUE(next.has_value()) << next.error().message;
-    state = std::move(*next);
-  }
+  for (int i = 0; i < steps; ++i) state = value_or_fail(stepper.step(state, load, dt_s));
 }
 
 }  // namespace brainshift::fem

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/grouped_mesh.hpp"
 #include "common/core/mesh.hpp"
 #include "common/io/geometry/node_field.hpp"
 

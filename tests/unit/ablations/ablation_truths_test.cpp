@@ -2,7 +2,6 @@
 #include "tests/ablations/ablation_patient.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <set>
 

@@ -2,11 +2,11 @@
 #include "tests/ablations/parts.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <set>
 
 #include "common/io/config/config_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/surgeries/study_program.hpp"
 
 namespace brainshift::ablations {
@@ -15,9 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 CaseConfig patient() {
-  auto config = surgeries::read_head(std::string(BRAINSHIFT_CASES) + "/patient-2.yaml");
-  EXPECT_TRUE(config) << config.error().message;
-  return *config;
+  return value_or_fail(surgeries::read_head(std::string(BRAINSHIFT_CASES) + "/patient-2.yaml"));
 }
 
 TEST(Parts, BeginWithTheDefaultAndHaveNamesOfTheirOwn) {
@@ -50,19 +48,15 @@ TEST(Parts, OfTheDataSeeTheTumourAlone) {
 }
 
 TEST(PartsFrom, KeepTheOrderAndHaveTheDefault) {
-  const auto parts = parts_from({"no-medium", "fixed"});
-  ASSERT_TRUE(parts);
-  ASSERT_EQ(parts->size(), 3u);
-  EXPECT_EQ((*parts)[0].variant.name, kDefault);
-  EXPECT_EQ((*parts)[1].variant.name, "fixed");
+  const auto parts = value_or_fail(parts_from({"no-medium", "fixed"}));
+  ASSERT_EQ(parts.size(), 3u);
+  EXPECT_EQ(parts[0].variant.name, kDefault);
+  EXPECT_EQ(parts[1].variant.name, "fixed");
 }
 
 TEST(PartsFrom, NameWhatIsUnknownAndWhatIsKnown) {
-  const auto parts = parts_from({"fixed", "no-luck"});
-  ASSERT_FALSE(parts);
-  EXPECT_EQ(parts.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(parts.error().message, HasSubstr("no-luck"));
-  EXPECT_THAT(parts.error().message, HasSubstr("low-rank"));
+  EXPECT_THAT(refusal_of(parts_from({"fixed", "no-luck"}), ErrorCode::kNotFound),
+              testing::AllOf(HasSubstr("no-luck"), HasSubstr("low-rank")));
 }
 
 }  // namespace

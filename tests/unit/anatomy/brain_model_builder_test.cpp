@@ -15,6 +15,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/values/model_id.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
 namespace brainshift::anatomy {
@@ -147,10 +148,9 @@ TEST(BrainModelBuilder, TumourIsTheEllipsoid) {
   const BrainModel& model = ball_model();
   EXPECT_TRUE(geometry::is_closed(model.tumour));
   EXPECT_NEAR(geometry::enclosed_volume(model.tumour), 4.0 / 3.0 * M_PI * 480.0, 20.0);
-  const auto volume = geometry::DistanceVolume::create(model.tumour_distance);
-  ASSERT_TRUE(volume);
+  const auto volume = value_or_fail(geometry::DistanceVolume::create(model.tumour_distance));
   for (const Vec3 x : model.tumour.vertices.colwise())
-    EXPECT_NEAR(volume->at(x).distance_mm, 0.0, 0.05);
+    EXPECT_NEAR(volume.at(x).distance_mm, 0.0, 0.05);
 }
 
 TEST(BrainModelBuilder, TumourOfThePaperHasAboutItsNumberOfPoints) {
@@ -274,34 +274,31 @@ TEST(BrainModelBuilder, ReportsProgressUpToTheEnd) {
 // The coarse default case on a real head (Colin27, from Debian's mricron-data).
 
 TEST(RealHead, CoarseDefaultCaseGivesAWholeModel) {
-  const auto config = io::read_case_config(
-      std::filesystem::path(BRAINSHIFT_SOURCE_DIR "/config/cases") / "colin27-coarse.yaml");
-  ASSERT_TRUE(config) << config.error().message;
-  const auto inputs = io::load_case_inputs(*config);
-  ASSERT_TRUE(inputs) << inputs.error().message;
-  const auto model = build_brain_model(*inputs);
-  ASSERT_TRUE(model) << model.error().message;
+  const auto config = value_or_fail(io::read_case_config(
+      std::filesystem::path(BRAINSHIFT_SOURCE_DIR "/config/cases") / "colin27-coarse.yaml"));
+  const auto inputs = value_or_fail(io::load_case_inputs(config));
+  const auto model = value_or_fail(build_brain_model(inputs));
 
-  const geometry::MeshQuality quality = geometry::mesh_quality(model->mesh);
+  const geometry::MeshQuality quality = geometry::mesh_quality(model.mesh);
   // 1,736,387 voxels of 1 mm^3; smoothing and 12 mm facets may change 3 %.
   EXPECT_NEAR(quality.volume_mm3, 1736387.0, 0.03 * 1736387.0);
   EXPECT_NEAR(quality.mean_edge_mm, 12.0, 1.2);
   EXPECT_GT(quality.min_dihedral_deg, 10.0);
-  const TriangleSurface brain = geometry::boundary_surface(model->mesh);
+  const TriangleSurface brain = geometry::boundary_surface(model.mesh);
   EXPECT_TRUE(geometry::is_closed(brain));
-  EXPECT_EQ(model->craniotomy.size() + model->brainstem.size() + model->slaves.size() +
-                model->fixed.size(),
-            static_cast<std::size_t>(brain.num_vertices()));
-  EXPECT_GE(model->craniotomy.size(), 5u);  // 45 x 24 mm over 12 mm edges
-  EXPECT_NEAR(geometry::enclosed_volume(model->tumour), 10990.0, 60.0);
+  EXPECT_EQ(
+      model.craniotomy.size() + model.brainstem.size() + model.slaves.size() + model.fixed.size(),
+      static_cast<std::size_t>(brain.num_vertices()));
+  EXPECT_GE(model.craniotomy.size(), 5u);  // 45 x 24 mm over 12 mm edges
+  EXPECT_NEAR(geometry::enclosed_volume(model.tumour), 10990.0, 60.0);
 
   // The craniotomy is on the right; slaves lie above the second plane, fixed nodes below it.
-  for (const NodeIndex node : model->craniotomy) EXPECT_GT(model->mesh.nodes(0, node), 50.0);
+  for (const NodeIndex node : model.craniotomy) EXPECT_GT(model.mesh.nodes(0, node), 50.0);
   const auto depth = [&](NodeIndex node) {
-    return model->mesh.nodes.col(node).dot(model->gravity_direction);
+    return model.mesh.nodes.col(node).dot(model.gravity_direction);
   };
-  for (const NodeIndex node : model->slaves) EXPECT_LT(depth(node), model->slave_plane_depth_mm);
-  for (const NodeIndex node : model->fixed) EXPECT_GE(depth(node), model->slave_plane_depth_mm);
+  for (const NodeIndex node : model.slaves) EXPECT_LT(depth(node), model.slave_plane_depth_mm);
+  for (const NodeIndex node : model.fixed) EXPECT_GE(depth(node), model.slave_plane_depth_mm);
 }
 
 }  // namespace

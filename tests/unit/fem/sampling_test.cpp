@@ -5,6 +5,7 @@
 
 #include "common/core/random.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::fem {
 namespace {
@@ -19,10 +20,9 @@ TEST(SamplingMatrix, ReproducesALinearField) {
   for (int i = 0; i < points.cols(); ++i) {
     points.col(i) = 30.0 * Vec3(random.uniform(), random.uniform(), random.uniform());
   }
-  const auto sampling = sampling_matrix(locator, mesh.num_nodes(), points, 0.0);
-  ASSERT_TRUE(sampling.has_value()) << sampling.error().message;
+  const auto sampling = value_or_fail(sampling_matrix(locator, mesh.num_nodes(), points, 0.0));
   const Points field = gradient * mesh.nodes;
-  const Points sampled = (*sampling * field.transpose()).transpose();
+  const Points sampled = (sampling * field.transpose()).transpose();
   EXPECT_LT((sampled - gradient * points).cwiseAbs().maxCoeff(), 1e-11);
 }
 
@@ -32,10 +32,9 @@ TEST(SamplingMatrix, NamesThePointThatLiesOutside) {
   Points points(3, 2);
   points << 15, 15, 15, 15, 15, 37;
   EXPECT_TRUE(sampling_matrix(locator, mesh.num_nodes(), points, 8.0).has_value());
-  const auto refused = sampling_matrix(locator, mesh.num_nodes(), points, 5.0);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_NE(refused.error().message.find("point 1"), std::string::npos) << refused.error().message;
+  EXPECT_THAT(refusal_of(sampling_matrix(locator, mesh.num_nodes(), points, 5.0),
+                         ErrorCode::kInvalidArgument),
+              testing::HasSubstr("point 1"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -17,9 +18,7 @@ namespace {
 const Vec3 kCentre(35, -45, 20);
 
 ClosestPointIndex voxel_index_of(const TriangleSurface& surface) {
-  auto index = ClosestPointIndex::build(surface);
-  EXPECT_TRUE(index.has_value());
-  return std::move(*index);
+  return value_or_fail(ClosestPointIndex::build(surface));
 }
 
 // Not convex: two thirds of a waist around the middle.
@@ -59,22 +58,21 @@ TEST(SignedDistanceGrid, NodesAreExactNearTheSurfaceAndHardlyTooFarElsewhere) {
     DistanceGridOptions options;
     options.spacing_mm = 0.73;
     options.margin_mm = 9.0;
-    const auto grid = signed_distance_grid(index, options);
-    ASSERT_TRUE(grid);
-    EXPECT_EQ(grid->values.size(), grid->num_nodes());
+    const auto grid = value_or_fail(signed_distance_grid(index, options));
+    EXPECT_EQ(grid.values.size(), grid.num_nodes());
     Random random(3);
     double worst_near = 0.0, worst_far = 0.0;
     int inside = 0;
     for (int repetition = 0; repetition < 6000; ++repetition) {
       const auto pick = [&](int axis) {
         return static_cast<int>(
-            random.index(static_cast<std::uint64_t>(grid->dims[static_cast<std::size_t>(axis)])));
+            random.index(static_cast<std::uint64_t>(grid.dims[static_cast<std::size_t>(axis)])));
       };
       const int i = pick(0), j = pick(1), k = pick(2);
-      const double truth = signed_distance(index, grid->node(i, j, k));
-      const double error = std::abs(grid->values[grid->index(i, j, k)]) - std::abs(truth);
+      const double truth = signed_distance(index, grid.node(i, j, k));
+      const double error = std::abs(grid.values[grid.index(i, j, k)]) - std::abs(truth);
       if (std::abs(truth) > 1e-6) {
-        ASSERT_EQ(grid->values[grid->index(i, j, k)] < 0.0f, truth < 0.0)
+        ASSERT_EQ(grid.values[grid.index(i, j, k)] < 0.0f, truth < 0.0)
             << i << ' ' << j << ' ' << k;
       }
       inside += truth < 0.0 ? 1 : 0;
@@ -92,24 +90,22 @@ TEST(SignedDistanceGrid, SameBitsWhateverTheNumberOfThreads) {
   const ClosestPointIndex index = voxel_index_of(peanut(2.0));
   DistanceGridOptions options;
   options.threads = 1;
-  const auto one = signed_distance_grid(index, options);
+  const auto one = value_or_fail(signed_distance_grid(index, options));
   options.threads = 3;
-  const auto three = signed_distance_grid(index, options);
-  ASSERT_TRUE(one && three);
-  EXPECT_EQ(one->values, three->values);
+  const auto three = value_or_fail(signed_distance_grid(index, options));
+  EXPECT_EQ(one.values, three.values);
 }
 
 TEST(SignedDistanceGrid, SpacingGrowsUntilTheNodesFit) {
   const ClosestPointIndex index = voxel_index_of(peanut(3.0));
   DistanceGridOptions options;
   options.max_nodes = 20000;
-  const auto grid = signed_distance_grid(index, options);
-  ASSERT_TRUE(grid);
-  EXPECT_LE(grid->num_nodes(), 20000u);
-  EXPECT_GT(grid->num_nodes(), 10000u);
-  EXPECT_GT(grid->spacing_mm, 0.5);
+  const auto grid = value_or_fail(signed_distance_grid(index, options));
+  EXPECT_LE(grid.num_nodes(), 20000u);
+  EXPECT_GT(grid.num_nodes(), 10000u);
+  EXPECT_GT(grid.spacing_mm, 0.5);
   EXPECT_LT(signed_distance(index, kCentre), 0.0);
-  EXPECT_LT(DistanceVolume::create(*grid)->at(kCentre).distance_mm, 0.0);
+  EXPECT_LT(DistanceVolume::create(grid)->at(kCentre).distance_mm, 0.0);
 }
 
 TEST(SignedDistanceGrid, RejectsOpenSurfacesAndOptionsOutOfRange) {
@@ -117,10 +113,8 @@ TEST(SignedDistanceGrid, RejectsOpenSurfacesAndOptionsOutOfRange) {
   open.triangles.conservativeResize(3, open.num_triangles() - 1);
   const auto refused = [](const ClosestPointIndex& index, const DistanceGridOptions& options,
                           const std::string& naming) {
-    const auto grid = signed_distance_grid(index, options);
-    ASSERT_FALSE(grid);
-    EXPECT_EQ(grid.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_NE(grid.error().message.find(naming), std::string::npos) << grid.error().message;
+    EXPECT_THAT(refusal_of(signed_distance_grid(index, options), ErrorCode::kInvalidArgument),
+                testing::HasSubstr(naming));
   };
   refused(voxel_index_of(open), {}, "is not closed");
   const ClosestPointIndex index = voxel_index_of(peanut(3.0));
@@ -146,14 +140,14 @@ TEST(DistanceVolume, InterpolationErrorFallsWithTheSquareOfTheSpacing) {
     DistanceGridOptions options;
     options.spacing_mm = spacing;
     options.margin_mm = 6.0;
-    const auto volume = DistanceVolume::create(*signed_distance_grid(index, options));
-    ASSERT_TRUE(volume);
+    const auto volume =
+        value_or_fail(DistanceVolume::create(*signed_distance_grid(index, options)));
     Random random(4);
     double worst = 0.0;
     for (int i = 0; i < 5000; ++i) {
       const double r = radius + 2.0 * (2.0 * random.uniform() - 1.0);
       const Vec3 x = kCentre + r * random.direction();
-      worst = std::max(worst, std::abs(volume->at(x).distance_mm - (r - radius)));
+      worst = std::max(worst, std::abs(volume.at(x).distance_mm - (r - radius)));
     }
     const double chord = edge * edge / (8.0 * radius) * 2.0;
     EXPECT_LT(worst, spacing * spacing / (4.0 * (radius - 2.0)) + chord);
@@ -168,14 +162,13 @@ TEST(DistanceVolume, InterpolationErrorFallsWithTheSquareOfTheSpacing) {
 TEST(DistanceVolume, DefaultSpacingErrsByHundredthsOfAMillimetre) {
   const TriangleSurface surface = ellipsoid_surface(kCentre, Vec3(18, 13, 9), 0.75);
   const ClosestPointIndex index = voxel_index_of(surface);
-  const auto volume = DistanceVolume::create(*signed_distance_grid(index));
-  ASSERT_TRUE(volume);
+  const auto volume = value_or_fail(DistanceVolume::create(*signed_distance_grid(index)));
   Random random(5);
   double worst = 0.0, sum_of_squares = 0.0;
   const Points on_surface = sample_surface(surface, 4000, 5);
   for (const Vec3 p : on_surface.colwise()) {
     const Vec3 x = p + 1.0 * random.uniform() * random.direction();
-    const double error = volume->at(x).distance_mm - signed_distance(index, x);
+    const double error = volume.at(x).distance_mm - signed_distance(index, x);
     worst = std::max(worst, std::abs(error));
     sum_of_squares += error * error;
   }
@@ -184,20 +177,20 @@ TEST(DistanceVolume, DefaultSpacingErrsByHundredthsOfAMillimetre) {
 }
 
 TEST(DistanceVolume, GradientIsThatOfTheInterpolant) {
-  const auto volume = DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(1.5))));
-  ASSERT_TRUE(volume);
+  const auto volume =
+      value_or_fail(DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(1.5)))));
   Random random(6);
-  const double step = 1e-5, h = volume->grid().spacing_mm;
+  const double step = 1e-5, h = volume.grid().spacing_mm;
   int compared = 0;
   for (int i = 0; i < 500; ++i) {
     const Vec3 x = kCentre + 20.0 * random.uniform() * random.direction();
-    const Vec3 cells = (x - volume->grid().origin_mm) / h;
+    const Vec3 cells = (x - volume.grid().origin_mm) / h;
     if (((cells - cells.array().round().matrix()).array().abs() < 2.0 * step / h).any()) continue;
-    const DistanceSample here = volume->at(x);
+    const DistanceSample here = volume.at(x);
     for (int axis = 0; axis < 3; ++axis) {
       const Vec3 dx = step * Vec3::Unit(axis);
       const double slope =
-          (volume->at(x + dx).distance_mm - volume->at(x - dx).distance_mm) / (2.0 * step);
+          (volume.at(x + dx).distance_mm - volume.at(x - dx).distance_mm) / (2.0 * step);
       EXPECT_NEAR(slope, here.gradient[axis], 1e-6);
     }
     EXPECT_GT(here.gradient.norm(), 0.3);
@@ -211,35 +204,34 @@ TEST(DistanceVolume, GoesOnOutsideTheGrid) {
   const ClosestPointIndex index = voxel_index_of(surface);
   DistanceGridOptions options;
   options.margin_mm = 5.0;
-  const auto volume = DistanceVolume::create(*signed_distance_grid(index, options));
-  ASSERT_TRUE(volume);
+  const auto volume = value_or_fail(DistanceVolume::create(*signed_distance_grid(index, options)));
   Random random(7);
   for (int i = 0; i < 500; ++i) {
     const Vec3 x = kCentre + (40.0 + 60.0 * random.uniform()) * random.direction();
-    const DistanceSample sample = volume->at(x);
+    const DistanceSample sample = volume.at(x);
     const ClosestPoint closest = index.closest(x);
     EXPECT_NEAR(sample.distance_mm, closest.distance_mm, 0.1 * closest.distance_mm);
     EXPECT_GT(sample.gradient.dot(x - closest.point) / closest.distance_mm, 0.9);
   }
   // Continuous where the grid ends.
-  const double h = volume->grid().spacing_mm;
-  const Vec3 rim = volume->grid().origin_mm + h * Vec3(0.0, 20.3, 20.6);
-  EXPECT_NEAR(volume->at(rim - Vec3(1e-7, 0, 0)).distance_mm,
-              volume->at(rim + Vec3(1e-7, 0, 0)).distance_mm, 1e-6);
-  EXPECT_TRUE(std::isfinite(volume->at(Vec3(1e9, -1e9, 1e9)).distance_mm));
+  const double h = volume.grid().spacing_mm;
+  const Vec3 rim = volume.grid().origin_mm + h * Vec3(0.0, 20.3, 20.6);
+  EXPECT_NEAR(volume.at(rim - Vec3(1e-7, 0, 0)).distance_mm,
+              volume.at(rim + Vec3(1e-7, 0, 0)).distance_mm, 1e-6);
+  EXPECT_TRUE(std::isfinite(volume.at(Vec3(1e9, -1e9, 1e9)).distance_mm));
 }
 
 TEST(DistanceVolume, ManyPointsAreTheSameAsOneByOne) {
-  const auto volume = DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(3.0))));
-  ASSERT_TRUE(volume);
+  const auto volume =
+      value_or_fail(DistanceVolume::create(*signed_distance_grid(voxel_index_of(peanut(3.0)))));
   Random random(8);
   PointRows points(50, 3), gradients(50, 3);
   VecX distances(50);
   for (int i = 0; i < 50; ++i)
     points.row(i) = kCentre + 60.0 * random.uniform() * random.direction();
-  volume->at(points, distances, gradients);
+  volume.at(points, distances, gradients);
   for (int i = 0; i < 50; ++i) {
-    const DistanceSample sample = volume->at(Vec3(points.row(i)));
+    const DistanceSample sample = volume.at(Vec3(points.row(i)));
     EXPECT_EQ(distances[i], sample.distance_mm);
     EXPECT_EQ(Vec3(gradients.row(i)), sample.gradient);
   }
@@ -252,10 +244,7 @@ TEST(DistanceVolume, RejectsGridsThatDoNotFit) {
   good.values.assign(12, 1.0f);
   ASSERT_TRUE(DistanceVolume::create(good));
   const auto refused = [](const DistanceGrid& grid, ErrorCode code, const std::string& naming) {
-    const auto volume = DistanceVolume::create(grid);
-    ASSERT_FALSE(volume);
-    EXPECT_EQ(volume.error().code, code);
-    EXPECT_NE(volume.error().message.find(naming), std::string::npos) << volume.error().message;
+    EXPECT_THAT(refusal_of(DistanceVolume::create(grid), code), testing::HasSubstr(naming));
   };
   refused({}, ErrorCode::kEmptySet, "no values");
   DistanceGrid grid = good;

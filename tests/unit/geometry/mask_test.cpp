@@ -10,6 +10,7 @@
 #include <queue>
 #include <random>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::geometry {
@@ -101,9 +102,8 @@ TEST(LargestComponent, AgreesWithBreadthFirstSearchOnNoise) {
     VoxelImage image = image_of(17, 13, 11);
     for (float& value : image.values)
       value = random() % 100 < percent ? static_cast<float>(1 + random() % 200) : 0.0f;
-    const auto result = largest_component(image);
-    ASSERT_TRUE(result);
-    EXPECT_EQ(result->values, largest_component_by_definition(image)) << percent << " %";
+    const auto result = value_or_fail(largest_component(image));
+    EXPECT_EQ(result.values, largest_component_by_definition(image)) << percent << " %";
   }
 }
 
@@ -112,12 +112,11 @@ TEST(LargestComponent, DropsSmallerComponentsAndKeepsTheFrame) {
   image.T_ras_voxel = Eigen::Translation3d(4, 5, 6);
   fill_box(image, {0, 0, 0}, {2, 2, 2}, 7.0f);
   fill_box(image, {5, 3, 3}, {8, 6, 6}, 3.0f);
-  const auto result = largest_component(image);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(sum(*result), 27.0);
-  EXPECT_EQ(result->at(5, 3, 3), 1.0f);
-  EXPECT_EQ(result->at(0, 0, 0), 0.0f);
-  EXPECT_EQ(result->T_ras_voxel.matrix(), image.T_ras_voxel.matrix());
+  const auto result = value_or_fail(largest_component(image));
+  EXPECT_EQ(sum(result), 27.0);
+  EXPECT_EQ(result.at(5, 3, 3), 1.0f);
+  EXPECT_EQ(result.at(0, 0, 0), 0.0f);
+  EXPECT_EQ(result.T_ras_voxel.matrix(), image.T_ras_voxel.matrix());
 }
 
 TEST(LargestComponent, DiagonalNeighboursAreNotConnected) {
@@ -125,9 +124,8 @@ TEST(LargestComponent, DiagonalNeighboursAreNotConnected) {
   fill_box(image, {1, 1, 1}, {3, 3, 3}, 1.0f);
   voxel(image, 3, 3, 2) = 1.0f;  // shares an edge with the cube
   voxel(image, 3, 3, 3) = 1.0f;
-  const auto result = largest_component(image);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(sum(*result), 8.0);
+  const auto result = value_or_fail(largest_component(image));
+  EXPECT_EQ(sum(result), 8.0);
 }
 
 TEST(LargestComponent, FillsCavitiesAndWhatFloatsInThem) {
@@ -135,41 +133,34 @@ TEST(LargestComponent, FillsCavitiesAndWhatFloatsInThem) {
   fill_box(image, {1, 1, 1}, {8, 8, 8}, 1.0f);
   fill_box(image, {3, 3, 3}, {6, 6, 6}, 0.0f);
   voxel(image, 4, 4, 4) = 1.0f;
-  const auto result = largest_component(image);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(sum(*result), 343.0);
+  const auto result = value_or_fail(largest_component(image));
+  EXPECT_EQ(sum(result), 343.0);
 }
 
 TEST(LargestComponent, LeavesATunnelToTheOutsideOpen) {
   VoxelImage image = image_of(9, 9, 9);
   fill_box(image, {1, 1, 1}, {8, 8, 8}, 1.0f);
   fill_box(image, {4, 4, 4}, {5, 5, 9}, 0.0f);
-  const auto result = largest_component(image);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(sum(*result), 343.0 - 4.0);
+  const auto result = value_or_fail(largest_component(image));
+  EXPECT_EQ(sum(result), 343.0 - 4.0);
 }
 
 TEST(LargestComponent, OfEqualComponentsTheFirstWins) {
   VoxelImage image = image_of(7, 1, 1);
   image.values = {0, 1, 1, 0, 1, 1, 0};
-  const auto result = largest_component(image);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->values, (std::vector<float>{0, 1, 1, 0, 0, 0, 0}));
+  const auto result = value_or_fail(largest_component(image));
+  EXPECT_EQ(result.values, (std::vector<float>{0, 1, 1, 0, 0, 0, 0}));
 }
 
 TEST(LargestComponent, NegativeAndNotANumberAreNotBrain) {
   VoxelImage image = image_of(3, 1, 1);
   image.values = {-1.0f, std::numeric_limits<float>::quiet_NaN(), 0.0f};
-  const auto result = largest_component(image);
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::kEmptySet);
-  EXPECT_NE(result.error().message.find("no voxel"), std::string::npos);
+  EXPECT_THAT(refusal_of(largest_component(image), ErrorCode::kEmptySet),
+              testing::HasSubstr("no voxel"));
 }
 
 TEST(LargestComponent, AnImageWithoutVoxelsIsEmpty) {
-  const auto result = largest_component(VoxelImage{});
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::kEmptySet);
+  refusal_of(largest_component(VoxelImage{}), ErrorCode::kEmptySet);
 }
 
 TEST(GaussianSmooth, TurnsAStepIntoTheNormalDistribution) {

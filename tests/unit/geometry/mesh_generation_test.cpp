@@ -13,6 +13,7 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::geometry {
@@ -27,9 +28,9 @@ SizingField uniform(double edge) {
 // A ball of radius 20 mm, off the origin, in an oblique left-handed frame with 1.5 mm voxels.
 const Ball kBall{Vec3(30, -10, 45), 20.0};
 VoxelImage ball_mask() {
-  return balls::soft_balls(balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2),
-                                              balls::oblique_left_handed(1.5)),
-                           {kBall}, 6.0);
+  return balls::soft_balls(
+      balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2), balls::oblique_left_handed(1.5)),
+      {kBall}, 6.0);
 }
 
 TetMesh meshed(const VoxelImage& mask, const SizingField& edge) {
@@ -93,11 +94,11 @@ TEST(MeshMask, WithoutSliverBoundLeavesOptimisationOut) {
   std::vector<std::string> stages;
   MeshingOptions options;
   options.sliver_bound_deg = 0.0;
-  const auto mesh = mesh_mask(ball_mask(), uniform(4.0), options,
-                              [&](std::string_view stage, double) { stages.emplace_back(stage); });
-  ASSERT_TRUE(mesh) << mesh.error().message;
+  const auto mesh =
+      value_or_fail(mesh_mask(ball_mask(), uniform(4.0), options,
+                              [&](std::string_view stage, double) { stages.emplace_back(stage); }));
   EXPECT_EQ(stages, (std::vector<std::string>{"mesh: refine", "mesh: done"}));
-  EXPECT_LT(mesh_quality(*mesh).min_dihedral_deg, 10.0);  // what the optimisation is for
+  EXPECT_LT(mesh_quality(mesh).min_dihedral_deg, 10.0);  // what the optimisation is for
 }
 
 TEST(MeshMask, RefinesWhereTheSizingFieldIsSmall) {
@@ -185,10 +186,8 @@ TEST(MeshMask, AnEmptyDomainIsAnError) {
   VoxelImage mask = balls::empty_image(5, Vec3::Zero(), Mat3::Identity());
   std::fill(mask.values.begin(), mask.values.end(), 0.5f);  // nowhere above the level
   for (const VoxelImage& image : {mask, VoxelImage{}}) {
-    const auto mesh = mesh_mask(image, uniform(4.0));
-    ASSERT_FALSE(mesh);
-    EXPECT_EQ(mesh.error().code, ErrorCode::kEmptySet);
-    EXPECT_NE(mesh.error().message.find("0.5"), std::string::npos);
+    EXPECT_THAT(refusal_of(mesh_mask(image, uniform(4.0)), ErrorCode::kEmptySet),
+                testing::HasSubstr("0.5"));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -50,11 +51,8 @@ TetMesh joined_by(int shared_nodes) {
 }
 
 void expect_refused(const TetMesh& mesh, ErrorCode code, const std::string& part) {
-  const Status status = check_mesh(mesh);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, code) << status.error().message;
-  EXPECT_NE(status.error().message.find(part), std::string::npos) << status.error().message;
-  EXPECT_EQ(status.error().message.find('\n'), std::string::npos);
+  EXPECT_THAT(refusal_of(check_mesh(mesh), code),
+              testing::AllOf(testing::HasSubstr(part), testing::Not(testing::HasSubstr("\n"))));
 }
 
 TEST(MeshQuality, OfARegularTetrahedronIsClosedForm) {

@@ -9,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -36,16 +37,14 @@ Points around(const Points& vertices, double most_mm) {
 
 TEST(MovedSurface, HasTheClosestPointsOfATreeOfItsOwn) {
   const TriangleSurface at_rest = egg();
-  const auto surface = MovingSurface::build(at_rest);
-  ASSERT_TRUE(surface);
+  const auto surface = value_or_fail(MovingSurface::build(at_rest));
   const Points vertices = deformed(at_rest.vertices);
-  const MovedSurface moved(*surface, vertices);
-  const auto tree = ClosestPointIndex::build({vertices, at_rest.triangles});
-  ASSERT_TRUE(tree);
+  const MovedSurface moved(surface, vertices);
+  const auto tree = value_or_fail(ClosestPointIndex::build({vertices, at_rest.triangles}));
   const Points queries = around(vertices, 4.0);
   for (const auto query : queries.colwise()) {
     const SurfacePlace place = moved.closest(query);
-    const ClosestPoint expected = tree->closest(query);
+    const ClosestPoint expected = tree.closest(query);
     ASSERT_NEAR(place.distance_mm, expected.distance_mm, 1e-9);
     ASSERT_LT((moved.point(place) - expected.point).norm(), 1e-6);
     EXPECT_NEAR(place.weights.sum(), 1.0, 1e-12);
@@ -55,9 +54,8 @@ TEST(MovedSurface, HasTheClosestPointsOfATreeOfItsOwn) {
 
 TEST(MovedSurface, RemembersWhereAPlaceCameFrom) {
   const TriangleSurface at_rest = egg();
-  const auto surface = MovingSurface::build(at_rest);
-  ASSERT_TRUE(surface);
-  const MovedSurface moved(*surface, at_rest.vertices.colwise() + Vec3(5, 6, -7));
+  const auto surface = value_or_fail(MovingSurface::build(at_rest));
+  const MovedSurface moved(surface, at_rest.vertices.colwise() + Vec3(5, 6, -7));
   const Points queries = around(at_rest.vertices, 3.0);
   for (const auto query : queries.colwise()) {
     const SurfacePlace place = moved.closest(query);
@@ -68,9 +66,8 @@ TEST(MovedSurface, RemembersWhereAPlaceCameFrom) {
 // The facets of this ball lean by up to 4 degrees; its interpolated normals by far less.
 TEST(MovedSurface, NormalsOfABallAreRadial) {
   const TriangleSurface ball = ellipsoid_surface(Vec3::Zero(), Vec3::Constant(14), 1.5);
-  const auto surface = MovingSurface::build(ball);
-  ASSERT_TRUE(surface);
-  const MovedSurface moved(*surface, ball.vertices);
+  const auto surface = value_or_fail(MovingSurface::build(ball));
+  const MovedSurface moved(surface, ball.vertices);
   double interpolated = 0.0, facets = 0.0;
   const Points queries = around(ball.vertices, 1.0);
   for (const auto query : queries.colwise()) {
@@ -81,7 +78,7 @@ TEST(MovedSurface, NormalsOfABallAreRadial) {
     EXPECT_GT(n.dot(radial), 0.0);
     interpolated = std::max(interpolated, n.cross(radial).norm());
     facets =
-        std::max(facets, surface->at_rest().triangle_normal(place.triangle).cross(radial).norm());
+        std::max(facets, surface.at_rest().triangle_normal(place.triangle).cross(radial).norm());
   }
   EXPECT_GT(facets, 0.03) << "the test shows nothing";
   EXPECT_LT(interpolated, 0.1 * facets);
@@ -98,9 +95,8 @@ TriangleSurface kite() {
 }
 
 TEST(MovedSurface, KnowsItsRim) {
-  const auto surface = MovingSurface::build(kite());
-  ASSERT_TRUE(surface);
-  const MovedSurface moved(*surface, kite().vertices);
+  const auto surface = value_or_fail(MovingSurface::build(kite()));
+  const MovedSurface moved(surface, kite().vertices);
   const auto on_rim = [&](double x, double y) {
     return moved.on_rim(moved.closest(Vec3(x, y, 0.3)));
   };
@@ -116,15 +112,13 @@ TEST(MovedSurface, KnowsARimVertexFromATriangleWithoutRimEdges) {
   const TriangleSurface ball = ellipsoid_surface(Vec3::Zero(), Vec3::Constant(10), 3.0);
   TriangleSurface open = ball;  // without one triangle
   open.triangles = ball.triangles.rightCols(ball.triangles.cols() - 1);
-  const auto surface = MovingSurface::build(open);
-  ASSERT_TRUE(surface);
-  const MovedSurface moved(*surface, open.vertices);
+  const auto surface = value_or_fail(MovingSurface::build(open));
+  const MovedSurface moved(surface, open.vertices);
   for (const int vertex : ball.triangles.col(0)) {
     EXPECT_TRUE(moved.on_rim(moved.closest(1.2 * ball.vertices.col(vertex))));
   }
-  const auto closed = MovingSurface::build(ball);
-  ASSERT_TRUE(closed);
-  const MovedSurface whole(*closed, ball.vertices);
+  const auto closed = value_or_fail(MovingSurface::build(ball));
+  const MovedSurface whole(closed, ball.vertices);
   for (const auto vertex : ball.vertices.colwise()) {
     EXPECT_FALSE(whole.on_rim(whole.closest(1.2 * vertex)));
   }
@@ -132,17 +126,15 @@ TEST(MovedSurface, KnowsARimVertexFromATriangleWithoutRimEdges) {
 
 TEST(MovedSurface, PassesTrianglesThatTheMotionFlattened) {
   const TriangleSurface at_rest = egg();
-  const auto surface = MovingSurface::build(at_rest);
-  ASSERT_TRUE(surface);
+  const auto surface = value_or_fail(MovingSurface::build(at_rest));
   Points vertices = at_rest.vertices;
   const auto flat = at_rest.triangles.col(5);
   vertices.col(flat[1]) = vertices.col(flat[0]);
-  const MovedSurface moved(*surface, vertices);
-  const auto tree = ClosestPointIndex::build({vertices, at_rest.triangles});
-  ASSERT_TRUE(tree);
+  const MovedSurface moved(surface, vertices);
+  const auto tree = value_or_fail(ClosestPointIndex::build({vertices, at_rest.triangles}));
   const Points queries = around(vertices, 1.0);
   for (const auto query : queries.colwise()) {
-    ASSERT_NEAR(moved.closest(query).distance_mm, tree->closest(query).distance_mm, 1e-9);
+    ASSERT_NEAR(moved.closest(query).distance_mm, tree.closest(query).distance_mm, 1e-9);
   }
 }
 

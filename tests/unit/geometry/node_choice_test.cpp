@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/geometry/node_choice.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::geometry {
@@ -51,14 +51,12 @@ TEST(RegionNodes, AreThoseWithinTheMarginOrTheRadiusAndAscend) {
 
 TEST(RegionNodes, ARegionWithoutNodesAndAModelWithoutTumourAreNamed) {
   BrainModel model = test_support::toy_patient(3);
-  const auto far = nodes_in_region(model, BallRegion{Vec3(500, 0, -1), 40.0}, {});
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().code, ErrorCode::kEmptySet);
-  EXPECT_EQ(far.error().message, "no node lies in the ball of 40 mm about (500, 0, -1) mm");
+  EXPECT_EQ(refusal_of(nodes_in_region(model, BallRegion{Vec3(500, 0, -1), 40.0}, {}),
+                       ErrorCode::kEmptySet),
+            "no node lies in the ball of 40 mm about (500, 0, -1) mm");
   model.tumour = {};
-  const auto none = nodes_in_region(model, TumourRegion{40.0}, distances_from_tumour(model));
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().message, "the model has no tumour");
+  EXPECT_EQ(sentence_of(nodes_in_region(model, TumourRegion{40.0}, distances_from_tumour(model))),
+            "the model has no tumour");
 }
 
 TEST(SpreadNodes, AreDistinctAndEachTheFarthestFromThoseBefore) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -51,25 +52,23 @@ std::string refusal(const TriangleSurface& surface, const CorticalSite& site = k
 }
 
 TEST(SurfaceCheck, AGoodSurfacePassesAsItIs) {
-  const auto checked = check_cortical_surface(cap(), kSite);
-  ASSERT_TRUE(checked) << checked.error().message;
-  EXPECT_EQ(checked->surface.triangles, cap().triangles);
-  EXPECT_FALSE(checked->turned);
-  EXPECT_EQ(checked->parts, 1);
-  EXPECT_EQ(checked->holes, 0);
-  EXPECT_NEAR(checked->extent_mm, std::hypot(40.0, 40.0), 0.5);
-  EXPECT_NEAR(checked->distance_mm, 4.0, 1e-9);
-  EXPECT_TRUE(checked->notes.empty());
+  const auto checked = value_or_fail(check_cortical_surface(cap(), kSite));
+  EXPECT_EQ(checked.surface.triangles, cap().triangles);
+  EXPECT_FALSE(checked.turned);
+  EXPECT_EQ(checked.parts, 1);
+  EXPECT_EQ(checked.holes, 0);
+  EXPECT_NEAR(checked.extent_mm, std::hypot(40.0, 40.0), 0.5);
+  EXPECT_NEAR(checked.distance_mm, 4.0, 1e-9);
+  EXPECT_TRUE(checked.notes.empty());
 }
 
 TEST(SurfaceCheck, ASurfaceThatLooksInwardsIsTurnedRoundAndReported) {
   TriangleSurface inwards = cap();
   inwards.triangles.row(0).swap(inwards.triangles.row(1));
-  const auto checked = check_cortical_surface(inwards, kSite);
-  ASSERT_TRUE(checked) << checked.error().message;
-  EXPECT_TRUE(checked->turned);
-  EXPECT_GT(vertex_normals(checked->surface).row(2).minCoeff(), 0.5);
-  EXPECT_THAT(checked->notes, testing::ElementsAre(HasSubstr("were turned round")));
+  const auto checked = value_or_fail(check_cortical_surface(inwards, kSite));
+  EXPECT_TRUE(checked.turned);
+  EXPECT_GT(vertex_normals(checked.surface).row(2).minCoeff(), 0.5);
+  EXPECT_THAT(checked.notes, testing::ElementsAre(HasSubstr("were turned round")));
 }
 
 TEST(SurfaceCheck, ASurfaceAcrossTheOpeningIsRejected) {
@@ -102,28 +101,25 @@ TEST(SurfaceCheck, ATriangleOfUnknownOrRepeatedVerticesIsRejected) {
 }
 
 TEST(SurfaceCheck, HolesAndPartsAreCounted) {
-  const auto with_holes = check_cortical_surface(
+  const auto with_holes = value_or_fail(check_cortical_surface(
       cap(21, -4.0,
           [](int i, int j) { return (i == 4 && j == 4) || (i >= 10 && i < 12 && j == 9); }),
-      kSite);
-  ASSERT_TRUE(with_holes) << with_holes.error().message;
-  EXPECT_EQ(with_holes->holes, 2);
-  EXPECT_EQ(with_holes->parts, 1);
-  EXPECT_NEAR(with_holes->longest_hole_rim_mm, 12.0, 0.3);  // cells of 2 mm
-  EXPECT_THAT(with_holes->notes, testing::ElementsAre(HasSubstr("has 2 holes")));
+      kSite));
+  EXPECT_EQ(with_holes.holes, 2);
+  EXPECT_EQ(with_holes.parts, 1);
+  EXPECT_NEAR(with_holes.longest_hole_rim_mm, 12.0, 0.3);  // cells of 2 mm
+  EXPECT_THAT(with_holes.notes, testing::ElementsAre(HasSubstr("has 2 holes")));
 
-  const auto two_parts =
-      check_cortical_surface(cap(21, -4.0, [](int i, int) { return i == 10; }), kSite);
-  ASSERT_TRUE(two_parts);
-  EXPECT_EQ(two_parts->parts, 2);
-  EXPECT_EQ(two_parts->holes, 0);
+  const auto two_parts = value_or_fail(
+      check_cortical_surface(cap(21, -4.0, [](int i, int) { return i == 10; }), kSite));
+  EXPECT_EQ(two_parts.parts, 2);
+  EXPECT_EQ(two_parts.holes, 0);
 
   // Two cells that meet at a corner are one hole, with one rim through that corner.
-  const auto touching = check_cortical_surface(
-      cap(21, -4.0, [](int i, int j) { return (i == 6 || i == 7) && i == j; }), kSite);
-  ASSERT_TRUE(touching);
-  EXPECT_EQ(touching->holes, 1);
-  EXPECT_NEAR(touching->longest_hole_rim_mm, 16.0, 0.4);
+  const auto touching = value_or_fail(check_cortical_surface(
+      cap(21, -4.0, [](int i, int j) { return (i == 6 || i == 7) && i == j; }), kSite));
+  EXPECT_EQ(touching.holes, 1);
+  EXPECT_NEAR(touching.longest_hole_rim_mm, 16.0, 0.4);
 }
 
 TEST(SurfaceCheck, OtherUnitsAreNamed) {
@@ -156,9 +152,8 @@ TEST(SurfaceCheck, FewOrInfinitePointsAreRejected) {
 TEST(SurfaceCheck, PointsWithoutTrianglesPass) {
   TriangleSurface points = cap();
   points.triangles.resize(3, 0);
-  const auto checked = check_cortical_surface(points, kSite);
-  ASSERT_TRUE(checked) << checked.error().message;
-  EXPECT_EQ(checked->parts, 0);
+  const auto checked = value_or_fail(check_cortical_surface(points, kSite));
+  EXPECT_EQ(checked.parts, 0);
   points.vertices.array() += 100.0;
   EXPECT_THAT(refusal(points), HasSubstr("is its pose right?"));
 }
@@ -170,18 +165,17 @@ TEST(CraniotomySite, IsTheMiddleOfTheOpeningAndItsNormal) {
   EXPECT_THAT(craniotomy_site(model).error().message, HasSubstr("no boundary triangle"));
   for (int j = 8; j <= 12; ++j)
     for (int i = 5; i <= 15; ++i) model.craniotomy.push_back(j * 21 + i);
-  const auto site = craniotomy_site(model);
-  ASSERT_TRUE(site) << site.error().message;
-  EXPECT_LT((site->centre - kSite.centre).norm(), 1.0);
-  EXPECT_GT(site->outward.z(), 0.999);
-  EXPECT_NEAR(site->size_mm, std::hypot(20.0, 8.0), 0.1);
+  const auto site = value_or_fail(craniotomy_site(model));
+  EXPECT_LT((site.centre - kSite.centre).norm(), 1.0);
+  EXPECT_GT(site.outward.z(), 0.999);
+  EXPECT_NEAR(site.size_mm, std::hypot(20.0, 8.0), 0.1);
 }
 
 TEST(SurfaceRims, AClosedSurfaceHasNone) {
-  const auto rims = surface_rims(ellipsoid_surface(Vec3::Zero(), Vec3(10, 12, 14), 3.0));
-  ASSERT_TRUE(rims);
-  EXPECT_EQ(rims->parts, 1);
-  EXPECT_TRUE(rims->rim_mm.empty());
+  const auto rims =
+      value_or_fail(surface_rims(ellipsoid_surface(Vec3::Zero(), Vec3(10, 12, 14), 3.0)));
+  EXPECT_EQ(rims.parts, 1);
+  EXPECT_TRUE(rims.rim_mm.empty());
 }
 
 }  // namespace

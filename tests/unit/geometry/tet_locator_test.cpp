@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -11,6 +10,7 @@
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/dense.hpp"
 
 namespace brainshift::geometry {
 namespace {
@@ -26,7 +26,7 @@ Vec3 described(const TetMesh& mesh, const TetLocation& location) {
 Eigen::Vector4d barycentric(const TetMesh& mesh, int tet, const Vec3& x) {
   Eigen::Matrix4d system;
   for (int k = 0; k < 4; ++k) system.col(k) << mesh.nodes.col(mesh.tets(k, tet)), 1.0;
-  return system.fullPivLu().solve(x.homogeneous());
+  return test_support::solve(system, x.homogeneous());
 }
 
 class LocatedPoints {

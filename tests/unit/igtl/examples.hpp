@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/igtl/message.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::igtl::test_example {
 
@@ -23,9 +24,7 @@ std::string content_of(const T& value) {
 
 template <typename T>
 void expect_refused(const Result<T>& decoded, const char* part) {
-  ASSERT_FALSE(decoded) << part;
-  EXPECT_EQ(decoded.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(decoded.error().message, ::testing::HasSubstr(part));
+  EXPECT_THAT(refusal_of(decoded, ErrorCode::kProtocol), ::testing::HasSubstr(part));
 }
 
 inline constexpr std::uint16_t kVersions[] = {1, 2};

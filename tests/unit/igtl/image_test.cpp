@@ -2,10 +2,10 @@
 #include "common/igtl/image.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -38,9 +38,8 @@ TYPED_TEST_SUITE(ImageOf, ScalarTypes);
 TYPED_TEST(ImageOf, DecodeReturnsWhatWasEncoded) {
   for (const int components : {1, 3, 255}) {
     const Image ours = image<TypeParam>(components);
-    const auto decoded = decode_image(content_of(ours));
-    ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_TRUE(*decoded == ours);
+    const auto decoded = value_or_fail(decode_image(content_of(ours)));
+    EXPECT_TRUE(decoded == ours);
   }
 }
 
@@ -52,9 +51,8 @@ TYPED_TEST(ImageOf, ExtremeNumbersSurvive) {
   voxels[1] = Limits::max();
   voxels[2] = Limits::min();
   if (Limits::has_infinity) voxels[3] = -Limits::infinity();
-  const auto decoded = decode_image(content_of(ours));
-  ASSERT_TRUE(decoded);
-  EXPECT_TRUE(*decoded == ours);
+  const auto decoded = value_or_fail(decode_image(content_of(ours)));
+  EXPECT_TRUE(decoded == ours);
 }
 
 TYPED_TEST(ImageOf, BigEndianVoxelsAreTheSameNumbers) {
@@ -65,9 +63,8 @@ TYPED_TEST(ImageOf, BigEndianVoxelsAreTheSameNumbers) {
     std::reverse(content.begin() + static_cast<std::ptrdiff_t>(at),
                  content.begin() + static_cast<std::ptrdiff_t>(at + sizeof(TypeParam)));
   }
-  const auto decoded = decode_image(content);
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  EXPECT_TRUE(*decoded == ours);
+  const auto decoded = value_or_fail(decode_image(content));
+  EXPECT_TRUE(decoded == ours);
 }
 
 TEST(Image, AViewIsTheSameBytesAsAnImage) {
@@ -94,9 +91,8 @@ TEST(Image, APartOfAVolumeSurvives) {
   ours.part = {3, 1, 2};
   ours.voxels = std::vector<std::int16_t>{1, 2, 3, 4, 5, 6};
   EXPECT_FALSE(ours.is_whole());
-  const auto decoded = decode_image(content_of(ours));
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  EXPECT_TRUE(*decoded == ours);
+  const auto decoded = value_or_fail(decode_image(content_of(ours)));
+  EXPECT_TRUE(decoded == ours);
 }
 
 // Along an axis of n voxels the first centre lies (n - 1) / 2 steps before the middle.

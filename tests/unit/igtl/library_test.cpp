@@ -15,6 +15,7 @@
 #include <cstring>
 
 #include "common/igtl/message.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace lib = ::igtl;
@@ -51,12 +52,11 @@ std::string difference(const std::string& ours, const std::string& theirs) {
 
 void expect_same(const Content& content, const std::string& theirs) {
   EXPECT_EQ(difference(encoded(envelope(), content), theirs), "") << type_of(content);
-  const auto decoded = decode(theirs);
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  EXPECT_TRUE(decoded->content == content) << type_of(content);
-  EXPECT_EQ(decoded->envelope.device, envelope().device);
-  EXPECT_EQ(decoded->envelope.timestamp, envelope().timestamp);
-  EXPECT_EQ(decoded->envelope.version, 1);
+  const auto decoded = value_or_fail(decode(theirs));
+  EXPECT_TRUE(decoded.content == content) << type_of(content);
+  EXPECT_EQ(decoded.envelope.device, envelope().device);
+  EXPECT_EQ(decoded.envelope.timestamp, envelope().timestamp);
+  EXPECT_EQ(decoded.envelope.version, 1);
 }
 
 void expect_same(const Content& content, lib::MessageBase& message) {
@@ -162,11 +162,10 @@ TEST(Library, APartOfAVolumeIsTheSameBytes) {
 TEST(Library, ObliqueGeometryAgreesToSinglePrecision) {
   const ImageGeometry geometry = test_example::geometry();
   const std::vector<std::uint8_t> voxels(geometry.num_voxels());
-  const auto decoded =
+  const auto decoded = value_or_fail(
       decode(packed(*library_image(geometry, 1, lib::ImageMessage::TYPE_UINT8, voxels.data(),
-                                   voxels.size(), {0, 0, 0}, geometry.dims)));
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  const auto& theirs = std::get<Image>(decoded->content).geometry;
+                                   voxels.size(), {0, 0, 0}, geometry.dims))));
+  const auto& theirs = std::get<Image>(decoded.content).geometry;
   EXPECT_LT((theirs.steps - geometry.steps).cwiseAbs().maxCoeff(), 1e-6F);
   EXPECT_EQ(theirs.centre, geometry.centre);
 }

@@ -2,10 +2,10 @@
 #include "common/igtl/message.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <set>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -20,12 +20,11 @@ TEST(Message, DecodeReturnsWhatWasEncodedForEveryTypeAndVersion) {
   std::set<std::size_t> types;
   for (const auto& [name, content] : contents()) {
     for (const std::uint16_t version : test_example::kVersions) {
-      const auto message = decode(encoded(envelope(version), content));
-      ASSERT_TRUE(message) << message.error().message;
-      EXPECT_TRUE(message->content == content) << name;
+      const auto message = value_or_fail(decode(encoded(envelope(version), content)));
+      EXPECT_TRUE(message.content == content) << name;
       Envelope expected = envelope(version);
       if (version == 1) expected.message_id = 0, expected.metadata.clear();
-      EXPECT_EQ(message->envelope, expected) << name;
+      EXPECT_EQ(message.envelope, expected) << name;
     }
     types.insert(content.index());
   }
@@ -34,10 +33,9 @@ TEST(Message, DecodeReturnsWhatWasEncodedForEveryTypeAndVersion) {
 
 TEST(Message, TheTypeOfAContentIsThatOfItsHeader) {
   for (const auto& [name, content] : contents()) {
-    const auto header = decode_header(encoded(envelope(), content));
-    ASSERT_TRUE(header);
-    EXPECT_EQ(header->type, type_of(content));
-    EXPECT_TRUE(is_known_type(header->type));
+    const auto header = value_or_fail(decode_header(encoded(envelope(), content)));
+    EXPECT_EQ(header.type, type_of(content));
+    EXPECT_TRUE(is_known_type(header.type));
   }
   EXPECT_FALSE(is_known_type("IMAGES"));
   EXPECT_FALSE(is_known_type(""));
@@ -113,13 +111,10 @@ TEST(Message, ErrorsNameTheType) {
   expect_message_refused(encode_header({1, "VIDEO", "camera", 0, 0, 0}),
                          "VIDEO: a message type that is not read");
   Header header{1, "TRANSFORM", "", 0, 47, 0};
-  const auto wrong_size = decode(header, std::string(47, '\0'));
-  ASSERT_FALSE(wrong_size);
-  EXPECT_EQ(wrong_size.error().message, "TRANSFORM: 47 bytes, must be 48");
+  EXPECT_EQ(sentence_of(decode(header, std::string(47, '\0'))), "TRANSFORM: 47 bytes, must be 48");
   header.version = 2;
-  const auto wrong_frame = decode(header, std::string(11, '\0'));
-  ASSERT_FALSE(wrong_frame);
-  EXPECT_THAT(wrong_frame.error().message, HasSubstr("TRANSFORM: extended header of 12 bytes"));
+  EXPECT_THAT(sentence_of(decode(header, std::string(11, '\0'))),
+              HasSubstr("TRANSFORM: extended header of 12 bytes"));
 }
 
 }  // namespace

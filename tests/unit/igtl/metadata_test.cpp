@@ -2,8 +2,8 @@
 #include "common/igtl/metadata.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -37,11 +37,10 @@ TEST(Metadata, DecodeReturnsWhatWasEncoded) {
   for (const Metadata& metadata : {Metadata{}, example_metadata()}) {
     for (const std::string& content : {""s, "content"s}) {
       const std::string body = body_of(metadata, content);
-      const auto parts = decode_body(2, body);
-      ASSERT_TRUE(parts) << parts.error().message;
-      EXPECT_EQ(parts->content, content);
-      EXPECT_EQ(parts->message_id, 0x01020304u);
-      EXPECT_EQ(parts->metadata, metadata);
+      const auto parts = value_or_fail(decode_body(2, body));
+      EXPECT_EQ(parts.content, content);
+      EXPECT_EQ(parts.message_id, 0x01020304u);
+      EXPECT_EQ(parts.metadata, metadata);
     }
   }
 }
@@ -49,34 +48,30 @@ TEST(Metadata, DecodeReturnsWhatWasEncoded) {
 TEST(Metadata, Version1IsTheContentAlone) {
   const BodyFrame frame = encode_body_frame(1, 7, example_metadata());
   EXPECT_EQ(frame.before + frame.after, "");
-  const auto parts = decode_body(1, "content");
-  ASSERT_TRUE(parts);
-  EXPECT_EQ(parts->content, "content");
-  EXPECT_TRUE(parts->metadata.empty());
+  const auto parts = value_or_fail(decode_body(1, "content"));
+  EXPECT_EQ(parts.content, "content");
+  EXPECT_TRUE(parts.metadata.empty());
 }
 
 TEST(Metadata, AnEmptyBodyIsEmptyInBothVersions) {
   for (const std::uint16_t version : test_example::kVersions) {
-    const auto parts = decode_body(version, "");
-    ASSERT_TRUE(parts);
-    EXPECT_EQ(parts->content, "");
+    const auto parts = value_or_fail(decode_body(version, ""));
+    EXPECT_EQ(parts.content, "");
   }
 }
 
 TEST(Metadata, ABodyWithoutAMetadataHeaderHasNone) {
   const std::string body = "\0\14\0\0\0\0\0\0\0\0\0\5content"s;
-  const auto parts = decode_body(2, body);
-  ASSERT_TRUE(parts);
-  EXPECT_EQ(parts->content, "content");
-  EXPECT_EQ(parts->message_id, 5u);
-  EXPECT_TRUE(parts->metadata.empty());
+  const auto parts = value_or_fail(decode_body(2, body));
+  EXPECT_EQ(parts.content, "content");
+  EXPECT_EQ(parts.message_id, 5u);
+  EXPECT_TRUE(parts.metadata.empty());
 }
 
 TEST(Metadata, WhatALongerExtendedHeaderAddsIsSkipped) {
   const std::string body = "\0\16\0\2\0\0\0\0\0\0\0\5??content\0\0"s;
-  const auto parts = decode_body(2, body);
-  ASSERT_TRUE(parts);
-  EXPECT_EQ(parts->content, "content");
+  const auto parts = value_or_fail(decode_body(2, body));
+  EXPECT_EQ(parts.content, "content");
 }
 
 TEST(Metadata, SizesBeyondTheBodyAreRefused) {
@@ -124,9 +119,8 @@ TEST(Metadata, AsManyEntriesAsTheProtocolAllowsSurvive) {
   Metadata many;
   for (std::size_t i = 0; i < kMaxMetadataEntries; ++i) many.push_back({std::to_string(i), "v"});
   ASSERT_TRUE(validate(many));
-  const auto parts = decode_body(2, body_of(many, ""));
-  ASSERT_TRUE(parts) << parts.error().message;
-  EXPECT_EQ(parts->metadata, many);
+  const auto parts = value_or_fail(decode_body(2, body_of(many, "")));
+  EXPECT_EQ(parts.metadata, many);
 }
 
 }  // namespace

@@ -2,10 +2,10 @@
 #include "common/igtl/point_list.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -16,18 +16,15 @@ using test_example::point_list;
 using ::testing::HasSubstr;
 
 void expect_invalid(const PointList& list, const char* part) {
-  const Status status = validate(list);
-  ASSERT_FALSE(status) << part;
-  EXPECT_THAT(status.error().message, HasSubstr(part));
+  EXPECT_THAT(sentence_of(validate(list)), HasSubstr(part));
 }
 
 TEST(PointList, DecodeReturnsWhatWasEncoded) {
   for (const PointList& list : {PointList{}, point_list()}) {
     const std::string content = content_of(list);
     EXPECT_EQ(content.size(), 136 * list.points.size());
-    const auto decoded = decode_point_list(content);
-    ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_EQ(*decoded, list);
+    const auto decoded = value_or_fail(decode_point_list(content));
+    EXPECT_EQ(decoded, list);
   }
 }
 

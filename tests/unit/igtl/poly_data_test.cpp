@@ -2,10 +2,10 @@
 #include "common/igtl/poly_data.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -41,9 +41,8 @@ TEST(PolyData, DecodeReturnsWhatWasEncoded) {
   PolyData points_only;
   points_only.points = poly_data().points;
   for (const PolyData& data : {poly_data(), points_only, PolyData{}}) {
-    const auto decoded = decode_poly_data(content_of(data));
-    ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_TRUE(*decoded == data);
+    const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
+    EXPECT_TRUE(decoded == data);
   }
 }
 
@@ -54,18 +53,16 @@ TEST(PolyData, AttributesOfCellsAndColourTablesSurvive) {
   data.attributes.push_back({"table", AttributeKind::kRgba, false, Eigen::MatrixXf::Ones(4, 256)});
   data.attributes.push_back({"", AttributeKind::kScalar, false, Eigen::MatrixXf::Ones(127, 4)});
   ASSERT_EQ(poly_message_of(data), "");
-  const auto decoded = decode_poly_data(content_of(data));
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  EXPECT_TRUE(*decoded == data);
+  const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
+  EXPECT_TRUE(decoded == data);
 }
 
 TEST(PolyData, NamesOfEveryLengthSurvive) {
   for (std::size_t size = 0; size <= 255; ++size) {
     PolyData data = poly_data();
     data.attributes[1].name = std::string(size, 'n');
-    const auto decoded = decode_poly_data(content_of(data));
-    ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_TRUE(*decoded == data) << size;
+    const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
+    EXPECT_TRUE(decoded == data) << size;
   }
 }
 

@@ -2,10 +2,10 @@
 #include "common/igtl/short_contents.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -26,22 +26,19 @@ TEST(ShortContents, LayoutsAreTheDocumentedOnes) {
 
 TEST(ShortContents, DecodeReturnsWhatWasEncoded) {
   for (const Text& text : {Text{}, test_example::text(), Text{std::string(65535, 'x'), kUtf8}}) {
-    const auto decoded = decode_text(content_of(text));
-    ASSERT_TRUE(decoded);
-    EXPECT_EQ(*decoded, text);
+    const auto decoded = value_or_fail(decode_text(content_of(text)));
+    EXPECT_EQ(decoded, text);
   }
   constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
   for (const StatusReport& report :
        {StatusReport{}, test_example::status_report(),
         StatusReport{65535, kLeast, std::string(20, 'e'), std::string(65535, 't')}}) {
-    const auto decoded = decode_status_report(content_of(report));
-    ASSERT_TRUE(decoded);
-    EXPECT_EQ(*decoded, report);
+    const auto decoded = value_or_fail(decode_status_report(content_of(report)));
+    EXPECT_EQ(decoded, report);
   }
   for (const Capability& capability : {Capability{}, Capability{{"IMAGE", "TWELVE_BYTES"}}}) {
-    const auto decoded = decode_capability(content_of(capability));
-    ASSERT_TRUE(decoded);
-    EXPECT_EQ(*decoded, capability);
+    const auto decoded = value_or_fail(decode_capability(content_of(capability)));
+    EXPECT_EQ(decoded, capability);
   }
 }
 

@@ -2,9 +2,9 @@
 #include "common/igtl/stream_reader.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "common/igtl/crc64.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -59,10 +59,9 @@ TEST(StreamReader, HoweverTheBytesArriveTheMessagesAreTheSame) {
     ASSERT_EQ(packets.size(), contents().size()) << piece;
     for (std::size_t i = 0; i < packets.size(); ++i) {
       EXPECT_FALSE(packets[i].skipped);
-      const auto message = decode(packets[i].header, packets[i].body);
-      ASSERT_TRUE(message) << message.error().message;
-      EXPECT_TRUE(message->content == contents()[i].second) << contents()[i].first;
-      EXPECT_EQ(message->envelope, envelope(2));
+      const auto message = value_or_fail(decode(packets[i].header, packets[i].body));
+      EXPECT_TRUE(message.content == contents()[i].second) << contents()[i].first;
+      EXPECT_EQ(message.envelope, envelope(2));
     }
   }
 }
@@ -72,9 +71,8 @@ TEST(StreamReader, AMessageIsGivenOutWithItsLastByte) {
   StreamReader reader;
   for (std::size_t i = 0; i < stream.size(); ++i) {
     std::string_view byte = std::string_view(stream).substr(i, 1);
-    const auto packet = reader.read(byte);
-    ASSERT_TRUE(packet);
-    EXPECT_EQ(packet->has_value(), i + 1 == stream.size()) << i;
+    const auto packet = value_or_fail(reader.read(byte));
+    EXPECT_EQ(packet.has_value(), i + 1 == stream.size()) << i;
     EXPECT_TRUE(byte.empty());
   }
 }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -29,30 +30,27 @@ TEST(Surface, ASurfaceComesBackFromItsPolyData) {
   const PolyData data = from_surface(surface);
   EXPECT_TRUE(validate(data));
   EXPECT_EQ(data.polygons.count, 4u);
-  const auto back = to_surface(data);
-  ASSERT_TRUE(back);
-  EXPECT_EQ(back->vertices, surface.vertices);
-  EXPECT_EQ(back->triangles, surface.triangles);
+  const auto back = value_or_fail(to_surface(data));
+  EXPECT_EQ(back.vertices, surface.vertices);
+  EXPECT_EQ(back.triangles, surface.triangles);
 }
 
 TEST(Surface, APolygonBecomesAFan) {
   PolyData data = square();
   data.polygons.add({0, 1, 2, 3});
-  const auto surface = to_surface(data);
-  ASSERT_TRUE(surface);
-  EXPECT_EQ(surface->triangles, triangles({0, 1, 2, 0, 2, 3}));
+  const auto surface = value_or_fail(to_surface(data));
+  EXPECT_EQ(surface.triangles, triangles({0, 1, 2, 0, 2, 3}));
 }
 
 // Both triangles of the strip 0 1 3 2 of a square face the same way.
 TEST(Surface, AStripKeepsItsOrientation) {
   PolyData data = square();
   data.triangle_strips.add({0, 1, 3, 2});
-  const auto surface = to_surface(data);
-  ASSERT_TRUE(surface);
-  ASSERT_EQ(surface->num_triangles(), 2);
+  const auto surface = value_or_fail(to_surface(data));
+  ASSERT_EQ(surface.num_triangles(), 2);
   for (int t = 0; t < 2; ++t) {
     const auto corner = [&](int i) -> Vec3 {
-      return surface->vertices.col(surface->triangles(i, t));
+      return surface.vertices.col(surface.triangles(i, t));
     };
     const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
     EXPECT_EQ(normal, Vec3(0.0, 0.0, 1.0));
@@ -63,9 +61,8 @@ TEST(Surface, TrianglesThatNameAPointTwiceAreLeftOut) {
   PolyData data = square();
   data.triangle_strips.add({0, 1, 2, 2, 3});
   data.polygons.add({1, 1, 2});
-  const auto surface = to_surface(data);
-  ASSERT_TRUE(surface);
-  EXPECT_EQ(surface->triangles, triangles({0, 1, 2}));
+  const auto surface = value_or_fail(to_surface(data));
+  EXPECT_EQ(surface.triangles, triangles({0, 1, 2}));
 }
 
 TEST(Surface, PointsAndLinesAloneAreNoSurface) {
@@ -74,9 +71,7 @@ TEST(Surface, PointsAndLinesAloneAreNoSurface) {
   data.lines.add({0, 1, 2});
   data.polygons.add({0, 1});
   data.polygons.add({});
-  const auto surface = to_surface(data);
-  ASSERT_FALSE(surface);
-  EXPECT_EQ(surface.error().code, ErrorCode::kEmptySet);
+  refusal_of(to_surface(data), ErrorCode::kEmptySet);
 }
 
 }  // namespace

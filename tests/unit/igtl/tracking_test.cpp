@@ -2,10 +2,10 @@
 #include "common/igtl/tracking.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/igtl/examples.hpp"
 
 namespace brainshift::igtl {
@@ -30,13 +30,11 @@ TEST(Tracking, ATransformIsWrittenColumnByColumn) {
 
 TEST(Tracking, DecodeReturnsWhatWasEncoded) {
   const Transform transform{test_example::matrix()};
-  const auto decoded = decode_transform(content_of(transform));
-  ASSERT_TRUE(decoded);
-  EXPECT_EQ(*decoded, transform);
+  const auto decoded = value_or_fail(decode_transform(content_of(transform)));
+  EXPECT_EQ(decoded, transform);
   for (const TrackingData& data : {TrackingData{}, tracking_data()}) {
-    const auto tools = decode_tracking_data(content_of(data));
-    ASSERT_TRUE(tools);
-    EXPECT_EQ(*tools, data);
+    const auto tools = value_or_fail(decode_tracking_data(content_of(data)));
+    EXPECT_EQ(tools, data);
   }
 }
 

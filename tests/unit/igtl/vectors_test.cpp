@@ -12,6 +12,7 @@
 
 #include "common/igtl/message.hpp"
 #include "common/igtl/stream_reader.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::igtl {
 namespace {
@@ -184,19 +185,17 @@ TEST_P(Vectors, EncodingTheDescribedValuesGivesTheSameBytes) {
 }
 
 TEST_P(Vectors, DecodingGivesTheDescribedValues) {
-  const auto message = decode(bytes_);
-  ASSERT_TRUE(message) << message.error().message;
-  EXPECT_EQ(message->envelope, envelope_);
-  EXPECT_TRUE(message->content == content_);
+  const auto message = value_or_fail(decode(bytes_));
+  EXPECT_EQ(message.envelope, envelope_);
+  EXPECT_TRUE(message.content == content_);
 }
 
 TEST_P(Vectors, AreReadFromAStream) {
   StreamReader reader;
   std::string_view bytes = bytes_;
-  const auto packet = reader.read(bytes);
-  ASSERT_TRUE(packet) << packet.error().message;
-  ASSERT_TRUE(packet->has_value());
-  EXPECT_EQ((*packet)->header.type, type_of(content_));
+  const auto packet = value_or_fail(reader.read(bytes));
+  ASSERT_TRUE(packet.has_value());
+  EXPECT_EQ(packet->header.type, type_of(content_));
   EXPECT_TRUE(bytes.empty());
 }
 

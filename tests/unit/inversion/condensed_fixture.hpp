@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <memory>
 
 #include "common/core/random.hpp"
@@ -12,6 +11,8 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {
@@ -52,9 +53,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
   static CondensedInverter inverter(Boundary boundary, const CondensedOptions& options = {},
                                     const CaseConfig& with = config()) {
     static const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-    auto made = CondensedInverter::build(operators(boundary), locator, with, options);
-    EXPECT_TRUE(made.has_value());
-    return std::move(*made);
+    return value_or_fail(CondensedInverter::build(operators(boundary), locator, with, options));
   }
   // Noisy displacements of the data region's nodes, from a sagging truth with contact.
   static SparseData sagging_data(Boundary boundary, double noise_mm, std::uint64_t seed = 4) {
@@ -63,8 +62,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     const Points load =
         fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                            brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-    const auto truth = model.forward().solve_with_contact(40.0 * load);
-    EXPECT_TRUE(truth.has_value());
+    const auto truth = value_or_fail(model.forward().solve_with_contact(40.0 * load));
     Random random(seed);
     const auto& region = operators(boundary)->region;
     const auto m = static_cast<Eigen::Index>(region.size());
@@ -73,7 +71,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
       const NodeIndex node = region[static_cast<std::size_t>(i)];
       data.positions.col(i) = brain.mesh.nodes.col(node);
       data.displacements.col(i) =
-          truth->displacement.col(node) + noise_mm * random.normal() * random.direction();
+          truth.displacement.col(node) + noise_mm * random.normal() * random.direction();
     }
     return data;
   }
@@ -129,10 +127,11 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     }
     Eigen::MatrixXd innovation = a * prior * a.transpose();
     innovation.diagonal() += noise;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
     DirectPosterior posterior;
-    posterior.mean = shift + prior * (a.transpose() * solver.solve(d - a * shift));
-    posterior.covariance = prior - prior * a.transpose() * solver.solve(a * prior);
+    posterior.mean =
+        shift + prior * (a.transpose() * test_support::solve_positive(innovation, d - a * shift));
+    posterior.covariance =
+        prior - prior * a.transpose() * test_support::solve_positive(innovation, a * prior);
     return posterior;
   }
 };

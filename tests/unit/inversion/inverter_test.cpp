@@ -9,6 +9,7 @@
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {
@@ -45,9 +46,7 @@ class Inverters : public ::testing::TestWithParam<Method> {
     return data;
   }
   static std::unique_ptr<Inverter> inverter() {
-    auto made = make_inverter(model(), GetParam());
-    EXPECT_TRUE(made.has_value());
-    return std::move(*made);
+    return value_or_fail(make_inverter(model(), GetParam()));
   }
 };
 
@@ -99,19 +98,18 @@ TEST_P(Inverters, JudgeTheirEstimate) {
 
 // Neighbours that are asked to change places, within what check_data lets pass.
 TEST_F(Inverters, ForgetAnUnusableEstimate) {
-  const auto made = make_inverter(model(), Method::kCondensed);
-  ASSERT_TRUE(made.has_value());
+  const auto made = value_or_fail(make_inverter(model(), Method::kCondensed));
   Estimate cold, unusable, after;
-  ASSERT_TRUE((*made)->update(data(), {}, cold));
+  ASSERT_TRUE(made->update(data(), {}, cold));
   SparseData torn = data();
   for (Eigen::Index i = 0; i < torn.positions.cols(); ++i) {
     torn.displacements.col(i) = Vec3(i % 2 == 0 ? 9.0 : -9.0, 0.0, 0.0);
   }
   torn.sd_mm.setConstant(1e-3);
-  ASSERT_TRUE((*made)->update(torn, {}, unusable));
+  ASSERT_TRUE(made->update(torn, {}, unusable));
   ASSERT_EQ(unusable.quality.quality, Quality::kUnusable);
   EXPECT_TRUE(unusable.quality.flags.has(QualityFlag::kInvertedElements));
-  ASSERT_TRUE((*made)->update(data(), {}, after));
+  ASSERT_TRUE(made->update(data(), {}, after));
   EXPECT_TRUE(after.quality.usable());
   EXPECT_EQ(after.history.size(), cold.history.size());
   EXPECT_TRUE(after.displacement == cold.displacement) << "the next update began from it";
@@ -124,9 +122,8 @@ TEST_P(Inverters, AStopEndsTheUpdateWithItsOwnReason) {
   InversionOptions asked;
   asked.stop = source.get_token();
   Estimate estimate;
-  const Status status = made->update(data(), asked, estimate);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().message, "inversion was stopped at iteration 1");
+  EXPECT_EQ(sentence_of(made->update(data(), asked, estimate)),
+            "inversion was stopped at iteration 1");
   EXPECT_TRUE(made->update(data(), {}, estimate)) << "the next update must work";
 }
 
@@ -136,14 +133,10 @@ TEST_P(Inverters, RejectDataThatAreNotFiniteOrOutsideTheBrain) {
   bad.displacements(1, 3) = std::numeric_limits<double>::quiet_NaN();
   outside.positions.col(2) = Vec3(30, 30, 90);
   Estimate estimate;
-  const Status status = made->update(bad, {}, estimate);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
-  EXPECT_THAT(status.error().message, HasSubstr("point 3"));
-  const Status far = made->update(outside, {}, estimate);
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(far.error().message, HasSubstr("point 2"));
+  EXPECT_THAT(refusal_of(made->update(bad, {}, estimate), ErrorCode::kNotFinite),
+              HasSubstr("point 3"));
+  EXPECT_THAT(refusal_of(made->update(outside, {}, estimate), ErrorCode::kInvalidArgument),
+              HasSubstr("point 2"));
 }
 
 TEST_P(Inverters, OnlyMethodCondensedTakesDataAlongADirection) {
@@ -157,15 +150,13 @@ TEST_P(Inverters, OnlyMethodCondensedTakesDataAlongADirection) {
 
 TEST_F(Inverters, CondensedOverGivenOperatorsIsTheOneThatCondenses) {
   auto operators = std::make_shared<const CondensedOperators>(std::move(*condense(*model())));
-  const auto given = condensed_inverter(
-      operators, std::make_shared<const geometry::TetLocator>(patient()->mesh), config());
-  ASSERT_TRUE(given.has_value());
-  EXPECT_EQ((*given)->bytes(), operators->bytes());
-  const auto made = make_inverter(model(), Method::kCondensed);
-  ASSERT_TRUE(made.has_value());
+  const auto given = value_or_fail(condensed_inverter(
+      operators, std::make_shared<const geometry::TetLocator>(patient()->mesh), config()));
+  EXPECT_EQ(given->bytes(), operators->bytes());
+  const auto made = value_or_fail(make_inverter(model(), Method::kCondensed));
   Estimate a, b;
-  ASSERT_TRUE((*given)->update(data(), {}, a));
-  ASSERT_TRUE((*made)->update(data(), {}, b));
+  ASSERT_TRUE(given->update(data(), {}, a));
+  ASSERT_TRUE(made->update(data(), {}, b));
   EXPECT_TRUE(a.displacement == b.displacement);
 }
 
@@ -188,9 +179,8 @@ TEST(Invert, EqualsTheFirstUpdateOfAnInverterForEveryMethod) {
     EXPECT_TRUE(once->displacement == estimate.displacement) << to_string(method);
     EXPECT_EQ(once->reason, estimate.reason) << to_string(method);
   }
-  const auto by_default = invert(*model, data);
-  ASSERT_TRUE(by_default.has_value());
-  EXPECT_EQ(by_default->sd_mm.size(), patient()->mesh.num_nodes()) << "method condensed has sd";
+  const auto by_default = value_or_fail(invert(*model, data));
+  EXPECT_EQ(by_default.sd_mm.size(), patient()->mesh.num_nodes()) << "method condensed has sd";
 }
 
 TEST(Invert, ChecksTheDataBeforeItPrepares) {
@@ -198,13 +188,10 @@ TEST(Invert, ChecksTheDataBeforeItPrepares) {
   small.condensed.memory_limit_gib = 1e-6;  // any preparation would fail
   const PreparedModel model = prepare(Boundary::kContact, small);
   const SparseData good = sagging_data(model, 0.1);
-  const auto few = invert(
-      model, {good.positions.leftCols(2), good.displacements.leftCols(2), good.sd_mm.head(2)});
-  ASSERT_FALSE(few.has_value());
-  EXPECT_THAT(few.error().message, testing::HasSubstr("2 points"));
-  const auto large = invert(model, good);
-  ASSERT_FALSE(large.has_value());
-  EXPECT_THAT(large.error().message, testing::HasSubstr("memory_limit_gib"));
+  EXPECT_THAT(sentence_of(invert(model, {good.positions.leftCols(2), good.displacements.leftCols(2),
+                                         good.sd_mm.head(2)})),
+              testing::HasSubstr("2 points"));
+  EXPECT_THAT(sentence_of(invert(model, good)), testing::HasSubstr("memory_limit_gib"));
 }
 
 TEST(Invert, CanBeStoppedWhileItPrepares) {
@@ -213,9 +200,8 @@ TEST(Invert, CanBeStoppedWhileItPrepares) {
   source.request_stop();
   InversionOptions options;
   options.stop = source.get_token();
-  const auto stopped = invert(model, sagging_data(model, 0.1), Method::kCondensed, options);
-  ASSERT_FALSE(stopped.has_value());
-  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+  refusal_of(invert(model, sagging_data(model, 0.1), Method::kCondensed, options),
+             ErrorCode::kUnavailable);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <memory>
 #include <utility>
 
@@ -13,6 +12,8 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/values/sparse_data.hpp"
+#include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {
@@ -26,9 +27,7 @@ inline std::shared_ptr<const BrainModel> patient() {
 
 inline PreparedModel prepare(Boundary boundary,
                              const CaseConfig& config = test_support::toy_config()) {
-  auto model = PreparedModel::prepare(patient(), config, boundary);
-  EXPECT_TRUE(model.has_value()) << model.error().message;
-  return std::move(*model);
+  return value_or_fail(PreparedModel::prepare(patient(), config, boundary));
 }
 
 // Noisy displacements of points on the tumour, from a sagging truth.
@@ -37,14 +36,13 @@ inline SparseData sagging_data(const PreparedModel& model, double noise_mm) {
   const Points load =
       fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                          brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-  const auto truth = model.forward().solve_with_contact(40.0 * load);
-  EXPECT_TRUE(truth.has_value());
+  const auto truth = value_or_fail(model.forward().solve_with_contact(40.0 * load));
   Random random(4);
   SparseData data;
   data.positions = brain.tumour.vertices;
   const auto sampling =
       fem::sampling_matrix(model.locator(), brain.mesh.num_nodes(), data.positions, 1.0);
-  data.displacements = (*sampling * truth->displacement.transpose()).transpose();
+  data.displacements = (*sampling * truth.displacement.transpose()).transpose();
   for (Eigen::Index i = 0; i < data.displacements.cols(); ++i) {
     data.displacements.col(i) += noise_mm * random.direction();
   }
@@ -79,7 +77,7 @@ inline VecX dense_posterior_mean(const PreparedModel& model, const SparseData& d
     c_at.col(j) = flat(model.forward().solve(model.prior().apply(adjoint)));
   }
   const Eigen::MatrixXd s = a * c_at + covariance;
-  return c_at * s.llt().solve(flat(data.displacements));
+  return c_at * test_support::solve_positive(s, flat(data.displacements));
 }
 
 }  // namespace brainshift::inversion

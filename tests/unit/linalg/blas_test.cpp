@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Dense>
-
 #include "common/core/thread_team.hpp"
 #include "common/linalg/blas.hpp"
+#include "tests/support/dense.hpp"
 
 namespace brainshift::linalg {
 namespace {
@@ -112,8 +110,8 @@ TEST(Blas, TridiagonalMatrixStandsForTheGivenOne) {
     EXPECT_NEAR(t.trace(), a.trace(), kRounding * a.trace());
     for (const double shift : {0.5, 3.0}) {
       const MatrixXd unit = shift * MatrixXd::Identity(n, n);
-      EXPECT_NEAR(turned.dot((unit + t).ldlt().solve(turned)), b.dot((unit + a).ldlt().solve(b)),
-                  10.0 * kRounding);
+      EXPECT_NEAR(turned.dot(test_support::solve(unit + t, turned).col(0)),
+                  b.dot(test_support::solve(unit + a, b).col(0)), 10.0 * kRounding);
     }
   }
 }
@@ -153,7 +151,7 @@ TEST(TeamCholesky, IsTheFactorOfAnotherLibrary) {
     const MatrixXd a = positive_definite(size);
     MatrixXd l = a;
     ASSERT_TRUE(cholesky(l, team));
-    const MatrixXd expected = a.llt().matrixL();
+    const MatrixXd expected = test_support::cholesky_factor(a);
     EXPECT_LE((team_lower(l) - expected).norm(), 1e-13 * (1.0 + expected.norm())) << size;
   }
 }
@@ -173,7 +171,9 @@ TEST(TeamCholesky, WorksOnABlockOfALargerMatrix) {
   MatrixXd larger = MatrixXd::Constant(310, 305, 7.0);
   larger.block(4, 2, 300, 300) = a;
   ASSERT_TRUE(cholesky(larger.block(4, 2, 300, 300), team));
-  EXPECT_LE((team_lower(larger.block(4, 2, 300, 300)) - MatrixXd(a.llt().matrixL())).norm(), 1e-10);
+  EXPECT_LE((team_lower(larger.block(4, 2, 300, 300)) - MatrixXd(test_support::cholesky_factor(a)))
+                .norm(),
+            1e-10);
   larger.block(4, 2, 300, 300).setConstant(7.0);
   EXPECT_EQ(larger, MatrixXd::Constant(310, 305, 7.0));
 }

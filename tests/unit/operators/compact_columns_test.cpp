@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/operators/compact_columns.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
 
@@ -47,9 +48,7 @@ CompactParts example() {
 }
 
 CompactColumns made(CompactParts parts = example()) {
-  auto columns = CompactColumns::from_parts(std::move(parts));
-  EXPECT_TRUE(columns.has_value()) << columns.error().message;
-  return std::move(*columns);
+  return value_or_fail(CompactColumns::from_parts(std::move(parts)));
 }
 
 TEST(CompactColumns, NumbersFollowTheFormulaOfTheHeader) {
@@ -161,9 +160,7 @@ TEST(CompactColumns, PartsThatDoNotFitAreRefused) {
   for (const Misfit& misfit : cases) {
     CompactParts parts = example();
     misfit.make(parts);
-    const auto refused = CompactColumns::from_parts(parts);
-    ASSERT_FALSE(refused.has_value()) << misfit.message;
-    EXPECT_THAT(refused.error().message, HasSubstr(misfit.message));
+    EXPECT_THAT(sentence_of(CompactColumns::from_parts(parts)), HasSubstr(misfit.message));
   }
 }
 
@@ -172,9 +169,7 @@ TEST(CompactColumns, MoreBlocksThanNodesAreRefused) {
   parts.blocks.setZero(3, 1000);
   parts.lengths.setZero(6000);
   parts.blocks.row(0).setConstant(CompactColumns::kBlockNodes);
-  const auto refused = CompactColumns::from_parts(parts);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_THAT(refused.error().message, HasSubstr("order has 8 numbers"));
+  EXPECT_THAT(sentence_of(CompactColumns::from_parts(parts)), HasSubstr("order has 8 numbers"));
 }
 
 }  // namespace

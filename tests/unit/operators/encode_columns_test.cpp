@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <limits>
@@ -8,6 +7,7 @@
 
 #include "common/core/random.hpp"
 #include "common/operators/encode_columns.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift {
 namespace {
@@ -100,9 +100,7 @@ CompactColumns encoded(const Points& nodes, const std::vector<const MatrixXf*>& 
   ThreadTeam team(threads);
   std::vector<ColumnGroup> given;
   for (const MatrixXf* group : groups) given.push_back(group_of(*group, step));
-  auto made = encode_columns(node_blocks(nodes), given, team);
-  EXPECT_TRUE(made.has_value()) << made.error().message;
-  return std::move(*made);
+  return value_or_fail(encode_columns(node_blocks(nodes), given, team));
 }
 
 MatrixXf decoded(const CompactColumns& columns) {
@@ -258,9 +256,8 @@ TEST(EncodeColumns, NumbersThatAreNotFiniteAreRefused) {
     MatrixXf fields = noise(60, 2, 1.0F, random);
     fields(31, 1) = bad;
     ThreadTeam team(1);
-    const auto refused = encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team);
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
+    refusal_of(encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team),
+               ErrorCode::kNotFinite);
   }
 }
 
@@ -311,10 +308,9 @@ TEST(EncodeColumns, CanBeStopped) {
   std::stop_source stop;
   stop.request_stop();
   ThreadTeam team(1);
-  const auto stopped =
-      encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team, {}, stop.get_token());
-  ASSERT_FALSE(stopped.has_value());
-  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+  refusal_of(
+      encode_columns(node_blocks(nodes), {group_of(fields, kStep)}, team, {}, stop.get_token()),
+      ErrorCode::kUnavailable);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
@@ -30,11 +31,7 @@ class BoxCase : public ::testing::Test {
         test_support::box_mesh(centre - Vec3::Constant(40), centre + Vec3::Constant(40), 6), {}));
     case_file_ = folder_.write("case.yaml", io::case_config_text(config));
   }
-  CaseConfig config() const {
-    auto read = io::read_case_config(case_file_);
-    EXPECT_TRUE(read.has_value()) << read.error().message;
-    return std::move(*read);
-  }
+  CaseConfig config() const { return value_or_fail(io::read_case_config(case_file_)); }
 
   test_support::TemporaryFolder folder_;
   std::filesystem::path case_file_;

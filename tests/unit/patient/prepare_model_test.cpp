@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/patient/read_patient.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/patient/box_case.hpp"
 
 namespace brainshift::patient {
@@ -23,21 +24,20 @@ TEST_F(BoxCase, IsPreparedUnderBothBoundaries) {
   options.progress = [&](std::string_view stage, double) {
     if (stages.empty() || stages.back() != stage) stages.emplace_back(stage);
   };
-  const auto prepared = prepare_model(config(), options);
-  ASSERT_TRUE(prepared.has_value()) << prepared.error().message;
-  const io::ModelFile& file = prepared->file;
+  const auto prepared = value_or_fail(prepare_model(config(), options));
+  const io::ModelFile& file = prepared.file;
   EXPECT_EQ(file.model.model_id, read_patient(case_file_)->model.model_id);
   ASSERT_EQ(file.condensed.size(), kPreparedBoundaries.size());
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {
     EXPECT_EQ(file.condensed[i].boundary, kPreparedBoundaries[i]);
     EXPECT_EQ(file.condensed[i].model_id, file.model.model_id);
     EXPECT_GT(file.condensed[i].prepare_s, 0.0);
-    EXPECT_GT(prepared->timings[i].factor_nonzeros, 0u);
+    EXPECT_GT(prepared.timings[i].factor_nonzeros, 0u);
   }
   ASSERT_EQ(file.inputs.size(), 2u);
   EXPECT_EQ(file.inputs[0].key, "case");
   EXPECT_EQ(file.inputs[1].key, "mesh.file");
-  EXPECT_FALSE(prepared->checkpoint.has_value());
+  EXPECT_FALSE(prepared.checkpoint.has_value());
   EXPECT_EQ(stages.front(), "read images");
   EXPECT_THAT(stages, Contains("contact: contact columns"));
   EXPECT_THAT(stages, Contains("fixed: prior modes"));
@@ -54,9 +54,7 @@ void interrupt(const CaseConfig& config, const std::filesystem::path& checkpoint
   options.progress = [&](std::string_view stage, double) {
     if (stage == "contact: compact columns") stop.request_stop();
   };
-  const auto interrupted = prepare_model(config, options);
-  ASSERT_FALSE(interrupted.has_value());
-  EXPECT_EQ(interrupted.error().code, ErrorCode::kUnavailable);
+  refusal_of(prepare_model(config, options), ErrorCode::kUnavailable);
   ASSERT_TRUE(std::filesystem::exists(checkpoint));
 }
 
@@ -67,16 +65,14 @@ TEST_F(BoxCase, AnInterruptedPreparationGoesOnFromItsCheckpoint) {
 
   int resumed = 0;
   options.on_resume = [&] { ++resumed; };
-  auto finished = prepare_model(config(), options);
-  ASSERT_TRUE(finished.has_value()) << finished.error().message;
+  auto finished = value_or_fail(prepare_model(config(), options));
   EXPECT_EQ(resumed, 1);
   PrepareOptions afresh;
-  const auto whole = prepare_model(config(), afresh);
-  ASSERT_TRUE(whole.has_value());
-  EXPECT_TRUE(finished->file.condensed[0].responses.parts() ==
-              whole->file.condensed[0].responses.parts());
-  ASSERT_TRUE(finished->checkpoint.has_value());
-  EXPECT_TRUE(finished->checkpoint->remove());
+  const auto whole = value_or_fail(prepare_model(config(), afresh));
+  EXPECT_TRUE(finished.file.condensed[0].responses.parts() ==
+              whole.file.condensed[0].responses.parts());
+  ASSERT_TRUE(finished.checkpoint.has_value());
+  EXPECT_TRUE(finished.checkpoint->remove());
   EXPECT_FALSE(std::filesystem::exists(options.checkpoint));
 }
 
@@ -89,10 +85,8 @@ TEST_F(BoxCase, ACheckpointThatIsAlteredWhileItIsOpenEndsThePreparation) {
     std::fstream bytes(options.checkpoint, std::ios::binary | std::ios::in | std::ios::out);
     bytes.seekp(24 + 40 + 1).put('\x7f').flush();  // in the first block's numbers
   };
-  const auto refused = prepare_model(config(), options);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(refused.error().message, HasSubstr("was altered while the file was open"));
+  EXPECT_THAT(refusal_of(prepare_model(config(), options), ErrorCode::kUnreadable),
+              HasSubstr("was altered while the file was open"));
 }
 
 TEST_F(BoxCase, StopsBeforeTheLongWorkWhenAsked) {
@@ -102,9 +96,7 @@ TEST_F(BoxCase, StopsBeforeTheLongWorkWhenAsked) {
   options.stop = stop.get_token();
   std::vector<std::string> stages;
   options.progress = [&](std::string_view stage, double) { stages.emplace_back(stage); };
-  const auto stopped = prepare_model(config(), options);
-  ASSERT_FALSE(stopped.has_value());
-  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+  refusal_of(prepare_model(config(), options), ErrorCode::kUnavailable);
   EXPECT_THAT(stages, ::testing::Each(StartsWith("read")));
 }
 
@@ -113,9 +105,7 @@ TEST_F(BoxCase, AFailedPreparationLeavesNoEmptyCheckpoint) {
   small.condensed.memory_limit_gib = 1e-6;
   PrepareOptions options;
   options.checkpoint = folder_ / "m.h5.partial";
-  const auto refused = prepare_model(small, options);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_THAT(refused.error().message, HasSubstr("condensed.memory_limit_gib"));
+  EXPECT_THAT(sentence_of(prepare_model(small, options)), HasSubstr("condensed.memory_limit_gib"));
   EXPECT_FALSE(std::filesystem::exists(options.checkpoint));
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/patient/box_case.hpp"
 
 namespace brainshift::patient {
@@ -15,31 +16,23 @@ using ::testing::HasSubstr;
 
 TEST_F(BoxCase, IsReadAndBuiltFromItsFile) {
   std::set<std::string> stages;
-  const auto patient =
-      read_patient(case_file_, [&](std::string_view stage, double) { stages.emplace(stage); });
-  ASSERT_TRUE(patient.has_value()) << patient.error().message;
-  EXPECT_EQ(patient->config.file, case_file_);
-  EXPECT_EQ(patient->model.case_id, patient->config.case_id);
-  EXPECT_GT(patient->model.slaves.size(), 4u);
+  const auto patient = value_or_fail(
+      read_patient(case_file_, [&](std::string_view stage, double) { stages.emplace(stage); }));
+  EXPECT_EQ(patient.config.file, case_file_);
+  EXPECT_EQ(patient.model.case_id, patient.config.case_id);
+  EXPECT_GT(patient.model.slaves.size(), 4u);
   EXPECT_FALSE(stages.empty());
-  const auto again = build_patient(patient->config);
-  ASSERT_TRUE(again.has_value());
-  EXPECT_EQ(again->model_id, patient->model.model_id);
+  const auto again = value_or_fail(build_patient(patient.config));
+  EXPECT_EQ(again.model_id, patient.model.model_id);
 }
 
 TEST_F(BoxCase, ErrorsOfEachStepPassThrough) {
-  const auto no_case = read_patient(folder_ / "none.yaml");
-  ASSERT_FALSE(no_case.has_value());
-  EXPECT_EQ(no_case.error().code, ErrorCode::kNotFound);
+  refusal_of(read_patient(folder_ / "none.yaml"), ErrorCode::kNotFound);
   CaseConfig far = config();
   far.craniotomy.centre_mm += Vec3(500, 0, 0);
-  const auto no_craniotomy = build_patient(far);
-  ASSERT_FALSE(no_craniotomy.has_value());
-  EXPECT_EQ(no_craniotomy.error().code, ErrorCode::kEmptySet);
+  refusal_of(build_patient(far), ErrorCode::kEmptySet);
   std::filesystem::remove(folder_ / "box.vtu");
-  const auto no_mesh = read_patient(case_file_);
-  ASSERT_FALSE(no_mesh.has_value());
-  EXPECT_THAT(no_mesh.error().message, HasSubstr("mesh.file"));
+  EXPECT_THAT(sentence_of(read_patient(case_file_)), HasSubstr("mesh.file"));
 }
 
 }  // namespace

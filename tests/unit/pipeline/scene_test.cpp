@@ -2,8 +2,8 @@
 #include "common/pipeline/scene.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::pipeline {
@@ -13,16 +13,13 @@ using testing::HasSubstr;
 
 void expect_refused(const CaseConfig& config, Method method, Boundary boundary,
                     const std::string& words) {
-  const auto plan = plan_scene(config, method, boundary);
-  ASSERT_FALSE(plan.has_value()) << words;
-  EXPECT_EQ(plan.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(plan.error().message, HasSubstr(words));
+  EXPECT_THAT(refusal_of(plan_scene(config, method, boundary), ErrorCode::kInvalidArgument),
+              HasSubstr(words));
 }
 
 TEST(PlanScene, CarriesEverythingByDefault) {
-  const auto plan = plan_scene({}, Method::kCondensed, Boundary::kContact);
-  ASSERT_TRUE(plan.has_value());
-  EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
+  const auto plan = value_or_fail(plan_scene({}, Method::kCondensed, Boundary::kContact));
+  EXPECT_TRUE(plan.contact && plan.uncertainty && plan.gravity_modes && plan.far_field);
 }
 
 TEST(PlanScene, DefaultsAreAllowedWithEveryMethodAndBoundary) {
@@ -42,18 +39,16 @@ TEST(PlanScene, LeavesOutWhatIsForcedOff) {
   config.scene.uncertainty = Carry::kOff;
   config.scene.gravity_modes = Carry::kOff;
   config.scene.far_field = Carry::kOff;
-  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
-  ASSERT_TRUE(plan.has_value());
-  EXPECT_FALSE(plan->contact || plan->uncertainty || plan->gravity_modes || plan->far_field);
+  const auto plan = value_or_fail(plan_scene(config, Method::kCondensed, Boundary::kContact));
+  EXPECT_FALSE(plan.contact || plan.uncertainty || plan.gravity_modes || plan.far_field);
 }
 
 TEST(PlanScene, CarriesWhatIsForcedOn) {
   CaseConfig config;
   config.scene.contact = config.scene.uncertainty = config.scene.gravity_modes =
       config.scene.far_field = config.scene.rotation = Carry::kOn;
-  const auto plan = plan_scene(config, Method::kCondensed, Boundary::kContact);
-  ASSERT_TRUE(plan.has_value());
-  EXPECT_TRUE(plan->contact && plan->uncertainty && plan->gravity_modes && plan->far_field);
+  const auto plan = value_or_fail(plan_scene(config, Method::kCondensed, Boundary::kContact));
+  EXPECT_TRUE(plan.contact && plan.uncertainty && plan.gravity_modes && plan.far_field);
 }
 
 TEST(PlanScene, CarriesPressureOnlyWhenAsked) {

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include <cmath>
 
 #include "common/fem/elasticity.hpp"
 #include "common/geometry/node_choice.hpp"
 #include "common/prior/force_prior.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/dense.hpp"
 
 namespace brainshift::prior {
 namespace {
@@ -130,7 +128,7 @@ TEST(ForceKernel, CompactIsPositiveDefiniteAlsoForLongCorrelation) {
     const Eigen::MatrixXd dense =
         ForceKernel::compact(mesh.nodes, fem::nodal_volumes(mesh), length, 1.0).dense();
     EXPECT_LT((dense - dense.transpose()).norm(), 1e-14 * dense.norm());
-    const VecX eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense).eigenvalues();
+    const VecX eigenvalues = test_support::eigenvalues(dense);
     EXPECT_GT(eigenvalues[0], 0.0) << "L = " << length;
   }
 }

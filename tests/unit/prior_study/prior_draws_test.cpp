@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/prior_study/prior_draws.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 
@@ -12,22 +12,20 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(PriorStrengths, AreAsInTheCaseButForThoseNamed) {
-  const auto strengths = parse_strengths({"opening=1.5", "fine=0"});
-  ASSERT_TRUE(strengths) << strengths.error().message;
+  const auto strengths = value_or_fail(parse_strengths({"opening=1.5", "fine=0"}));
   PriorScaleValues expected = kAsInTheCase;
   expected[static_cast<std::size_t>(PriorPart::kOpening)] = 1.5;
   expected[static_cast<std::size_t>(PriorPart::kFine)] = 0.0;
-  EXPECT_EQ(*strengths, expected);
+  EXPECT_EQ(strengths, expected);
   EXPECT_EQ(*parse_strengths({}), kAsInTheCase);
 }
 
 TEST(PriorStrengths, RefuseWhatNamesNoStrength) {
   for (const char* const text : {"", "opening", "opening=", "=1", "wind=1", "opening=-1",
                                  "opening=nan", "opening=inf", "opening=1.5x", "Opening=1"}) {
-    const auto strengths = parse_strengths({text});
-    ASSERT_FALSE(strengths) << text;
-    EXPECT_EQ(strengths.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(strengths.error().message, HasSubstr("strength " + std::string(text) + ":"));
+    EXPECT_THAT(refusal_of(parse_strengths({text}), ErrorCode::kInvalidArgument),
+                HasSubstr("strength " + std::string(text) + ":"))
+        << text;
   }
   EXPECT_FALSE(parse_strengths({"opening=1", "opening=1"})) << "twice";
 }

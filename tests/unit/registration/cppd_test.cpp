@@ -7,14 +7,13 @@
 
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::registration {
 namespace {
 
 geometry::ClosestPointIndex cloud_index_of(const TriangleSurface& surface) {
-  auto index = geometry::ClosestPointIndex::build(surface);
-  EXPECT_TRUE(index.has_value());
-  return std::move(*index);
+  return value_or_fail(geometry::ClosestPointIndex::build(surface));
 }
 
 // The square [0, 10]^2 in z = 2 with its outward side up.

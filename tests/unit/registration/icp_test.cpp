@@ -11,6 +11,7 @@
 #include "common/core/random.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/registration/pose_information.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/registration/known_motion.hpp"
 
 namespace brainshift::registration {
@@ -28,9 +29,7 @@ using test::motion;
 using test::placement_error;
 
 ClosestPointIndex index_of(const TriangleSurface& surface) {
-  auto index = ClosestPointIndex::build(surface);
-  EXPECT_TRUE(index.has_value());
-  return std::move(*index);
+  return value_or_fail(ClosestPointIndex::build(surface));
 }
 
 TriangleSurface ellipsoid() { return geometry::ellipsoid_surface(kCentre, Vec3(18, 13, 9), 1.5); }
@@ -73,15 +72,15 @@ TEST(Icp, RecoversKnownMotionsExactlyWithoutNoise) {
       const Points on_surface = geometry::sample_surface(surface, 300, seed);
       const RigidTransform T_points_surface = motion(random, 4.0, 6.0);
       const Points points = traced(on_surface, T_points_surface, 0.0, random);
-      const auto result = align(points, index, RigidTransform::Identity(), without_prior());
-      ASSERT_TRUE(result);
-      EXPECT_TRUE(result->converged);
-      EXPECT_LT(result->iterations, 30);
-      EXPECT_LT(result->rms_mm, 1e-4);
-      EXPECT_LT(placement_error(result->T_surface_points, T_points_surface.inverse(), points), 1e-4)
+      const auto result =
+          value_or_fail(align(points, index, RigidTransform::Identity(), without_prior()));
+      EXPECT_TRUE(result.converged);
+      EXPECT_LT(result.iterations, 30);
+      EXPECT_LT(result.rms_mm, 1e-4);
+      EXPECT_LT(placement_error(result.T_surface_points, T_points_surface.inverse(), points), 1e-4)
           << "seed " << seed;
-      EXPECT_EQ(result->observable_axes, 6);
-      EXPECT_TRUE(result->rotation_observable);
+      EXPECT_EQ(result.observable_axes, 6);
+      EXPECT_TRUE(result.rotation_observable);
     }
   }
 }
@@ -98,12 +97,12 @@ TEST(Icp, ErrorWithNoiseIsWithinItsStatistics) {
     const Points on_surface = geometry::sample_surface(surface, count, seed);
     const RigidTransform T_points_surface = motion(random, 4.0, 6.0);
     const Points points = traced(on_surface, T_points_surface, noise, random);
-    const auto result = align(points, index, RigidTransform::Identity(), without_prior());
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged);
-    EXPECT_NEAR(result->rms_mm, noise, 0.1);  // 1 / sqrt(2 * 400) of it is statistics
+    const auto result =
+        value_or_fail(align(points, index, RigidTransform::Identity(), without_prior()));
+    EXPECT_TRUE(result.converged);
+    EXPECT_NEAR(result.rms_mm, noise, 0.1);  // 1 / sqrt(2 * 400) of it is statistics
     sum_of_squares +=
-        std::pow((result->T_surface_points * (T_points_surface * kCentre) - kCentre).norm(), 2);
+        std::pow((result.T_surface_points * (T_points_surface * kCentre) - kCentre).norm(), 2);
   }
   // Each translation axis sees a third of the points' information: variance 3 sd^2 / count per
   // axis, a little more because rotation is estimated too.
@@ -125,13 +124,12 @@ TEST(Icp, ConvergesFromFarWithOutliers) {
     IcpOptions options = without_prior();
     options.sd_mm = 0.2;
     options.welsch_scale_mm = 0.6;
-    const auto result = align(points, index, RigidTransform::Identity(), options);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged) << "seed " << seed;
-    EXPECT_LT(placement_error(result->T_surface_points, T_points_surface.inverse(),
+    const auto result = value_or_fail(align(points, index, RigidTransform::Identity(), options));
+    EXPECT_TRUE(result.converged) << "seed " << seed;
+    EXPECT_LT(placement_error(result.T_surface_points, T_points_surface.inverse(),
                               T_points_surface * on_surface),
               0.2)
-        << "seed " << seed << ", " << result->iterations << " iterations";
+        << "seed " << seed << ", " << result.iterations << " iterations";
   }
 }
 
@@ -152,11 +150,11 @@ TEST(Icp, AlignsPlanarSectionsOnly) {
     on_surface.col(static_cast<Eigen::Index>(i)) = ends[i];
   const RigidTransform T_points_surface = motion(random, 3.0, 4.0);
   const Points points = traced(on_surface, T_points_surface, 0.2, random);
-  const auto result = align(points, index, RigidTransform::Identity(), without_prior());
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->converged);
-  EXPECT_TRUE(result->rotation_observable);
-  EXPECT_LT(placement_error(result->T_surface_points, T_points_surface.inverse(), points), 0.2);
+  const auto result =
+      value_or_fail(align(points, index, RigidTransform::Identity(), without_prior()));
+  EXPECT_TRUE(result.converged);
+  EXPECT_TRUE(result.rotation_observable);
+  EXPECT_LT(placement_error(result.T_surface_points, T_points_surface.inverse(), points), 0.2);
 }
 
 TEST(Icp, StartsFromTheInitialPose) {
@@ -168,10 +166,9 @@ TEST(Icp, StartsFromTheInitialPose) {
   const Points points =
       traced(geometry::sample_surface(surface, 300, 6), T_points_surface, 0.0, random);
   const RigidTransform T_initial = motion(random, 3.0, 3.0) * T_points_surface.inverse();
-  const auto result = align(points, index, T_initial, without_prior());
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->converged);
-  EXPECT_LT(placement_error(result->T_surface_points, T_points_surface.inverse(), points), 1e-4);
+  const auto result = value_or_fail(align(points, index, T_initial, without_prior()));
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(placement_error(result.T_surface_points, T_points_surface.inverse(), points), 1e-4);
 }
 
 TEST(Icp, SphereShowsNoRotationAndKeepsTheTrackedOne) {
@@ -188,14 +185,13 @@ TEST(Icp, SphereShowsNoRotationAndKeepsTheTrackedOne) {
     Vec6 tracked;
     tracked << 0.2, -0.1, 0.05, 0, 0, 0;
     const RigidTransform T_initial = rigid_increment(tracked, kCentre + shift);
-    const auto result = align(points, index, T_initial, options);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged);
-    EXPECT_FALSE(result->rotation_observable);
-    EXPECT_EQ(result->observable_axes, 3);
-    EXPECT_LT(rotation_error_deg(result->T_surface_points, T_initial), 1e-6);
+    const auto result = value_or_fail(align(points, index, T_initial, options));
+    EXPECT_TRUE(result.converged);
+    EXPECT_FALSE(result.rotation_observable);
+    EXPECT_EQ(result.observable_axes, 3);
+    EXPECT_LT(rotation_error_deg(result.T_surface_points, T_initial), 1e-6);
     // Translation is found all the same.
-    EXPECT_LT((result->T_surface_points * (kCentre + shift) - kCentre).norm(), 0.15);
+    EXPECT_LT((result.T_surface_points * (kCentre + shift) - kCentre).norm(), 0.15);
   }
 }
 
@@ -211,12 +207,12 @@ TEST(Icp, HalfOfASphereShowsNoRotationEither) {
     n.z() = std::abs(n.z());
     points.col(i) = kCentre + Vec3(1, 2, -1) + 13.8 * n;
   }
-  const auto result = align(points, index, RigidTransform::Identity(), without_prior());
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->converged);
-  EXPECT_FALSE(result->rotation_observable);
-  EXPECT_EQ(result->observable_axes, 3);
-  EXPECT_LT((result->T_surface_points * (kCentre + Vec3(1, 2, -1)) - kCentre).norm(), 0.1);
+  const auto result =
+      value_or_fail(align(points, index, RigidTransform::Identity(), without_prior()));
+  EXPECT_TRUE(result.converged);
+  EXPECT_FALSE(result.rotation_observable);
+  EXPECT_EQ(result.observable_axes, 3);
+  EXPECT_LT((result.T_surface_points * (kCentre + Vec3(1, 2, -1)) - kCentre).norm(), 0.1);
 }
 
 TEST(Icp, SpheroidHidesTheTurnAboutItsAxisOnly) {
@@ -228,12 +224,12 @@ TEST(Icp, SpheroidHidesTheTurnAboutItsAxisOnly) {
   const RigidTransform T_points_surface = rigid_increment(xi, kCentre);
   const Points points =
       traced(geometry::sample_surface(surface, 400, 9), T_points_surface, 0.1, random);
-  const auto result = align(points, index, RigidTransform::Identity(), without_prior());
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->observable_axes, 5);
-  EXPECT_FALSE(result->rotation_observable);
+  const auto result =
+      value_or_fail(align(points, index, RigidTransform::Identity(), without_prior()));
+  EXPECT_EQ(result.observable_axes, 5);
+  EXPECT_FALSE(result.rotation_observable);
   // The axis itself is found.
-  const Vec3 axis = result->T_surface_points.linear() * T_points_surface.linear() * Vec3::UnitZ();
+  const Vec3 axis = result.T_surface_points.linear() * T_points_surface.linear() * Vec3::UnitZ();
   EXPECT_LT(std::acos(std::min(1.0, axis.z())) / kDegree, 0.5);
 }
 
@@ -250,12 +246,12 @@ TEST(Icp, PlaneShowsThreeAxes) {
   Vec6 xi;
   xi << 0.05, -0.03, 0, 0, 0, 2;
   const Points moved = rigid_increment(xi, Vec3::Zero()) * points;
-  const auto result = align(moved, index_of(plane), RigidTransform::Identity(), without_prior());
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->converged);
-  EXPECT_EQ(result->observable_axes, 3);
-  EXPECT_FALSE(result->rotation_observable);
-  EXPECT_LT((result->T_surface_points * moved).row(2).cwiseAbs().maxCoeff(), 1e-4);
+  const auto result =
+      value_or_fail(align(moved, index_of(plane), RigidTransform::Identity(), without_prior()));
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.observable_axes, 3);
+  EXPECT_FALSE(result.rotation_observable);
+  EXPECT_LT((result.T_surface_points * moved).row(2).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(Icp, PriorDrawsTheRotationTowardsTheTrackedPose) {
@@ -268,10 +264,9 @@ TEST(Icp, PriorDrawsTheRotationTowardsTheTrackedPose) {
   for (const double sd_deg : {100.0, 3.0, 1.0, 0.1}) {
     IcpOptions options;
     options.rotation_sd_deg = sd_deg;
-    const auto result = align(points, index, RigidTransform::Identity(), options);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged);
-    const double turned = rotation_error_deg(result->T_surface_points, RigidTransform::Identity());
+    const auto result = value_or_fail(align(points, index, RigidTransform::Identity(), options));
+    EXPECT_TRUE(result.converged);
+    const double turned = rotation_error_deg(result.T_surface_points, RigidTransform::Identity());
     EXPECT_LT(turned, previous);
     previous = turned;
   }
@@ -301,16 +296,15 @@ TEST(Icp, EndsInAMinimumOfItsObjective) {
         traced(geometry::sample_surface(surface, 60, 15), motion(random, 2.0, 6.0), 0.3, random);
     IcpOptions options;
     options.rotation_sd_deg = sd_deg;
-    const auto result = align(points, index, RigidTransform::Identity(), options);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->converged);
-    const Vec3 centre = result->T_surface_points * Vec3(points.rowwise().mean());
-    const double least = objective(points, index, result->T_surface_points, options);
+    const auto result = value_or_fail(align(points, index, RigidTransform::Identity(), options));
+    EXPECT_TRUE(result.converged);
+    const Vec3 centre = result.T_surface_points * Vec3(points.rowwise().mean());
+    const double least = objective(points, index, result.T_surface_points, options);
     for (int k = 0; k < 6; ++k)
       for (const double sign : {-1.0, 1.0}) {
         const double h = k < 3 ? 0.1 * kDegree : 0.02;
         const RigidTransform beside =
-            rigid_increment(sign * h * Vec6::Unit(k), centre) * result->T_surface_points;
+            rigid_increment(sign * h * Vec6::Unit(k), centre) * result.T_surface_points;
         EXPECT_GT(objective(points, index, beside, options), least) << "axis " << k;
       }
   }
@@ -322,10 +316,9 @@ TEST(Icp, RepeatsBitForBit) {
   Random random(12);
   const Points points =
       traced(geometry::sample_surface(surface, 200, 12), motion(random, 4.0, 6.0), 0.3, random);
-  const auto first = align(points, index, RigidTransform::Identity());
-  const auto second = align(points, index_of(surface), RigidTransform::Identity());
-  ASSERT_TRUE(first && second);
-  EXPECT_EQ(first->T_surface_points.matrix(), second->T_surface_points.matrix());
+  const auto first = value_or_fail(align(points, index, RigidTransform::Identity()));
+  const auto second = value_or_fail(align(points, index_of(surface), RigidTransform::Identity()));
+  EXPECT_EQ(first.T_surface_points.matrix(), second.T_surface_points.matrix());
 }
 
 TEST(Icp, SaysWhenItRanOutOfIterations) {
@@ -335,20 +328,20 @@ TEST(Icp, SaysWhenItRanOutOfIterations) {
       traced(geometry::sample_surface(surface, 200, 13), motion(random, 8.0, 10.0), 0.3, random);
   IcpOptions options;
   options.max_iterations = 2;
-  const auto result = align(points, index_of(surface), RigidTransform::Identity(), options);
-  ASSERT_TRUE(result);
-  EXPECT_FALSE(result->converged);
-  EXPECT_EQ(result->iterations, 2);
+  const auto result =
+      value_or_fail(align(points, index_of(surface), RigidTransform::Identity(), options));
+  EXPECT_FALSE(result.converged);
+  EXPECT_EQ(result.iterations, 2);
 }
 
 TEST(Icp, StaysFiniteWhenEveryPointIsFarAway) {
   const Points points = geometry::sample_surface(ellipsoid(), 50, 1).colwise() + Vec3(0, 0, 5000);
   IcpOptions options;
   options.max_iterations = 5;
-  const auto result = align(points, index_of(ellipsoid()), RigidTransform::Identity(), options);
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->T_surface_points.matrix().allFinite());
-  EXPECT_TRUE(std::isfinite(result->rms_mm));
+  const auto result =
+      value_or_fail(align(points, index_of(ellipsoid()), RigidTransform::Identity(), options));
+  EXPECT_TRUE(result.T_surface_points.matrix().allFinite());
+  EXPECT_TRUE(std::isfinite(result.rms_mm));
 }
 
 TEST(Icp, TranslationOnlyKeepsTheOrientationAndFindsATranslation) {
@@ -358,12 +351,11 @@ TEST(Icp, TranslationOnlyKeepsTheOrientationAndFindsATranslation) {
   const RigidTransform T_points_surface = motion(random, 4.0, 0.0);
   IcpOptions options;
   options.rotation = false;
-  const auto result = align(traced(surface.vertices, T_points_surface, 0.0, random), index,
-                            RigidTransform::Identity(), options);
-  ASSERT_TRUE(result.has_value());
-  EXPECT_TRUE(result->T_surface_points.linear().isIdentity(1e-12));
-  EXPECT_LT((T_points_surface.translation() + result->T_surface_points.translation()).norm(), 1e-3);
-  EXPECT_TRUE(result->rotation_observable);
+  const auto result = value_or_fail(align(traced(surface.vertices, T_points_surface, 0.0, random),
+                                          index, RigidTransform::Identity(), options));
+  EXPECT_TRUE(result.T_surface_points.linear().isIdentity(1e-12));
+  EXPECT_LT((T_points_surface.translation() + result.T_surface_points.translation()).norm(), 1e-3);
+  EXPECT_TRUE(result.rotation_observable);
 }
 
 // The true difference: where the aligned points go with rotation and without.
@@ -377,15 +369,15 @@ TEST(Icp, EstimateForRotationLeftOutBoundsTheTrueDifference) {
         const Points points =
             traced(surface.vertices, motion(random, 2.0, rotation_deg), 0.3, random);
         IcpOptions options;
-        const auto with = align(points, index, RigidTransform::Identity(), options);
+        const auto with = value_or_fail(align(points, index, RigidTransform::Identity(), options));
         options.rotation = false;
-        const auto without = align(points, index, RigidTransform::Identity(), options);
-        ASSERT_TRUE(with && without);
+        const auto without =
+            value_or_fail(align(points, index, RigidTransform::Identity(), options));
         const double truth =
-            placement_error(with->T_surface_points, without->T_surface_points, points);
-        EXPECT_LE(truth, without->left_out_rotation_mm) << rotation_deg;
-        EXPECT_LE(without->left_out_rotation_mm, 10.0 * std::max(0.3, truth)) << rotation_deg;
-        EXPECT_EQ(with->left_out_rotation_mm, 0.0);
+            placement_error(with.T_surface_points, without.T_surface_points, points);
+        EXPECT_LE(truth, without.left_out_rotation_mm) << rotation_deg;
+        EXPECT_LE(without.left_out_rotation_mm, 10.0 * std::max(0.3, truth)) << rotation_deg;
+        EXPECT_EQ(with.left_out_rotation_mm, 0.0);
         greatest = std::max(greatest, truth);
       }
     }
@@ -402,14 +394,13 @@ TEST(Icp, EstimateForUnobservableRotationBoundsRotationsWithinThePrior) {
   for (const double rotation_deg : {1.0, 3.0, 6.0}) {
     const RigidTransform T_points_surface = motion(random, 2.0, rotation_deg);
     const Points points = traced(ball.vertices, T_points_surface, 0.0, random);
-    const auto result = align(points, index, RigidTransform::Identity());
-    ASSERT_TRUE(result.has_value());
-    ASSERT_FALSE(result->rotation_observable);
+    const auto result = value_or_fail(align(points, index, RigidTransform::Identity()));
+    ASSERT_FALSE(result.rotation_observable);
     const double truth =
-        placement_error(result->T_surface_points, T_points_surface.inverse(), points);
+        placement_error(result.T_surface_points, T_points_surface.inverse(), points);
     EXPECT_GT(truth, 0.1);
-    EXPECT_LE(truth, result->left_out_rotation_mm) << rotation_deg;
-    EXPECT_LE(result->left_out_rotation_mm, 2.5);
+    EXPECT_LE(truth, result.left_out_rotation_mm) << rotation_deg;
+    EXPECT_LE(result.left_out_rotation_mm, 2.5);
   }
 }
 
@@ -420,9 +411,9 @@ TEST(Icp, RotationThatNothingHoldsHasNoBound) {
   const Points far = surface.vertices.colwise() + Vec3(0, 0, 1e4);
   options.max_iterations = 1;
   options.welsch_scale_mm = 1e-3;
-  const auto result = align(far, index_of(surface), RigidTransform::Identity(), options);
-  ASSERT_TRUE(result.has_value());
-  EXPECT_EQ(result->left_out_rotation_mm, std::numeric_limits<double>::infinity());
+  const auto result =
+      value_or_fail(align(far, index_of(surface), RigidTransform::Identity(), options));
+  EXPECT_EQ(result.left_out_rotation_mm, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

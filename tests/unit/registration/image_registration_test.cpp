@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
@@ -8,6 +7,7 @@
 
 #include "common/registration/image_registration.hpp"
 #include "common/registration/pose_information.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/registration/blob_image.hpp"
 
 namespace brainshift::registration {
@@ -130,12 +130,11 @@ ImageRegistration recover(const Remap& remap) {
 }
 
 TEST(ImageRegistration, LeavesWhatIsInPlace) {
-  const auto result = registrar().align(samples());
-  ASSERT_TRUE(result);
-  EXPECT_TRUE(result->converged);
-  EXPECT_LT(error_mm(result->T_ras_ras, RigidTransform::Identity()), 0.1);
-  EXPECT_EQ(result->overlap, 1.0);
-  EXPECT_GE(result->nmi_after, result->nmi_before);
+  const auto result = value_or_fail(registrar().align(samples()));
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_mm(result.T_ras_ras, RigidTransform::Identity()), 0.1);
+  EXPECT_EQ(result.overlap, 1.0);
+  EXPECT_GE(result.nmi_after, result.nmi_before);
 }
 
 TEST(ImageRegistration, TakesOutAKnownError) {
@@ -161,10 +160,9 @@ TEST(ImageRegistration, TakesTheHighestOfSeveralHills) {
   displaced.positions.colwise() += error;
   const RigidTransform T_error(Eigen::Translation3d{error});
   options.start_offset_mm = 12.0;
-  const auto several = registrar(options).align(displaced);
-  ASSERT_TRUE(several);
-  EXPECT_LT(error_mm(several->T_ras_ras, T_error), 0.1);
-  EXPECT_LT(several->agreement, 0.9);
+  const auto several = value_or_fail(registrar(options).align(displaced));
+  EXPECT_LT(error_mm(several.T_ras_ras, T_error), 0.1);
+  EXPECT_LT(several.agreement, 0.9);
 }
 
 TEST(ImageRegistration, DoesNotCareHowIntensitiesGoTogether) {
@@ -199,13 +197,11 @@ TEST(ImageRegistration, SeesOnlyTheRegion) {
         region.values[static_cast<std::size_t>(voxel)] = inside ? 1.0f : 0.0f;
         if (!inside) spoiled.values[static_cast<std::size_t>(voxel)] = 0.0f;
       }
-  const auto made = ImageRegistrar::create(spoiled, &region);
-  ASSERT_TRUE(made);
+  const auto made = value_or_fail(ImageRegistrar::create(spoiled, &region));
   IntensitySamples displaced = samples();
   displaced.positions = test::moved(known_error(), displaced.positions);
-  const auto result = made->align(displaced);
-  ASSERT_TRUE(result);
-  EXPECT_LT(error_mm(result->T_ras_ras, known_error()), 0.1);
+  const auto result = value_or_fail(made.align(displaced));
+  EXPECT_LT(error_mm(result.T_ras_ras, known_error()), 0.1);
 }
 
 // Nothing of the image is in the samples: no pose deserves trust.
@@ -221,9 +217,7 @@ TEST(ImageRegistration, LowAgreementTellsUnrelatedImages) {
 
 void expect_image_refused(const Result<ImageRegistration>& result, ErrorCode code,
                           const std::string& text) {
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, code);
-  EXPECT_THAT(result.error().message, HasSubstr(text));
+  EXPECT_THAT(refusal_of(result, code), HasSubstr(text));
 }
 
 TEST(ImageRegistration, RefusesBadSamples) {
@@ -257,9 +251,8 @@ TEST(ImageRegistration, RefusesBadSamples) {
 TEST(ImageRegistration, RefusesAConstantMri) {
   VoxelImage constant = mri();
   for (float& value : constant.values) value = 42.0f;
-  const auto made = ImageRegistrar::create(constant, nullptr);
-  ASSERT_TRUE(made);
-  expect_image_refused(made->align(samples()), ErrorCode::kInvalidArgument, "the MRI is 42");
+  const auto made = value_or_fail(ImageRegistrar::create(constant, nullptr));
+  expect_image_refused(made.align(samples()), ErrorCode::kInvalidArgument, "the MRI is 42");
 }
 
 TEST(ImageRegistration, RefusesAnOptimumAtTheEdge) {
@@ -274,10 +267,7 @@ TEST(ImageRegistration, RefusesAnOptimumAtTheEdge) {
 
 void expect_refused_mri(const VoxelImage& image, ErrorCode code, const std::string& text,
                         const ImageRegistrationOptions& options = {}) {
-  const auto made = ImageRegistrar::create(image, nullptr, options);
-  ASSERT_FALSE(made) << text;
-  EXPECT_EQ(made.error().code, code);
-  EXPECT_THAT(made.error().message, HasSubstr(text));
+  EXPECT_THAT(refusal_of(ImageRegistrar::create(image, nullptr, options), code), HasSubstr(text));
 }
 
 TEST(ImageRegistration, RefusesABadMri) {
@@ -292,9 +282,8 @@ TEST(ImageRegistration, RefusesABadMri) {
   bad.T_ras_voxel.linear().col(1).setZero();
   expect_refused_mri(bad, ErrorCode::kInvalidArgument, "no usable affine");
   const VoxelImage region;
-  const auto made = ImageRegistrar::create(mri(), &region);
-  ASSERT_FALSE(made);
-  EXPECT_THAT(made.error().message, HasSubstr("region of 0 x 0 x 0 voxels"));
+  EXPECT_THAT(sentence_of(ImageRegistrar::create(mri(), &region)),
+              HasSubstr("region of 0 x 0 x 0 voxels"));
 }
 
 TEST(ImageRegistration, RefusesOptionsOutOfRange) {

@@ -2,9 +2,7 @@
 #include "common/registration/surface_distances.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
@@ -15,6 +13,8 @@
 #include "common/geometry/surface.hpp"
 #include "common/registration/alignment_data.hpp"
 #include "common/registration/icp.hpp"
+#include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::registration {
@@ -68,9 +68,7 @@ Points still(const SurfaceDistances& surface) {
 }
 
 SurfaceDistances built(const Points& measured, const SurfaceDistanceOptions& options = {}) {
-  auto made = SurfaceDistances::build(indexed(cap()), measured, options);
-  EXPECT_TRUE(made.has_value());
-  return std::move(*made);
+  return value_or_fail(SurfaceDistances::build(indexed(cap()), measured, options));
 }
 
 TEST(SurfaceDistances, OfASunkenCortexAreTheDepthAlongItsNormal) {
@@ -159,20 +157,15 @@ TEST(SurfaceDistances, TheCamerasPoseIsACommonError) {
 }
 
 TEST(SurfaceDistances, RefuseWhatLiesElsewhereOrIsNotFinite) {
-  const auto far =
-      SurfaceDistances::build(indexed(cap()), points_on_cap(100, 8.0).colwise() + Vec3(0, 0, 80));
-  ASSERT_FALSE(far.has_value());
-  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(far.error().message, HasSubstr("0 of 100 points lie over the craniotomy"));
+  EXPECT_THAT(refusal_of(SurfaceDistances::build(
+                             indexed(cap()), points_on_cap(100, 8.0).colwise() + Vec3(0, 0, 80)),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("0 of 100 points lie over the craniotomy"));
   Points measured = points_on_cap(100, 8.0);
   measured(1, 17) = std::numeric_limits<double>::quiet_NaN();
-  const auto not_finite = SurfaceDistances::build(indexed(cap()), measured);
-  ASSERT_FALSE(not_finite.has_value());
-  EXPECT_EQ(not_finite.error().code, ErrorCode::kNotFinite);
-  EXPECT_THAT(not_finite.error().message, HasSubstr("point 17"));
-  const auto nothing = IndexedPatch::build(SurfacePatch{});
-  ASSERT_FALSE(nothing.has_value());
-  EXPECT_EQ(nothing.error().code, ErrorCode::kEmptySet);
+  EXPECT_THAT(refusal_of(SurfaceDistances::build(indexed(cap()), measured), ErrorCode::kNotFinite),
+              HasSubstr("point 17"));
+  refusal_of(IndexedPatch::build(SurfacePatch{}), ErrorCode::kEmptySet);
 }
 
 TEST(SurfaceDistances, OfAnEstimateThatIsNotFiniteAreNone) {
@@ -201,9 +194,8 @@ SurfaceDistances of_tumour(const BrainModel& patient, const Points& measured,
                            const RigidTransform& T = RigidTransform::Identity(),
                            SurfaceDistanceOptions options = {}) {
   options.points = 400;
-  auto made = SurfaceDistances::build(indexed(tumour_patch(patient)), measured, options, T);
-  EXPECT_TRUE(made.has_value());
-  return std::move(*made);
+  return value_or_fail(
+      SurfaceDistances::build(indexed(tumour_patch(patient)), measured, options, T));
 }
 
 // The amplitude a of the displacement a (x - centre) that data show when nothing else moves but
@@ -236,7 +228,7 @@ Amplitude dilation_shown_by(const SparseData& data) {
     const VecX rows = rows_of(column);
     covariance += rows * rows.transpose();
   }
-  const VecX whitened = covariance.ldlt().solve(signal);
+  const VecX whitened = test_support::solve_positive(covariance, signal);
   return {whitened.dot(seen) / whitened.dot(signal), 1.0 / std::sqrt(whitened.dot(signal))};
 }
 
@@ -254,11 +246,9 @@ TEST(TumourDistances, ShowADilationThatARigidAlignmentHides) {
   EXPECT_NEAR(shown.value, 0.05, 0.002);
   EXPECT_LT(shown.sd, 0.005);
 
-  const auto index = geometry::ClosestPointIndex::build(patient.tumour);
-  ASSERT_TRUE(index);
-  const auto icp = align(measured, *index, RigidTransform::Identity());
-  ASSERT_TRUE(icp);
-  const Amplitude hidden = dilation_shown_by(sparse_data_from_alignment(measured, *icp, 0.5));
+  const auto index = value_or_fail(geometry::ClosestPointIndex::build(patient.tumour));
+  const auto icp = value_or_fail(align(measured, index, RigidTransform::Identity()));
+  const Amplitude hidden = dilation_shown_by(sparse_data_from_alignment(measured, icp, 0.5));
   EXPECT_NEAR(hidden.value, 0.0, 0.005);
   EXPECT_GT(hidden.sd, 0.05);
 }
@@ -332,7 +322,7 @@ VecX toy_inversion(const SparseData& data) {
     normal += weight * row * row.transpose();
     right += weight * n.dot(data.displacements.col(i)) * row;
   }
-  return normal.ldlt().solve(right);
+  return test_support::solve_positive(normal, right);
 }
 
 TEST(TumourDistances, AndAnInversionInTurnFindTheDeformedSurfaceAndSettle) {
@@ -359,12 +349,11 @@ TEST(TumourDistances, AndAnInversionInTurnFindTheDeformedSurfaceAndSettle) {
     estimate = toy_inversion(data);
   }
   EXPECT_LE(rounds, 6);
-  const auto found = geometry::ClosestPointIndex::build(
-      {tumour.vertices + field_at_all(tumour.vertices, estimate), tumour.triangles});
-  ASSERT_TRUE(found);
+  const auto found = value_or_fail(geometry::ClosestPointIndex::build(
+      {tumour.vertices + field_at_all(tumour.vertices, estimate), tumour.triangles}));
   double farthest = 0.0;
   for (const auto vertex : true_vertices.colwise()) {
-    farthest = std::max(farthest, found->closest(vertex).distance_mm);
+    farthest = std::max(farthest, found.closest(vertex).distance_mm);
   }
   EXPECT_LT(farthest, 0.05);
   // Sliding included, as far as the shape and the prior show it.
@@ -398,12 +387,10 @@ TEST(TumourDistances, RefusePointsFarFromTheSurfaceInTheirOwnWords) {
   options.measured = "tumour boundary";
   options.surface = "tumour";
   const auto patch = indexed(tumour_patch(patient));
-  const auto far = SurfaceDistances::build(patch, away, options);
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(far.error().message,
-              HasSubstr("tumour boundary: 0 of 50 points lie over the tumour within 30 mm, at "
-                        "least 3 are needed"));
+  EXPECT_THAT(
+      refusal_of(SurfaceDistances::build(patch, away, options), ErrorCode::kInvalidArgument),
+      HasSubstr("tumour boundary: 0 of 50 points lie over the tumour within 30 mm, at "
+                "least 3 are needed"));
   RigidTransform back = RigidTransform::Identity();
   back.translation() = Vec3(0, -70, 0);
   EXPECT_TRUE(SurfaceDistances::build(patch, away, options, back));

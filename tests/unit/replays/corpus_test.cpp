@@ -7,6 +7,7 @@
 #include "common/wire/convert.hpp"
 #include "tests/benchmarks/csv_table.hpp"
 #include "tests/replays/corpus.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::replays {
@@ -65,13 +66,12 @@ TEST(Corpus, ReadsWhatItWrote) {
   meta.model_id = "m";
   meta.seed = 7;
   ASSERT_TRUE(write_recording(folder / "one.surgery", meta, recording));
-  const auto read = read_recording(folder / "one.surgery");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->meta, meta);
-  ASSERT_EQ(read->observations.size(), recording.size());
+  const auto read = value_or_fail(read_recording(folder / "one.surgery"));
+  EXPECT_EQ(read.meta, meta);
+  ASSERT_EQ(read.observations.size(), recording.size());
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    EXPECT_EQ(read->observations[i].recorded_ns, recording[i].recorded_ns);
-    EXPECT_EQ(wire::encode(read->observations[i].observation),
+    EXPECT_EQ(read.observations[i].recorded_ns, recording[i].recorded_ns);
+    EXPECT_EQ(wire::encode(read.observations[i].observation),
               wire::encode(recording[i].observation));
   }
 }
@@ -81,9 +81,7 @@ TEST(Corpus, RefusesAFileThatExistsAndOneWithoutObservations) {
   io::SurgeryMeta meta;
   meta.case_id = "c";
   ASSERT_TRUE(write_recording(folder / "one.surgery", meta, record(two_moments(), 2)));
-  const auto again = write_recording(folder / "one.surgery", meta, {});
-  ASSERT_FALSE(again);
-  EXPECT_EQ(again.error().code, ErrorCode::kWriteFailed);
+  refusal_of(write_recording(folder / "one.surgery", meta, {}), ErrorCode::kWriteFailed);
   EXPECT_TRUE(read_recording(folder / "one.surgery")) << "the first is still there";
 
   EXPECT_EQ(read_recording(folder / "none.surgery").error().code, ErrorCode::kNotFound);
@@ -149,13 +147,12 @@ TEST(Manifest, RoundingHardlyChangesTheSumsAndTwoInterchangedPointsDo) {
 TEST(Manifest, WritesWhatTheComparisonReads) {
   const test_support::TemporaryFolder folder;
   ASSERT_TRUE(write_manifest(folder / "m.csv", {entry_of("sag", 9, boundary(1, some_points()))}));
-  const auto table = bench::CsvTable::read(folder / "m.csv");
-  ASSERT_TRUE(table) << table.error().message;
-  EXPECT_EQ(table->text(0, "surgery"), "sag");
-  EXPECT_EQ(table->number(0, "seed"), 9.0);
-  EXPECT_EQ(table->text(0, "recorded_ns"), "750000000");
-  EXPECT_EQ(table->text(0, "acquired_ns"), "30000000000");
-  EXPECT_NEAR(table->number(0, "mean_mm"), 22.0 / 6.0, 1e-11);
+  const auto table = value_or_fail(bench::CsvTable::read(folder / "m.csv"));
+  EXPECT_EQ(table.text(0, "surgery"), "sag");
+  EXPECT_EQ(table.number(0, "seed"), 9.0);
+  EXPECT_EQ(table.text(0, "recorded_ns"), "750000000");
+  EXPECT_EQ(table.text(0, "acquired_ns"), "30000000000");
+  EXPECT_NEAR(table.number(0, "mean_mm"), 22.0 / 6.0, 1e-11);
 }
 
 }  // namespace

@@ -25,6 +25,7 @@
 #include "server/service/service.hpp"
 #include "server/transport/outbox.hpp"
 #include "server/transport/router.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/server/fake_session.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
@@ -129,10 +130,9 @@ class TransportTest : public testing::Test {
 
   void serve(ServiceOptions service_options, RouterOptions router_options = {}) {
     router_options.endpoint = "tcp://127.0.0.1:*";
-    auto router = Router::bind(router_options);
-    ASSERT_TRUE(router.has_value()) << router.error().message;
-    endpoint_ = router->endpoint();
-    router_ = std::make_shared<Router>(std::move(*router));
+    auto router = value_or_fail(Router::bind(router_options));
+    endpoint_ = router.endpoint();
+    router_ = std::make_shared<Router>(std::move(router));
     service_ = std::make_unique<Service>(std::move(service_options), outbox_);
     thread_ = std::thread([this] { run_status_ = router_->run(*service_, outbox_, stop_fd_); });
   }
@@ -215,9 +215,7 @@ class TransportTest : public testing::Test {
     while (received.type != MessageType::kSessionState || received.request_id != 7) {
       received = peer.receive();
     }
-    const auto state = wire::decode_session_state(received.payload);
-    EXPECT_TRUE(state.has_value());
-    return state ? *state : SessionState{};
+    return value_or_fail(wire::decode_session_state(received.payload));
   }
 
   // A session whose updates `peer` receives.
@@ -237,9 +235,7 @@ class TransportTest : public testing::Test {
     return received;
   }
   static UpdateMessage next_update(RawPeer& peer) {
-    auto message = wire::decode_update(next(peer, MessageType::kUpdate).payload);
-    EXPECT_TRUE(message.has_value());
-    return message ? *message : UpdateMessage{};
+    return value_or_fail(wire::decode_update(next(peer, MessageType::kUpdate).payload));
   }
   // What the peer receives for its observation.
   static UpdateMessage answer(RawPeer& peer, const Observation& observation) {

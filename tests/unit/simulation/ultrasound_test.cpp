@@ -8,6 +8,7 @@
 #include "common/core/rigid_motion.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -76,20 +77,17 @@ double grey_mean(const tracking::Recording& recording, int frame, const Vec3& x,
 }
 
 TEST(ProbeWindow, LiesOnTheBrainAndLooksOutwards) {
-  const auto window = probe_window(head().brain, head().craniotomy);
-  ASSERT_TRUE(window);
-  EXPECT_NEAR(window->centre.norm(), kBrain_mm, 1.0);
-  EXPECT_GT(window->outward.dot(Vec3(47, 1, 0).normalized()), 0.99);
-  EXPECT_NEAR(window->along.norm(), 1.0, 1e-12);
-  EXPECT_NEAR(window->along.dot(window->outward), 0.0, 1e-12);
-  EXPECT_EQ(window->half_long_mm, 20.0);
-  EXPECT_EQ(window->half_short_mm, 12.0);
+  const auto window = value_or_fail(probe_window(head().brain, head().craniotomy));
+  EXPECT_NEAR(window.centre.norm(), kBrain_mm, 1.0);
+  EXPECT_GT(window.outward.dot(Vec3(47, 1, 0).normalized()), 0.99);
+  EXPECT_NEAR(window.along.norm(), 1.0, 1e-12);
+  EXPECT_NEAR(window.along.dot(window.outward), 0.0, 1e-12);
+  EXPECT_EQ(window.half_long_mm, 20.0);
+  EXPECT_EQ(window.half_short_mm, 12.0);
   Craniotomy away = head().craniotomy;
   away.centre_mm = Vec3(150, 0, 0);
-  const auto none = probe_window(head().brain, away);
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::kEmptySet);
-  EXPECT_THAT(none.error().message, HasSubstr("craniotomy.centre_mm = [150, 0, 0]"));
+  EXPECT_THAT(refusal_of(probe_window(head().brain, away), ErrorCode::kEmptySet),
+              HasSubstr("craniotomy.centre_mm = [150, 0, 0]"));
 }
 
 TEST(TissueEcho, IsNoFunctionOfTheMri) {
@@ -105,19 +103,16 @@ TEST(TissueEcho, RefusesOtherVoxelsAndNoBrain) {
   VoxelImage other = head().brain;
   other.T_ras_voxel.translation().x() += 5.0;
   auto made = tissue_echo(head().mri, other, head().tumour);
-  ASSERT_FALSE(made);
-  EXPECT_THAT(made.error().message, HasSubstr("must be the same ones"));
+  EXPECT_THAT(sentence_of(made), HasSubstr("must be the same ones"));
   VoxelImage empty = head().brain;
   for (float& value : empty.values) value = 0.0f;
   made = tissue_echo(head().mri, empty, head().tumour);
-  ASSERT_FALSE(made);
-  EXPECT_EQ(made.error().code, ErrorCode::kEmptySet);
+  refusal_of(made, ErrorCode::kEmptySet);
 }
 
 TEST(MriWithTumour, ShowsARimAndACore) {
-  const auto image = mri_with_tumour(head().mri, head().brain, head().tumour);
-  ASSERT_TRUE(image);
-  const geometry::Interpolator at(*image);
+  const auto image = value_or_fail(mri_with_tumour(head().mri, head().brain, head().tumour));
+  const geometry::Interpolator at(image);
   EXPECT_NEAR(at(kSweptTumour), 60.0, 10.0);
   EXPECT_NEAR(at(kSweptTumour + Vec3(0, 6, 0)), 140.0, 15.0);
   EXPECT_NEAR(at(Vec3(0, -20, 10)), 100.0, 10.0);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
@@ -10,6 +9,7 @@
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/simulation/variation.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
@@ -117,10 +117,10 @@ TEST(Variation, TheSeedDecidesTheTruth) {
     scenario.fluid_levels_mm[0] -= 20.0;              // the toy patient is smaller than a head
     BrainModel lying = test_support::toy_patient(6);  // else the scenario's tilt does nothing
     lying.gravity_direction = Vec3(0.5, 0, -1).normalized();
-    const auto surgery = play_scenario(lying, test_support::toy_config(), scenario, seed);
-    EXPECT_TRUE(surgery) << surgery.error().message;
-    EXPECT_LT(surgery->truths[0].scalars.at("brain_volume_strain"), 0.0);
-    return surgery->truths[0].displacement;
+    const auto surgery =
+        value_or_fail(play_scenario(lying, test_support::toy_config(), scenario, seed));
+    EXPECT_LT(surgery.truths[0].scalars.at("brain_volume_strain"), 0.0);
+    return surgery.truths[0].displacement;
   };
   const Points first = truth(1);
   EXPECT_EQ(first, truth(1));
@@ -135,10 +135,9 @@ TEST(GravityTurn, IsARotationOfGravity) {
   Scenario scenario = *find_scenario("paper");
   scenario.fluid_levels_mm = {20.0};
   const auto play = [&] {
-    const auto surgery =
-        play_scenario(test_support::toy_patient(6), test_support::toy_config(), scenario, 1);
-    EXPECT_TRUE(surgery) << surgery.error().message;
-    return surgery->truths[0].displacement;
+    const auto surgery = value_or_fail(
+        play_scenario(test_support::toy_patient(6), test_support::toy_config(), scenario, 1));
+    return surgery.truths[0].displacement;
   };
   const Points straight = play();
   scenario.gravity_turn_deg = Vec3(0, 0, 40);  // gravity is -z
@@ -171,9 +170,7 @@ const TetMesh& ball() {
 }
 
 CaseConfig unvaried_patient(std::uint64_t seed) {
-  auto config = vary_patient(ball_case().config, ball(), seed);
-  EXPECT_TRUE(config) << config.error().message;
-  return std::move(*config);
+  return value_or_fail(vary_patient(ball_case().config, ball(), seed));
 }
 
 TEST(VariedPatient, HasTheTumourInsideTheBrainBelowTheOpening) {
@@ -257,9 +254,7 @@ TEST(VariedPatient, AHeadThatHoldsNoTumourIsRefused) {
   TetMesh small = ball();
   small.nodes = (0.3 * (small.nodes.colwise() - kBallCentre)).colwise() + kBallCentre;
   const auto config = vary_patient(ball_case().config, small, 1);
-  ASSERT_FALSE(config);
-  EXPECT_EQ(config.error().code, ErrorCode::kNotConverged);
-  EXPECT_THAT(config.error().message, HasSubstr("ball"));
+  EXPECT_THAT(refusal_of(config, ErrorCode::kNotConverged), HasSubstr("ball"));
   EXPECT_FALSE(vary_patient(ball_case().config, TetMesh{}, 1));
 }
 

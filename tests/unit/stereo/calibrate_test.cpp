@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/core/random.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/stereo_scene.hpp"
 
 namespace brainshift::stereo {
@@ -42,30 +43,28 @@ std::string refusal(const Result<StereoCalibration>& result) {
 
 TEST(Calibrate, ExactCornersGiveTheRigBack) {
   const StereoCalibration rig = operating_rig();
-  const auto found = calibrate(exact_pairs(10), kBoard, 640, 480);
-  ASSERT_TRUE(found) << found.error().message;
+  const auto found = value_or_fail(calibrate(exact_pairs(10), kBoard, 640, 480));
   // Corners are rounded to 32 bits on the way: about 3e-5 px.
-  EXPECT_LT(found->rms_px, 1e-3);
-  EXPECT_LT(found->epipolar_rms_px, 1e-3);
-  EXPECT_NEAR(found->left.focal_x_px, rig.left.focal_x_px, 0.1);
-  EXPECT_NEAR(found->right.focal_y_px, rig.right.focal_y_px, 0.1);
-  EXPECT_NEAR(found->left.centre_x_px, rig.left.centre_x_px, 0.1);
-  EXPECT_NEAR(found->right.centre_y_px, rig.right.centre_y_px, 0.1);
-  EXPECT_NEAR(found->left.distortion[0], rig.left.distortion[0], 0.002);
-  EXPECT_NEAR(found->right.distortion[2], rig.right.distortion[2], 1e-5);
-  EXPECT_LT((found->T_right_left.translation() - rig.T_right_left.translation()).norm(), 0.01);
-  EXPECT_LT(angle_deg(found->T_right_left, rig.T_right_left), 0.01);
-  EXPECT_EQ(found->pairs.size(), 10U);
+  EXPECT_LT(found.rms_px, 1e-3);
+  EXPECT_LT(found.epipolar_rms_px, 1e-3);
+  EXPECT_NEAR(found.left.focal_x_px, rig.left.focal_x_px, 0.1);
+  EXPECT_NEAR(found.right.focal_y_px, rig.right.focal_y_px, 0.1);
+  EXPECT_NEAR(found.left.centre_x_px, rig.left.centre_x_px, 0.1);
+  EXPECT_NEAR(found.right.centre_y_px, rig.right.centre_y_px, 0.1);
+  EXPECT_NEAR(found.left.distortion[0], rig.left.distortion[0], 0.002);
+  EXPECT_NEAR(found.right.distortion[2], rig.right.distortion[2], 1e-5);
+  EXPECT_LT((found.T_right_left.translation() - rig.T_right_left.translation()).norm(), 0.01);
+  EXPECT_LT(angle_deg(found.T_right_left, rig.T_right_left), 0.01);
+  EXPECT_EQ(found.pairs.size(), 10U);
 }
 
 TEST(Calibrate, TheReprojectionErrorIsTheNoiseOfTheCorners) {
-  const auto found = calibrate(exact_pairs(12, 0.2), kBoard, 640, 480);
-  ASSERT_TRUE(found) << found.error().message;
+  const auto found = value_or_fail(calibrate(exact_pairs(12, 0.2), kBoard, 640, 480));
   // rms over corners of two components of 0.2 px each, less a little for what the fit takes up.
-  EXPECT_NEAR(found->rms_px, 0.2 * std::sqrt(2.0), 0.03);
-  EXPECT_NEAR(found->epipolar_rms_px, 0.2 * std::sqrt(2.0), 0.05);
-  for (const CalibrationPair& pair : found->pairs) EXPECT_NEAR(pair.rms_px, 0.28, 0.1) << pair.name;
-  EXPECT_NEAR(right_camera_in_left(*found).norm(), right_camera_in_left(operating_rig()).norm(),
+  EXPECT_NEAR(found.rms_px, 0.2 * std::sqrt(2.0), 0.03);
+  EXPECT_NEAR(found.epipolar_rms_px, 0.2 * std::sqrt(2.0), 0.05);
+  for (const CalibrationPair& pair : found.pairs) EXPECT_NEAR(pair.rms_px, 0.28, 0.1) << pair.name;
+  EXPECT_NEAR(right_camera_in_left(found).norm(), right_camera_in_left(operating_rig()).norm(),
               0.3);
 }
 
@@ -78,15 +77,14 @@ TEST(Calibrate, PicturesOfABoardGiveTheRigBackAndPairsWithoutItAreListed) {
                      render(rig, Eye::kRight, kBoard, T)});
   }
   pairs[3].right = GrayImage(640, 480, 128);
-  const auto found = calibrate(pairs, kBoard);
-  ASSERT_TRUE(found) << found.error().message;
-  EXPECT_THAT(found->without_board, testing::ElementsAre("p3"));
-  EXPECT_EQ(found->calibration.pairs.size(), 6U);
-  EXPECT_LT(found->calibration.rms_px, 0.15);
-  EXPECT_NEAR(found->calibration.left.focal_x_px, rig.left.focal_x_px, 6.0);
-  EXPECT_NEAR(right_camera_in_left(found->calibration).norm(), right_camera_in_left(rig).norm(),
+  const auto found = value_or_fail(calibrate(pairs, kBoard));
+  EXPECT_THAT(found.without_board, testing::ElementsAre("p3"));
+  EXPECT_EQ(found.calibration.pairs.size(), 6U);
+  EXPECT_LT(found.calibration.rms_px, 0.15);
+  EXPECT_NEAR(found.calibration.left.focal_x_px, rig.left.focal_x_px, 6.0);
+  EXPECT_NEAR(right_camera_in_left(found.calibration).norm(), right_camera_in_left(rig).norm(),
               0.15);
-  EXPECT_LT(angle_deg(found->calibration.T_right_left, rig.T_right_left), 0.3);
+  EXPECT_LT(angle_deg(found.calibration.T_right_left, rig.T_right_left), 0.3);
 }
 
 TEST(Calibrate, TooFewPairsAreRefused) {
@@ -121,9 +119,8 @@ TEST(Calibrate, ABoardOfAnotherSizeIsNamed) {
 TEST(Calibrate, PicturesOfDifferentSizesAreNamed) {
   std::vector<PicturePair> pairs(5, {"a", GrayImage(64, 48), GrayImage(64, 48)});
   pairs[1] = {"b", GrayImage(64, 48), GrayImage(32, 48)};
-  const auto found = calibrate(pairs, kBoard);
-  ASSERT_FALSE(found);
-  EXPECT_EQ(found.error().message, "b: a picture of 32 x 48 px: the first one has 64 x 48 px");
+  EXPECT_EQ(sentence_of(calibrate(pairs, kBoard)),
+            "b: a picture of 32 x 48 px: the first one has 64 x 48 px");
 }
 
 }  // namespace

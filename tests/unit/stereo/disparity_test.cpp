@@ -6,6 +6,7 @@
 
 #include "common/core/random.hpp"
 #include "common/stereo/disparity.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/stereo_scene.hpp"
 
 namespace brainshift::stereo {
@@ -44,12 +45,12 @@ Eigen::Vector2d centroid(const GrayImage& image) {
 TEST(Rectify, APointLiesInOneRowAndItsDisparityGivesItBack) {
   const StereoCalibration rig = operating_rig();
   for (const Vec3& x : {Vec3(0, 0, 250), Vec3(-35, 20, 230), Vec3(40, -28, 280)}) {
-    const auto rectified = rectify(spot(rig, Eye::kLeft, x), spot(rig, Eye::kRight, x), rig);
-    ASSERT_TRUE(rectified) << rectified.error().message;
-    const Eigen::Vector2d left = centroid(rectified->pair.left);
-    const Eigen::Vector2d right = centroid(rectified->pair.right);
+    const auto rectified =
+        value_or_fail(rectify(spot(rig, Eye::kLeft, x), spot(rig, Eye::kRight, x), rig));
+    const Eigen::Vector2d left = centroid(rectified.pair.left);
+    const Eigen::Vector2d right = centroid(rectified.pair.right);
     EXPECT_NEAR(left.y(), right.y(), 0.1);  // of spots rounded to grey levels
-    const Vec3 back = triangulate(rectified->geometry, left.x(), left.y(), left.x() - right.x());
+    const Vec3 back = triangulate(rectified.geometry, left.x(), left.y(), left.x() - right.x());
     // 0.05 px of disparity are 0.1 mm of depth here.
     EXPECT_LT((back - x).norm(), 0.15) << back.transpose();
   }
@@ -68,13 +69,10 @@ TEST(Rectify, DepthAndDisparityAreInverse) {
 
 TEST(Rectify, PicturesOfAnotherSizeThanTheCalibrationsAreRefused) {
   const GrayImage good(640, 480), small(320, 240);
-  const auto left = rectify(small, good, operating_rig());
-  ASSERT_FALSE(left);
-  EXPECT_EQ(left.error().message,
+  EXPECT_EQ(sentence_of(rectify(small, good, operating_rig())),
             "the left picture has 320 x 240 px: the calibration is for 640 x 480 px");
-  const auto right = rectify(good, small, operating_rig());
-  ASSERT_FALSE(right);
-  EXPECT_THAT(right.error().message, HasSubstr("the right picture has 320 x 240 px"));
+  EXPECT_THAT(sentence_of(rectify(good, small, operating_rig())),
+              HasSubstr("the right picture has 320 x 240 px"));
 }
 
 struct BadCalibration {
@@ -89,9 +87,8 @@ TEST_P(Calibration, ThatCannotBeIsRefused) {
   StereoCalibration rig = operating_rig();
   ASSERT_TRUE(validate(rig));
   GetParam().spoil(rig);
-  const auto rectified = rectify(GrayImage(640, 480), GrayImage(640, 480), rig);
-  ASSERT_FALSE(rectified);
-  EXPECT_THAT(rectified.error().message, HasSubstr(GetParam().says));
+  EXPECT_THAT(sentence_of(rectify(GrayImage(640, 480), GrayImage(640, 480), rig)),
+              HasSubstr(GetParam().says));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -167,12 +164,11 @@ TEST(Match, AShiftedPictureHasThatDisparity) {
   // x_right = x_left - d: the right picture shows at x what the left shows at x + d.
   for (const double d : {0.0, 7.0, 12.25, 12.5, -9.75}) {
     const RectifiedPair pair{dots(200, 80, 0.0, 3), dots(200, 80, d, 3), {}, {}};
-    const auto map = match(pair, options_for(-16, 48));
-    ASSERT_TRUE(map) << map.error().message;
+    const auto map = value_or_fail(match(pair, options_for(-16, 48)));
     // What lies beyond the right picture's edge has no partner.
-    EXPECT_GT(map->valid_fraction, 0.85);
+    EXPECT_GT(map.valid_fraction, 0.85);
     double worst = 0.0;
-    for (const float value : map->disparity_px.pixels)
+    for (const float value : map.disparity_px.pixels)
       if (!std::isnan(value)) worst = std::max(worst, std::abs(static_cast<double>(value) - d));
     EXPECT_LT(worst, 0.75) << d;
   }
@@ -198,11 +194,10 @@ TEST(Match, WhatOneCameraAloneSeesIsNotValid) {
   MatchOptions options = options_for(0, 32);
   options.uniqueness_percent = 0;   // the two other tests of a match
   options.min_part_fraction = 0.0;  // shall not help
-  const auto map = match(pair, options);
-  ASSERT_TRUE(map);
-  EXPECT_GT(valid_between(*map, 40, 75), 0.9) << "the wall";
-  EXPECT_GT(valid_between(*map, 106, 154), 0.9) << "the plate";
-  EXPECT_LT(valid_between(*map, 84, 96), 0.1) << "hidden from the right camera";
+  const auto map = value_or_fail(match(pair, options));
+  EXPECT_GT(valid_between(map, 40, 75), 0.9) << "the wall";
+  EXPECT_GT(valid_between(map, 106, 154), 0.9) << "the plate";
+  EXPECT_LT(valid_between(map, 84, 96), 0.1) << "hidden from the right camera";
   options.max_left_right_px = 1e9;
   EXPECT_GT(valid_between(*match(pair, options), 84, 96), 0.3) << "else the test shows nothing";
 }
@@ -213,20 +208,18 @@ TEST(Match, AWhiteWallHasNoDisparity) {
   for (GrayImage* image : {&pair.left, &pair.right})
     for (std::uint8_t& pixel : image->pixels)
       pixel = static_cast<std::uint8_t>(std::lround(150.0 + random.normal()));
-  const auto map = match(pair, options_for(0, 32));
-  ASSERT_TRUE(map);
-  EXPECT_LT(map->valid_fraction, 0.01);
+  const auto map = value_or_fail(match(pair, options_for(0, 32)));
+  EXPECT_LT(map.valid_fraction, 0.01);
 }
 
 TEST(Match, WhatTheOriginalPicturesDoNotShowIsNotValid) {
   RectifiedPair pair{dots(120, 60, 0.0, 4), dots(120, 60, 5.0, 4), GrayImage(120, 60, 1), {}};
   for (int y = 0; y < 30; ++y)
     for (int x = 0; x < 120; ++x) pair.left_seen.at(x, y) = 0;
-  const auto map = match(pair, options_for(0, 16));
-  ASSERT_TRUE(map);
-  for (int x = 0; x < 120; ++x) EXPECT_TRUE(std::isnan(map->disparity_px.at(x, 20)));
-  EXPECT_FALSE(std::isnan(map->disparity_px.at(60, 45)));
-  EXPECT_GT(map->valid_fraction, 0.8) << "of what is seen";
+  const auto map = value_or_fail(match(pair, options_for(0, 16)));
+  for (int x = 0; x < 120; ++x) EXPECT_TRUE(std::isnan(map.disparity_px.at(x, 20)));
+  EXPECT_FALSE(std::isnan(map.disparity_px.at(60, 45)));
+  EXPECT_GT(map.valid_fraction, 0.8) << "of what is seen";
 }
 
 TEST(Match, ConfidenceIsAProbability) {

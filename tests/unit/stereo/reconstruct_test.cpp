@@ -2,7 +2,6 @@
 // From pictures of a known patch to its surface: as near as the disparity's error allows, and
 // facing the camera.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "common/geometry/surface_check.hpp"
 #include "common/stereo/cleaning.hpp"
 #include "common/stereo/reconstruct.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/stereo_scene.hpp"
 
 namespace brainshift::stereo {
@@ -144,51 +144,47 @@ Errors errors_of(const ReconstructedSurface& result, const Patch& patch,
 TEST(Reconstruct, APatchIsFoundAsWellAsItsDisparityAllows) {
   const StereoCalibration rig = operating_rig();
   const Patch patch;
-  const auto measured = measure_disparity(render(rig, Eye::kLeft, patch, 1),
-                                          render(rig, Eye::kRight, patch, 2), rig, {150.0, 400.0});
-  ASSERT_TRUE(measured) << measured.error().message;
-  EXPECT_GT(measured->map.valid_fraction, 0.6);
-  const auto result = reconstruct(measured->map, measured->geometry, some_pose());
-  ASSERT_TRUE(result) << result.error().message;
-  const Errors errors = errors_of(*result, patch, some_pose());
-  EXPECT_GT(result->surface.num_vertices(), 5000);
+  const auto measured = value_or_fail(measure_disparity(
+      render(rig, Eye::kLeft, patch, 1), render(rig, Eye::kRight, patch, 2), rig, {150.0, 400.0}));
+  EXPECT_GT(measured.map.valid_fraction, 0.6);
+  const auto result = value_or_fail(reconstruct(measured.map, measured.geometry, some_pose()));
+  const Errors errors = errors_of(result, patch, some_pose());
+  EXPECT_GT(result.surface.num_vertices(), 5000);
   // Z^2 / (f b) is 1.9 mm per px here.
   // The error may be as large as the stated sd. It is smaller, because kFloor_px holds errors of
   // real light and a vertex averages a block's pixels; below a quarter the sd would say nothing.
-  EXPECT_LT(errors.rms_mm, result->median_sd_mm);
-  EXPECT_GT(errors.rms_mm, 0.25 * result->median_sd_mm);
+  EXPECT_LT(errors.rms_mm, result.median_sd_mm);
+  EXPECT_GT(errors.rms_mm, 0.25 * result.median_sd_mm);
   EXPECT_GT(errors.within_2_sd, 0.95);
   // The cap falls away by 50 mm towards the corners.
-  EXPECT_GT(result->median_depth_mm, 250.0);
-  EXPECT_LT(result->median_depth_mm, 290.0);
+  EXPECT_GT(result.median_depth_mm, 250.0);
+  EXPECT_LT(result.median_depth_mm, 290.0);
 }
 
 TEST(Reconstruct, NormalsLookTowardsTheCamera) {
-  const auto result = reconstruct(plane(), kGeometry, some_pose());
-  ASSERT_TRUE(result) << result.error().message;
-  const Points normals = geometry::vertex_normals(result->surface);
+  const auto result = value_or_fail(reconstruct(plane(), kGeometry, some_pose()));
+  const Points normals = geometry::vertex_normals(result.surface);
   const Vec3 camera = some_pose().translation();
   for (Eigen::Index i = 0; i < normals.cols(); ++i)
-    EXPECT_GT(normals.col(i).dot(camera - result->surface.vertices.col(i)), 200.0);
-  const auto rims = geometry::surface_rims(result->surface);
-  ASSERT_TRUE(rims) << rims.error().message;
-  EXPECT_EQ(rims->parts, 1);
-  EXPECT_EQ(rims->rim_mm.size(), 1U);
+    EXPECT_GT(normals.col(i).dot(camera - result.surface.vertices.col(i)), 200.0);
+  const auto rims = value_or_fail(geometry::surface_rims(result.surface));
+  EXPECT_EQ(rims.parts, 1);
+  EXPECT_EQ(rims.rim_mm.size(), 1U);
 }
 
 TEST(Reconstruct, APlaneHasItsDepthSpacingAndStandardDeviation) {
   ReconstructOptions options;
   options.spacing_mm = 1.0;  // 4 px at 250 mm
-  const auto result = reconstruct(plane(), kGeometry, RigidTransform::Identity(), options);
-  ASSERT_TRUE(result) << result.error().message;
-  EXPECT_EQ(result->surface.num_vertices(), 50 * 40);
-  EXPECT_EQ(result->surface.num_triangles(), 2 * 49 * 39);
-  for (const double z : result->surface.vertices.row(2)) EXPECT_NEAR(z, 250.0, 1e-6);
-  EXPECT_NEAR(result->sd_mm.maxCoeff(), 250.0 * 250.0 / 30000.0 * 0.25, 1e-6);
-  EXPECT_NEAR(result->confidence.minCoeff(), confidence(0.25), 1e-6);
+  const auto result =
+      value_or_fail(reconstruct(plane(), kGeometry, RigidTransform::Identity(), options));
+  EXPECT_EQ(result.surface.num_vertices(), 50 * 40);
+  EXPECT_EQ(result.surface.num_triangles(), 2 * 49 * 39);
+  for (const double z : result.surface.vertices.row(2)) EXPECT_NEAR(z, 250.0, 1e-6);
+  EXPECT_NEAR(result.sd_mm.maxCoeff(), 250.0 * 250.0 / 30000.0 * 0.25, 1e-6);
+  EXPECT_NEAR(result.confidence.minCoeff(), confidence(0.25), 1e-6);
   // The first block's four columns have their mean at 1.5 px.
-  EXPECT_NEAR(result->surface.vertices(0, 0), (1.5 - 100.0) * 250.0 / 1000.0, 1e-9);
-  EXPECT_NEAR(result->surface.vertices(1, 0), (1.5 - 80.0) * 250.0 / 1000.0, 1e-9);
+  EXPECT_NEAR(result.surface.vertices(0, 0), (1.5 - 100.0) * 250.0 / 1000.0, 1e-9);
+  EXPECT_NEAR(result.surface.vertices(1, 0), (1.5 - 80.0) * 250.0 / 1000.0, 1e-9);
   options.max_points = 500;
   EXPECT_LE(
       reconstruct(plane(), kGeometry, RigidTransform::Identity(), options)->surface.num_vertices(),
@@ -201,14 +197,12 @@ TEST(Reconstruct, SpecksAndStepsAreNotBridged) {
     for (int x = 100; x < 200; ++x) map.disparity_px.at(x, y) = 150.0F;  // 200 mm: a step of 50 mm
   for (int y = 20; y < 30; ++y)
     for (int x = 20; x < 30; ++x) map.disparity_px.at(x, y) = 170.0F;  // a speck of 100 px
-  const auto result = reconstruct(map, kGeometry, RigidTransform::Identity());
-  ASSERT_TRUE(result) << result.error().message;
-  EXPECT_EQ(result->pixels_in_small_parts, 100);
-  const auto rims = geometry::surface_rims(result->surface);
-  ASSERT_TRUE(rims) << rims.error().message;
-  EXPECT_EQ(rims->parts, 2) << "the step's two sides";
-  EXPECT_EQ(rims->rim_mm.size(), 3U) << "and the hole that the speck leaves";
-  for (const double z : result->surface.vertices.row(2))
+  const auto result = value_or_fail(reconstruct(map, kGeometry, RigidTransform::Identity()));
+  EXPECT_EQ(result.pixels_in_small_parts, 100);
+  const auto rims = value_or_fail(geometry::surface_rims(result.surface));
+  EXPECT_EQ(rims.parts, 2) << "the step's two sides";
+  EXPECT_EQ(rims.rim_mm.size(), 3U) << "and the hole that the speck leaves";
+  for (const double z : result.surface.vertices.row(2))
     EXPECT_TRUE(std::abs(z - 250.0) < 1.0 || std::abs(z - 200.0) < 1.0) << z;
 }
 

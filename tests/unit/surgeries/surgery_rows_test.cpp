@@ -2,7 +2,6 @@
 // Scores of estimates that are made from the truth, so that every figure is known.
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <numbers>
 
 #include "tests/benchmarks/csv_table.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/surgeries/surgery_rows.hpp"
@@ -37,11 +37,7 @@ class Score : public testing::Test {
     estimate.displacement = truth.displacement;
     estimate.sd_mm = VecX::Constant(n, 0.1);
   }
-  UpdateScore score() const {
-    const auto result = score_update(model, truth, estimate);
-    EXPECT_TRUE(result) << result.error().message;
-    return *result;
-  }
+  UpdateScore score() const { return value_or_fail(score_update(model, truth, estimate)); }
 
   BrainModel model = test_support::toy_patient(6);
   io::SurgeryTruth truth;
@@ -168,11 +164,7 @@ Row row(const SurgeryFacts& of) {
 
 class RowTable : public testing::Test {
  protected:
-  RowFile open(bool resume) {
-    auto file = open_surgeries(path, resume);
-    EXPECT_TRUE(file) << file.error().message;
-    return *file;
-  }
+  RowFile open(bool resume) { return value_or_fail(open_surgeries(path, resume)); }
   test_support::TemporaryFolder folder;
   std::filesystem::path path = folder.path() / "rows.csv";
 };
@@ -181,24 +173,23 @@ TEST_F(RowTable, ReadsBackWhatAnUpdateWas) {
   RowFile file = open(false);
   const SurgeryFacts one = facts(7, "paper");
   ASSERT_TRUE(file.append({row(one), refused_row(one, 1, "no data, no estimate")}));
-  const auto table = bench::CsvTable::read(path);
-  ASSERT_TRUE(table) << table.error().message;
-  ASSERT_EQ(table->rows(), 2u);
-  EXPECT_EQ(table->text(0, "scenario"), "paper");
-  EXPECT_EQ(table->text(0, "stage"), "tumour");
-  EXPECT_EQ(table->number(0, "place"), 2.0);
-  EXPECT_EQ(table->number(0, "seed"), 7.0);
-  EXPECT_EQ(table->text(0, "reason"), "settled; at last");
-  EXPECT_EQ(table->text(0, "quality"), "unusable");
-  EXPECT_EQ(table->text(0, "flags"), "strength_at_bound;volume_lost");
-  EXPECT_EQ(table->number(0, "recovered_pct"), 97.5);
-  EXPECT_EQ(table->number(0, "update_ms"), 7.0);
-  EXPECT_EQ(table->text(0, "warm_cold_mm"), "");
-  EXPECT_EQ(table->text(1, "status"), "refused");
-  EXPECT_EQ(table->text(1, "reason"), "no data; no estimate");
-  EXPECT_EQ(table->text(1, "quality"), "");
-  EXPECT_EQ(table->text(1, "recovered_pct"), "");
-  EXPECT_EQ(table->text(1, "stage"), "tumour+cortex");
+  const auto table = value_or_fail(bench::CsvTable::read(path));
+  ASSERT_EQ(table.rows(), 2u);
+  EXPECT_EQ(table.text(0, "scenario"), "paper");
+  EXPECT_EQ(table.text(0, "stage"), "tumour");
+  EXPECT_EQ(table.number(0, "place"), 2.0);
+  EXPECT_EQ(table.number(0, "seed"), 7.0);
+  EXPECT_EQ(table.text(0, "reason"), "settled; at last");
+  EXPECT_EQ(table.text(0, "quality"), "unusable");
+  EXPECT_EQ(table.text(0, "flags"), "strength_at_bound;volume_lost");
+  EXPECT_EQ(table.number(0, "recovered_pct"), 97.5);
+  EXPECT_EQ(table.number(0, "update_ms"), 7.0);
+  EXPECT_EQ(table.text(0, "warm_cold_mm"), "");
+  EXPECT_EQ(table.text(1, "status"), "refused");
+  EXPECT_EQ(table.text(1, "reason"), "no data; no estimate");
+  EXPECT_EQ(table.text(1, "quality"), "");
+  EXPECT_EQ(table.text(1, "recovered_pct"), "");
+  EXPECT_EQ(table.text(1, "stage"), "tumour+cortex");
 }
 
 TEST_F(RowTable, ARunThatGoesOnKnowsWhatIsThere) {
@@ -224,10 +215,8 @@ TEST_F(RowTable, TwoRunsDoNotWriteToOneTable) {
   ASSERT_TRUE(first.append({row(facts(7, "paper"))}));
   RowFile second = open(true);
   ASSERT_TRUE(second.append({row(facts(8, "paper"))}));
-  const auto refused = first.append({row(facts(8, "paper"))});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(refused.error().message, HasSubstr("another run writes to it"));
+  EXPECT_THAT(refusal_of(first.append({row(facts(8, "paper"))}), ErrorCode::kWriteFailed),
+              HasSubstr("another run writes to it"));
   ASSERT_TRUE(second.append({row(facts(9, "paper"))}));
   std::filesystem::remove(path);
   EXPECT_FALSE(second.append({row(facts(9, "paper"))}));
@@ -236,10 +225,8 @@ TEST_F(RowTable, TwoRunsDoNotWriteToOneTable) {
 
 TEST_F(RowTable, ATableOfOtherColumnsIsNotContinued) {
   std::ofstream(path) << "head,place\nx,1\n";
-  const auto file = open_surgeries(path, true);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(file.error().message, HasSubstr("rows.csv"));
+  EXPECT_THAT(refusal_of(open_surgeries(path, true), ErrorCode::kUnreadable),
+              HasSubstr("rows.csv"));
 }
 
 TEST_F(RowTable, ARowThatWasCutOffIsReported) {
@@ -249,15 +236,11 @@ TEST_F(RowTable, ARowThatWasCutOffIsReported) {
     ASSERT_TRUE(file.append({row(one)}));
   }
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 60);
-  const auto file = open_surgeries(path, true);
-  ASSERT_FALSE(file);
-  EXPECT_THAT(file.error().message, HasSubstr("line 2"));
+  EXPECT_THAT(sentence_of(open_surgeries(path, true)), HasSubstr("line 2"));
 }
 
 TEST_F(RowTable, AFolderThatIsNotThereIsReported) {
-  const auto file = open_surgeries(folder.path() / "none" / "rows.csv", false);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
+  refusal_of(open_surgeries(folder.path() / "none" / "rows.csv", false), ErrorCode::kWriteFailed);
 }
 
 }  // namespace

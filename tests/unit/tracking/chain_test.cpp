@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/tracking/chain.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
 
@@ -47,14 +48,13 @@ AffineTransform expected(double t_s) {
 }
 
 TEST(Chain, IsTheProductOfItsLinks) {
-  const auto chain = evaluate_chain(recording(), constants(), "Image", "Ras");
-  ASSERT_TRUE(chain);
-  EXPECT_EQ(chain->used, 8);
-  EXPECT_TRUE(chain->dropped.empty());
-  EXPECT_THAT(chain->links, testing::ElementsAre("ImageToProbe", "ProbeToTracker",
-                                                 "ReferenceToTracker", "ReferenceToRas"));
+  const auto chain = value_or_fail(evaluate_chain(recording(), constants(), "Image", "Ras"));
+  EXPECT_EQ(chain.used, 8);
+  EXPECT_TRUE(chain.dropped.empty());
+  EXPECT_THAT(chain.links, testing::ElementsAre("ImageToProbe", "ProbeToTracker",
+                                                "ReferenceToTracker", "ReferenceToRas"));
   for (int i = 0; i < 8; ++i) {
-    const auto& T = chain->T_target_source[static_cast<std::size_t>(i)];
+    const auto& T = chain.T_target_source[static_cast<std::size_t>(i)];
     ASSERT_TRUE(T);
     EXPECT_LT((T->matrix() - expected(0.1 * i).matrix()).cwiseAbs().maxCoeff(), 1e-9);
   }
@@ -63,15 +63,15 @@ TEST(Chain, IsTheProductOfItsLinks) {
 TEST(Chain, LatencyTakesThePoseOfAnEarlierTime) {
   ChainOptions options;
   options.latency_s = 0.04;
-  const auto chain = evaluate_chain(recording(), constants(), "Image", "Ras", options);
-  ASSERT_TRUE(chain);
+  const auto chain =
+      value_or_fail(evaluate_chain(recording(), constants(), "Image", "Ras", options));
   for (int i = 1; i < 8; ++i) {
-    const auto& T = chain->T_target_source[static_cast<std::size_t>(i)];
+    const auto& T = chain.T_target_source[static_cast<std::size_t>(i)];
     ASSERT_TRUE(T);
     EXPECT_LT((T->matrix() - expected(0.1 * i - 0.04).matrix()).cwiseAbs().maxCoeff(), 1e-9);
   }
-  EXPECT_FALSE(chain->T_target_source[0]);  // before the first sample
-  EXPECT_EQ(chain->why_not[0], "ProbeToTracker was not tracked at that time");
+  EXPECT_FALSE(chain.T_target_source[0]);  // before the first sample
+  EXPECT_EQ(chain.why_not[0], "ProbeToTracker was not tracked at that time");
 }
 
 TEST(Chain, CountsDroppedFramesByReasonAndFirstFrame) {
@@ -80,53 +80,46 @@ TEST(Chain, CountsDroppedFramesByReasonAndFirstFrame) {
   broken.links[0].samples[3].status = LinkStatus::kInvalid;
   broken.links[0].samples[6].status = LinkStatus::kInvalid;
   broken.links[1].samples[4].status = LinkStatus::kWithoutStatus;
-  const auto chain = evaluate_chain(broken, constants(), "Image", "Ras");
-  ASSERT_TRUE(chain);
-  EXPECT_EQ(chain->used, 4);
-  ASSERT_EQ(chain->dropped.size(), 3U);
-  EXPECT_EQ(chain->dropped[0].reason, "the image is invalid");
-  EXPECT_EQ(chain->dropped[1].reason, "ProbeToTracker is invalid");
-  EXPECT_EQ(chain->dropped[1].count, 2);
-  EXPECT_EQ(chain->dropped[1].first_frame, 3);
-  EXPECT_EQ(chain->dropped[2].reason, "ReferenceToTracker has no status");
-  for (const std::size_t frame : {1U, 3U, 4U, 6U}) EXPECT_FALSE(chain->T_target_source[frame]);
+  const auto chain = value_or_fail(evaluate_chain(broken, constants(), "Image", "Ras"));
+  EXPECT_EQ(chain.used, 4);
+  ASSERT_EQ(chain.dropped.size(), 3U);
+  EXPECT_EQ(chain.dropped[0].reason, "the image is invalid");
+  EXPECT_EQ(chain.dropped[1].reason, "ProbeToTracker is invalid");
+  EXPECT_EQ(chain.dropped[1].count, 2);
+  EXPECT_EQ(chain.dropped[1].first_frame, 3);
+  EXPECT_EQ(chain.dropped[2].reason, "ReferenceToTracker has no status");
+  for (const std::size_t frame : {1U, 3U, 4U, 6U}) EXPECT_FALSE(chain.T_target_source[frame]);
 }
 
 TEST(Chain, ALinkAbsentForTooLongIsTooOld) {
   Recording gap = recording();
   for (const std::size_t frame : {3U, 4U})
     gap.links[0].samples[frame].status = LinkStatus::kMissing;
-  const auto chain = evaluate_chain(gap, constants(), "Image", "Ras");
-  ASSERT_TRUE(chain);
-  EXPECT_EQ(chain->used, 6);
-  EXPECT_EQ(chain->why_not[3], "ProbeToTracker is too old");
+  const auto chain = value_or_fail(evaluate_chain(gap, constants(), "Image", "Ras"));
+  EXPECT_EQ(chain.used, 6);
+  EXPECT_EQ(chain.why_not[3], "ProbeToTracker is too old");
 }
 
 TEST(Chain, WithoutConnectionNamesTheFrames) {
   Recording broken = recording();
   broken.links.pop_back();
-  const auto chain = evaluate_chain(broken, constants(), "Image", "Ras");
-  ASSERT_FALSE(chain);
-  EXPECT_THAT(chain.error().message, HasSubstr("no chain from Image to Ras"));
-  EXPECT_THAT(chain.error().message, HasSubstr("Reference"));
+  EXPECT_THAT(sentence_of(evaluate_chain(broken, constants(), "Image", "Ras")),
+              testing::AllOf(HasSubstr("no chain from Image to Ras"), HasSubstr("Reference")));
 }
 
 TEST(Chain, OptionsOutOfRangeAreNamed) {
   ChainOptions options;
   options.latency_s = 2.0;
   auto chain = evaluate_chain(recording(), constants(), "Image", "Ras", options);
-  ASSERT_FALSE(chain);
-  EXPECT_THAT(chain.error().message, HasSubstr("latency = 2 s"));
+  EXPECT_THAT(sentence_of(chain), HasSubstr("latency = 2 s"));
   options = {};
   options.time.max_age_s = std::numeric_limits<double>::quiet_NaN();
   chain = evaluate_chain(recording(), constants(), "Image", "Ras", options);
-  ASSERT_FALSE(chain);
-  EXPECT_THAT(chain.error().message, HasSubstr("max age"));
+  EXPECT_THAT(sentence_of(chain), HasSubstr("max age"));
   options = {};
   options.time.max_extrapolation_s = -1.0;
   chain = evaluate_chain(recording(), constants(), "Image", "Ras", options);
-  ASSERT_FALSE(chain);
-  EXPECT_THAT(chain.error().message, HasSubstr("max extrapolation = -1 s"));
+  EXPECT_THAT(sentence_of(chain), HasSubstr("max extrapolation = -1 s"));
 }
 
 }  // namespace

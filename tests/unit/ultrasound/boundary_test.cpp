@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/ultrasound/boundary.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
 
@@ -32,14 +33,13 @@ Contour circle(int corners, double radius_px) {
 }
 
 TEST(BoundaryPoints, AreEquallySpacedAlongAClosedContour) {
-  const auto points = boundary_points(circle(1000, 50), pixels(0.2, 0.2));
-  ASSERT_TRUE(points);
+  const auto points = value_or_fail(boundary_points(circle(1000, 50), pixels(0.2, 0.2)));
   // Circumference 2 pi 10 mm = 62.83 mm: 314 steps.
-  ASSERT_EQ(points->cols(), 314);
-  for (Eigen::Index i = 0; i < points->cols(); ++i) {
-    const Vec3 next = points->col((i + 1) % points->cols());
-    EXPECT_NEAR((next - points->col(i)).norm(), 0.2, 1e-3);
-    EXPECT_NEAR((points->col(i) - pixels(0.2, 0.2) * Vec3(100, 80, 0)).norm(), 10.0, 1e-3);
+  ASSERT_EQ(points.cols(), 314);
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Vec3 next = points.col((i + 1) % points.cols());
+    EXPECT_NEAR((next - points.col(i)).norm(), 0.2, 1e-3);
+    EXPECT_NEAR((points.col(i) - pixels(0.2, 0.2) * Vec3(100, 80, 0)).norm(), 10.0, 1e-3);
   }
 }
 
@@ -50,11 +50,10 @@ TEST(BoundaryPoints, DoNotDependOnHowDenselyAContourWasClicked) {
   coarse.points_px << 0, 40, 40, 0, 0, 0, 40, 40;
   fine.points_px.resize(2, 6);
   fine.points_px << 0, 1, 3.5, 40, 40, 0, 0, 0, 0, 0, 40, 40;
-  const auto a = boundary_points(coarse, pixels(0.3, 0.1));
-  const auto b = boundary_points(fine, pixels(0.3, 0.1));
-  ASSERT_TRUE(a && b);
-  ASSERT_EQ(a->cols(), b->cols());
-  EXPECT_LT((*a - *b).cwiseAbs().maxCoeff(), 1e-12);
+  const auto a = value_or_fail(boundary_points(coarse, pixels(0.3, 0.1)));
+  const auto b = value_or_fail(boundary_points(fine, pixels(0.3, 0.1)));
+  ASSERT_EQ(a.cols(), b.cols());
+  EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 TEST(BoundaryPoints, OfAnOpenContourKeepBothEnds) {
@@ -62,17 +61,14 @@ TEST(BoundaryPoints, OfAnOpenContourKeepBothEnds) {
   line.closed = false;
   line.points_px.resize(2, 2);
   line.points_px << 0, 10, 0, 0;
-  const auto points = boundary_points(line, pixels(0.1, 0.1));
-  ASSERT_TRUE(points);
-  ASSERT_EQ(points->cols(), 6);  // 1 mm in steps of 0.2
-  EXPECT_LT((points->col(0) - pixels(0.1, 0.1) * Vec3(0, 0, 0)).norm(), 1e-12);
-  EXPECT_LT((points->col(5) - pixels(0.1, 0.1) * Vec3(10, 0, 0)).norm(), 1e-12);
+  const auto points = value_or_fail(boundary_points(line, pixels(0.1, 0.1)));
+  ASSERT_EQ(points.cols(), 6);  // 1 mm in steps of 0.2
+  EXPECT_LT((points.col(0) - pixels(0.1, 0.1) * Vec3(0, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((points.col(5) - pixels(0.1, 0.1) * Vec3(10, 0, 0)).norm(), 1e-12);
 }
 
 void expect_boundary_refused(const Contour& contour, double spacing_mm, const std::string& says) {
-  const auto points = boundary_points(contour, pixels(0.2, 0.2), spacing_mm);
-  ASSERT_FALSE(points);
-  EXPECT_THAT(points.error().message, HasSubstr(says));
+  EXPECT_THAT(sentence_of(boundary_points(contour, pixels(0.2, 0.2), spacing_mm)), HasSubstr(says));
 }
 
 TEST(BoundaryPoints, RefuseWhatIsNoContourNamingTheFrame) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/ultrasound/frame_samples.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
 
@@ -39,34 +40,31 @@ ImagePoses poses() {
 const PixelWindow kAll{0, 0, kWidth, kHeight};
 
 TEST(FrameSamples, AreBlocksOfTheSectorAtTheirPlaces) {
-  const auto samples = frame_samples(recording(), poses(), kAll, 2);
-  ASSERT_TRUE(samples);
+  const auto samples = value_or_fail(frame_samples(recording(), poses(), kAll, 2));
   // Columns 4 to 11 make 4 blocks; rows 0 to 9 make 5.
-  ASSERT_EQ(samples->positions.cols(), 2 * 4 * 5);
-  ASSERT_EQ(samples->intensities.size(), 2 * 4 * 5);
-  EXPECT_TRUE(samples->positions.col(0).isApprox(Vec3(4.5 * 0.5, 0.5 * 0.25, 0.0)));
-  EXPECT_DOUBLE_EQ(samples->intensities[0], 4.5 + 10 * 0.5);
-  EXPECT_TRUE(samples->positions.col(20 + 19).isApprox(Vec3(10.5 * 0.5, 8.5 * 0.25, 3.0)));
-  EXPECT_DOUBLE_EQ(samples->intensities[20 + 19], 10.5 + 10 * 8.5);
+  ASSERT_EQ(samples.positions.cols(), 2 * 4 * 5);
+  ASSERT_EQ(samples.intensities.size(), 2 * 4 * 5);
+  EXPECT_TRUE(samples.positions.col(0).isApprox(Vec3(4.5 * 0.5, 0.5 * 0.25, 0.0)));
+  EXPECT_DOUBLE_EQ(samples.intensities[0], 4.5 + 10 * 0.5);
+  EXPECT_TRUE(samples.positions.col(20 + 19).isApprox(Vec3(10.5 * 0.5, 8.5 * 0.25, 3.0)));
+  EXPECT_DOUBLE_EQ(samples.intensities[20 + 19], 10.5 + 10 * 8.5);
 }
 
 // Dark in one frame, but not in all: tissue.
 TEST(FrameSamples, KeepDarkPixelsInsideTheSector) {
-  const auto samples = frame_samples(recording(), poses(), {6, 3, 1, 1}, 1);
-  ASSERT_TRUE(samples);
-  ASSERT_EQ(samples->intensities.size(), 2);
-  EXPECT_EQ(samples->intensities[0], 0.0);
-  EXPECT_EQ(samples->intensities[1], 36.0);
+  const auto samples = value_or_fail(frame_samples(recording(), poses(), {6, 3, 1, 1}, 1));
+  ASSERT_EQ(samples.intensities.size(), 2);
+  EXPECT_EQ(samples.intensities[0], 0.0);
+  EXPECT_EQ(samples.intensities[1], 36.0);
 }
 
 TEST(FrameSamples, StayInTheWindowAndLeaveOutFramesWithoutAPose) {
   ImagePoses one = poses();
   one[0].reset();
-  const auto samples = frame_samples(recording(), one, {5, 2, 100, 4}, 2);
-  ASSERT_TRUE(samples);
-  EXPECT_EQ(samples->intensities.size(), 3 * 2);
-  EXPECT_TRUE((samples->positions.row(2).array() == 3.0).all());
-  EXPECT_GE(samples->positions.row(0).minCoeff(), 0.5 * 5);
+  const auto samples = value_or_fail(frame_samples(recording(), one, {5, 2, 100, 4}, 2));
+  EXPECT_EQ(samples.intensities.size(), 3 * 2);
+  EXPECT_TRUE((samples.positions.row(2).array() == 3.0).all());
+  EXPECT_GE(samples.positions.row(0).minCoeff(), 0.5 * 5);
   tracking::Recording invalid = recording();
   invalid.image_ok[0] = 0;
   EXPECT_EQ(frame_samples(invalid, poses(), {5, 2, 100, 4}, 2)->intensities.size(), 3 * 2);
@@ -74,9 +72,7 @@ TEST(FrameSamples, StayInTheWindowAndLeaveOutFramesWithoutAPose) {
 
 void expect_refused(const Result<IntensitySamples>& samples, ErrorCode code,
                     const std::string& text) {
-  ASSERT_FALSE(samples);
-  EXPECT_EQ(samples.error().code, code);
-  EXPECT_THAT(samples.error().message, HasSubstr(text));
+  EXPECT_THAT(refusal_of(samples, code), HasSubstr(text));
 }
 
 TEST(FrameSamples, RefuseWhatIsWrong) {

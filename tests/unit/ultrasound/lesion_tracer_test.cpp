@@ -2,7 +2,6 @@
 // Synthetic images: a lesion of known outline in multiplicative noise, which is smoothed to the
 // size of speckle.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "common/ultrasound/lesion_tracer.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/virtual_sweep.hpp"
 
 namespace brainshift::ultrasound {
@@ -187,23 +187,21 @@ TEST(TraceLesion, FindsTheOutlineFromAnySeedInside) {
   const Recording recording = images({lesion}, 0.3, 1);
   for (const Eigen::Vector2d& shift :
        {Eigen::Vector2d(0, 0), Eigen::Vector2d(18, 8), Eigen::Vector2d(-15, 5)}) {
-    const auto traced = trace_lesion(recording, {0, lesion.centre_px + shift});
-    ASSERT_TRUE(traced) << traced.error().message;
-    EXPECT_TRUE(traced->bright);
-    const auto errors = radial_errors(*traced, lesion);
+    const auto traced = value_or_fail(trace_lesion(recording, {0, lesion.centre_px + shift}));
+    EXPECT_TRUE(traced.bright);
+    const auto errors = radial_errors(traced, lesion);
     EXPECT_LT(errors[errors.size() / 2], 1.5) << shift.transpose();
     EXPECT_LT(errors[errors.size() * 95 / 100], 4.0) << shift.transpose();
-    EXPECT_GE(traced->confidence, 0.9);
+    EXPECT_GE(traced.confidence, 0.9);
   }
 }
 
 TEST(TraceLesion, FindsDarkLesionsToo) {
   Lesion lesion;
   std::swap(lesion.inside, lesion.outside);
-  const auto traced = trace_lesion(images({lesion}, 0.3, 2), {0, lesion.centre_px});
-  ASSERT_TRUE(traced) << traced.error().message;
-  EXPECT_FALSE(traced->bright);
-  EXPECT_LT(radial_errors(*traced, lesion)[48], 1.5);
+  const auto traced = value_or_fail(trace_lesion(images({lesion}, 0.3, 2), {0, lesion.centre_px}));
+  EXPECT_FALSE(traced.bright);
+  EXPECT_LT(radial_errors(traced, lesion)[48], 1.5);
 }
 
 TEST(TraceLesion, NeverInventsAContourInNoise) {
@@ -226,9 +224,7 @@ TEST(TraceLesion, NeverInventsAContourInNoise) {
 TEST(TraceLesion, AnImageWithoutAnyGreyIsRefused) {
   Lesion none;
   none.inside = none.outside;
-  const auto traced = trace_lesion(images({none}, 0.0, 1), {0, none.centre_px});
-  ASSERT_FALSE(traced);
-  EXPECT_EQ(traced.error().code, ErrorCode::kEmptySet);
+  refusal_of(trace_lesion(images({none}, 0.0, 1), {0, none.centre_px}), ErrorCode::kEmptySet);
 }
 
 TEST(TraceLesion, RefusesBadSeeds) {
@@ -243,9 +239,7 @@ TEST(TraceLesion, RefusesBadSeeds) {
   EXPECT_THAT(message({0, {std::nan(""), 10}}), HasSubstr("seed at nan"));
   Recording invalid = recording;
   invalid.image_ok[0] = 0;
-  const auto traced = trace_lesion(invalid, {0, {120, 90}});
-  ASSERT_FALSE(traced);
-  EXPECT_THAT(traced.error().message, HasSubstr("image is invalid"));
+  EXPECT_THAT(sentence_of(trace_lesion(invalid, {0, {120, 90}})), HasSubstr("image is invalid"));
 }
 
 TEST(TraceSweep, FollowsALesionThatMovesAndStopsWhereItEnds) {
@@ -256,14 +250,13 @@ TEST(TraceSweep, FollowsALesionThatMovesAndStopsWhereItEnds) {
     lesions[i].a_px -= 12.0 * part, lesions[i].b_px -= 6.0 * part;
     if (i >= 11) lesions[i].inside = lesions[i].outside;  // behind the lesion
   }
-  const auto sweep = trace_sweep(images(lesions, 0.3, 5), {4, lesions[4].centre_px});
-  ASSERT_TRUE(sweep) << sweep.error().message;
-  ASSERT_EQ(sweep->contours.size(), 11U);
-  ASSERT_EQ(sweep->contours.front().contour.frame, 0);
-  ASSERT_EQ(sweep->contours.back().contour.frame, 10);
-  EXPECT_EQ(sweep->stopped_before, "");
-  EXPECT_THAT(sweep->stopped_after, HasSubstr("no boundary found on frame 11"));
-  for (const TracedContour& traced : sweep->contours) {
+  const auto sweep = value_or_fail(trace_sweep(images(lesions, 0.3, 5), {4, lesions[4].centre_px}));
+  ASSERT_EQ(sweep.contours.size(), 11U);
+  ASSERT_EQ(sweep.contours.front().contour.frame, 0);
+  ASSERT_EQ(sweep.contours.back().contour.frame, 10);
+  EXPECT_EQ(sweep.stopped_before, "");
+  EXPECT_THAT(sweep.stopped_after, HasSubstr("no boundary found on frame 11"));
+  for (const TracedContour& traced : sweep.contours) {
     const auto errors =
         radial_errors(traced, lesions[static_cast<std::size_t>(traced.contour.frame)]);
     EXPECT_LT(errors[errors.size() / 2], 1.5) << traced.contour.frame;

@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "tests/support/results.hpp"
+
 namespace brainshift {
 namespace {
 
@@ -34,11 +36,7 @@ TEST(DistanceGrid, InvalidOnesNameWhatIsWrong) {
   const auto message = [](ErrorCode code, auto change) {
     DistanceGrid bad = grid();
     change(bad);
-    const Status status = validate(bad);
-    EXPECT_FALSE(status.has_value());
-    if (status) return std::string();
-    EXPECT_EQ(status.error().code, code);
-    return status.error().message;
+    return refusal_of(validate(bad), code);
   };
   const auto contains = [](const std::string& text, const char* part) {
     return text.find(part) != std::string::npos;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/values/session_state.hpp"
+#include "tests/support/results.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +14,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void expect_refused(const FieldChoice& choice, ErrorCode code, const std::string& sentence) {
-  const Status status = validate(choice);
-  ASSERT_FALSE(status) << "accepted: " << sentence;
-  EXPECT_EQ(status.error().code, code);
-  EXPECT_EQ(status.error().message, sentence);
+  EXPECT_EQ(refusal_of(validate(choice), code), sentence) << "accepted: " << sentence;
 }
 
 FieldChoice ball(const Vec3& centre_mm, double radius_mm) {

@@ -2,9 +2,9 @@
 #include "common/wire/decision.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "brainshift/v1/decision.pb.h"
+#include "tests/support/results.hpp"
 
 namespace brainshift::wire {
 namespace {
@@ -15,19 +15,16 @@ TEST(Decision, ComesBackAsItWasWritten) {
   for (const Outcome outcome :
        {Outcome::kUsed, Outcome::kFailed, Outcome::kSuperseded, Outcome::kSkipped}) {
     const Decision decision{7, "ius", (1ull << 63) - 1, outcome, 12, 657, "the session ended"};
-    const auto decoded = decode_decision(encode(decision));
-    ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_EQ(*decoded, decision);
+    const auto decoded = value_or_fail(decode_decision(encode(decision)));
+    EXPECT_EQ(decoded, decision);
   }
 }
 
 TEST(Decision, WhatNobodyDecidesIsRefused) {
   v1::Decision message;
   message.set_outcome("forgotten");
-  const auto unknown = decode_decision(message.SerializeAsString());
-  ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(unknown.error().message, HasSubstr("decision.outcome: \"forgotten\""));
+  EXPECT_THAT(refusal_of(decode_decision(message.SerializeAsString()), ErrorCode::kProtocol),
+              HasSubstr("decision.outcome: \"forgotten\""));
   message.set_outcome("used");
   message.set_active(1u << 31);
   EXPECT_THAT(decode_decision(message.SerializeAsString()).error().message,

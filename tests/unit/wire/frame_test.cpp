@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/wire/frame.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace brainshift::wire {
 namespace {
@@ -16,10 +16,7 @@ std::string sample_frame() {
 }
 
 void expect_frame_refused(const std::string& bytes, const char* field) {
-  const auto frame = decode_frame(bytes);
-  ASSERT_FALSE(frame);
-  EXPECT_EQ(frame.error().code, ErrorCode::kProtocol);
-  EXPECT_THAT(frame.error().message, HasSubstr(field));
+  EXPECT_THAT(refusal_of(decode_frame(bytes), ErrorCode::kProtocol), HasSubstr(field));
 }
 
 std::string with_byte(std::string bytes, std::size_t offset, unsigned char value) {
@@ -32,11 +29,10 @@ TEST(Frame, DecodeReturnsWhatWasEncodedForEveryType) {
     if (type == 8) continue;  // version 1's
     for (const std::string& payload : {std::string(), kPayload, std::string(100000, 'x')}) {
       const std::string bytes = encode_frame(static_cast<MessageType>(type), ~0ull - type, payload);
-      const auto frame = decode_frame(bytes);
-      ASSERT_TRUE(frame) << frame.error().message;
-      EXPECT_EQ(frame->type, static_cast<MessageType>(type));
-      EXPECT_EQ(frame->request_id, ~0ull - type);
-      EXPECT_EQ(frame->payload, payload);
+      const auto frame = value_or_fail(decode_frame(bytes));
+      EXPECT_EQ(frame.type, static_cast<MessageType>(type));
+      EXPECT_EQ(frame.request_id, ~0ull - type);
+      EXPECT_EQ(frame.payload, payload);
     }
   }
 }

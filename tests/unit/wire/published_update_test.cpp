@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "brainshift/v1/brainshift.pb.h"
+#include "tests/support/results.hpp"
 #include "tests/unit/wire/refusals.hpp"
 #include "tests/unit/wire/same_values.hpp"
 #include "tests/unit/wire/sample_values.hpp"
@@ -20,9 +21,7 @@ UpdateMessage usable_update() {
 }
 
 PublishedUpdate opened(const UpdateMessage& message) {
-  auto update = PublishedUpdate::open(encode(message));
-  EXPECT_TRUE(update) << update.error().message;
-  return update ? std::move(*update) : PublishedUpdate{};
+  return value_or_fail(PublishedUpdate::open(encode(message)));
 }
 
 TEST(PublishedUpdate, SaysWhoseItIsAndWhetherItIsUsable) {
@@ -47,23 +46,20 @@ TEST(PublishedUpdate, APartHoldsItsColumnsAndEverythingElseOfTheUpdate) {
   expected.update.part = FieldPart{4, {0, 3}, 0};
   part.displacement = whole.displacement(Eigen::all, std::vector<int>{0, 3});
   part.sd_mm = whole.sd_mm(std::vector<int>{0, 3});
-  const auto received = decode_update(update.cut(expected.update.part, true));
-  ASSERT_TRUE(received) << received.error().message;
-  expect_same(*received, expected);
+  const auto received = value_or_fail(decode_update(update.cut(expected.update.part, true)));
+  expect_same(received, expected);
 
   part.sd_mm.resize(0);
-  const auto without = decode_update(update.cut(expected.update.part, false));
-  ASSERT_TRUE(without) << without.error().message;
-  expect_same(*without, expected);
+  const auto without = value_or_fail(decode_update(update.cut(expected.update.part, false)));
+  expect_same(without, expected);
 }
 
 TEST(PublishedUpdate, TheWholeFieldWithoutDeviationsNamesNoNodes) {
   UpdateMessage expected = usable_update();
   const PublishedUpdate update = opened(expected);
   expected.update.estimate.sd_mm.resize(0);
-  const auto received = decode_update(update.cut(std::nullopt, false));
-  ASSERT_TRUE(received) << received.error().message;
-  expect_same(*received, expected);
+  const auto received = value_or_fail(decode_update(update.cut(std::nullopt, false)));
+  expect_same(received, expected);
 }
 
 TEST(PublishedUpdate, IsNotOpenedWhenItIsAPartOrMalformed) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Payloads that Protobuf would accept and the service must reject.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <functional>
 #include <limits>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/wire/report.hpp"
+#include "tests/support/results.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 
@@ -30,10 +30,7 @@ DaemonReport sample_report() {
 }
 
 void expect_report_refused(const DaemonReport& report, ErrorCode code, const char* field) {
-  const auto decoded = decode_report(encode(report));
-  ASSERT_FALSE(decoded) << field;
-  EXPECT_EQ(decoded.error().code, code);
-  EXPECT_THAT(decoded.error().message, HasSubstr(field));
+  EXPECT_THAT(refusal_of(decode_report(encode(report)), code), HasSubstr(field));
 }
 
 TEST(Report, IsReproducedWithAndWithoutAJournal) {
@@ -68,10 +65,9 @@ TEST(Report, TextOfAPeerCannotDriveATerminal) {
   DaemonReport report = sample_report();
   report.sources[0].source = "i\033[2Jus";
   report.journal->reason = "a\nb";
-  const auto decoded = decode_report(encode(report));
-  ASSERT_TRUE(decoded);
-  EXPECT_EQ(decoded->sources[0].source, "i [2Jus");
-  EXPECT_EQ(decoded->journal->reason, "a b");
+  const auto decoded = value_or_fail(decode_report(encode(report)));
+  EXPECT_EQ(decoded.sources[0].source, "i [2Jus");
+  EXPECT_EQ(decoded.journal->reason, "a b");
 }
 
 TEST(Report, AnEmptyPayloadIsNoReport) { EXPECT_FALSE(decode_report("")); }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "brainshift/v1/brainshift.pb.h"
+#include "tests/support/results.hpp"
 #include "tests/unit/wire/same_values.hpp"
 #include "tests/unit/wire/sample_values.hpp"
 
@@ -15,9 +16,8 @@ namespace pb = brainshift::v1;
 
 template <typename T>
 void expect_round_trip(const T& value, Result<T> (*decode)(std::string_view)) {
-  const auto decoded = decode(encode(value));
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  expect_same(value, *decoded);
+  const auto decoded = value_or_fail(decode(encode(value)));
+  expect_same(value, decoded);
 }
 
 TEST(RoundTrip, EveryObservationKindIsReproduced) {
@@ -28,9 +28,8 @@ TEST(RoundTrip, EveryObservationKindIsReproduced) {
 }
 
 TEST(RoundTrip, NegativeZeroKeepsItsSign) {
-  const auto decoded = decode_observation(encode(sample_observation(3)));
-  ASSERT_TRUE(decoded);
-  const auto& pose = std::get<PatientPose>(decoded->body);
+  const auto decoded = value_or_fail(decode_observation(encode(sample_observation(3))));
+  const auto& pose = std::get<PatientPose>(decoded.body);
   EXPECT_TRUE(std::signbit(pose.gravity_direction.y()));
   ASSERT_TRUE(pose.fluid_level_mm.has_value());
   EXPECT_TRUE(std::signbit(*pose.fluid_level_mm));
@@ -99,16 +98,15 @@ TEST(RoundTrip, AnEstimateThatIsNotFiniteTravelsWithoutItsNumbers) {
   estimate.sd_mm[1] = std::numeric_limits<double>::quiet_NaN();
   estimate.misfit_mm.mean = std::numeric_limits<double>::infinity();
   estimate.quality.flags.set(QualityFlag::kNotFinite);
-  const auto decoded = decode_update(encode(message));
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  const Estimate& received = decoded->update.estimate;
+  const auto decoded = value_or_fail(decode_update(encode(message)));
+  const Estimate& received = decoded.update.estimate;
   EXPECT_EQ(received.status, EstimateStatus::kDeadline);
   EXPECT_EQ(received.quality.quality, Quality::kUnusable);
   EXPECT_EQ(received.quality.flags, estimate.quality.flags);
   EXPECT_EQ(received.quality.reason, estimate.quality.reason);
   EXPECT_EQ(received.displacement.cols(), 0);
   EXPECT_EQ(received.sd_mm.size(), 0);
-  EXPECT_EQ(decoded->update.left_out.size(), message.update.left_out.size());
+  EXPECT_EQ(decoded.update.left_out.size(), message.update.left_out.size());
 }
 
 // The names of the messages are those of the library; the numbers are bits, counted from 1.
@@ -188,9 +186,8 @@ TEST(RoundTrip, TheDaemonsTimeIsAddedWithoutDecoding) {
   std::string payload = encode(observation);
   append_daemon_time(-5, payload);
   observation.daemon_ns = -5;
-  const auto decoded = decode_observation(payload);
-  ASSERT_TRUE(decoded) << decoded.error().message;
-  expect_same(observation, *decoded);
+  const auto decoded = value_or_fail(decode_observation(payload));
+  expect_same(observation, decoded);
 }
 
 TEST(RoundTrip, EveryErrorCodeIsReproduced) {
@@ -209,9 +206,8 @@ TEST(RoundTrip, AFieldOfAHeadMeshIsReproducedAsFloats) {
       Points::NullaryExpr(3, 18475, [&] { return normal(random); });
   message.update.estimate.sd_mm = VecX::NullaryExpr(18475, [&] { return normal(random); });
   const std::string payload = encode(message);
-  const auto decoded = decode_update(payload);
-  ASSERT_TRUE(decoded);
-  expect_same_matrix(decoded->update.estimate.displacement.cast<float>(),
+  const auto decoded = value_or_fail(decode_update(payload));
+  expect_same_matrix(decoded.update.estimate.displacement.cast<float>(),
                      message.update.estimate.displacement.cast<float>());
   // Four bytes per number and next to nothing else.
   EXPECT_LT(payload.size(), 4u * 4u * 18475u + 2000u);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
 #include "client/lib/client_keys.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 
@@ -41,9 +41,7 @@ std::string update_frame(std::uint64_t sequence, bool final = true,
 
 template <typename T>
 void expect_error(const Result<T>& result, ErrorCode code, const std::string& text) {
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, code) << result.error().message;
-  EXPECT_THAT(result.error().message, HasSubstr(text));
+  EXPECT_THAT(refusal_of(result, code), HasSubstr(text));
 }
 
 TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
@@ -82,10 +80,9 @@ TEST(Client, EveryRequestReachesTheDaemonAndItsReplyComesBack) {
   Observation observation;
   observation.sequence = 42;
   observation.body = TumourBoundary{Points::Random(3, 200), 0.51};
-  const auto receipt = client.submit(observation);
-  ASSERT_TRUE(receipt);
-  EXPECT_EQ(receipt->observation_sequence, 42u);
-  EXPECT_TRUE(receipt->replaced_pending);
+  const auto receipt = value_or_fail(client.submit(observation));
+  EXPECT_EQ(receipt.observation_sequence, 42u);
+  EXPECT_TRUE(receipt.replaced_pending);
 }
 
 TEST(Client, AnErrorReplyBecomesTheCallersError) {
@@ -195,11 +192,10 @@ TEST(Client, UpdatesBetweenRepliesAreKeptInOrder) {
   ASSERT_TRUE(client.status());
   ASSERT_TRUE(client.status());
   for (const std::uint64_t expected : {11, 12, 13, 21, 22, 23}) {
-    const auto message = client.next_update(kPatience);
-    ASSERT_TRUE(message) << message.error().message;
-    EXPECT_EQ(message->update.sequence, expected);
-    EXPECT_EQ(message->update.final, expected % 10 != 1);
-    EXPECT_EQ(message->update.estimate.displacement,
+    const auto message = value_or_fail(client.next_update(kPatience));
+    EXPECT_EQ(message.update.sequence, expected);
+    EXPECT_EQ(message.update.final, expected % 10 != 1);
+    EXPECT_EQ(message.update.estimate.displacement,
               Points::Constant(3, 2, static_cast<double>(expected)));
   }
   expect_error(client.next_update(milliseconds(1)), ErrorCode::kUnavailable, daemon.endpoint());
@@ -218,10 +214,9 @@ TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
   ASSERT_TRUE(client.status());
   EXPECT_FALSE(client.latest_usable()) << "queued, not handed out yet";
   for (const std::uint64_t sequence : {1, 2, 3}) {
-    const auto message = client.next_update(kPatience);
-    ASSERT_TRUE(message) << message.error().message;
-    EXPECT_EQ(message->update.sequence, sequence);
-    EXPECT_EQ(message->update.usable(), sequence == 1);
+    const auto message = value_or_fail(client.next_update(kPatience));
+    EXPECT_EQ(message.update.sequence, sequence);
+    EXPECT_EQ(message.update.usable(), sequence == 1);
     ASSERT_TRUE(client.latest_usable());
     EXPECT_EQ(client.latest_usable()->update.estimate.displacement, Points::Constant(3, 2, 1.0));
   }
@@ -264,9 +259,8 @@ TEST(Client, WorksAgainAfterTheDaemonRestarted) {
   daemon.reset();
   expect_error(client.next_update(kPatience), ErrorCode::kUnavailable, "lost the connection");
   daemon = std::make_unique<FakeDaemon>(handler, endpoint);
-  const auto status = client.status();
-  ASSERT_TRUE(status) << status.error().message;
-  EXPECT_EQ(status->version, "1.2.3");
+  const auto status = value_or_fail(client.status());
+  EXPECT_EQ(status.version, "1.2.3");
 }
 
 TEST(Client, ARequestAboveThePayloadCapIsRefusedHere) {
@@ -279,19 +273,16 @@ TEST(Client, ARequestAboveThePayloadCapIsRefusedHere) {
 // ---------- keys ----------
 
 TEST(ClientKeys, ANewPairBelongsTogetherAndIsAnotherEachTime) {
-  const auto one = new_keys();
-  const auto other = new_keys();
-  ASSERT_TRUE(one && other);
-  EXPECT_NE(one->secret_key, other->secret_key);
-  EXPECT_EQ(public_key_of(one->secret_key).value(), one->public_key);
-  EXPECT_EQ(public_key_of(other->secret_key).value(), other->public_key);
+  const auto one = value_or_fail(new_keys());
+  const auto other = value_or_fail(new_keys());
+  EXPECT_NE(one.secret_key, other.secret_key);
+  EXPECT_EQ(public_key_of(one.secret_key).value(), one.public_key);
+  EXPECT_EQ(public_key_of(other.secret_key).value(), other.public_key);
 }
 
 TEST(ClientKeys, ATextThatIsNoKeyHasNoPublicKey) {
   for (const std::string& none : {std::string(), std::string(39, '0'), std::string(40, '"')}) {
-    const auto key = public_key_of(none);
-    ASSERT_FALSE(key);
-    EXPECT_EQ(key.error().code, ErrorCode::kInvalidArgument);
+    refusal_of(public_key_of(none), ErrorCode::kInvalidArgument);
   }
 }
 

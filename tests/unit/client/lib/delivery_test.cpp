@@ -10,6 +10,7 @@
 
 #include "client/lib/client.hpp"
 #include "common/wire/frame.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 
 namespace brainshift::client {
@@ -97,9 +98,7 @@ struct Viewing {
 };
 
 Eigen::RowVectorXd x_of(const Result<UpdateMessage>& message) {
-  EXPECT_TRUE(message) << message.error().message;
-  return message ? Eigen::RowVectorXd(message->update.estimate.displacement.row(0))
-                 : Eigen::RowVectorXd();
+  return value_or_fail(message).update.estimate.displacement.row(0);
 }
 
 TEST(ClientDelivery, ChangesComeOutAsTheWholeChoiceAndSayWhatTravelled) {
@@ -138,9 +137,7 @@ TEST(ClientDelivery, AMalformedUpdateIsReportedAndAskedForAnew) {
             part_frame(3, 3.0, 2)};
   });
   EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(1, 1));
-  const auto malformed = viewing.client.next_update(kPatience);
-  ASSERT_FALSE(malformed);
-  EXPECT_EQ(malformed.error().code, ErrorCode::kProtocol);
+  refusal_of(viewing.client.next_update(kPatience), ErrorCode::kProtocol);
   EXPECT_EQ(x_of(viewing.client.next_update(kPatience)), Eigen::RowVector2d(2, 2));
 }
 
@@ -156,21 +153,17 @@ TEST(ClientDelivery, AChoiceThatIsRefusedLaterIsReported) {
     const Error refused{ErrorCode::kEmptySet, "choice: no node lies in the ball"};
     return {encode_frame(MessageType::kErrorReply, request.request_id, wire::encode(refused))};
   });
-  auto client = Client::connect(daemon.endpoint(), {.renewal_interval = milliseconds(20)});
-  ASSERT_TRUE(client);
-  ASSERT_TRUE(client->subscribe(1, kChoice));
-  const auto update = client->next_update(kPatience);
-  ASSERT_FALSE(update);
-  EXPECT_EQ(update.error().code, ErrorCode::kEmptySet);
-  EXPECT_EQ(update.error().message, "choice: no node lies in the ball");
+  auto client =
+      value_or_fail(Client::connect(daemon.endpoint(), {.renewal_interval = milliseconds(20)}));
+  ASSERT_TRUE(client.subscribe(1, kChoice));
+  EXPECT_EQ(refusal_of(client.next_update(kPatience), ErrorCode::kEmptySet),
+            "choice: no node lies in the ball");
 }
 
 TEST(ClientDelivery, ABadChoiceIsRefusedBeforeItIsSent) {
-  auto client = Client::connect("tcp://127.0.0.1:1");
-  ASSERT_TRUE(client);
-  const Status refused = client->subscribe(1, {.tolerance_mm = -1.0});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().message, "choice.tolerance_mm = -1: must be in [0, 100]");
+  auto client = value_or_fail(Client::connect("tcp://127.0.0.1:1"));
+  EXPECT_EQ(sentence_of(client.subscribe(1, {.tolerance_mm = -1.0})),
+            "choice.tolerance_mm = -1: must be in [0, 100]");
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "client/lib/client.hpp"
 #include "common/wire/frame.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 
@@ -93,9 +94,7 @@ class FakeDaemon {
 using Answers = FakeDaemon::Answers;
 
 inline Client connect_to(const std::string& endpoint, const ClientOptions& options) {
-  auto client = Client::connect(endpoint, options);
-  EXPECT_TRUE(client) << client.error().message;
-  return std::move(*client);
+  return value_or_fail(Client::connect(endpoint, options));
 }
 
 // A field of two nodes, all of whose displacements are the update's number.

@@ -2,7 +2,6 @@
 #include "client/lib/session_watch.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 

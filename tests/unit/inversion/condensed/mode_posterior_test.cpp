@@ -2,11 +2,10 @@
 // More of it in condensed_inverter_test.cpp.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-
 #include "common/core/random.hpp"
 #include "common/inversion/condensed/mode_posterior.hpp"
 #include "common/inversion/skull/contact_system.hpp"
+#include "tests/support/dense.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -147,15 +146,16 @@ TEST(SourceCheck, EqualsTheInnovationStatisticOfTheRowsThatSeeTheUnknowns) {
   const MatrixXd own = problem.jacobian.bottomRows(kSecond);
   MatrixXd information = first.transpose() * first;
   information.diagonal() += problem.prior;
-  const Eigen::LLT<MatrixXd> others(information);
-  const VecX mean = others.solve(first.transpose() * problem.data.head(kFirst));
+  const VecX mean =
+      test_support::solve_positive(information, first.transpose() * problem.data.head(kFirst));
   const VecX innovation = problem.data.tail(kSecond) - own * mean;
-  MatrixXd covariance = own * others.solve(own.transpose());
+  MatrixXd covariance = own * test_support::solve_positive(information, own.transpose());
   covariance.diagonal().array() += 1.0;
-  const double all = innovation.dot(covariance.llt().solve(innovation));
+  const double all = innovation.dot(test_support::solve_positive(covariance, innovation).col(0));
   const MatrixXd seen = own.leftCols(10);
   const VecX noise =
-      innovation - seen * (seen.transpose() * seen).llt().solve(seen.transpose() * innovation);
+      innovation -
+      seen * test_support::solve_positive(seen.transpose() * seen, seen.transpose() * innovation);
   EXPECT_NEAR(problem.check_second().chi_square, all - noise.squaredNorm(), 0.05);
 }
 

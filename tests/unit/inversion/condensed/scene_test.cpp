@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "common/inversion/condensed/omission_estimates.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -37,9 +38,7 @@ class Scene : public ::testing::Test {
     static const auto operators =
         std::make_shared<const CondensedOperators>(std::move(*condense(prepared())));
     static const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-    auto made = CondensedInverter::build(operators, locator, config(), options);
-    EXPECT_TRUE(made.has_value());
-    return std::move(*made);
+    return value_or_fail(CondensedInverter::build(operators, locator, config(), options));
   }
 
   // Noisy displacements of the tumour's vertices; sag in units of the brain's weight, sideways a

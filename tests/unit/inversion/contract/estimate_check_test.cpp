@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
@@ -11,6 +10,7 @@
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/operators/encode_columns.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -84,12 +84,9 @@ TEST_F(EstimateCheck, AFieldThatContradictsItsContactForcesIsRefused) {
   wrong->responses =
       *encode_columns(node_blocks(patient()->mesh.nodes), {group_of(columns, kModeStep)}, team);
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-  auto broken = CondensedInverter::build(wrong, locator, config(), {});
-  ASSERT_TRUE(broken.has_value());
-  const auto status = broken->update(data, estimate);
-  ASSERT_FALSE(status.has_value());
-  EXPECT_EQ(status.error().code, ErrorCode::kNotConverged);
-  EXPECT_NE(status.error().message.find("equilibrium"), std::string::npos);
+  auto broken = value_or_fail(CondensedInverter::build(wrong, locator, config(), {}));
+  const auto status = broken.update(data, estimate);
+  EXPECT_THAT(refusal_of(status, ErrorCode::kNotConverged), testing::HasSubstr("equilibrium"));
   EXPECT_EQ(estimate.status, EstimateStatus::kNotRun);
 }
 
@@ -112,12 +109,10 @@ TEST_F(EstimateCheck, AFieldThatIsNotFiniteIsRefused) {
   }
   wrong->responses = *CompactColumns::from_parts(std::move(parts));
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
-  auto broken = CondensedInverter::build(wrong, locator, config(), {});
-  ASSERT_TRUE(broken.has_value());
+  auto broken = value_or_fail(CondensedInverter::build(wrong, locator, config(), {}));
   Estimate estimate;
-  const auto status = broken->update(sagging_data(Boundary::kContact, 0.05), estimate);
-  ASSERT_FALSE(status.has_value());
-  EXPECT_EQ(status.error().code, ErrorCode::kNotFinite);
+  refusal_of(broken.update(sagging_data(Boundary::kContact, 0.05), estimate),
+             ErrorCode::kNotFinite);
 }
 
 TEST_F(EstimateCheck, LinearElementsNearIncompressibilityAreSaidToLock) {
@@ -129,12 +124,10 @@ TEST_F(EstimateCheck, LinearElementsNearIncompressibilityAreSaidToLock) {
   ASSERT_TRUE(inverter.update(data, estimate));
   EXPECT_NE(estimate.reason.find("lock"), std::string::npos) << estimate.reason;
 
-  const auto model = PreparedModel::prepare(patient(), nearly, Boundary::kContact);
-  ASSERT_TRUE(model.has_value());
-  const auto paper = invert(*model, data, Method::kPaper);
-  ASSERT_TRUE(paper.has_value());
-  EXPECT_NE(paper->reason.find("lock"), std::string::npos) << paper->reason;
-  EXPECT_FALSE(std::isnan(paper->min_volume_ratio));
+  const auto model = value_or_fail(PreparedModel::prepare(patient(), nearly, Boundary::kContact));
+  const auto paper = value_or_fail(invert(model, data, Method::kPaper));
+  EXPECT_NE(paper.reason.find("lock"), std::string::npos) << paper.reason;
+  EXPECT_FALSE(std::isnan(paper.min_volume_ratio));
 }
 
 using testing::HasSubstr;

@@ -3,12 +3,12 @@
 // elasticity.
 #include <gmock/gmock.h>
 
-#include <Eigen/LU>
-
 #include "common/contact/penalised_system.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
 namespace brainshift::inversion {
@@ -32,22 +32,18 @@ CaseConfig drained() {
 }
 
 Estimate condensed_estimate(const PreparedModel& model, const SparseData& data) {
-  auto operators = condense(model);
-  EXPECT_TRUE(operators.has_value()) << operators.error().message;
-  auto inverter = CondensedInverter::build(
-      std::make_shared<const CondensedOperators>(std::move(*operators)),
-      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config(), {});
-  EXPECT_TRUE(inverter.has_value());
+  auto operators = value_or_fail(condense(model));
+  auto inverter = value_or_fail(CondensedInverter::build(
+      std::make_shared<const CondensedOperators>(std::move(operators)),
+      std::make_shared<const geometry::TetLocator>(model.model().mesh), model.config(), {}));
   Estimate estimate;
-  const auto status = inverter->update(data, estimate);
+  const auto status = inverter.update(data, estimate);
   EXPECT_TRUE(status.has_value()) << status.error().message;
   return estimate;
 }
 
 Estimate iterated_estimate(const PreparedModel& model, const SparseData& data, Method method) {
-  auto estimate = invert(model, data, method);
-  EXPECT_TRUE(estimate.has_value()) << estimate.error().message;
-  return std::move(*estimate);
+  return value_or_fail(invert(model, data, method));
 }
 
 double relative_difference(const Points& a, const Points& b) {
@@ -113,7 +109,7 @@ VecX direct_mean(const PreparedModel& model, const SparseData& data,
                  const contact::ActiveSet& active) {
   const fem::DofMap& dofs = model.forward().dofs();
   const int n = patient()->mesh.num_nodes();
-  const Eigen::MatrixXd inverse = dense_stiffness(model, active).inverse();
+  const Eigen::MatrixXd inverse = test_support::inverse(dense_stiffness(model, active));
   const auto response = [&](const VecX& force) {
     return flat(dofs.expand(
         inverse * dofs.restrict_to(Points(Eigen::Map<const Points>(force.data(), 3, n)))));

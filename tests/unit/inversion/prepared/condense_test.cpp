@@ -11,6 +11,7 @@
 #include "common/inversion/prepared/condense.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/encode_columns.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
@@ -26,17 +27,16 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
   config.prior.resection_weight_sd = 1.0;
   config.prior.resection_stress_sd_pa = 300.0;
   config.prior.gravity_levels_mm = levels;
-  const auto model =
+  const auto model = value_or_fail(
       PreparedModel::prepare(patient(), config, Boundary::kFixed,
-                             [&](std::string_view stage, double) { stages.emplace(stage); });
-  ASSERT_TRUE(model.has_value());
-  EXPECT_EQ(model->boundary(), Boundary::kFixed);
-  EXPECT_EQ(&model->model(), patient().get());
+                             [&](std::string_view stage, double) { stages.emplace(stage); }));
+  EXPECT_EQ(model.boundary(), Boundary::kFixed);
+  EXPECT_EQ(&model.model(), patient().get());
   // Fluid levels in three directions, bumps of three radii, the brain's halves, resection, opening.
-  EXPECT_EQ(model->prior().num_modes(), 6 + (27 + 27 + 7) + 4 + 9 + 21);
-  EXPECT_GT(model->timings().factor_nonzeros, 0u);
-  EXPECT_GT(model->timings().bytes, 0u);
-  EXPECT_GE(model->timings().total_s, model->timings().factor_s);
+  EXPECT_EQ(model.prior().num_modes(), 6 + (27 + 27 + 7) + 4 + 9 + 21);
+  EXPECT_GT(model.timings().factor_nonzeros, 0u);
+  EXPECT_GT(model.timings().bytes, 0u);
+  EXPECT_GE(model.timings().total_s, model.timings().factor_s);
   EXPECT_EQ(stages.count("prior"), 1u);
   EXPECT_EQ(stages.count("ready"), 1u);
 }
@@ -44,10 +44,8 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
 TEST(PreparedModel, ABodyThatFloatsIsNamed) {
   auto floating = std::make_shared<BrainModel>(*patient());
   floating->fixed.clear();
-  const auto model =
-      PreparedModel::prepare(floating, test_support::toy_config(), Boundary::kContact);
-  ASSERT_FALSE(model.has_value());
-  EXPECT_EQ(model.error().code, ErrorCode::kFloatingBody) << model.error().message;
+  refusal_of(PreparedModel::prepare(floating, test_support::toy_config(), Boundary::kContact),
+             ErrorCode::kFloatingBody);
 }
 
 PriorScaleValues all(double value) {
@@ -148,12 +146,8 @@ TEST_F(Condensed, APriorWithFarTooMuchMotionOrNoneIsRefusedWithTheFigure) {
   EXPECT_GT(usual_mm, 0.5);
   EXPECT_LT(usual_mm, kMostMotion_mm);
   const auto refused = [](const CaseConfig& with) {
-    const auto model = PreparedModel::prepare(patient(), with, Boundary::kContact);
-    EXPECT_TRUE(model.has_value());
-    const auto made = condense(*model);
-    EXPECT_FALSE(made.has_value());
-    EXPECT_EQ(made.error().code, ErrorCode::kInvalidArgument);
-    return made.error().message;
+    const auto model = value_or_fail(PreparedModel::prepare(patient(), with, Boundary::kContact));
+    return refusal_of(condense(model), ErrorCode::kInvalidArgument);
   };
   CaseConfig strong = config();
   strong.prior.force_density_sd_n_m3 *= 1e4;
@@ -179,14 +173,13 @@ TEST(BlockRunner, DealsAnEvenNumberOfBlocksOfAboutTheSameSize) {
 TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
   CondenseOptions one;
   one.threads = 1;
-  const auto serial = condense(prepared(Boundary::kContact), one);
+  const auto serial = value_or_fail(condense(prepared(Boundary::kContact), one));
   CondenseOptions three;
   three.threads = 3;
-  const auto parallel = condense(prepared(Boundary::kContact), three);
-  ASSERT_TRUE(serial && parallel);
-  EXPECT_TRUE(serial->responses.parts() == parallel->responses.parts());
-  EXPECT_TRUE(serial->compliance == parallel->compliance);
-  EXPECT_TRUE(serial->truncated_variance_mm2 == parallel->truncated_variance_mm2);
+  const auto parallel = value_or_fail(condense(prepared(Boundary::kContact), three));
+  EXPECT_TRUE(serial.responses.parts() == parallel.responses.parts());
+  EXPECT_TRUE(serial.compliance == parallel.compliance);
+  EXPECT_TRUE(serial.truncated_variance_mm2 == parallel.truncated_variance_mm2);
 }
 
 // A store in memory that also remembers compliances, as a checkpoint does.
@@ -218,15 +211,13 @@ struct RememberingStore {
 
 TEST_F(Condensed, FinishedBlocksAreNotSolvedAgainAndNeedNoMemoryOfTheirOwn) {
   RememberingStore store;
-  const auto first = condense(prepared(Boundary::kContact), store.options());
-  ASSERT_TRUE(first);
+  const auto first = value_or_fail(condense(prepared(Boundary::kContact), store.options()));
   ASSERT_GT(store.saved, 0);
   store.saved = 0;
-  const auto second = condense(prepared(Boundary::kContact), store.options());
-  ASSERT_TRUE(second);
+  const auto second = value_or_fail(condense(prepared(Boundary::kContact), store.options()));
   EXPECT_EQ(store.saved, 0);
   const auto in_memory = operators(Boundary::kContact);
-  for (const auto& made : {&*first, &*second}) {
+  for (const auto& made : {&first, &second}) {
     EXPECT_TRUE(made->responses.parts() == in_memory->responses.parts());
     EXPECT_TRUE(made->compliance == in_memory->compliance);
     EXPECT_TRUE(made->region_responses == in_memory->region_responses);
@@ -234,11 +225,9 @@ TEST_F(Condensed, FinishedBlocksAreNotSolvedAgainAndNeedNoMemoryOfTheirOwn) {
 }
 
 TEST_F(Condensed, AModelThatIsGivenAwayGivesTheSame) {
-  auto model = PreparedModel::prepare(patient(), config(), Boundary::kContact);
-  ASSERT_TRUE(model);
-  const auto made = condense(std::move(*model));
-  ASSERT_TRUE(made);
-  EXPECT_TRUE(made->responses.parts() == operators(Boundary::kContact)->responses.parts());
+  auto model = value_or_fail(PreparedModel::prepare(patient(), config(), Boundary::kContact));
+  const auto made = value_or_fail(condense(std::move(model)));
+  EXPECT_TRUE(made.responses.parts() == operators(Boundary::kContact)->responses.parts());
 }
 
 TEST_F(Condensed, AStoreThatFailsEndsItWithTheStoresWords) {
@@ -251,21 +240,16 @@ TEST_F(Condensed, AStoreThatFailsEndsItWithTheStoresWords) {
   torn.store.read = [](int, Eigen::Index, Eigen::MatrixXf&) -> Status {
     return fail(ErrorCode::kUnreadable, "m.h5.partial: cannot be read");
   };
-  const auto not_saved = condense(prepared(Boundary::kContact), full);
-  ASSERT_FALSE(not_saved);
-  EXPECT_EQ(not_saved.error().message, "m.h5.partial: no space");
-  const auto not_read = condense(prepared(Boundary::kContact), torn);
-  ASSERT_FALSE(not_read);
-  EXPECT_EQ(not_read.error().message, "m.h5.partial: cannot be read");
+  EXPECT_EQ(sentence_of(condense(prepared(Boundary::kContact), full)), "m.h5.partial: no space");
+  EXPECT_EQ(sentence_of(condense(prepared(Boundary::kContact), torn)),
+            "m.h5.partial: cannot be read");
 }
 
 TEST_F(Condensed, AStoreWithANumberThatIsNotFiniteIsRefused) {
   RememberingStore store;
   ASSERT_TRUE(condense(prepared(Boundary::kContact), store.options()));
   store.kept.begin()->second.first(0, 5) = std::numeric_limits<float>::quiet_NaN();
-  const auto refused = condense(prepared(Boundary::kContact), store.options());
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kNotFinite);
+  refusal_of(condense(prepared(Boundary::kContact), store.options()), ErrorCode::kNotFinite);
 }
 
 // A store and a model that is given away are what a large mesh needs.
@@ -286,12 +270,9 @@ TEST(CondenseMemory, OfAHundredThousandNodesIsWithinTheDefaultWithColumnsOnDisk)
 TEST_F(Condensed, MemoryLimitIsRespectedBeforeWorkBegins) {
   CaseConfig small = config();
   small.condensed.memory_limit_gib = 0.001;
-  const auto model = PreparedModel::prepare(patient(), small, Boundary::kContact);
-  ASSERT_TRUE(model);
-  const auto refused = condense(*model);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(refused.error().message, HasSubstr("condensed.memory_limit_gib = 0.001"));
+  const auto model = value_or_fail(PreparedModel::prepare(patient(), small, Boundary::kContact));
+  EXPECT_THAT(refusal_of(condense(model), ErrorCode::kInvalidArgument),
+              HasSubstr("condensed.memory_limit_gib = 0.001"));
 }
 
 TEST_F(Condensed, CanBeStopped) {
@@ -299,9 +280,7 @@ TEST_F(Condensed, CanBeStopped) {
   stop.request_stop();
   CondenseOptions options;
   options.stop = stop.get_token();
-  const auto stopped = condense(prepared(Boundary::kContact), options);
-  ASSERT_FALSE(stopped);
-  EXPECT_EQ(stopped.error().code, ErrorCode::kUnavailable);
+  refusal_of(condense(prepared(Boundary::kContact), options), ErrorCode::kUnavailable);
 }
 
 TEST_F(Condensed, ProgressRunsFromZeroToOneInEveryStage) {

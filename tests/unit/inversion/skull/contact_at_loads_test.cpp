@@ -3,6 +3,7 @@
 
 #include "common/inversion/skull/contact_at_loads.hpp"
 #include "common/inversion/skull/contact_reduction.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/inversion/skull_fixture.hpp"
 
 namespace brainshift::inversion {
@@ -26,9 +27,8 @@ TEST(ContactReduction, PredictsForcesAndPenetrationAlsoForModesBeforeTheWindow) 
   ASSERT_EQ(contact.set(), model.set()) << "the step is too long for the test";
 
   const VecX dg = step.head(kBefore), dz = step.tail(window.count);
-  const auto before = model.response_before();
-  ASSERT_TRUE(before);
-  const VecX df = -*before * dg - model.response().leftCols(window.count) * dz;
+  const auto before = value_or_fail(model.response_before());
+  const VecX df = -before * dg - model.response().leftCols(window.count) * dz;
   const VecX change = model.penetration_change(dg, dz, df);
   ASSERT_GT(change.norm(), 1e-6);
   EXPECT_LT((contact.forces() - forces - df).norm(), 1e-6 * df.norm());
@@ -246,9 +246,7 @@ TEST(ContactAtLoads, ACompliantSkullThatCannotBeFactorisedIsRejected) {
   CondensedOperators brain = skull_operators(0.0);
   brain.compliance *= -1.0;
   Search search(brain);
-  const Status status = search.at_loads.solve(skull_loads(3, 1.0));
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kSingularMatrix);
+  refusal_of(search.at_loads.solve(skull_loads(3, 1.0)), ErrorCode::kSingularMatrix);
 }
 
 }  // namespace

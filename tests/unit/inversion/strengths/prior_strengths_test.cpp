@@ -3,12 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "tests/support/dense.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -85,10 +86,9 @@ double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
   MatrixXd covariance =
       problem.jacobian * sd.cwiseAbs2().asDiagonal() * problem.jacobian.transpose();
   covariance.diagonal().array() += 1.0;
-  const Eigen::LLT<MatrixXd> factor(covariance);
-  const MatrixXd lower = factor.matrixL();
-  return log_prior - 0.5 * problem.data.dot(factor.solve(problem.data)) -
-         lower.diagonal().array().log().sum();
+  return log_prior -
+         0.5 * problem.data.dot(test_support::solve_positive(covariance, problem.data).col(0)) -
+         test_support::cholesky_factor(covariance).diagonal().array().log().sum();
 }
 
 PriorStrengths fitted(const Problem& problem, bool estimate = true) {
@@ -204,7 +204,7 @@ void expect_moments_of_the_mixture(const Problem& problem, PriorStrengths result
     const VecX sd = prior_sd_with(each.scales, floored, floor);
     MatrixXd inner = sd.asDiagonal() * problem.gram() * sd.asDiagonal();
     inner.diagonal().array() += 1.0;
-    const MatrixXd covariance = sd.asDiagonal() * inner.inverse() * sd.asDiagonal();
+    const MatrixXd covariance = sd.asDiagonal() * test_support::inverse(inner) * sd.asDiagonal();
     const VecX m = covariance * problem.right();
     if (most_probable.size() == 0) most_probable = m;
     mean += each.weight * m;
@@ -234,9 +234,8 @@ TEST(PriorStrengths, AnotherLinearModelChangesThemOnlyWhereItIsWorthwhile) {
     EXPECT_EQ(result.held(), held);
     ASSERT_EQ(result.refit(two.gram(), two.right(), false), false);
     EXPECT_EQ(result.held(), held) << "loads that nobody descends from again are its own";
-    const auto refitted = result.refit(two.gram(), two.right(), true);
-    ASSERT_TRUE(refitted.has_value());
-    const bool changed = *refitted;
+    const auto refitted = value_or_fail(result.refit(two.gram(), two.right(), true));
+    const bool changed = refitted;
     double gain = 0.0;  // of another strength of one part
     for (const std::size_t g : kPresent) {
       for (const double strength : kStrengths) {
@@ -256,9 +255,8 @@ TEST(PriorStrengths, AnotherLinearModelChangesThemOnlyWhereItIsWorthwhile) {
     Random random(seed);
     for (double& value : again.data) value += 0.7 * random.normal();
     PriorStrengths result = fitted(one);
-    const auto changed = result.refit(again.gram(), again.right(), true);
-    ASSERT_TRUE(changed.has_value());
-    stayed += !*changed && fitted(again).held() != result.held() ? 1 : 0;
+    const auto changed = value_or_fail(result.refit(again.gram(), again.right(), true));
+    stayed += !changed && fitted(again).held() != result.held() ? 1 : 0;
   }
   EXPECT_GT(stayed, 0) << "the test shows nothing";
 }

@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "tests/support/dense.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -48,9 +48,8 @@ double log_evidence(const Model& model, const PerPart<double>& variances) {
   MatrixXd covariance =
       model.jacobian * prior_variance(variances).asDiagonal() * model.jacobian.transpose();
   covariance.diagonal().array() += 1.0;
-  const Eigen::LLT<MatrixXd> factor(covariance);
-  const MatrixXd lower = factor.matrixL();
-  return -lower.diagonal().array().log().sum() - 0.5 * model.data.dot(factor.solve(model.data));
+  return -test_support::cholesky_factor(covariance).diagonal().array().log().sum() -
+         0.5 * model.data.dot(test_support::solve_positive(covariance, model.data).col(0));
 }
 
 PerPart<double> of(double first, double second, double third) {
@@ -129,7 +128,7 @@ TEST_F(StrengthEvidenceTest, MomentsAreThoseOfTheLinearModel) {
   const VecX prior = prior_variance(variances);
   MatrixXd precision = model.gram();
   precision.diagonal() += prior.cwiseInverse();
-  const MatrixXd covariance = precision.inverse();
+  const MatrixXd covariance = test_support::inverse(precision);
   VecX mean(kShared + kLoads);
   ASSERT_TRUE(evidence.mean(variances, work, mean));
   EXPECT_LT((mean - covariance * model.right()).norm(), 1e-2 * mean.norm());

@@ -34,18 +34,17 @@ TEST_F(CalibrationFile, ComesBackBitForBit) {
   const StereoCalibration c = sample();
   const auto path = folder_ / "c.yaml";
   ASSERT_TRUE(write_calibration(path, c));
-  const auto read = read_calibration(path);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->width_px, 640);
-  EXPECT_EQ(read->left.focal_x_px, c.left.focal_x_px);
-  EXPECT_EQ(read->left.distortion, c.left.distortion);
-  EXPECT_EQ(read->right.centre_y_px, c.right.centre_y_px);
-  EXPECT_TRUE(read->T_right_left.linear().isApprox(c.T_right_left.linear(), 1e-15));
-  EXPECT_EQ(read->T_right_left.translation(), c.T_right_left.translation());
-  EXPECT_EQ(read->rms_px, c.rms_px);
-  ASSERT_EQ(read->pairs.size(), 2U);
-  EXPECT_EQ(read->pairs[0].name, c.pairs[0].name);
-  EXPECT_EQ(read->pairs[1].rms_px, c.pairs[1].rms_px);
+  const auto read = value_or_fail(read_calibration(path));
+  EXPECT_EQ(read.width_px, 640);
+  EXPECT_EQ(read.left.focal_x_px, c.left.focal_x_px);
+  EXPECT_EQ(read.left.distortion, c.left.distortion);
+  EXPECT_EQ(read.right.centre_y_px, c.right.centre_y_px);
+  EXPECT_TRUE(read.T_right_left.linear().isApprox(c.T_right_left.linear(), 1e-15));
+  EXPECT_EQ(read.T_right_left.translation(), c.T_right_left.translation());
+  EXPECT_EQ(read.rms_px, c.rms_px);
+  ASSERT_EQ(read.pairs.size(), 2U);
+  EXPECT_EQ(read.pairs[0].name, c.pairs[0].name);
+  EXPECT_EQ(read.pairs[1].rms_px, c.pairs[1].rms_px);
 }
 
 TEST_F(CalibrationFile, BadOnesNameLineAndKey) {
@@ -65,7 +64,7 @@ TEST_F(CalibrationFile, BadOnesNameLineAndKey) {
       ErrorCode::kInvalidArgument);
   test_support::expect_refused(read, {{"", "c.yaml: is not a YAML mapping"}},
                                ErrorCode::kInvalidArgument);
-  test_support::refusal_of(read_calibration(folder_ / "absent.yaml"), ErrorCode::kNotFound);
+  refusal_of(read_calibration(folder_ / "absent.yaml"), ErrorCode::kNotFound);
 }
 
 }  // namespace

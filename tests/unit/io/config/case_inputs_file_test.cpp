@@ -4,6 +4,7 @@
 
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -35,24 +36,20 @@ class CaseInputsFile : public testing::Test {
     config_.mri = folder_ / "t1.nii";
   }
   void expect_blame(ErrorCode code, const std::string& key, const std::string& file) {
-    const auto inputs = load_case_inputs(config_);
-    ASSERT_FALSE(inputs);
-    EXPECT_EQ(inputs.error().code, code);
-    EXPECT_THAT(inputs.error().message, StartsWith(key + ": "));
-    EXPECT_THAT(inputs.error().message, HasSubstr(file));
+    EXPECT_THAT(refusal_of(load_case_inputs(config_), code),
+                testing::AllOf(StartsWith(key + ": "), HasSubstr(file)));
   }
   TemporaryFolder folder_;
   CaseConfig config_;
 };
 
 TEST_F(CaseInputsFile, NamedFilesAreReadAndOthersAreNot) {
-  const auto inputs = load_case_inputs(config_);
-  ASSERT_TRUE(inputs) << inputs.error().message;
-  EXPECT_EQ(inputs->mesh.value().num_tets(), 1);
-  EXPECT_EQ(inputs->tumour_surface.value().num_triangles(), 1);
-  EXPECT_EQ(inputs->skull.value().num_triangles(), 1);
-  EXPECT_FALSE(inputs->brain);
-  EXPECT_FALSE(inputs->tumour_labels);
+  const auto inputs = value_or_fail(load_case_inputs(config_));
+  EXPECT_EQ(inputs.mesh.value().num_tets(), 1);
+  EXPECT_EQ(inputs.tumour_surface.value().num_triangles(), 1);
+  EXPECT_EQ(inputs.skull.value().num_triangles(), 1);
+  EXPECT_FALSE(inputs.brain);
+  EXPECT_FALSE(inputs.tumour_labels);
 }
 
 TEST_F(CaseInputsFile, ASegmentOfASegmentationIsTheTumour) {
@@ -64,9 +61,8 @@ TEST_F(CaseInputsFile, ASegmentOfASegmentationIsTheTumour) {
                   "Segment1_Name:=Tumour\nSegment1_LabelValue:=2\n\n") +
           "\1\2");
   config_.tumour = TumourLabel{file, 5, "Tumour"};
-  const auto inputs = load_case_inputs(config_);
-  ASSERT_TRUE(inputs) << inputs.error().message;
-  EXPECT_THAT(inputs->tumour_labels.value().values, testing::ElementsAre(0, 5));
+  const auto inputs = value_or_fail(load_case_inputs(config_));
+  EXPECT_THAT(inputs.tumour_labels.value().values, testing::ElementsAre(0, 5));
   config_.tumour = TumourLabel{file, 5};
   expect_blame(ErrorCode::kInvalidArgument, "tumour.label_volume.file", "\"Brain\", \"Tumour\"");
 }

@@ -14,7 +14,6 @@ namespace {
 using test_support::content_of;
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::replaced;
 
 namespace fs = std::filesystem;
@@ -75,66 +74,64 @@ Result<CaseConfig> parse(const std::string& text) {
 }
 
 TEST(CaseFile, MinimalFileHasTheDefaultsOfCaseConfig) {
-  const auto read = parse(kMinimal);
-  ASSERT_TRUE(read) << read.error().message;
+  const auto read = value_or_fail(parse(kMinimal));
   const CaseConfig defaults;
-  EXPECT_EQ(read->case_id, "small");
-  EXPECT_EQ(read->file, "/cases/c.yaml");
-  EXPECT_EQ(read->brain, "/cases/mask.nii");
-  EXPECT_THAT(read->mri.string(), IsEmpty());
-  const auto& generate = std::get<MeshGeneration>(read->mesh);
+  EXPECT_EQ(read.case_id, "small");
+  EXPECT_EQ(read.file, "/cases/c.yaml");
+  EXPECT_EQ(read.brain, "/cases/mask.nii");
+  EXPECT_THAT(read.mri.string(), IsEmpty());
+  const auto& generate = std::get<MeshGeneration>(read.mesh);
   EXPECT_EQ(generate.edge_mm, MeshGeneration{}.edge_mm);
   EXPECT_EQ(generate.tumour_edge_mm, MeshGeneration{}.tumour_edge_mm);
   EXPECT_EQ(generate.smoothing_mm, MeshGeneration{}.smoothing_mm);
-  EXPECT_EQ(read->craniotomy.long_axis_mm, defaults.craniotomy.long_axis_mm);
-  EXPECT_EQ(read->brainstem.radius_mm, defaults.brainstem.radius_mm);
-  EXPECT_EQ(read->gravity_direction, defaults.gravity_direction);
-  EXPECT_EQ(read->material.poisson_ratio, defaults.material.poisson_ratio);
-  EXPECT_EQ(read->contact.gap_mm, defaults.contact.gap_mm);
-  EXPECT_FALSE(read->contact.skull_file);
-  EXPECT_EQ(read->prior.gravity_levels_mm, defaults.prior.gravity_levels_mm);
-  EXPECT_EQ(read->inversion.max_iterations, defaults.inversion.max_iterations);
+  EXPECT_EQ(read.craniotomy.long_axis_mm, defaults.craniotomy.long_axis_mm);
+  EXPECT_EQ(read.brainstem.radius_mm, defaults.brainstem.radius_mm);
+  EXPECT_EQ(read.gravity_direction, defaults.gravity_direction);
+  EXPECT_EQ(read.material.poisson_ratio, defaults.material.poisson_ratio);
+  EXPECT_EQ(read.contact.gap_mm, defaults.contact.gap_mm);
+  EXPECT_FALSE(read.contact.skull_file);
+  EXPECT_EQ(read.prior.gravity_levels_mm, defaults.prior.gravity_levels_mm);
+  EXPECT_EQ(read.inversion.max_iterations, defaults.inversion.max_iterations);
 }
 
 TEST(CaseFile, EveryKeyArrivesInItsField) {
-  const auto read = parse(kFull);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->mri, "/data/t1.nii");
-  EXPECT_EQ(read->brain, "/cases/mask.nii");
-  const auto& generate = std::get<MeshGeneration>(read->mesh);
+  const auto read = value_or_fail(parse(kFull));
+  EXPECT_EQ(read.mri, "/data/t1.nii");
+  EXPECT_EQ(read.brain, "/cases/mask.nii");
+  const auto& generate = std::get<MeshGeneration>(read.mesh);
   EXPECT_EQ(generate.edge_mm, 6);
   EXPECT_EQ(generate.tumour_edge_mm, 3);
   EXPECT_EQ(generate.craniotomy_edge_mm, 4);
   EXPECT_EQ(generate.tumour_margin_mm, 11);
   EXPECT_EQ(generate.craniotomy_margin_mm, 12);
   EXPECT_EQ(generate.smoothing_mm, 1.5);
-  EXPECT_EQ(std::get<TumourLabel>(read->tumour).path, "/cases/labels.nii");
-  EXPECT_EQ(std::get<TumourLabel>(read->tumour).label, 7);
-  EXPECT_EQ(std::get<TumourLabel>(read->tumour).segment, std::nullopt);
-  EXPECT_EQ(read->craniotomy.centre_mm, Vec3(7, 8, 9));
-  EXPECT_EQ(read->craniotomy.long_axis_mm, 30);
-  EXPECT_EQ(read->craniotomy.short_axis_mm, 20);
-  EXPECT_LT((read->craniotomy.long_axis_direction - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
-  EXPECT_EQ(read->brainstem.centre_mm, Vec3(0, 1, -60));
-  EXPECT_EQ(read->brainstem.radius_mm, 9);
-  EXPECT_EQ(read->gravity_direction, Vec3(0, 0, -1)) << "normalised";
-  EXPECT_EQ(read->material.shear_modulus_pa, 2200);
-  EXPECT_EQ(read->material.poisson_ratio, 0.45);
-  EXPECT_EQ(read->material.tissue_density_kg_m3, 1040);
-  EXPECT_EQ(read->material.fluid_density_saturated_kg_m3, 1007);
-  EXPECT_EQ(read->material.fluid_density_unsaturated_kg_m3, 1.2);
-  EXPECT_EQ(read->contact.gap_mm, 2);
-  EXPECT_EQ(read->contact.skull_file, fs::path("/cases/skull.stl"));
-  EXPECT_EQ(read->contact.slave_depth_mm, 25);
-  EXPECT_EQ(read->contact.penalty_n_per_mm, 6);
-  EXPECT_EQ(read->prior.correlation_length_mm, 7);
-  EXPECT_EQ(read->prior.force_density_sd_n_m3, 900);
-  EXPECT_EQ(read->prior.gravity_mode_sd, 0.5);
-  EXPECT_THAT(read->prior.gravity_levels_mm, ElementsAre(1, -2.5));
-  EXPECT_EQ(read->inversion.sigma_mm, 0.3);
-  EXPECT_EQ(read->inversion.sparse_points, 100);
-  EXPECT_EQ(read->inversion.max_iterations, 40);
-  EXPECT_EQ(read->inversion.relative_misfit_change, 1e-4);
+  EXPECT_EQ(std::get<TumourLabel>(read.tumour).path, "/cases/labels.nii");
+  EXPECT_EQ(std::get<TumourLabel>(read.tumour).label, 7);
+  EXPECT_EQ(std::get<TumourLabel>(read.tumour).segment, std::nullopt);
+  EXPECT_EQ(read.craniotomy.centre_mm, Vec3(7, 8, 9));
+  EXPECT_EQ(read.craniotomy.long_axis_mm, 30);
+  EXPECT_EQ(read.craniotomy.short_axis_mm, 20);
+  EXPECT_LT((read.craniotomy.long_axis_direction - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
+  EXPECT_EQ(read.brainstem.centre_mm, Vec3(0, 1, -60));
+  EXPECT_EQ(read.brainstem.radius_mm, 9);
+  EXPECT_EQ(read.gravity_direction, Vec3(0, 0, -1)) << "normalised";
+  EXPECT_EQ(read.material.shear_modulus_pa, 2200);
+  EXPECT_EQ(read.material.poisson_ratio, 0.45);
+  EXPECT_EQ(read.material.tissue_density_kg_m3, 1040);
+  EXPECT_EQ(read.material.fluid_density_saturated_kg_m3, 1007);
+  EXPECT_EQ(read.material.fluid_density_unsaturated_kg_m3, 1.2);
+  EXPECT_EQ(read.contact.gap_mm, 2);
+  EXPECT_EQ(read.contact.skull_file, fs::path("/cases/skull.stl"));
+  EXPECT_EQ(read.contact.slave_depth_mm, 25);
+  EXPECT_EQ(read.contact.penalty_n_per_mm, 6);
+  EXPECT_EQ(read.prior.correlation_length_mm, 7);
+  EXPECT_EQ(read.prior.force_density_sd_n_m3, 900);
+  EXPECT_EQ(read.prior.gravity_mode_sd, 0.5);
+  EXPECT_THAT(read.prior.gravity_levels_mm, ElementsAre(1, -2.5));
+  EXPECT_EQ(read.inversion.sigma_mm, 0.3);
+  EXPECT_EQ(read.inversion.sparse_points, 100);
+  EXPECT_EQ(read.inversion.max_iterations, 40);
+  EXPECT_EQ(read.inversion.relative_misfit_change, 1e-4);
 }
 
 TEST(CaseFile, ReadyMeshAndTumourSurfaceNeedNoBrainMask) {
@@ -142,51 +139,45 @@ TEST(CaseFile, ReadyMeshAndTumourSurfaceNeedNoBrainMask) {
       replaced(replaced(kMinimal, "images: {brain: mask.nii}", "mesh: {file: head.msh}"),
                "{ellipsoid: {centre_mm: [1, 2, 3], semi_axes_mm: [4, 5, 6]}}",
                "{surface: {file: tumour.stl}}");
-  const auto read = parse(text);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(std::get<MeshFile>(read->mesh).path, "/cases/head.msh");
-  EXPECT_EQ(std::get<TumourSurfaceFile>(read->tumour).path, "/cases/tumour.stl");
+  const auto read = value_or_fail(parse(text));
+  EXPECT_EQ(std::get<MeshFile>(read.mesh).path, "/cases/head.msh");
+  EXPECT_EQ(std::get<TumourSurfaceFile>(read.tumour).path, "/cases/tumour.stl");
 }
 
 TEST(CaseFile, EdgeLengthHoldsForRegionsWithoutTheirOwn) {
-  const auto read =
-      parse_case_config(std::string(kMinimal) + "mesh: {generate: {edge_mm: 12}}", "c");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(std::get<MeshGeneration>(read->mesh).tumour_edge_mm, 12);
-  EXPECT_EQ(std::get<MeshGeneration>(read->mesh).craniotomy_edge_mm, 12);
+  const auto read = value_or_fail(
+      parse_case_config(std::string(kMinimal) + "mesh: {generate: {edge_mm: 12}}", "c"));
+  EXPECT_EQ(std::get<MeshGeneration>(read.mesh).tumour_edge_mm, 12);
+  EXPECT_EQ(std::get<MeshGeneration>(read.mesh).craniotomy_edge_mm, 12);
 }
 
 TEST(CaseFile, HeadingWithoutKeysMeansDefaults) {
-  const auto read =
-      parse_case_config(std::string(kMinimal) + "material:\n  # nothing\nmesh:\n", "c");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->material.poisson_ratio, Material{}.poisson_ratio);
+  const auto read = value_or_fail(
+      parse_case_config(std::string(kMinimal) + "material:\n  # nothing\nmesh:\n", "c"));
+  EXPECT_EQ(read.material.poisson_ratio, Material{}.poisson_ratio);
 }
 
 TEST(CaseFile, RelativeCaseFileGivesAbsolutePaths) {
-  const auto read = parse_case_config(kMinimal, "cases/c.yaml");
-  ASSERT_TRUE(read);
-  EXPECT_EQ(read->brain, fs::current_path() / "cases/mask.nii");
+  const auto read = value_or_fail(parse_case_config(kMinimal, "cases/c.yaml"));
+  EXPECT_EQ(read.brain, fs::current_path() / "cases/mask.nii");
 }
 
 TEST(CaseFile, EmptyGravityLevelsAreAllowed) {
-  const auto read =
-      parse_case_config(std::string(kMinimal) + "prior: {gravity_levels_mm: []}", "c");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_THAT(read->prior.gravity_levels_mm, IsEmpty());
+  const auto read = value_or_fail(
+      parse_case_config(std::string(kMinimal) + "prior: {gravity_levels_mm: []}", "c"));
+  EXPECT_THAT(read.prior.gravity_levels_mm, IsEmpty());
 }
 
 TEST(CaseFile, TextOfACaseReadsBackAsTheSameCase) {
   for (const char* text : {kMinimal, kFull}) {
-    const auto first = parse(text);
-    ASSERT_TRUE(first);
-    const std::string written = case_config_text(*first);
-    const auto second = parse_case_config(written, first->file);
+    const auto first = value_or_fail(parse(text));
+    const std::string written = case_config_text(first);
+    const auto second = parse_case_config(written, first.file);
     ASSERT_TRUE(second) << second.error().message << written;
     // Every key is in the text with all digits, so equal texts are equal cases.
     EXPECT_EQ(case_config_text(*second), written);
-    EXPECT_EQ(second->gravity_direction, first->gravity_direction);
-    EXPECT_EQ(second->craniotomy.long_axis_direction, first->craniotomy.long_axis_direction);
+    EXPECT_EQ(second->gravity_direction, first.gravity_direction);
+    EXPECT_EQ(second->craniotomy.long_axis_direction, first.craniotomy.long_axis_direction);
   }
 }
 
@@ -195,11 +186,10 @@ TEST(CaseFile, TextKeepsAwkwardNamesAndNumbers) {
   config.case_id = "a: \"b\" \\ #c\t[é]";
   config.brain = "/data/with space/it's.nii";
   config.inversion.sigma_mm = 0.1 + 0.2;
-  const auto read = parse_case_config(case_config_text(config), config.file);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->case_id, config.case_id);
-  EXPECT_EQ(read->brain, config.brain);
-  EXPECT_EQ(read->inversion.sigma_mm, config.inversion.sigma_mm);
+  const auto read = value_or_fail(parse_case_config(case_config_text(config), config.file));
+  EXPECT_EQ(read.case_id, config.case_id);
+  EXPECT_EQ(read.brain, config.brain);
+  EXPECT_EQ(read.inversion.sigma_mm, config.inversion.sigma_mm);
 }
 
 TEST(CaseFile, KeysOfPorePressureAreReadAndWritten) {
@@ -207,11 +197,9 @@ TEST(CaseFile, KeysOfPorePressureAreReadAndWritten) {
       std::string(kFull) + "scene: {pressure: on, pressure_step_s: 5}\n", "_unsaturated_kg_m3: 1.2",
       "_unsaturated_kg_m3: 1.2\n  permeability_m3_s_kg: 2e-8\n  biot_coefficient: 0.75\n"
       "  storage_per_pa: 3e-6");
-  const auto read = parse(text);
-  ASSERT_TRUE(read) << read.error().message;
-  const auto again = parse(case_config_text(*read));
-  ASSERT_TRUE(again) << again.error().message;
-  for (const CaseConfig& config : {*read, *again}) {
+  const auto read = value_or_fail(parse(text));
+  const auto again = value_or_fail(parse(case_config_text(read)));
+  for (const CaseConfig& config : {read, again}) {
     EXPECT_EQ(config.scene.pressure, Carry::kOn);
     EXPECT_EQ(config.scene.pressure_step_s, 5.0);
     EXPECT_EQ(config.material.permeability_m3_s_kg, 2e-8);
@@ -225,11 +213,9 @@ TEST(CaseFile, StiffnessOfTissuesIsReadAndWritten) {
       replaced(kFull, "_unsaturated_kg_m3: 1.2",
                "_unsaturated_kg_m3: 1.2\n  tumour: {shear_modulus_pa: 6300}\n"
                "  regions: {2: {poisson_ratio: 0.3}, 7: {shear_modulus_pa: 1e5}}");
-  const auto read = parse(text);
-  ASSERT_TRUE(read) << read.error().message;
-  const auto again = parse(case_config_text(*read));
-  ASSERT_TRUE(again) << again.error().message;
-  for (const CaseConfig& config : {*read, *again}) {
+  const auto read = value_or_fail(parse(text));
+  const auto again = value_or_fail(parse(case_config_text(read)));
+  for (const CaseConfig& config : {read, again}) {
     const Material& material = config.material;
     ASSERT_TRUE(material.tumour);
     EXPECT_EQ(material.tumour->shear_modulus_pa, 6300.0);
@@ -337,17 +323,16 @@ TEST(ShippedCases, AllReadAndAreValid) {
        fs::directory_iterator(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases")) {
     if (entry.path().extension() != ".yaml") continue;
     ++cases;
-    const auto read = read_case_config(entry.path());
-    ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->case_id, entry.path().stem().string());
+    const auto read = value_or_fail(read_case_config(entry.path()));
+    EXPECT_EQ(read.case_id, entry.path().stem().string());
   }
   EXPECT_GE(cases, 2);
 }
 
 TEST(ShippedCases, DefaultCaseHasThePapersTumourVolume) {
-  const auto read = read_case_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml");
-  ASSERT_TRUE(read) << read.error().message;
-  const Vec3 axes = std::get<TumourEllipsoid>(read->tumour).semi_axes_mm;
+  const auto read = value_or_fail(
+      read_case_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml"));
+  const Vec3 axes = std::get<TumourEllipsoid>(read.tumour).semi_axes_mm;
   EXPECT_NEAR(4.0 / 3.0 * 3.14159265358979 * axes.prod(), 10990.0, 0.01);
 }
 

@@ -13,27 +13,26 @@ namespace {
 namespace fs = std::filesystem;
 using test_support::content_of;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 using testing::AllOf;
 using testing::HasSubstr;
 
 TEST(DaemonFile, ShippedFileHasTheDefaults) {
-  const auto read = read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/daemon.yaml");
-  ASSERT_TRUE(read) << read.error().message;
+  const auto read =
+      value_or_fail(read_daemon_config(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/daemon.yaml"));
   const DaemonConfig defaults;
-  EXPECT_EQ(read->endpoint, defaults.endpoint);
-  EXPECT_EQ(read->allow_remote, defaults.allow_remote);
-  EXPECT_EQ(read->model, defaults.model);
-  EXPECT_EQ(read->journal_dir, defaults.journal_dir);
-  EXPECT_EQ(read->log_level, defaults.log_level);
-  EXPECT_EQ(read->max_clients, defaults.max_clients);
-  EXPECT_EQ(read->max_message_mib, defaults.max_message_mib);
-  EXPECT_EQ(read->metrics.endpoint, defaults.metrics.endpoint);
-  EXPECT_FALSE(read->security.on());
-  EXPECT_EQ(read->limits.connections, defaults.limits.connections);
-  EXPECT_EQ(read->limits.observations_per_s, defaults.limits.observations_per_s);
-  EXPECT_EQ(read->limits.session_starts_per_min, defaults.limits.session_starts_per_min);
+  EXPECT_EQ(read.endpoint, defaults.endpoint);
+  EXPECT_EQ(read.allow_remote, defaults.allow_remote);
+  EXPECT_EQ(read.model, defaults.model);
+  EXPECT_EQ(read.journal_dir, defaults.journal_dir);
+  EXPECT_EQ(read.log_level, defaults.log_level);
+  EXPECT_EQ(read.max_clients, defaults.max_clients);
+  EXPECT_EQ(read.max_message_mib, defaults.max_message_mib);
+  EXPECT_EQ(read.metrics.endpoint, defaults.metrics.endpoint);
+  EXPECT_FALSE(read.security.on());
+  EXPECT_EQ(read.limits.connections, defaults.limits.connections);
+  EXPECT_EQ(read.limits.observations_per_s, defaults.limits.observations_per_s);
+  EXPECT_EQ(read.limits.session_starts_per_min, defaults.limits.session_starts_per_min);
 }
 
 TEST(DaemonFile, ShippedFileDocumentsEveryKeyAsTheTableDoes) {
@@ -60,25 +59,24 @@ class DaemonFileKeys : public testing::Test {
 };
 
 TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
-  const auto config = read(
+  const auto config = value_or_fail(read(
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
       "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n"
       "security:\n  secret_key: k\n  allow_list: a\n"
-      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n");
-  ASSERT_TRUE(config) << config.error().message;
-  EXPECT_EQ(config->endpoint, "ipc:///tmp/s");
-  EXPECT_TRUE(config->allow_remote);
-  EXPECT_EQ(config->model, folder_ / "m.h5");
-  EXPECT_EQ(config->journal_dir, "/j");
-  EXPECT_EQ(config->log_level, "debug");
-  EXPECT_EQ(config->max_clients, 3);
-  EXPECT_EQ(config->max_message_mib, 5);
-  EXPECT_EQ(config->metrics.endpoint, "127.0.0.2:80");
-  EXPECT_EQ(config->security.secret_key, folder_ / "k");
-  EXPECT_EQ(config->security.allow_list, folder_ / "a");
-  EXPECT_EQ(config->limits.connections, 4);
-  EXPECT_EQ(config->limits.observations_per_s, 6);
-  EXPECT_EQ(config->limits.session_starts_per_min, 7);
+      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n"));
+  EXPECT_EQ(config.endpoint, "ipc:///tmp/s");
+  EXPECT_TRUE(config.allow_remote);
+  EXPECT_EQ(config.model, folder_ / "m.h5");
+  EXPECT_EQ(config.journal_dir, "/j");
+  EXPECT_EQ(config.log_level, "debug");
+  EXPECT_EQ(config.max_clients, 3);
+  EXPECT_EQ(config.max_message_mib, 5);
+  EXPECT_EQ(config.metrics.endpoint, "127.0.0.2:80");
+  EXPECT_EQ(config.security.secret_key, folder_ / "k");
+  EXPECT_EQ(config.security.allow_list, folder_ / "a");
+  EXPECT_EQ(config.limits.connections, 4);
+  EXPECT_EQ(config.limits.observations_per_s, 6);
+  EXPECT_EQ(config.limits.session_starts_per_min, 7);
 }
 
 TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {

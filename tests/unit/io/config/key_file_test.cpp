@@ -2,7 +2,6 @@
 #include "common/io/config/key_file.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include "tests/support/refusals.hpp"
@@ -14,7 +13,6 @@ namespace {
 namespace fs = std::filesystem;
 using test_support::content_of;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 using testing::AllOf;
 using testing::ElementsAre;
@@ -60,19 +58,17 @@ class KeyFiles : public testing::Test {
 };
 
 TEST_F(KeyFiles, APairReadsBackAndItsSecretIsForTheOwnerAlone) {
-  const auto files = write_key_pair(folder_.path(), {"console", kPublic, kSecret});
-  ASSERT_TRUE(files) << files.error().message;
-  EXPECT_EQ(mode_of(files->secret_file), 0600u);
-  EXPECT_EQ(mode_of(files->public_file), 0644u);
-  const auto pair = read_secret_key(files->secret_file);
-  ASSERT_TRUE(pair) << pair.error().message;
-  EXPECT_EQ(pair->name, "console");
-  EXPECT_EQ(pair->public_key, kPublic);
-  EXPECT_EQ(pair->secret_key, kSecret);
-  EXPECT_EQ(read_public_key(files->public_file).value(), kPublic);
-  EXPECT_THAT(content_of(files->public_file), Not(HasSubstr(kSecret)));
-  EXPECT_THAT(content_of(files->public_file), HasSubstr("PUBLIC"));
-  EXPECT_THAT(content_of(files->secret_file), HasSubstr("SECRET"));
+  const auto files = value_or_fail(write_key_pair(folder_.path(), {"console", kPublic, kSecret}));
+  EXPECT_EQ(mode_of(files.secret_file), 0600u);
+  EXPECT_EQ(mode_of(files.public_file), 0644u);
+  const auto pair = value_or_fail(read_secret_key(files.secret_file));
+  EXPECT_EQ(pair.name, "console");
+  EXPECT_EQ(pair.public_key, kPublic);
+  EXPECT_EQ(pair.secret_key, kSecret);
+  EXPECT_EQ(read_public_key(files.public_file).value(), kPublic);
+  EXPECT_THAT(content_of(files.public_file), Not(HasSubstr(kSecret)));
+  EXPECT_THAT(content_of(files.public_file), HasSubstr("PUBLIC"));
+  EXPECT_THAT(content_of(files.secret_file), HasSubstr("SECRET"));
 }
 
 TEST_F(KeyFiles, NothingIsOverwritten) {
@@ -128,9 +124,8 @@ TEST_F(KeyFiles, AnAllowListGrowsAndReadsBackInOrder) {
   const AllowedKey admin{Role::kAdmin, "console", kOther};
   ASSERT_TRUE(add_allowed_key(list, viewer));
   ASSERT_TRUE(add_allowed_key(list, admin));
-  const auto keys = read_allow_list(list);
-  ASSERT_TRUE(keys) << keys.error().message;
-  EXPECT_THAT(*keys, ElementsAre(viewer, admin));
+  const auto keys = value_or_fail(read_allow_list(list));
+  EXPECT_THAT(keys, ElementsAre(viewer, admin));
 }
 
 TEST_F(KeyFiles, ADuplicateIsNotAddedAndTheListStaysAsItWas) {

@@ -10,7 +10,6 @@ namespace brainshift::io {
 namespace {
 
 using test_support::expect_edits_refused;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 
 const char* const kGood = R"(<PlusConfiguration version="2.1">
@@ -36,10 +35,9 @@ Result<std::vector<tracking::ConstantLink>> read_plus(const std::string& text) {
 }
 
 TEST(PlusConfig, ReadsTransforms) {
-  const auto links = read_plus(kGood);
-  ASSERT_TRUE(links) << links.error().message;
-  ASSERT_EQ(links->size(), 2U);
-  const tracking::ConstantLink& image = links->front();
+  const auto links = value_or_fail(read_plus(kGood));
+  ASSERT_EQ(links.size(), 2U);
+  const tracking::ConstantLink& image = links.front();
   EXPECT_EQ(image.frames.name(), "ImageToProbe");
   EXPECT_TRUE((image.T_to_from * Vec3(10, 20, 0)).isApprox(Vec3(2, 6, 3)));
 }

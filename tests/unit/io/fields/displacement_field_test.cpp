@@ -35,7 +35,7 @@ TEST(VoxelGrid, WhatNoFileCanHoldIsRefusedWithItsReason) {
   const auto refusal = [](ErrorCode code, const std::function<void(VoxelGrid&)>& spoil) {
     VoxelGrid grid = oblique_grid();
     spoil(grid);
-    return test_support::refusal_of(validate(grid), code);
+    return refusal_of(validate(grid), code);
   };
   const auto kBad = ErrorCode::kInvalidArgument;
   EXPECT_THAT(refusal(kBad, [](VoxelGrid& g) { g.dims[1] = 0; }), HasSubstr("5 x 0 x 3"));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -31,33 +32,25 @@ TEST(FileAccess, WritingReplacesTheWholeFile) {
 
 TEST(FileAccess, MissingFileIsNotFoundAndNamed) {
   const TemporaryFolder folder;
-  const auto read = read_file(folder / "absent");
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(read.error().message, HasSubstr("absent: no such file"));
+  EXPECT_THAT(refusal_of(read_file(folder / "absent"), ErrorCode::kNotFound),
+              HasSubstr("absent: no such file"));
 }
 
 TEST(FileAccess, FolderIsUnreadable) {
   const TemporaryFolder folder;
-  const auto read = read_file(folder.path());
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+  refusal_of(read_file(folder.path()), ErrorCode::kUnreadable);
 }
 
 TEST(FileAccess, WritingIntoAMissingFolderFailsAndNamesTheFile) {
   const TemporaryFolder folder;
-  const Status status = write_file(folder / "no" / "f", "x");
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(status.error().message, HasSubstr("no/f: cannot create"));
+  EXPECT_THAT(refusal_of(write_file(folder / "no" / "f", "x"), ErrorCode::kWriteFailed),
+              HasSubstr("no/f: cannot create"));
 }
 
 TEST(FileAccess, WritingOverAFolderFailsAndLeavesNothing) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "d");
-  const Status status = write_file(folder / "d", "x");
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  refusal_of(write_file(folder / "d", "x"), ErrorCode::kWriteFailed);
   EXPECT_EQ(folder.entries(), 1u);
 }
 
@@ -67,10 +60,8 @@ TEST(FileAccess, OnlyARegularFileIsReplaced) {
   std::filesystem::create_symlink("/dev/null", folder / "device");
   for (const char* name : {"pipe", "device"}) {
     const auto before = std::filesystem::symlink_status(folder / name).type();
-    const Status status = write_file(folder / name, "x");
-    ASSERT_FALSE(status);
-    EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
-    EXPECT_THAT(status.error().message, HasSubstr("exists and is not a regular file"));
+    EXPECT_THAT(refusal_of(write_file(folder / name, "x"), ErrorCode::kWriteFailed),
+                HasSubstr("exists and is not a regular file"));
     EXPECT_EQ(std::filesystem::symlink_status(folder / name).type(), before);
   }
   EXPECT_EQ(folder.entries(), 2u);
@@ -80,9 +71,8 @@ TEST(FileAccess, UncommittedFileIsRemovedAndTheOldOneKept) {
   const TemporaryFolder folder;
   folder.write("f", "old");
   {
-    const auto pending = PendingFile::create(folder / "f");
-    ASSERT_TRUE(pending);
-    std::ofstream(pending->temporary_path()) << "half";
+    const auto pending = value_or_fail(PendingFile::create(folder / "f"));
+    std::ofstream(pending.temporary_path()) << "half";
     EXPECT_EQ(folder.entries(), 2u);
   }
   EXPECT_EQ(folder.entries(), 1u);
@@ -91,16 +81,14 @@ TEST(FileAccess, UncommittedFileIsRemovedAndTheOldOneKept) {
 
 TEST(FileAccess, TwoWritersOfOneFileDoNotMeet) {
   const TemporaryFolder folder;
-  auto first = PendingFile::create(folder / "f");
-  auto second = PendingFile::create(folder / "f");
-  ASSERT_TRUE(first);
-  ASSERT_TRUE(second);
-  EXPECT_NE(first->temporary_path(), second->temporary_path());
-  std::ofstream(first->temporary_path()) << "first";
-  std::ofstream(second->temporary_path()) << "second";
-  ASSERT_TRUE(first->commit());
+  auto first = value_or_fail(PendingFile::create(folder / "f"));
+  auto second = value_or_fail(PendingFile::create(folder / "f"));
+  EXPECT_NE(first.temporary_path(), second.temporary_path());
+  std::ofstream(first.temporary_path()) << "first";
+  std::ofstream(second.temporary_path()) << "second";
+  ASSERT_TRUE(first.commit());
   EXPECT_EQ(content_of(folder / "f"), "first");
-  ASSERT_TRUE(second->commit());
+  ASSERT_TRUE(second.commit());
   EXPECT_EQ(content_of(folder / "f"), "second");
 }
 

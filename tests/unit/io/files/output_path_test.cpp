@@ -7,6 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -19,16 +20,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// The sentence of a refusal; "" and a failure if the path is taken.
-std::string path_refusal(const Status& status, ErrorCode code) {
-  EXPECT_FALSE(status);
-  if (status) return {};
-  EXPECT_EQ(status.error().code, code);
-  return status.error().message;
-}
-
 std::string file_refusal(const fs::path& path, ErrorCode code = ErrorCode::kInvalidArgument) {
-  return path_refusal(check_output_file("--out", path), code);
+  return refusal_of(check_output_file("--out", path), code);
 }
 
 void make_socket(const fs::path& path) {
@@ -108,10 +101,10 @@ TEST(OutputFolder, AFileInTheWayOrAnUnwritableFolderIsRefused) {
   fs::create_symlink(folder / "nothing", folder / "dangling");
   for (const fs::path& path : {folder / "file", folder / "file" / "below", folder / "dangling",
                                fs::path("/dev/null"), fs::path("/proc/new")}) {
-    EXPECT_THAT(path_refusal(check_output_folder("--out", path), ErrorCode::kInvalidArgument),
+    EXPECT_THAT(refusal_of(check_output_folder("--out", path), ErrorCode::kInvalidArgument),
                 StartsWith("--out: " + path.string() + ": "));
   }
-  EXPECT_THAT(path_refusal(check_output_folder("--out", ""), ErrorCode::kInvalidArgument),
+  EXPECT_THAT(refusal_of(check_output_folder("--out", ""), ErrorCode::kInvalidArgument),
               HasSubstr("must name a folder"));
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/files/stop_signals.hpp"
+#include "tests/support/results.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
@@ -18,11 +19,10 @@ TEST(FailingWrites, DoNotEndTheProcess) {
 }
 
 TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
-  const auto signals = StopSignals::catch_all();
-  ASSERT_TRUE(signals.has_value());
-  EXPECT_FALSE(signals->arrived());
+  const auto signals = value_or_fail(StopSignals::catch_all());
+  EXPECT_FALSE(signals.arrived());
   std::raise(SIGTERM);
-  EXPECT_TRUE(signals->arrived());
+  EXPECT_TRUE(signals.arrived());
 }
 
 TEST(StopSignals, WriteToAnotherDescriptorAndRestoreWhatWasThere) {
@@ -30,10 +30,9 @@ TEST(StopSignals, WriteToAnotherDescriptorAndRestoreWhatWasThere) {
   const auto handler = +[](int) {};
   std::signal(SIGINT, handler);
   {
-    const auto signals = StopSignals::catch_into(fd);
-    ASSERT_TRUE(signals.has_value());
+    const auto signals = value_or_fail(StopSignals::catch_into(fd));
     std::raise(SIGINT);
-    EXPECT_TRUE(signals->arrived());
+    EXPECT_TRUE(signals.arrived());
   }
   EXPECT_EQ(std::signal(SIGINT, SIG_DFL), handler);
   EXPECT_EQ(close(fd), 0) << "it is the caller's";

@@ -15,7 +15,6 @@ namespace {
 
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::ElementsAre;
@@ -91,10 +90,9 @@ auto reading(const LabelChoice& choice = {}) {
 
 TEST(LabelMapFile, ReadsEveryTypeEncodingAndByteOrder) {
   const auto expect_counted = [](const std::string& content) {
-    const auto image = read(content);
-    ASSERT_TRUE(image) << image.error().message;
-    EXPECT_THAT(image->dims, ElementsAre(2, 3, 2));
-    EXPECT_THAT(image->values, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
+    const auto image = value_or_fail(read(content));
+    EXPECT_THAT(image.dims, ElementsAre(2, 3, 2));
+    EXPECT_THAT(image.values, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
   };
   expect_counted(nrrd("unsigned char", counted<std::uint8_t>(), kSpace, ""));
   expect_counted(nrrd("signed char", counted<std::int8_t>(), kSpace, ""));
@@ -117,23 +115,20 @@ TEST(LabelMapFile, EverySpaceBecomesRas) {
         std::pair{"right-anterior-superior", Vec3(1, 1, 1)}, std::pair{"RAS", Vec3(1, 1, 1)},
         std::pair{"left-anterior-superior", Vec3(-1, 1, 1)}, std::pair{"LAS", Vec3(-1, 1, 1)}}) {
     // An oblique grid whose third axis points down.
-    const auto image =
+    const auto image = value_or_fail(
         read(nrrd("uchar", counted<std::uint8_t>(),
                   "space: " + std::string(name) +
                       "\nspace directions: (0,2,0) (-3,0,0) (0.5,0,-4)\n"
-                      "space origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\"\n"));
-    ASSERT_TRUE(image) << image.error().message;
-    EXPECT_EQ(image->T_ras_voxel * Vec3(0, 0, 0), signs.cwiseProduct(Vec3(10, 20, 30)));
-    EXPECT_EQ(image->T_ras_voxel * Vec3(1, 2, 3),
+                      "space origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\"\n")));
+    EXPECT_EQ(image.T_ras_voxel * Vec3(0, 0, 0), signs.cwiseProduct(Vec3(10, 20, 30)));
+    EXPECT_EQ(image.T_ras_voxel * Vec3(1, 2, 3),
               signs.cwiseProduct(Vec3(10 - 6 + 1.5, 20 + 2, 30 - 12)));
   }
 }
 
 TEST(LabelMapFile, ASegmentIsChosenByName) {
   const auto voxels = [](const char* name, int label) {
-    const auto image = read(layered(kThreeSegments), {name, label});
-    EXPECT_TRUE(image) << image.error().message;
-    return image ? image->values : std::vector<float>{};
+    return value_or_fail(read(layered(kThreeSegments), {name, label})).values;
   };
   EXPECT_THAT(voxels("Head", 1), ElementsAre(1, 1, 0, 0));
   EXPECT_THAT(voxels("Mass", 7), ElementsAre(0, 7, 7, 7));
@@ -142,23 +137,21 @@ TEST(LabelMapFile, ASegmentIsChosenByName) {
 
 TEST(LabelMapFile, TheOnlySegmentNeedsNoName) {
   const std::string keys = "Segment0_ID:=Segment_1\nSegment0_LabelValue:=4\n";
-  const auto image = read(nrrd("uchar", counted<std::uint8_t>(), kSpace, keys), {"", 9});
-  ASSERT_TRUE(image) << image.error().message;
-  EXPECT_THAT(image->values, ElementsAre(0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0));
+  const auto image =
+      value_or_fail(read(nrrd("uchar", counted<std::uint8_t>(), kSpace, keys), {"", 9}));
+  EXPECT_THAT(image.values, ElementsAre(0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0));
 }
 
 TEST(LabelMapFile, OldSegmentationsHaveOneSegmentInEachLayer) {
-  const auto image = read(layered("Segment0_Name:=a\nSegment1_Name:=b\n"), {"b", 1});
-  ASSERT_TRUE(image) << image.error().message;
-  EXPECT_THAT(image->values, ElementsAre(0, 1, 1, 1));
+  const auto image = value_or_fail(read(layered("Segment0_Name:=a\nSegment1_Name:=b\n"), {"b", 1}));
+  EXPECT_THAT(image.values, ElementsAre(0, 1, 1, 1));
 }
 
 TEST(LabelMapFile, LayersMayBeTheLastAxis) {
   std::string text = replaced(layered(kThreeSegments), "sizes: 2 2 2 1", "sizes: 2 2 1 2");
   text = replaced(text, "none (1,0,0) (0,1,0) (0,0,1)", "(1,0,0) (0,1,0) (0,0,1) none");
-  const auto image = read(text, {"Mass", 1});
-  ASSERT_TRUE(image) << image.error().message;
-  EXPECT_THAT(image->values, ElementsAre(0, 1, 0, 1));
+  const auto image = value_or_fail(read(text, {"Mass", 1}));
+  EXPECT_THAT(image.values, ElementsAre(0, 1, 0, 1));
 }
 
 TEST(LabelMapFile, RefusesAChoiceThatIsNone) {

@@ -11,7 +11,6 @@ namespace brainshift::io {
 namespace {
 
 using test_support::content_of;
-using test_support::refusal_of;
 using test_support::replaced;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -48,23 +47,21 @@ TEST_F(MeshWriter, WrittenMeshAndFieldsAreReadBackBitForBit) {
   const NodeField sd{"sd", mesh.nodes.row(1)};
   ASSERT_TRUE(write_vtu(folder_ / "m.vtu", mesh, {displacement, sd}));
   EXPECT_EQ(folder_.entries(), 1u);
-  const auto read = read_vtu(folder_ / "m.vtu");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->mesh.nodes, mesh.nodes);
-  EXPECT_EQ(read->mesh.tets, mesh.tets);
-  EXPECT_EQ(read->mesh.labels, mesh.labels);
-  ASSERT_EQ(read->node_fields.size(), 2u);
-  EXPECT_EQ(read->node_fields[0].name, displacement.name);
-  EXPECT_EQ(read->node_fields[0].values, displacement.values);
-  EXPECT_EQ(read->node_fields[1].values, sd.values);
+  const auto read = value_or_fail(read_vtu(folder_ / "m.vtu"));
+  EXPECT_EQ(read.mesh.nodes, mesh.nodes);
+  EXPECT_EQ(read.mesh.tets, mesh.tets);
+  EXPECT_EQ(read.mesh.labels, mesh.labels);
+  ASSERT_EQ(read.node_fields.size(), 2u);
+  EXPECT_EQ(read.node_fields[0].name, displacement.name);
+  EXPECT_EQ(read.node_fields[0].values, displacement.values);
+  EXPECT_EQ(read.node_fields[1].values, sd.values);
 }
 
 TEST_F(MeshWriter, MeshWithoutLabelsHasNoneWhenReadBack) {
   ASSERT_TRUE(write_vtu(folder_ / "m.vtu", large_mesh(), {}));
-  const auto read = read_vtu(folder_ / "m.vtu");
-  ASSERT_TRUE(read);
-  EXPECT_THAT(read->mesh.labels, IsEmpty());
-  EXPECT_THAT(read->node_fields, IsEmpty());
+  const auto read = value_or_fail(read_vtu(folder_ / "m.vtu"));
+  EXPECT_THAT(read.mesh.labels, IsEmpty());
+  EXPECT_THAT(read.node_fields, IsEmpty());
 }
 
 TEST_F(MeshWriter, FieldOfAnotherLengthIsRefusedAndNothingWritten) {
@@ -100,10 +97,10 @@ TEST_F(MeshWriter, LpsTwinOfAWrittenMeshLoadsEqual) {
   ASSERT_TRUE(write_vtu(folder_ / "ras.vtu", mesh, {{"u", mesh.nodes}}));
   ASSERT_TRUE(write_vtu(folder_ / "lps.vtu", turned, {{"u", turned.nodes}}));
   const std::string text = replaced(content_of(folder_ / "lps.vtu"), "82 65 83 0", "76 80 83 0");
-  const auto ras = read_vtu(folder_ / "ras.vtu"), lps = read_vtu(folder_.write("lps.vtu", text));
-  ASSERT_TRUE(ras && lps);
-  EXPECT_EQ(lps->mesh.nodes, ras->mesh.nodes);
-  EXPECT_EQ(lps->node_fields[0].values, ras->node_fields[0].values);
+  const auto ras = value_or_fail(read_vtu(folder_ / "ras.vtu"));
+  const auto lps = value_or_fail(read_vtu(folder_.write("lps.vtu", text)));
+  EXPECT_EQ(lps.mesh.nodes, ras.mesh.nodes);
+  EXPECT_EQ(lps.node_fields[0].values, ras.node_fields[0].values);
 }
 
 TEST_F(MeshWriter, LpsTwinOfAWrittenSurfaceLoadsEqual) {
@@ -112,11 +109,10 @@ TEST_F(MeshWriter, LpsTwinOfAWrittenSurfaceLoadsEqual) {
   surface.vertices.topRows<2>() *= -1.0;
   ASSERT_TRUE(write_surface(folder_ / "lps.vtp", surface));
   const std::string text = replaced(content_of(folder_ / "lps.vtp"), "82 65 83 0", "76 80 83 0");
-  const auto ras = read_surface(folder_ / "ras.vtp");
-  const auto lps = read_surface(folder_.write("lps.vtp", text));
-  ASSERT_TRUE(ras && lps);
-  EXPECT_EQ(lps->vertices, ras->vertices);
-  EXPECT_EQ(lps->triangles, ras->triangles);
+  const auto ras = value_or_fail(read_surface(folder_ / "ras.vtp"));
+  const auto lps = value_or_fail(read_surface(folder_.write("lps.vtp", text)));
+  EXPECT_EQ(lps.vertices, ras.vertices);
+  EXPECT_EQ(lps.triangles, ras.triangles);
 }
 
 TEST_F(MeshWriter, WrittenSurfacesComeBackBitForBit) {
@@ -125,10 +121,9 @@ TEST_F(MeshWriter, WrittenSurfacesComeBackBitForBit) {
   for (const char* name : {"s.ply", "s.vtp"}) {
     const auto path = folder_ / name;
     ASSERT_TRUE(write_surface(path, surface, {{"sd_mm", sd}}));
-    const auto read = read_surface(path);
-    ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->vertices, surface.vertices) << name;
-    EXPECT_EQ(read->triangles, surface.triangles) << name;
+    const auto read = value_or_fail(read_surface(path));
+    EXPECT_EQ(read.vertices, surface.vertices) << name;
+    EXPECT_EQ(read.triangles, surface.triangles) << name;
   }
 }
 
@@ -138,10 +133,9 @@ TEST_F(MeshWriter, WrittenPointsComeBack) {
   for (const char* name : {"p.ply", "p.vtp"}) {
     const auto path = folder_ / name;
     ASSERT_TRUE(write_surface(path, points));
-    const auto read = read_surface_or_points(path);
-    ASSERT_TRUE(read) << read.error().message;
-    EXPECT_EQ(read->vertices, points.vertices) << name;
-    EXPECT_EQ(read->num_triangles(), 0);
+    const auto read = value_or_fail(read_surface_or_points(path));
+    EXPECT_EQ(read.vertices, points.vertices) << name;
+    EXPECT_EQ(read.num_triangles(), 0);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -24,15 +25,13 @@ constexpr const char* kText =
     "# camera to patient\n0 -1 0 10.5\n1, 0, 0, -20\n\n0\t0 1 +3e1\n0 0 0 1\n";
 
 TEST_F(PoseFile, TextAndYamlAgree) {
-  const auto text = read(kText);
-  const auto yaml = read(
-      "T_ras_camera: [0, -1, 0, 10.5, 1, 0, 0, -20, 0, 0, 1, 30,\n"
-      "               0, 0, 0, 1]\n",
-      "p.yaml");
-  ASSERT_TRUE(text) << text.error().message;
-  ASSERT_TRUE(yaml) << yaml.error().message;
-  EXPECT_TRUE(text->isApprox(*yaml));
-  EXPECT_TRUE((*text * Vec3(1, 2, 3)).isApprox(Vec3(8.5, -19, 33)));
+  const auto text = value_or_fail(read(kText));
+  const auto yaml =
+      value_or_fail(read("T_ras_camera: [0, -1, 0, 10.5, 1, 0, 0, -20, 0, 0, 1, 30,\n"
+                         "               0, 0, 0, 1]\n",
+                         "p.yaml"));
+  EXPECT_TRUE(text.isApprox(yaml));
+  EXPECT_TRUE((text * Vec3(1, 2, 3)).isApprox(Vec3(8.5, -19, 33)));
 }
 
 TEST_F(PoseFile, TakesTextJsonAndYaml) {
@@ -52,9 +51,8 @@ TEST_F(PoseFile, TakesTextJsonAndYaml) {
 
 // kThreeDecimals: rounding to 0.866 and 0.5 leaves R^T R off by 4.4e-5, to 0.87 by 7e-3.
 TEST_F(PoseFile, ThreeDecimalsAreMadeOrthonormalAndTwoAreRefused) {
-  const auto pose = read("0.866 -0.5 0 0\n0.5 0.866 0 0\n0 0 1 0\n0 0 0 1\n");
-  ASSERT_TRUE(pose) << pose.error().message;
-  EXPECT_LT((pose->linear().transpose() * pose->linear() - Mat3::Identity()).norm(), 1e-14);
+  const auto pose = value_or_fail(read("0.866 -0.5 0 0\n0.5 0.866 0 0\n0 0 1 0\n0 0 0 1\n"));
+  EXPECT_LT((pose.linear().transpose() * pose.linear() - Mat3::Identity()).norm(), 1e-14);
   expect_refusals(
       {{"0.87 -0.5 0 0\n0.5 0.87 0 0\n0 0 1 0\n0 0 0 1\n", "R^T R differs from I by 0.0069"}});
 }
@@ -76,10 +74,9 @@ TEST_F(PoseFile, WhatIsWrittenIsReadBack) {
   T.translation() = Vec3(-1e-9, 1234.5678901234567, -0.1);
   const auto path = folder_ / "w.txt";
   ASSERT_TRUE(write_pose(path, "T_ras_reference", T, {"a comment: 1 2 3", "another"}));
-  const auto read = read_pose(path, "T_ras_reference", 1e-12);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_LT((read->matrix() - T.matrix()).cwiseAbs().maxCoeff(), 1e-14);
-  EXPECT_EQ(read->translation(), T.translation());
+  const auto read = value_or_fail(read_pose(path, "T_ras_reference", 1e-12));
+  EXPECT_LT((read.matrix() - T.matrix()).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_EQ(read.translation(), T.translation());
   EXPECT_EQ(write_pose(folder_ / "none" / "w.txt", "T", T).error().code, ErrorCode::kWriteFailed);
 }
 
@@ -98,7 +95,7 @@ TEST_F(PoseFile, OtherTextsAreRefused) {
 TEST_F(PoseFile, TheCallerSaysHowRigidAPoseMustBe) {
   const auto path = folder_.write("t.txt", "0.866 -0.5 0 1  0.5 0.866 0 2  0 0 1 3  0 0 0 1");
   EXPECT_TRUE(read_pose(path, "T_ras_reference"));
-  test_support::refusal_of(read_pose(path, "T_ras_camera", 1e-5));
+  refusal_of(read_pose(path, "T_ras_camera", 1e-5));
 }
 
 }  // namespace

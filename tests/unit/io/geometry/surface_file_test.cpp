@@ -16,7 +16,6 @@ namespace {
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
 using test_support::put;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 using testing::HasSubstr;
 
@@ -110,14 +109,14 @@ class SurfaceFormat : public testing::TestWithParam<Format> {
 };
 
 TEST_P(SurfaceFormat, KnownSurfaceIsReadWithSharedVertices) {
-  const auto surface = read_surface(folder_.write(GetParam().file, GetParam().content));
-  ASSERT_TRUE(surface) << surface.error().message;
-  ASSERT_EQ(surface->num_vertices(), 4);
-  ASSERT_EQ(surface->num_triangles(), 4);
+  const auto surface =
+      value_or_fail(read_surface(folder_.write(GetParam().file, GetParam().content)));
+  ASSERT_EQ(surface.num_vertices(), 4);
+  ASSERT_EQ(surface.num_triangles(), 4);
   for (int t = 0; t < 4; ++t) {
     for (int k = 0; k < 3; ++k) {
       const auto& v = kVertices[kTriangles[t][k]];
-      EXPECT_LT((surface->vertices.col(surface->triangles(k, t)) - Vec3(v[0], v[1], v[2])).norm(),
+      EXPECT_LT((surface.vertices.col(surface.triangles(k, t)) - Vec3(v[0], v[1], v[2])).norm(),
                 1e-6);
     }
   }
@@ -257,18 +256,16 @@ TEST(SurfaceSpace, ModelThatSaysLpsIsTurnedIntoRas) {
 TEST(SurfaceSpace, AnotherSpaceIsRefusedByFileAndValue) {
   const TemporaryFolder folder;
   for (const auto& [file, text] : slicer_files()) {
-    const std::string refusal =
-        refusal_of(read_surface(folder.write(file, with_heading(file, text, "LAS"))));
-    EXPECT_THAT(refusal, HasSubstr(file));
-    EXPECT_THAT(refusal, HasSubstr("SPACE is 'LAS': must be RAS or LPS"));
+    EXPECT_THAT(refusal_of(read_surface(folder.write(file, with_heading(file, text, "LAS")))),
+                testing::AllOf(HasSubstr(file), HasSubstr("SPACE is 'LAS': must be RAS or LPS")));
   }
 }
 
 TEST(SurfaceSpace, WordThatOnlyEndsLikeTheKeySaysNothing) {
   const TemporaryFolder folder;
-  const auto read = read_surface(folder.write("s.obj", "# COLOURSPACE=sRGB\n" + obj(false)));
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->vertices.col(1), Vec3(10.5, 0, 0));
+  const auto read =
+      value_or_fail(read_surface(folder.write("s.obj", "# COLOURSPACE=sRGB\n" + obj(false))));
+  EXPECT_EQ(read.vertices.col(1), Vec3(10.5, 0, 0));
 }
 
 // ---- points ----
@@ -280,13 +277,12 @@ class SurfacePoints : public testing::Test {
 
 TEST_F(SurfacePoints, TextGivesPointsWithoutTriangles) {
   for (const char* name : {"p.xyz", "p.TXT", "p.csv", "p.pts"}) {
-    const auto points = read_surface_or_points(folder_.write(
-        name, "x y z colour\n# made by hand\n1 2\t3 255\n// another\n\n -4.5,5e0;+6\r\n"));
-    ASSERT_TRUE(points) << points.error().message;
-    ASSERT_EQ(points->num_vertices(), 2);
-    EXPECT_EQ(points->num_triangles(), 0);
-    EXPECT_EQ(points->vertices.col(0), Vec3(1, 2, 3));
-    EXPECT_EQ(points->vertices.col(1), Vec3(-4.5, 5, 6));
+    const auto points = value_or_fail(read_surface_or_points(folder_.write(
+        name, "x y z colour\n# made by hand\n1 2\t3 255\n// another\n\n -4.5,5e0;+6\r\n")));
+    ASSERT_EQ(points.num_vertices(), 2);
+    EXPECT_EQ(points.num_triangles(), 0);
+    EXPECT_EQ(points.vertices.col(0), Vec3(1, 2, 3));
+    EXPECT_EQ(points.vertices.col(1), Vec3(-4.5, 5, 6));
   }
 }
 
@@ -294,10 +290,9 @@ TEST_F(SurfacePoints, APlyWithoutFacesGivesPointsHereAndIsRefusedAsASurface) {
   const auto path = folder_.write("p.ply",
                                   "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n"
                                   "property float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n");
-  const auto points = read_surface_or_points(path);
-  ASSERT_TRUE(points) << points.error().message;
-  EXPECT_EQ(points->num_vertices(), 2);
-  EXPECT_EQ(points->num_triangles(), 0);
+  const auto points = value_or_fail(read_surface_or_points(path));
+  EXPECT_EQ(points.num_vertices(), 2);
+  EXPECT_EQ(points.num_triangles(), 0);
   EXPECT_THAT(read_surface(path).error().message, HasSubstr("p.ply: has no triangle"));
 }
 

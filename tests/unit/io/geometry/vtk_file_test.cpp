@@ -18,7 +18,6 @@ namespace {
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
 using test_support::put;
-using test_support::refusal_of;
 using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::ElementsAre;
@@ -177,27 +176,25 @@ class VtuEncoding : public testing::TestWithParam<VtkEncoding> {
 };
 
 TEST_P(VtuEncoding, KnownMeshIsReadWithItsFields) {
-  const auto read = read_vtu(folder_.write("m.vtu", vtu(GetParam())));
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_EQ(read->mesh.num_nodes(), 6) << "read_vtu keeps every point";
-  EXPECT_EQ(read->mesh.nodes, Eigen::Map<const Points>(kPoints.data(), 3, 6));
-  ASSERT_EQ(read->mesh.num_tets(), 2);
-  EXPECT_EQ(read->mesh.tets.col(0), Eigen::Vector4i(0, 1, 2, 3));
-  EXPECT_EQ(read->mesh.tets.col(1), Eigen::Vector4i(5, 1, 2, 0));
-  EXPECT_THAT(read->mesh.labels, ElementsAre(3, -4));
-  ASSERT_EQ(read->node_fields.size(), 2u) << "integer arrays are no fields";
-  EXPECT_EQ(read->node_fields[0].name, "u");
-  EXPECT_EQ(read->node_fields[0].values, Eigen::Map<const Eigen::MatrixXd>(kPoints.data(), 3, 6));
-  EXPECT_EQ(read->node_fields[1].name, "p");
-  EXPECT_EQ(read->node_fields[1].values.rows(), 1);
-  EXPECT_EQ(read->node_fields[1].values(0, 5), 6.5);
+  const auto read = value_or_fail(read_vtu(folder_.write("m.vtu", vtu(GetParam()))));
+  ASSERT_EQ(read.mesh.num_nodes(), 6) << "read_vtu keeps every point";
+  EXPECT_EQ(read.mesh.nodes, Eigen::Map<const Points>(kPoints.data(), 3, 6));
+  ASSERT_EQ(read.mesh.num_tets(), 2);
+  EXPECT_EQ(read.mesh.tets.col(0), Eigen::Vector4i(0, 1, 2, 3));
+  EXPECT_EQ(read.mesh.tets.col(1), Eigen::Vector4i(5, 1, 2, 0));
+  EXPECT_THAT(read.mesh.labels, ElementsAre(3, -4));
+  ASSERT_EQ(read.node_fields.size(), 2u) << "integer arrays are no fields";
+  EXPECT_EQ(read.node_fields[0].name, "u");
+  EXPECT_EQ(read.node_fields[0].values, Eigen::Map<const Eigen::MatrixXd>(kPoints.data(), 3, 6));
+  EXPECT_EQ(read.node_fields[1].name, "p");
+  EXPECT_EQ(read.node_fields[1].values.rows(), 1);
+  EXPECT_EQ(read.node_fields[1].values(0, 5), 6.5);
 }
 
 TEST_P(VtuEncoding, TetMeshDropsTheUnreferencedNode) {
-  const auto mesh = read_tet_mesh(folder_.write("m.vtu", vtu(GetParam())));
-  ASSERT_TRUE(mesh) << mesh.error().message;
-  ASSERT_EQ(mesh->num_nodes(), 5);
-  EXPECT_EQ(mesh->nodes.col(mesh->tets(0, 1)), Vec3(1, 1, 100));
+  const auto mesh = value_or_fail(read_tet_mesh(folder_.write("m.vtu", vtu(GetParam()))));
+  ASSERT_EQ(mesh.num_nodes(), 5);
+  EXPECT_EQ(mesh.nodes.col(mesh.tets(0, 1)), Vec3(1, 1, 100));
 }
 
 TEST_P(VtuEncoding, NoTruncationCrashesOrGivesAPartOfTheMesh) {
@@ -304,19 +301,16 @@ TEST_F(VtuFile, MissingOrUnknownPartsAreNamed) {
 TEST_P(VtuEncoding, PointsAndVectorsInLpsAreTurnedIntoRas) {
   const Eigen::Map<const Points> as_written(kPoints.data(), 3, 6);
   const Eigen::DiagonalMatrix<double, 3> turn(-1.0, -1.0, 1.0);
-  const auto ras = read_vtu(folder_.write("r.vtu", vtu(GetParam(), "RAS")));
-  ASSERT_TRUE(ras) << ras.error().message;
-  EXPECT_EQ(ras->mesh.nodes, as_written);
-  EXPECT_EQ(ras->node_fields[0].values, as_written);
-  const auto lps = read_vtu(folder_.write("l.vtu", vtu(GetParam(), "LPS")));
-  ASSERT_TRUE(lps) << lps.error().message;
-  EXPECT_EQ(lps->mesh.nodes, Points(turn * as_written));
-  EXPECT_EQ(lps->mesh.tets, ras->mesh.tets);
-  EXPECT_EQ(lps->node_fields[0].values, Points(turn * as_written));
-  EXPECT_EQ(lps->node_fields[1].values, ras->node_fields[1].values) << "scalars have no frame";
-  const auto grouped = read_tet_mesh(folder_ / "l.vtu");
-  ASSERT_TRUE(grouped);
-  EXPECT_EQ(grouped->nodes.col(1), Vec3(-1.5, 0, 0));
+  const auto ras = value_or_fail(read_vtu(folder_.write("r.vtu", vtu(GetParam(), "RAS"))));
+  EXPECT_EQ(ras.mesh.nodes, as_written);
+  EXPECT_EQ(ras.node_fields[0].values, as_written);
+  const auto lps = value_or_fail(read_vtu(folder_.write("l.vtu", vtu(GetParam(), "LPS"))));
+  EXPECT_EQ(lps.mesh.nodes, Points(turn * as_written));
+  EXPECT_EQ(lps.mesh.tets, ras.mesh.tets);
+  EXPECT_EQ(lps.node_fields[0].values, Points(turn * as_written));
+  EXPECT_EQ(lps.node_fields[1].values, ras.node_fields[1].values) << "scalars have no frame";
+  const auto grouped = value_or_fail(read_tet_mesh(folder_ / "l.vtu"));
+  EXPECT_EQ(grouped.nodes.col(1), Vec3(-1.5, 0, 0));
 }
 
 TEST_P(VtuEncoding, AnotherSpaceIsRefusedByFileAndValue) {
@@ -359,13 +353,12 @@ TEST(VtpFile, TrianglesAreReadInEveryEncoding) {
   for (const VtkEncoding& encoding :
        {VtkEncoding{.name = "", .ascii = true}, VtkEncoding{.name = "", .compressed = true},
         VtkEncoding{.name = "", .appended = true, .raw = true}}) {
-    const auto surface =
-        read_surface(folder.write("s.vtp", vtp(encoding, {3, 6}, "NumberOfPolys=\"2\"")));
-    ASSERT_TRUE(surface) << surface.error().message;
-    EXPECT_EQ(surface->num_vertices(), 4);
-    EXPECT_EQ(surface->vertices.col(3), Vec3(0, 0, 1));
-    EXPECT_EQ(surface->triangles.col(0), Eigen::Vector3i(0, 2, 1));
-    EXPECT_EQ(surface->triangles.col(1), Eigen::Vector3i(0, 1, 3));
+    const auto surface = value_or_fail(
+        read_surface(folder.write("s.vtp", vtp(encoding, {3, 6}, "NumberOfPolys=\"2\""))));
+    EXPECT_EQ(surface.num_vertices(), 4);
+    EXPECT_EQ(surface.vertices.col(3), Vec3(0, 0, 1));
+    EXPECT_EQ(surface.triangles.col(0), Eigen::Vector3i(0, 2, 1));
+    EXPECT_EQ(surface.triangles.col(1), Eigen::Vector3i(0, 1, 3));
   }
 }
 

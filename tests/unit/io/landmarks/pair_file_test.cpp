@@ -13,7 +13,6 @@ namespace {
 
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::AllOf;
@@ -30,12 +29,11 @@ void expect_two(const std::string& name, const std::string& content,
                 const std::vector<std::string>& names = {"a", "b c"}) {
   SCOPED_TRACE(content);
   const TemporaryFolder folder;
-  const auto pairs = read_pairs(folder.write(name, content));
-  ASSERT_TRUE(pairs) << pairs.error().message;
-  EXPECT_EQ(pairs->names, names);
-  EXPECT_THAT(pairs->first, ElementsAre(Vec3(1, 2, 3), Vec3(4, 5, 6)));
-  EXPECT_THAT(pairs->second, ElementsAre(Vec3(1.5, 2.5, 3.5), Vec3(4, 5, -6)));
-  EXPECT_TRUE(pairs->left_out.empty());
+  const auto pairs = value_or_fail(read_pairs(folder.write(name, content)));
+  EXPECT_EQ(pairs.names, names);
+  EXPECT_THAT(pairs.first, ElementsAre(Vec3(1, 2, 3), Vec3(4, 5, 6)));
+  EXPECT_THAT(pairs.second, ElementsAre(Vec3(1.5, 2.5, 3.5), Vec3(4, 5, -6)));
+  EXPECT_TRUE(pairs.left_out.empty());
 }
 
 // read_pairs of a file of this name; an error begins with its path.
@@ -77,12 +75,11 @@ TEST(PairFile, TwoListsOfSlicerArePairedByName) {
                                    R"({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
       "controlPoints": [{"label": "b c", "position": [4, 5, -6]},
                         {"label": "a", "position": [1.5, 2.5, 3.5]}]}]})");
-  const auto pairs = read_pairs(before, during);
-  ASSERT_TRUE(pairs) << pairs.error().message;
-  EXPECT_THAT(pairs->names, ElementsAre("a", "b c"));
-  EXPECT_THAT(pairs->first, ElementsAre(Vec3(1, 2, 3), Vec3(4, 5, 6)));
-  EXPECT_THAT(pairs->second, ElementsAre(Vec3(1.5, 2.5, 3.5), Vec3(4, 5, -6)));
-  EXPECT_THAT(pairs->left_out, ElementsAre("lost"));
+  const auto pairs = value_or_fail(read_pairs(before, during));
+  EXPECT_THAT(pairs.names, ElementsAre("a", "b c"));
+  EXPECT_THAT(pairs.first, ElementsAre(Vec3(1, 2, 3), Vec3(4, 5, 6)));
+  EXPECT_THAT(pairs.second, ElementsAre(Vec3(1.5, 2.5, 3.5), Vec3(4, 5, -6)));
+  EXPECT_THAT(pairs.left_out, ElementsAre("lost"));
 }
 
 TEST(PairFile, RefusesTwoListsThatCannotBePaired) {
@@ -135,14 +132,12 @@ TEST(PairFile, RealLandmarksAreTheSameInBothFormats) {
   const char* data = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
   if (data == nullptr) GTEST_SKIP() << "BRAINSHIFT_EXTERNAL_DATA is not set";
   const auto folder = std::filesystem::path(data) / "resect_case4";
-  const auto table = read_pairs(folder / "Case4-MRI-beforeUS.csv");
-  const auto tags = read_pairs(folder / "Case4-MRI-beforeUS.tag");
-  ASSERT_TRUE(table) << table.error().message;
-  ASSERT_TRUE(tags) << tags.error().message;
-  EXPECT_EQ(table->names.size(), 15U);
-  EXPECT_EQ(table->names, tags->names);
-  EXPECT_EQ(table->first, tags->first);
-  EXPECT_EQ(table->second, tags->second);
+  const auto table = value_or_fail(read_pairs(folder / "Case4-MRI-beforeUS.csv"));
+  const auto tags = value_or_fail(read_pairs(folder / "Case4-MRI-beforeUS.tag"));
+  EXPECT_EQ(table.names.size(), 15U);
+  EXPECT_EQ(table.names, tags.names);
+  EXPECT_EQ(table.first, tags.first);
+  EXPECT_EQ(table.second, tags.second);
 }
 
 // ---- two lists by name ----
@@ -156,12 +151,11 @@ NamedPoints list(std::initializer_list<const char*> names, double shift = 0.0) {
 }
 
 TEST(NamedPoints, PairsAreFoundByNameInWhateverOrder) {
-  const auto pairs = pair_by_name(list({"a", "b", "c"}), list({"d", "c", "a"}, 10));
-  ASSERT_TRUE(pairs) << pairs.error().message;
-  EXPECT_THAT(pairs->names, ElementsAre("a", "c"));
-  EXPECT_THAT(pairs->first, ElementsAre(Vec3(0, 0, 0), Vec3(2, 0, 0)));
-  EXPECT_THAT(pairs->second, ElementsAre(Vec3(12, 0, 0), Vec3(11, 0, 0)));
-  EXPECT_THAT(pairs->left_out, ElementsAre("b", "d"));
+  const auto pairs = value_or_fail(pair_by_name(list({"a", "b", "c"}), list({"d", "c", "a"}, 10)));
+  EXPECT_THAT(pairs.names, ElementsAre("a", "c"));
+  EXPECT_THAT(pairs.first, ElementsAre(Vec3(0, 0, 0), Vec3(2, 0, 0)));
+  EXPECT_THAT(pairs.second, ElementsAre(Vec3(12, 0, 0), Vec3(11, 0, 0)));
+  EXPECT_THAT(pairs.left_out, ElementsAre("b", "d"));
 }
 
 TEST(NamedPoints, RefusesNamesThatDoNotName) {

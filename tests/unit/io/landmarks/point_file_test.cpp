@@ -12,7 +12,6 @@ namespace {
 
 using test_support::expect_edits_refused;
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::replaced;
 using test_support::TemporaryFolder;
 using testing::ElementsAre;
@@ -41,11 +40,10 @@ Result<NamedPoints> read(const std::string& name, const std::string& content) {
 
 void expect_two_points(const std::string& name, const std::string& content, const Vec3& signs) {
   SCOPED_TRACE(name + ": " + content);
-  const auto list = read(name, content);
-  ASSERT_TRUE(list) << list.error().message;
-  EXPECT_THAT(list->names, ElementsAre("nasion", "left, ear"));
-  EXPECT_THAT(list->points, ElementsAre(signs.cwiseProduct(Vec3(-1.5, -2, 3)),
-                                        signs.cwiseProduct(Vec3(4, -5, 6.25))));
+  const auto list = value_or_fail(read(name, content));
+  EXPECT_THAT(list.names, ElementsAre("nasion", "left, ear"));
+  EXPECT_THAT(list.points, ElementsAre(signs.cwiseProduct(Vec3(-1.5, -2, 3)),
+                                       signs.cwiseProduct(Vec3(4, -5, 6.25))));
 }
 
 // read_points of a file of this name; an error begins with its path.
@@ -96,10 +94,9 @@ TEST(PointFile, TablesHaveANameOrAHeadingOrNeither) {
                     "label,l,p,s,defined,selected,visible,locked,description\n"
                     "nasion,-1.5,-2,3,1,1,1,0,\n\"left, ear\",4,-5,6.25,1,1,1,0,note\n",
                     Vec3(-1, -1, 1));
-  const auto bare = read("a.csv", "1,2,3\n4,5,6\n");
-  ASSERT_TRUE(bare) << bare.error().message;
-  EXPECT_THAT(bare->names, ElementsAre("", ""));
-  EXPECT_EQ(bare->points[1], Vec3(4, 5, 6));
+  const auto bare = value_or_fail(read("a.csv", "1,2,3\n4,5,6\n"));
+  EXPECT_THAT(bare.names, ElementsAre("", ""));
+  EXPECT_EQ(bare.points[1], Vec3(4, 5, 6));
 }
 
 TEST(PointFile, RefusesMarkupsThatAreNoPointList) {

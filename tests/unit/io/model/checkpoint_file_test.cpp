@@ -7,6 +7,7 @@
 #include <csignal>
 #include <thread>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -149,10 +150,9 @@ TEST_F(CheckpointFileTest, OtherKeyStartsAfresh) {
 TEST_F(CheckpointFileTest, ForeignFileIsLeftAlone) {
   for (const char* content : {"case_id: example\n", "x", "bshiftcX and more than a header of it"}) {
     folder_.write("condense.checkpoint", content);
-    const auto file = CheckpointFile::open_or_create(path_, kKey);
-    ASSERT_FALSE(file) << content;
-    EXPECT_EQ(file.error().code, ErrorCode::kUnreadable);
-    EXPECT_THAT(file.error().message, HasSubstr("condense.checkpoint: is there but is no checkp"));
+    EXPECT_THAT(refusal_of(CheckpointFile::open_or_create(path_, kKey), ErrorCode::kUnreadable),
+                HasSubstr("condense.checkpoint: is there but is no checkp"))
+        << content;
     EXPECT_EQ(content_of(path_), content);
   }
 }
@@ -160,28 +160,23 @@ TEST_F(CheckpointFileTest, ForeignFileIsLeftAlone) {
 TEST_F(CheckpointFileTest, OneProcessAtATime) {
   {
     const CheckpointFile first = open();
-    const auto second = CheckpointFile::open_or_create(path_, kKey);
-    ASSERT_FALSE(second);
-    EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
+    refusal_of(CheckpointFile::open_or_create(path_, kKey), ErrorCode::kUnavailable);
   }
   EXPECT_TRUE(CheckpointFile::open_or_create(path_, kKey));
 }
 
 TEST_F(CheckpointFileTest, UnwritablePlaceIsNamed) {
-  const auto file = CheckpointFile::open_or_create(folder_ / "no" / "c", kKey);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(file.error().message, HasSubstr("no/c: cannot open: No such file"));
+  EXPECT_THAT(refusal_of(CheckpointFile::open_or_create(folder_ / "no" / "c", kKey),
+                         ErrorCode::kWriteFailed),
+              HasSubstr("no/c: cannot open: No such file"));
   EXPECT_FALSE(CheckpointFile::open_or_create(folder_.path(), kKey));
 }
 
 TEST_F(CheckpointFileTest, BlockIsAppendedOnce) {
   CheckpointFile file = open();
   ASSERT_TRUE(file.append(1, block<float>(1, 3, 2)));
-  const Status again = file.append(1, block<float>(2, 3, 2));
-  ASSERT_FALSE(again);
-  EXPECT_EQ(again.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(again.error().message, HasSubstr("has block 1 already"));
+  EXPECT_THAT(refusal_of(file.append(1, block<float>(2, 3, 2)), ErrorCode::kInvalidArgument),
+              HasSubstr("has block 1 already"));
 }
 
 TEST_F(CheckpointFileTest, WhatIsNotThereIsNotRead) {
@@ -239,8 +234,7 @@ TEST_F(CheckpointFileTest, FullDiskKeepsTheBlocksThatWereThere) {
   const Status status = file.append(8, block<float>(8, 6, 2));
   setrlimit(RLIMIT_FSIZE, &old);
   std::signal(SIGXFSZ, SIG_DFL);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  refusal_of(status, ErrorCode::kWriteFailed);
   EXPECT_EQ(std::filesystem::file_size(path_), ends[2]);
   EXPECT_TRUE(file.append(8, block<float>(8, 6, 2))) << "when there is room again";
   EXPECT_THAT(file.blocks(), ElementsAre(0, 4, 7, 8));

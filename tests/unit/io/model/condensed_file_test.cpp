@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/model/model_file_example.hpp"
 
@@ -41,17 +42,16 @@ TEST(CondensedFile, OperatorsAreReadBackBitForBit) {
   const ModelFile original = condensed_file();
   const Status written = write_model(folder / "m.h5", original);
   ASSERT_TRUE(written) << written.error().message;
-  const auto read = read_model(folder / "m.h5");
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_EQ(read->condensed.size(), 2u);
-  expect_equal(read->condensed[0], original.condensed[0]);
-  expect_equal(read->condensed[1], original.condensed[1]);
-  ASSERT_EQ(read->inputs.size(), 2u);
+  const auto read = value_or_fail(read_model(folder / "m.h5"));
+  ASSERT_EQ(read.condensed.size(), 2u);
+  expect_equal(read.condensed[0], original.condensed[0]);
+  expect_equal(read.condensed[1], original.condensed[1]);
+  ASSERT_EQ(read.inputs.size(), 2u);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(read->inputs[i].key, original.inputs[i].key);
-    EXPECT_EQ(read->inputs[i].path, original.inputs[i].path);
-    EXPECT_EQ(read->inputs[i].bytes, original.inputs[i].bytes);
-    EXPECT_EQ(read->inputs[i].crc32, original.inputs[i].crc32);
+    EXPECT_EQ(read.inputs[i].key, original.inputs[i].key);
+    EXPECT_EQ(read.inputs[i].path, original.inputs[i].path);
+    EXPECT_EQ(read.inputs[i].bytes, original.inputs[i].bytes);
+    EXPECT_EQ(read.inputs[i].crc32, original.inputs[i].crc32);
   }
 }
 
@@ -60,31 +60,27 @@ TEST(CondensedFile, OneBoundaryConditionMayBeMissing) {
   ModelFile file = condensed_file();
   file.condensed.erase(file.condensed.begin());
   ASSERT_TRUE(write_model(folder / "m.h5", file));
-  const auto read = read_model(folder / "m.h5");
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_EQ(read->condensed.size(), 1u);
-  expect_equal(read->condensed[0], file.condensed[0]);
+  const auto read = value_or_fail(read_model(folder / "m.h5"));
+  ASSERT_EQ(read.condensed.size(), 1u);
+  expect_equal(read.condensed[0], file.condensed[0]);
 }
 
 TEST(CondensedFile, OperatorsMayBeReadByThemselvesAndLater) {
   const TemporaryFolder folder;
   const ModelFile original = condensed_file();
   ASSERT_TRUE(write_model(folder / "m.h5", original));
-  const auto bare = read_model(folder / "m.h5", {});
-  ASSERT_TRUE(bare) << bare.error().message;
-  EXPECT_TRUE(bare->condensed.empty());
-  EXPECT_EQ(bare->model.model_id, original.model.model_id);
-  const auto fixed = read_operators(folder / "m.h5", bare->model, Boundary::kFixed);
-  ASSERT_TRUE(fixed) << fixed.error().message;
-  ASSERT_TRUE(fixed->has_value());
-  expect_equal(**fixed, original.condensed[1]);
+  const auto bare = value_or_fail(read_model(folder / "m.h5", {}));
+  EXPECT_TRUE(bare.condensed.empty());
+  EXPECT_EQ(bare.model.model_id, original.model.model_id);
+  const auto fixed = value_or_fail(read_operators(folder / "m.h5", bare.model, Boundary::kFixed));
+  ASSERT_TRUE(fixed.has_value());
+  expect_equal(*fixed, original.condensed[1]);
 
   ModelFile without = original;
   without.condensed.pop_back();
   ASSERT_TRUE(write_model(folder / "m.h5", without));
-  const auto none = read_operators(folder / "m.h5", bare->model, Boundary::kFixed);
-  ASSERT_TRUE(none) << none.error().message;
-  EXPECT_FALSE(none->has_value());
+  const auto none = value_or_fail(read_operators(folder / "m.h5", bare.model, Boundary::kFixed));
+  EXPECT_FALSE(none.has_value());
 }
 
 TEST(CondensedFile, OperatorsOfAnotherModelAreRefused) {
@@ -92,14 +88,10 @@ TEST(CondensedFile, OperatorsOfAnotherModelAreRefused) {
   ASSERT_TRUE(write_model(folder / "m.h5", condensed_file()));
   BrainModel other = condensed_file().model;
   other.model_id = std::string(other.model_id.size(), '0');
-  const auto refused = read_operators(folder / "m.h5", other, Boundary::kContact);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(refused.error().message,
+  EXPECT_THAT(refusal_of(read_operators(folder / "m.h5", other, Boundary::kContact),
+                         ErrorCode::kUnreadable),
               HasSubstr("the operators belong to another model than '" + other.model_id));
-  const auto missing = read_operators(folder / "gone.h5", other, Boundary::kContact);
-  ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  refusal_of(read_operators(folder / "gone.h5", other, Boundary::kContact), ErrorCode::kNotFound);
 }
 
 TEST(CondensedFile, OperatorsWithoutControlNodesAreReadBack) {
@@ -112,9 +104,8 @@ TEST(CondensedFile, OperatorsWithoutControlNodesAreReadBack) {
   operators.control_weights.resize(4, 0);
   const Status written = write_model(folder / "m.h5", file);
   ASSERT_TRUE(written) << written.error().message;
-  const auto read = read_model(folder / "m.h5");
-  ASSERT_TRUE(read) << read.error().message;
-  expect_equal(read->condensed[0], operators);
+  const auto read = value_or_fail(read_model(folder / "m.h5"));
+  expect_equal(read.condensed[0], operators);
 }
 
 // More slaves than one tile of the mirrored triangle, and not a multiple of it.
@@ -139,9 +130,8 @@ TEST(CondensedFile, PackedComplianceOfManySlavesIsReadBackBitForBit) {
     file.condensed = {operators};
     const Status written = write_model(folder / "m.h5", file);
     ASSERT_TRUE(written) << written.error().message;
-    const auto read = read_model(folder / "m.h5");
-    ASSERT_TRUE(read) << read.error().message;
-    expect_equal(read->condensed[0], operators);
+    const auto read = value_or_fail(read_model(folder / "m.h5"));
+    expect_equal(read.condensed[0], operators);
   }
 }
 
@@ -228,10 +218,9 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
   for (const Misfit& misfit : cases) {
     ModelFile file = condensed_file();
     misfit.make(file.condensed[0]);
-    const Status status = write_model(folder / "m.h5", file);
-    ASSERT_FALSE(status) << misfit.message;
-    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(status.error().message, HasSubstr("m.h5: condensed/contact/" + misfit.message));
+    EXPECT_THAT(refusal_of(write_model(folder / "m.h5", file), ErrorCode::kInvalidArgument),
+                HasSubstr("m.h5: condensed/contact/" + misfit.message))
+        << misfit.message;
     EXPECT_EQ(folder.entries(), 0u);
   }
 }
@@ -245,19 +234,17 @@ TEST(CondensedFile, LargestAndTinyNumbersAreFinite) {
       -0.0f;
   file.condensed[0].slave_modes.row(0) << Double::max(), Double::lowest(), Double::denorm_min();
   ASSERT_TRUE(write_model(folder / "m.h5", file));
-  const auto read = read_model(folder / "m.h5");
-  ASSERT_TRUE(read) << read.error().message;
-  expect_equal(read->condensed[0], file.condensed[0]);
+  const auto read = value_or_fail(read_model(folder / "m.h5"));
+  expect_equal(read.condensed[0], file.condensed[0]);
 }
 
 TEST(CondensedFile, SameBoundaryTwiceIsNotWritten) {
   const TemporaryFolder folder;
   ModelFile file = condensed_file();
   file.condensed[1] = file.condensed[0];
-  const Status status = write_model(folder / "m.h5", file);
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, HasSubstr("two sets of operators for the boundary condition"
-                                                " contact"));
+  EXPECT_THAT(sentence_of(write_model(folder / "m.h5", file)),
+              HasSubstr("two sets of operators for the boundary condition"
+                        " contact"));
 }
 
 // Alters a file behind its checksum, as another program could.

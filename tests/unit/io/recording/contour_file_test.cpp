@@ -10,7 +10,6 @@ namespace brainshift::io {
 namespace {
 
 using test_support::expect_refused;
-using test_support::refusal_of;
 using test_support::TemporaryFolder;
 
 // read_contours of a file of this name; an error begins with its path.
@@ -28,19 +27,18 @@ auto reading_contours(const std::string& name) {
 
 TEST(ContourFile, CsvGroupsRowsByFrame) {
   const TemporaryFolder folder;
-  const auto contours = read_contours(
+  const auto contours = value_or_fail(read_contours(
       folder.write(
           "c.csv",
           "frame,u_px,v_px\n# traced by hand\n3, 1.5, 2\n3,4,5 # corner\n3,6,-7\r\n\n8,1,1\n"),
-      false);
-  ASSERT_TRUE(contours) << contours.error().message;
-  ASSERT_EQ(contours->size(), 2U);
-  EXPECT_EQ((*contours)[0].frame, 3);
-  EXPECT_FALSE((*contours)[0].closed);
+      false));
+  ASSERT_EQ(contours.size(), 2U);
+  EXPECT_EQ(contours[0].frame, 3);
+  EXPECT_FALSE(contours[0].closed);
   Eigen::Matrix2Xd expected(2, 3);
   expected << 1.5, 4, 6, 2, 5, -7;
-  EXPECT_EQ((*contours)[0].points_px, expected);
-  EXPECT_EQ((*contours)[1].frame, 8);
+  EXPECT_EQ(contours[0].points_px, expected);
+  EXPECT_EQ(contours[1].frame, 8);
 }
 
 TEST(ContourFile, JsonSaysWhetherEachContourIsClosed) {
@@ -90,11 +88,11 @@ TEST(ContourFile, NamesContourAndKeyThatAreWrong) {
 
 TEST(SeedFile, HasASeedPerRow) {
   const TemporaryFolder folder;
-  const auto seeds = read_seeds(folder.write("s.csv", "frame,u_px,v_px\n3,10,20\n40,11,21\n"));
-  ASSERT_TRUE(seeds);
-  ASSERT_EQ(seeds->size(), 2U);
-  EXPECT_EQ((*seeds)[1].frame, 40);
-  EXPECT_EQ((*seeds)[1].at_px, Eigen::Vector2d(11, 21));
+  const auto seeds =
+      value_or_fail(read_seeds(folder.write("s.csv", "frame,u_px,v_px\n3,10,20\n40,11,21\n")));
+  ASSERT_EQ(seeds.size(), 2U);
+  EXPECT_EQ(seeds[1].frame, 40);
+  EXPECT_EQ(seeds[1].at_px, Eigen::Vector2d(11, 21));
 }
 
 }  // namespace

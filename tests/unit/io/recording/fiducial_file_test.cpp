@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -27,22 +28,20 @@ constexpr const char* kPairs =
 
 TEST(FiducialFile, PairsAreFitted) {
   const TemporaryFolder folder;
-  const auto file = read_fiducials(folder.write("f.csv", kPairs));
-  ASSERT_TRUE(file) << file.error().message;
-  EXPECT_FALSE(file->matched);
-  EXPECT_LT(file->fit.fre_mm, 1e-9);
-  EXPECT_LT((file->fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-9);
+  const auto file = value_or_fail(read_fiducials(folder.write("f.csv", kPairs)));
+  EXPECT_FALSE(file.matched);
+  EXPECT_LT(file.fit.fre_mm, 1e-9);
+  EXPECT_LT((file.fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-9);
 }
 
 TEST(FiducialFile, TheOrderOfUnpairedPointsIsFound) {
   const TemporaryFolder folder;
-  const auto file = read_fiducials(
+  const auto file = value_or_fail(read_fiducials(
       folder.write("f.csv",
                    "ras,-10,30,90\nreference,0,0,0\nreference,50,0,0\nras,-70,20,30\nras,10,70,30\n"
-                   "reference,0,80,0\nreference,10,20,60\nras,10,20,30\n"));
-  ASSERT_TRUE(file) << file.error().message;
-  EXPECT_TRUE(file->matched);
-  EXPECT_LT((file->fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-9);
+                   "reference,0,80,0\nreference,10,20,60\nras,10,20,30\n")));
+  EXPECT_TRUE(file.matched);
+  EXPECT_LT((file.fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-9);
 }
 
 TEST(FiducialFile, NamesWhatIsWrong) {

@@ -2,11 +2,11 @@
 #include "common/io/recording/record_chain.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
 #include <random>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/recording/surgery_records.hpp"
 
@@ -142,15 +142,14 @@ TEST_F(ChangedFile, ACutFileIsRefusedAndItsValidPrefixIsRecovered) {
 
 TEST_F(ChangedFile, ABrokenRecordIsNamedWithItsFileAndThePrefixIsGiven) {
   run_sql(path, "UPDATE record SET payload = x'00' WHERE id = 17");
-  const auto file = SurgeryFile::open(path);
-  ASSERT_TRUE(file) << file.error().message;
-  const Visited visited = visit_all(*file);
+  const auto file = value_or_fail(SurgeryFile::open(path));
+  const Visited visited = visit_all(file);
   ASSERT_FALSE(visited.status);
   EXPECT_EQ(visited.status.error().code, ErrorCode::kUnreadable);
   EXPECT_THAT(visited.status.error().message, HasSubstr(path.string() + ": record 17: "));
   EXPECT_EQ(visited.records.size(), 16u);
   EXPECT_TRUE(is_prefix(visited.records));
-  EXPECT_FALSE(file->records(RecordKind::kObservation));
+  EXPECT_FALSE(file.records(RecordKind::kObservation));
   EXPECT_FALSE(SurgeryFile::open_to_append(path)) << "nothing is added to a broken chain";
 }
 
@@ -158,9 +157,8 @@ TEST_F(ChangedFile, RecordsThatAreLostSwappedOrInsertedBreakTheChain) {
   const auto expect_broken_after = [&](const char* sql, const char* record) {
     write(good);
     run_sql(path, sql);
-    const auto file = SurgeryFile::open(path);
-    ASSERT_TRUE(file) << file.error().message;
-    const Visited visited = visit_all(*file);
+    const auto file = value_or_fail(SurgeryFile::open(path));
+    const Visited visited = visit_all(file);
     ASSERT_FALSE(visited.status) << sql;
     EXPECT_THAT(visited.status.error().message, HasSubstr(record));
     EXPECT_TRUE(is_prefix(visited.records));
@@ -177,23 +175,18 @@ TEST_F(ChangedFile, RecordsThatAreLostSwappedOrInsertedBreakTheChain) {
 
 TEST_F(ChangedFile, ChangedMetaAndTruthAreFound) {
   run_sql(path, "UPDATE meta SET value = 'd' WHERE key = 'case_id'");
-  const auto file = SurgeryFile::open(path);
-  ASSERT_FALSE(file);
-  EXPECT_THAT(file.error().message, HasSubstr("meta"));
+  EXPECT_THAT(sentence_of(SurgeryFile::open(path)), HasSubstr("meta"));
   fs::remove(path);
-  auto with_truth = SurgeryFile::create(path, {.case_id = "c"});
-  ASSERT_TRUE(with_truth);
+  auto with_truth = value_or_fail(SurgeryFile::create(path, {.case_id = "c"}));
   SurgeryTruth truth;
   truth.displacement = Points::Ones(3, 50);
   truth.points["sparse"] = {{{0, 1, 2, 3}, {1, 0, 0, 0}}};
-  ASSERT_TRUE(with_truth->write_truth(1, truth));
-  ASSERT_TRUE(with_truth->close());
+  ASSERT_TRUE(with_truth.write_truth(1, truth));
+  ASSERT_TRUE(with_truth.close());
   ASSERT_TRUE(SurgeryFile::open(path)->read_truth(1));
   run_sql(path, "UPDATE truth_point SET node2 = 4");
-  const auto read = SurgeryFile::open(path)->read_truth(1);
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(read.error().message, HasSubstr("truth of observation 1"));
+  EXPECT_THAT(refusal_of(SurgeryFile::open(path)->read_truth(1), ErrorCode::kUnreadable),
+              HasSubstr("truth of observation 1"));
 }
 
 }  // namespace

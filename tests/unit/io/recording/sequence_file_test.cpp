@@ -17,7 +17,6 @@ using test_support::expect_edits_refused;
 using test_support::expect_refused;
 using test_support::meta_text;
 using test_support::nrrd_text;
-using test_support::refusal_of;
 using test_support::replaced;
 using test_support::SequenceContent;
 using test_support::TemporaryFolder;
@@ -70,17 +69,16 @@ TEST(SequenceFile, SaysTheSameInEveryFormat) {
                                    std::pair{"c.seq.nrrd", nrrd_text(content, false)},
                                    std::pair{"d.nrrd", nrrd_text(content, true)}}) {
     SCOPED_TRACE(name);
-    const auto recording = read_sequence(folder.write(name, text));
-    ASSERT_TRUE(recording) << recording.error().message;
-    EXPECT_EQ(recording->width, 12);
-    EXPECT_EQ(recording->height, 9);
-    EXPECT_EQ(recording->pixels, content.pixels);
-    ASSERT_EQ(recording->num_frames(), 4);
-    EXPECT_NEAR(recording->time_s[3], 1000.3, 1e-9);
-    EXPECT_TRUE(recording->defects.empty());
-    const auto* probe = find_link(*recording, "ProbeToTracker");
-    const auto* reference = find_link(*recording, "ReferenceToTracker");
-    const auto* stylus = find_link(*recording, "StylusToTracker");
+    const auto recording = value_or_fail(read_sequence(folder.write(name, text)));
+    EXPECT_EQ(recording.width, 12);
+    EXPECT_EQ(recording.height, 9);
+    EXPECT_EQ(recording.pixels, content.pixels);
+    ASSERT_EQ(recording.num_frames(), 4);
+    EXPECT_NEAR(recording.time_s[3], 1000.3, 1e-9);
+    EXPECT_TRUE(recording.defects.empty());
+    const auto* probe = find_link(recording, "ProbeToTracker");
+    const auto* reference = find_link(recording, "ReferenceToTracker");
+    const auto* stylus = find_link(recording, "StylusToTracker");
     ASSERT_TRUE(probe && reference && stylus);
     for (int i = 0; i < 4; ++i) {
       const auto frame = static_cast<std::size_t>(i);
@@ -115,9 +113,9 @@ TEST(SequenceFile, TurnsEveryOrientationIntoMF) {
                                    std::tuple{"UND", true, true}}) {
     content.fields["UltrasoundImageOrientation"] = name;
     content.pixels = mirrored(u, v);
-    const auto recording = read_sequence(folder.write("a.mha", meta_text(content, true)));
-    ASSERT_TRUE(recording) << recording.error().message;
-    EXPECT_EQ(recording->pixels, mf) << name;
+    const auto recording =
+        value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
+    EXPECT_EQ(recording.pixels, mf) << name;
   }
 }
 
@@ -133,13 +131,12 @@ TEST(SequenceFile, ReadsSixteenBitsOfEitherByteOrder) {
     big += {static_cast<char>(value >> 8), static_cast<char>(value & 255)};
   }
   content.pixels = little;
-  const auto a = read_sequence(folder.write("a.mha", meta_text(content, true)));
+  const auto a = value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
   content.pixels = big;
-  const auto b = read_sequence(folder.write(
-      "b.mha", replaced(meta_text(content, true), "OrderMSB = False", "OrderMSB = True")));
-  ASSERT_TRUE(a && b);
-  EXPECT_EQ(a->pixels, b->pixels);
-  EXPECT_EQ(a->frame_values(1)(0, 11),
+  const auto b = value_or_fail(read_sequence(folder.write(
+      "b.mha", replaced(meta_text(content, true), "OrderMSB = False", "OrderMSB = True"))));
+  EXPECT_EQ(a.pixels, b.pixels);
+  EXPECT_EQ(a.frame_values(1)(0, 11),
             9 * 12 * 70 - 9000);  // mirrored: the first pixel is the last
 }
 
@@ -148,15 +145,15 @@ TEST(SequenceFile, AMatrixThatIsNoRigidMotionMakesThatLinkInvalidAndIsListed) {
   SequenceContent content = small_sweep().content();
   content.frames[2]["ProbeToTrackerTransform"] = "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1";
   content.frames[3]["ReferenceToTrackerTransform"] = "nan 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1";
-  const auto recording = read_sequence(folder.write("a.mha", meta_text(content, true)));
-  ASSERT_TRUE(recording) << recording.error().message;
-  EXPECT_EQ(find_link(*recording, "ProbeToTracker")->samples[2].status, LinkStatus::kInvalid);
-  EXPECT_EQ(find_link(*recording, "ReferenceToTracker")->samples[3].status, LinkStatus::kInvalid);
-  ASSERT_EQ(recording->defects.size(), 2U);
-  EXPECT_EQ(recording->defects[0].frame, 2);
-  EXPECT_EQ(recording->defects[0].field, "Seq_Frame0002_ProbeToTrackerTransform");
-  EXPECT_THAT(recording->defects[0].what, HasSubstr("no rigid motion"));
-  EXPECT_THAT(recording->defects[1].what, HasSubstr("finite"));
+  const auto recording =
+      value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
+  EXPECT_EQ(find_link(recording, "ProbeToTracker")->samples[2].status, LinkStatus::kInvalid);
+  EXPECT_EQ(find_link(recording, "ReferenceToTracker")->samples[3].status, LinkStatus::kInvalid);
+  ASSERT_EQ(recording.defects.size(), 2U);
+  EXPECT_EQ(recording.defects[0].frame, 2);
+  EXPECT_EQ(recording.defects[0].field, "Seq_Frame0002_ProbeToTrackerTransform");
+  EXPECT_THAT(recording.defects[0].what, HasSubstr("no rigid motion"));
+  EXPECT_THAT(recording.defects[1].what, HasSubstr("finite"));
 }
 
 TEST(SequenceFile, ImageLinksMayScale) {
@@ -164,9 +161,9 @@ TEST(SequenceFile, ImageLinksMayScale) {
   SequenceContent content = small_sweep().content();
   content.frames[0]["ImageToProbeTransform"] = "0.1 0 0 4 0 0.1 0 0 0 0 0.1 0 0 0 0 1";
   content.frames[0]["ImageToProbeTransformStatus"] = "OK";
-  const auto recording = read_sequence(folder.write("a.mha", meta_text(content, true)));
-  ASSERT_TRUE(recording);
-  const auto* image = find_link(*recording, "ImageToProbe");
+  const auto recording =
+      value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
+  const auto* image = find_link(recording, "ImageToProbe");
   ASSERT_NE(image, nullptr);
   EXPECT_EQ(image->samples[0].status, LinkStatus::kOk);
   EXPECT_EQ(image->samples[0].T_to_from(0, 3), 4.0);
@@ -180,11 +177,11 @@ TEST(SequenceFile, StatusDecides) {
   content.frames[1].erase("ProbeToTrackerTransformStatus");
   content.frames[2]["ProbeToTrackerTransformStatus"] = "OUT_OF_VIEW";
   content.frames[3].erase("ProbeToTrackerTransform");
-  const auto recording = read_sequence(folder.write("a.mha", meta_text(content, true)));
-  ASSERT_TRUE(recording);
-  EXPECT_FALSE(recording->image_ok[0]);
-  EXPECT_TRUE(recording->image_ok[1]);
-  const auto& samples = find_link(*recording, "ProbeToTracker")->samples;
+  const auto recording =
+      value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
+  EXPECT_FALSE(recording.image_ok[0]);
+  EXPECT_TRUE(recording.image_ok[1]);
+  const auto& samples = find_link(recording, "ProbeToTracker")->samples;
   EXPECT_EQ(samples[0].status, LinkStatus::kOk);
   EXPECT_EQ(samples[1].status, LinkStatus::kWithoutStatus);
   EXPECT_EQ(samples[2].status, LinkStatus::kInvalid);
@@ -210,15 +207,14 @@ TEST(SequenceFile, ATrackerAloneIsReadWhereNoImagesAreWanted) {
                                    // Images of which nobody says how they lie are no obstacle.
                                    std::pair{"c.mha", meta_text(small_sweep().content(), true)}}) {
     SCOPED_TRACE(name);
-    const auto recording = read_sequence(folder.write(name, text), options);
-    ASSERT_TRUE(recording) << recording.error().message;
-    EXPECT_EQ(recording->width, 0);
-    EXPECT_EQ(recording->height, 0);
-    EXPECT_EQ(recording->pixels, "");
-    ASSERT_EQ(recording->num_frames(), 4);
-    EXPECT_NEAR(recording->time_s[3], 1000.3, 1e-9);
-    EXPECT_EQ(find_link(*recording, "ProbeToTracker")->samples[2].status, LinkStatus::kOk);
-    for (const char ok : recording->image_ok) EXPECT_TRUE(ok);
+    const auto recording = value_or_fail(read_sequence(folder.write(name, text), options));
+    EXPECT_EQ(recording.width, 0);
+    EXPECT_EQ(recording.height, 0);
+    EXPECT_EQ(recording.pixels, "");
+    ASSERT_EQ(recording.num_frames(), 4);
+    EXPECT_NEAR(recording.time_s[3], 1000.3, 1e-9);
+    EXPECT_EQ(find_link(recording, "ProbeToTracker")->samples[2].status, LinkStatus::kOk);
+    for (const char ok : recording.image_ok) EXPECT_TRUE(ok);
   }
 }
 

@@ -3,7 +3,6 @@
 #include "common/io/recording/sqlite_database.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,6 +10,7 @@
 #include <fstream>
 #include <functional>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/recording/surgery_records.hpp"
 
@@ -26,10 +26,9 @@ class SurgeryOnDisk : public ::testing::Test {
 
   // A writer that keeps the log beside the file, as a crash does.
   SurgeryFile live(std::uint64_t records) const {
-    auto file = SurgeryFile::create(path, {.case_id = "c"});
-    EXPECT_TRUE(file) << file.error().message;
-    for (std::uint64_t i = 1; i <= records; ++i) EXPECT_TRUE(file->append(numbered_record(i)));
-    return std::move(*file);
+    auto file = value_or_fail(SurgeryFile::create(path, {.case_id = "c"}));
+    for (std::uint64_t i = 1; i <= records; ++i) EXPECT_TRUE(file.append(numbered_record(i)));
+    return file;
   }
 
   // The reason for a failure is all that the process with fewer rights can leave behind.
@@ -107,10 +106,7 @@ TEST_F(SurgeryOnDisk, AFileThatIsDeletedOrReplacedIsNoLongerInPlace) {
   EXPECT_FALSE(file.in_place());
   std::ofstream(path) << "somebody else's";
   EXPECT_FALSE(file.in_place());
-  const Status closed = file.close();
-  ASSERT_FALSE(closed);
-  EXPECT_EQ(closed.error().code, ErrorCode::kWriteFailed);
-  EXPECT_EQ(closed.error().message,
+  EXPECT_EQ(refusal_of(file.close(), ErrorCode::kWriteFailed),
             path.string() + ": was deleted or replaced while it was written");
   EXPECT_EQ(test_support::content_of(path), "somebody else's");
 }

@@ -2,7 +2,6 @@
 #include "common/io/recording/surgery_file.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -13,6 +12,7 @@
 #include <fstream>
 #include <limits>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::io {
@@ -51,11 +51,7 @@ SurgeryTruth sample_truth() {
 
 class SurgeryFileTest : public ::testing::Test {
  protected:
-  SurgeryFile make() {
-    auto file = SurgeryFile::create(path, kMeta);
-    EXPECT_TRUE(file) << file.error().message;
-    return std::move(*file);
-  }
+  SurgeryFile make() { return value_or_fail(SurgeryFile::create(path, kMeta)); }
   void make_complete() {
     SurgeryFile file = make();
     for (std::uint64_t i = 1; i <= 20; ++i) ASSERT_TRUE(file.append(record(i)));
@@ -63,12 +59,9 @@ class SurgeryFileTest : public ::testing::Test {
     ASSERT_TRUE(file.close());
   }
   void expect_open_refused(ErrorCode code, const std::string& text) {
-    const auto file = SurgeryFile::open(path);
-    ASSERT_FALSE(file);
-    EXPECT_EQ(file.error().code, code) << file.error().message;
-    EXPECT_THAT(file.error().message, HasSubstr(path.string()));
-    EXPECT_THAT(file.error().message, HasSubstr(text));
-    EXPECT_EQ(file.error().message.find('\n'), std::string::npos);
+    EXPECT_THAT(refusal_of(SurgeryFile::open(path), code),
+                testing::AllOf(HasSubstr(path.string()), HasSubstr(text),
+                               testing::Not(testing::HasSubstr("\n"))));
   }
   // Runs SQL on the file behind SurgeryFile's back.
   void tamper(const char* sql) {
@@ -89,9 +82,7 @@ class SurgeryFileTest : public ::testing::Test {
 };
 
 void expect_error(const Status& status, ErrorCode code, const std::string& text) {
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, code) << status.error().message;
-  EXPECT_THAT(status.error().message, HasSubstr(text));
+  EXPECT_THAT(refusal_of(status, code), HasSubstr(text));
 }
 
 // ---------- what is written is read ----------
@@ -111,10 +102,9 @@ TEST_F(SurgeryFileTest, RecordsAndMetaComeBackInOrderAndBitForBit) {
   ASSERT_TRUE(file.append(large));
   ASSERT_TRUE(file.close());
 
-  const auto opened = SurgeryFile::open(path);
-  ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ(opened->meta(), kMeta);
-  const auto observations = opened->records(RecordKind::kObservation).value();
+  const auto opened = value_or_fail(SurgeryFile::open(path));
+  EXPECT_EQ(opened.meta(), kMeta);
+  const auto observations = opened.records(RecordKind::kObservation).value();
   const std::vector<SurgeryRecord> expected = {record(2), record(1), extreme, large};
   ASSERT_EQ(observations.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -123,27 +113,25 @@ TEST_F(SurgeryFileTest, RecordsAndMetaComeBackInOrderAndBitForBit) {
     EXPECT_EQ(observations[i].recorded_ns, expected[i].recorded_ns);
     EXPECT_EQ(observations[i].payload, expected[i].payload);
   }
-  ASSERT_EQ(opened->records(RecordKind::kUpdate).value().size(), 1u);
+  ASSERT_EQ(opened.records(RecordKind::kUpdate).value().size(), 1u);
 }
 
 TEST_F(SurgeryFileTest, TruthComesBackBitForBit) {
   make_complete();
-  const auto file = SurgeryFile::open(path);
-  ASSERT_TRUE(file);
-  const auto truth = file->read_truth(1);
-  ASSERT_TRUE(truth) << truth.error().message;
-  ASSERT_EQ(truth->displacement.cols(), 50);
-  EXPECT_TRUE(std::signbit(truth->displacement(0, 0)));
-  EXPECT_EQ(truth->displacement(1, 0), std::numeric_limits<double>::denorm_min());
-  ASSERT_EQ(truth->points.size(), 2u);
-  ASSERT_EQ(truth->points.at("sparse").size(), 2u);
-  EXPECT_EQ(truth->points.at("sparse")[0].nodes, Eigen::Vector4i(0, 1, 2, 49));
-  EXPECT_EQ(truth->points.at("sparse")[0].weights, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4));
-  EXPECT_EQ(truth->points.at("sparse")[1].nodes, Eigen::Vector4i(3, 3, 3, 3));
-  EXPECT_EQ(truth->points.at("cross")[0].weights,
+  const auto file = value_or_fail(SurgeryFile::open(path));
+  const auto truth = value_or_fail(file.read_truth(1));
+  ASSERT_EQ(truth.displacement.cols(), 50);
+  EXPECT_TRUE(std::signbit(truth.displacement(0, 0)));
+  EXPECT_EQ(truth.displacement(1, 0), std::numeric_limits<double>::denorm_min());
+  ASSERT_EQ(truth.points.size(), 2u);
+  ASSERT_EQ(truth.points.at("sparse").size(), 2u);
+  EXPECT_EQ(truth.points.at("sparse")[0].nodes, Eigen::Vector4i(0, 1, 2, 49));
+  EXPECT_EQ(truth.points.at("sparse")[0].weights, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4));
+  EXPECT_EQ(truth.points.at("sparse")[1].nodes, Eigen::Vector4i(3, 3, 3, 3));
+  EXPECT_EQ(truth.points.at("cross")[0].weights,
             Eigen::Vector4d(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0));
-  EXPECT_EQ(truth->scalars, sample_truth().scalars);
-  EXPECT_EQ(truth->displacement, sample_truth().displacement);
+  EXPECT_EQ(truth.scalars, sample_truth().scalars);
+  EXPECT_EQ(truth.displacement, sample_truth().displacement);
 }
 
 TEST_F(SurgeryFileTest, EachObservationHasItsOwnTruth) {
@@ -169,11 +157,10 @@ TEST_F(SurgeryFileTest, AfterCloseThereIsOneFile) {
 TEST_F(SurgeryFileTest, ALiveFileCanBeReadWhileItIsWritten) {
   SurgeryFile file = make();
   ASSERT_TRUE(file.append(record(1)));
-  const auto reader = SurgeryFile::open(path);
-  ASSERT_TRUE(reader) << reader.error().message;
-  EXPECT_EQ(reader->records(RecordKind::kObservation).value().size(), 1u);
+  const auto reader = value_or_fail(SurgeryFile::open(path));
+  EXPECT_EQ(reader.records(RecordKind::kObservation).value().size(), 1u);
   ASSERT_TRUE(file.append(record(2)));
-  EXPECT_EQ(reader->records(RecordKind::kObservation).value().size(), 2u);
+  EXPECT_EQ(reader.records(RecordKind::kObservation).value().size(), 2u);
 }
 
 TEST_F(SurgeryFileTest, AcknowledgedRecordsSurviveAKill) {
@@ -189,9 +176,8 @@ TEST_F(SurgeryFileTest, AcknowledgedRecordsSurviveAKill) {
   int state = 0;
   ASSERT_EQ(::waitpid(child, &state, 0), child);
   ASSERT_TRUE(WIFSIGNALED(state));
-  const auto file = SurgeryFile::open(path);
-  ASSERT_TRUE(file) << file.error().message;
-  const auto records = file->records(RecordKind::kObservation).value();
+  const auto file = value_or_fail(SurgeryFile::open(path));
+  const auto records = file.records(RecordKind::kObservation).value();
   ASSERT_EQ(records.size(), 5u);
   EXPECT_EQ(records[4].payload, record(5).payload);
 }
@@ -206,10 +192,8 @@ TEST_F(SurgeryFileTest, RecordsGoToAWriteAheadLog) {
 
 TEST_F(SurgeryFileTest, CreateRefusesToOverwriteAnything) {
   std::ofstream(path) << "precious";
-  const auto file = SurgeryFile::create(path, kMeta);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
-  EXPECT_EQ(file.error().message, path.string() + ": exists already");
+  EXPECT_EQ(refusal_of(SurgeryFile::create(path, kMeta), ErrorCode::kWriteFailed),
+            path.string() + ": exists already");
   EXPECT_EQ(fs::file_size(path), 8u);
 }
 
@@ -231,10 +215,8 @@ TEST_F(SurgeryFileTest, ADiscardedFileLeavesNothingBehind) {
 
 TEST_F(SurgeryFileTest, CreateInAFolderThatDoesNotExistNamesTheFile) {
   path = folder / "nowhere" / "one.surgery";
-  const auto file = SurgeryFile::create(path, kMeta);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(file.error().message, HasSubstr(path.string()));
+  EXPECT_THAT(refusal_of(SurgeryFile::create(path, kMeta), ErrorCode::kWriteFailed),
+              HasSubstr(path.string()));
 }
 
 TEST_F(SurgeryFileTest, OpenRefusesWhatIsNoSurgeryFile) {
@@ -277,21 +259,18 @@ TEST_F(SurgeryFileTest, EveryTruncationIsRefused) {
 TEST_F(SurgeryFileTest, AFileIsAddedToAndKeepsWhatItHas) {
   make_complete();
   {
-    auto file = SurgeryFile::open_to_append(path);
-    ASSERT_TRUE(file) << file.error().message;
-    EXPECT_EQ(file->meta(), kMeta);
-    ASSERT_TRUE(file->append(record(21)));
+    auto file = value_or_fail(SurgeryFile::open_to_append(path));
+    EXPECT_EQ(file.meta(), kMeta);
+    ASSERT_TRUE(file.append(record(21)));
     EXPECT_TRUE(fs::exists(fs::path(path) += "-wal")) << "an acknowledged record survives a kill";
-    ASSERT_TRUE(file->close());
+    ASSERT_TRUE(file.close());
   }
-  const auto file = SurgeryFile::open(path);
-  ASSERT_TRUE(file) << file.error().message;
-  const auto records = file->records(RecordKind::kObservation);
-  ASSERT_TRUE(records);
-  ASSERT_EQ(records->size(), 21U);
-  EXPECT_EQ(records->front().payload, record(1).payload);
-  EXPECT_EQ(records->back().payload, record(21).payload);
-  EXPECT_TRUE(file->read_truth(1));
+  const auto file = value_or_fail(SurgeryFile::open(path));
+  const auto records = value_or_fail(file.records(RecordKind::kObservation));
+  ASSERT_EQ(records.size(), 21U);
+  EXPECT_EQ(records.front().payload, record(1).payload);
+  EXPECT_EQ(records.back().payload, record(21).payload);
+  EXPECT_TRUE(file.read_truth(1));
 }
 
 TEST_F(SurgeryFileTest, NothingIsAddedToWhatIsNoSurgeryFile) {
@@ -306,15 +285,14 @@ TEST_F(SurgeryFileTest, NothingIsAddedToWhatIsNoSurgeryFile) {
 
 TEST_F(SurgeryFileTest, AFileOpenedForReadingOrClosedRefusesWrites) {
   make_complete();
-  auto file = SurgeryFile::open(path);
-  ASSERT_TRUE(file);
-  expect_error(file->append(record(9)), ErrorCode::kWriteFailed, "opened for reading");
-  expect_error(file->write_truth(9, sample_truth()), ErrorCode::kWriteFailed, "opened for reading");
-  EXPECT_TRUE(file->close());
-  EXPECT_TRUE(file->close());
-  expect_error(file->append(record(9)), ErrorCode::kWriteFailed, "closed");
-  EXPECT_EQ(file->records(RecordKind::kObservation).error().code, ErrorCode::kUnreadable);
-  EXPECT_EQ(file->read_truth(1).error().code, ErrorCode::kUnreadable);
+  auto file = value_or_fail(SurgeryFile::open(path));
+  expect_error(file.append(record(9)), ErrorCode::kWriteFailed, "opened for reading");
+  expect_error(file.write_truth(9, sample_truth()), ErrorCode::kWriteFailed, "opened for reading");
+  EXPECT_TRUE(file.close());
+  EXPECT_TRUE(file.close());
+  expect_error(file.append(record(9)), ErrorCode::kWriteFailed, "closed");
+  EXPECT_EQ(file.records(RecordKind::kObservation).error().code, ErrorCode::kUnreadable);
+  EXPECT_EQ(file.read_truth(1).error().code, ErrorCode::kUnreadable);
 }
 
 TEST_F(SurgeryFileTest, CloseTellsWhenAReaderKeepsTheLog) {
@@ -406,21 +384,18 @@ TEST_F(SurgeryFileTest, AFullDiskIsReportedAndLosesNoAcknowledgedRecord) {
   }
   EXPECT_TRUE(file.append(record(3)));
   ASSERT_TRUE(file.close());
-  const auto opened = SurgeryFile::open(path);
-  ASSERT_TRUE(opened);
-  const auto records = opened->records(RecordKind::kObservation).value();
+  const auto opened = value_or_fail(SurgeryFile::open(path));
+  const auto records = opened.records(RecordKind::kObservation).value();
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].payload, record(1).payload);
   EXPECT_EQ(records[1].payload, record(3).payload);
-  EXPECT_EQ(opened->read_truth(1).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(opened.read_truth(1).error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(SurgeryFileTest, ACreationThatFailsLeavesNothingBehind) {
   const FileSizeLimit limit(2000);
-  const auto file = SurgeryFile::create(path, kMeta);
-  ASSERT_FALSE(file);
-  EXPECT_EQ(file.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(file.error().message, HasSubstr(path.string()));
+  EXPECT_THAT(refusal_of(SurgeryFile::create(path, kMeta), ErrorCode::kWriteFailed),
+              HasSubstr(path.string()));
   EXPECT_THAT(files_in_folder(), ::testing::IsEmpty());
 }
 

@@ -2,13 +2,13 @@
 #include "common/io/recording/surgery_layout.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <vector>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/recording/surgery_records.hpp"
 
@@ -20,11 +20,7 @@ using ::testing::HasSubstr;
 
 class SurgeryLayout : public ::testing::Test {
  protected:
-  SurgeryState state() const {
-    const auto file = SurgeryFile::open(path);
-    EXPECT_TRUE(file) << file.error().message;
-    return file ? file->state() : SurgeryState{};
-  }
+  SurgeryState state() const { return value_or_fail(SurgeryFile::open(path)).state(); }
   // A process that is killed after its last record.
   void crash_after(std::uint64_t records) const {
     const pid_t child = ::fork();
@@ -67,32 +63,29 @@ TEST_F(SurgeryLayout, ACopyWithoutItsLogIsASurgeryThatSaysThatItWasNotClosed) {
   crash_after(5);
   const fs::path copy = folder / "copy.surgery";
   fs::copy_file(path, copy);
-  const auto file = SurgeryFile::open(copy);
-  ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->meta().case_id, "c");
-  EXPECT_FALSE(file->state().closed);
-  EXPECT_FALSE(file->state().log_beside);
-  const Visited visited = visit_all(*file);
+  const auto file = value_or_fail(SurgeryFile::open(copy));
+  EXPECT_EQ(file.meta().case_id, "c");
+  EXPECT_FALSE(file.state().closed);
+  EXPECT_FALSE(file.state().log_beside);
+  const Visited visited = visit_all(file);
   EXPECT_TRUE(visited.status) << visited.status.error().message;
   EXPECT_LT(visited.records.size(), 5u);
-  EXPECT_EQ(visited.records.size(), file->state().records);
-  EXPECT_THAT(describe(file->state()), HasSubstr("its end is missing if"));
+  EXPECT_EQ(visited.records.size(), file.state().records);
+  EXPECT_THAT(describe(file.state()), HasSubstr("its end is missing if"));
 }
 
 TEST_F(SurgeryLayout, ALiveFileIsNotClosedAndAnAddedOneNoLonger) {
-  auto file = SurgeryFile::create(path, {});
-  ASSERT_TRUE(file);
+  auto file = value_or_fail(SurgeryFile::create(path, {}));
   EXPECT_FALSE(state().closed);
-  ASSERT_TRUE(file->close());
-  EXPECT_TRUE(file->state().closed);
+  ASSERT_TRUE(file.close());
+  EXPECT_TRUE(file.state().closed);
   EXPECT_TRUE(state().closed);
-  auto added = SurgeryFile::open_to_append(path);
-  ASSERT_TRUE(added);
+  auto added = value_or_fail(SurgeryFile::open_to_append(path));
   EXPECT_TRUE(state().closed) << "nothing was added";
-  ASSERT_TRUE(added->append(numbered_record(1)));
+  ASSERT_TRUE(added.append(numbered_record(1)));
   EXPECT_FALSE(state().closed);
-  EXPECT_FALSE(added->state().closed);
-  ASSERT_TRUE(added->close());
+  EXPECT_FALSE(added.state().closed);
+  ASSERT_TRUE(added.close());
   EXPECT_TRUE(state().closed);
   EXPECT_EQ(state().records, 1u);
 }
@@ -107,12 +100,10 @@ TEST_F(SurgeryLayout, AFileThatWasOpenedToAddToAndGivenUpIsStillClosed) {
 TEST_F(SurgeryLayout, AClosedFileThatLostItsLastRecordsIsRefused) {
   write_numbered(path, 20);
   run_sql(path, "DELETE FROM record WHERE id > 18");
-  const auto file = SurgeryFile::open(path);
-  ASSERT_FALSE(file);
-  EXPECT_THAT(file.error().message, HasSubstr("was closed with 20 records, but holds 18"));
-  const auto damaged = SurgeryFile::open_damaged(path);
-  ASSERT_TRUE(damaged) << damaged.error().message;
-  const Visited visited = visit_all(*damaged);
+  EXPECT_THAT(sentence_of(SurgeryFile::open(path)),
+              HasSubstr("was closed with 20 records, but holds 18"));
+  const auto damaged = value_or_fail(SurgeryFile::open_damaged(path));
+  const Visited visited = visit_all(damaged);
   EXPECT_EQ(visited.records.size(), 18u);
   EXPECT_TRUE(is_prefix(visited.records));
   ASSERT_FALSE(visited.status);
@@ -122,16 +113,15 @@ TEST_F(SurgeryLayout, AClosedFileThatLostItsLastRecordsIsRefused) {
 // ---------- groups ----------
 
 TEST_F(SurgeryLayout, AGroupOfRecordsIsKeptAsAWholeOrNotAtAll) {
-  auto file = SurgeryFile::create(path, {});
-  ASSERT_TRUE(file);
+  auto file = value_or_fail(SurgeryFile::create(path, {}));
   std::vector<SurgeryRecord> group = {numbered_record(1), numbered_record(2), numbered_record(3)};
-  ASSERT_TRUE(file->append(group));
+  ASSERT_TRUE(file.append(group));
   std::vector<SurgeryRecord> bad = {numbered_record(4), numbered_record(5)};
   bad[1].sequence = 1ull << 63;
-  EXPECT_FALSE(file->append(bad));
-  EXPECT_EQ(file->state().records, 3u);
-  ASSERT_TRUE(file->append(numbered_record(4)));
-  ASSERT_TRUE(file->close());
+  EXPECT_FALSE(file.append(bad));
+  EXPECT_EQ(file.state().records, 3u);
+  ASSERT_TRUE(file.append(numbered_record(4)));
+  ASSERT_TRUE(file.close());
   const Visited visited = visit_all(*SurgeryFile::open(path));
   EXPECT_TRUE(visited.status);
   EXPECT_EQ(visited.records.size(), 4u);

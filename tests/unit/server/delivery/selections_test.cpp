@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "common/core/random.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::server {
@@ -18,9 +19,7 @@ std::shared_ptr<const BrainModel> toy_model() {
 }
 
 SelectionPtr resolved(Selections& selections, const FieldChoice& choice) {
-  const auto selection = selections.resolve(choice);
-  EXPECT_TRUE(selection) << selection.error().message;
-  return selection ? *selection : nullptr;
+  return value_or_fail(selections.resolve(choice));
 }
 
 TEST(Selections, EverythingIsNoSelection) {
@@ -97,24 +96,20 @@ TEST(Selections, EqualChoicesAreSharedForAsLongAsSomebodyHasThem) {
 
 TEST(Selections, ARegionWithoutNodesIsNamed) {
   Selections selections(toy_model());
-  const auto far = selections.resolve({.region = BallRegion{Vec3(500, 0, -1), 40.0}});
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().code, ErrorCode::kEmptySet);
-  EXPECT_EQ(far.error().message, "choice: no node lies in the ball of 40 mm about (500, 0, -1) mm");
+  EXPECT_EQ(refusal_of(selections.resolve({.region = BallRegion{Vec3(500, 0, -1), 40.0}}),
+                       ErrorCode::kEmptySet),
+            "choice: no node lies in the ball of 40 mm about (500, 0, -1) mm");
 
   BrainModel healthy = test_support::toy_patient(3);
   healthy.tumour = {};
   Selections without(std::make_shared<const BrainModel>(std::move(healthy)));
-  const auto tumour = without.resolve({.region = TumourRegion{40.0}});
-  ASSERT_FALSE(tumour);
-  EXPECT_EQ(tumour.error().message, "choice: the model has no tumour");
+  EXPECT_EQ(sentence_of(without.resolve({.region = TumourRegion{40.0}})),
+            "choice: the model has no tumour");
 }
 
 TEST(Selections, ABadLengthIsRefused) {
   Selections selections(toy_model());
-  const auto refused = selections.resolve({.spacing_mm = -1.0});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  refusal_of(selections.resolve({.spacing_mm = -1.0}), ErrorCode::kInvalidArgument);
 }
 
 // ---------- nodes apart ----------

@@ -11,6 +11,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
 #include "server/delivery/parcels.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::server {
 
@@ -41,11 +42,8 @@ inline Bytes frame_of(const UpdateMessage& message) {
 }
 
 inline UpdateMessage decoded(const Bytes& bytes) {
-  const auto frame = wire::decode_frame(*bytes);
-  EXPECT_TRUE(frame);
-  auto message = wire::decode_update(frame->payload);
-  EXPECT_TRUE(message) << message.error().message;
-  return message ? std::move(*message) : UpdateMessage{};
+  const auto frame = value_or_fail(wire::decode_frame(*bytes));
+  return value_or_fail(wire::decode_update(frame.payload));
 }
 
 }  // namespace brainshift::server

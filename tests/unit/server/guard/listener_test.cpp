@@ -2,11 +2,11 @@
 #include "server/guard/listener.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <filesystem>
 #include <string>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::server {
@@ -17,9 +17,8 @@ using testing::MatchesRegex;
 
 TEST(Listener, TellsThePortThatItTook) {
   for (const char* endpoint : {"tcp://127.0.0.1:*", "tcp://127.0.0.1:0", "tcp://lo:*"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_TRUE(listener) << listener.error().message;
-    EXPECT_THAT(listener->endpoint(), MatchesRegex("tcp://127\\.0\\.0\\.1:[1-9][0-9]+"));
+    const auto listener = value_or_fail(Listener::open(endpoint));
+    EXPECT_THAT(listener.endpoint(), MatchesRegex("tcp://127\\.0\\.0\\.1:[1-9][0-9]+"));
   }
 }
 
@@ -27,18 +26,15 @@ TEST(Listener, WhatIsNoEndpointIsRefusedByName) {
   for (const char* endpoint : {"", "nonsense", "ftp://127.0.0.1:1", "tcp://127.0.0.1", "tcp://:5",
                                "tcp://127.0.0.1:", "tcp://127.0.0.1:99999", "tcp://127.0.0.1:-1",
                                "tcp://127.0.0.1:80x", "ipc://"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_FALSE(listener) << endpoint;
-    EXPECT_EQ(listener.error().code, ErrorCode::kInvalidArgument) << endpoint;
-    EXPECT_THAT(listener.error().message, HasSubstr(endpoint));
+    EXPECT_THAT(refusal_of(Listener::open(endpoint), ErrorCode::kInvalidArgument),
+                HasSubstr(endpoint));
   }
 }
 
 TEST(Listener, AnAddressThatIsNotHereIsUnavailable) {
   for (const char* endpoint : {"tcp://192.0.2.1:5555", "tcp://no-such-interface0:5555"}) {
-    const auto listener = Listener::open(endpoint);
-    ASSERT_FALSE(listener) << endpoint;
-    EXPECT_EQ(listener.error().code, ErrorCode::kUnavailable) << endpoint;
+    SCOPED_TRACE(endpoint);
+    refusal_of(Listener::open(endpoint), ErrorCode::kUnavailable);
   }
 }
 
@@ -46,8 +42,7 @@ TEST(Listener, TheSocketOfAnIpcPathGoesWithIt) {
   const test_support::TemporaryFolder folder;
   const auto path = folder / "s";
   {
-    const auto listener = Listener::open("ipc://" + path.string());
-    ASSERT_TRUE(listener) << listener.error().message;
+    const auto listener = value_or_fail(Listener::open("ipc://" + path.string()));
     EXPECT_TRUE(std::filesystem::is_socket(path));
   }
   EXPECT_FALSE(std::filesystem::exists(path));

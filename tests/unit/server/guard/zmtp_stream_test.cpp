@@ -2,7 +2,6 @@
 #include "server/guard/zmtp_stream.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <random>
 #include <string>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The journal on a real disk that fails: full, deleted under it, syncs that fail, killed.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -16,6 +15,7 @@
 #include <optional>
 #include <random>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/journal/journal_fakes.hpp"
 
@@ -27,14 +27,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 std::vector<std::uint64_t> sequences_in(const fs::path& path) {
+  const auto file = value_or_fail(io::SurgeryFile::open(path));
   std::vector<std::uint64_t> sequences;
-  const auto file = io::SurgeryFile::open(path);
-  EXPECT_TRUE(file) << file.error().message;
-  if (!file) return sequences;
-  const auto records = file->records(io::RecordKind::kObservation);
-  EXPECT_TRUE(records) << records.error().message;
-  if (!records) return sequences;
-  for (const auto& each : *records) sequences.push_back(each.sequence);
+  for (const auto& each : value_or_fail(file.records(io::RecordKind::kObservation))) {
+    sequences.push_back(each.sequence);
+  }
   return sequences;
 }
 

@@ -2,7 +2,6 @@
 #include "server/journal/journal.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <atomic>
 #include <fstream>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "server/journal/record_sink.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/journal/journal_fakes.hpp"
 
@@ -79,18 +79,16 @@ TEST(Journal, WritesASurgeryFileThatReadsBackInOrder) {
   }
   journal.stop();
   EXPECT_TRUE(journal.status().has_value());
-  const auto file = io::SurgeryFile::open(path);
-  ASSERT_TRUE(file.has_value());
-  EXPECT_TRUE(file->state().closed);
-  EXPECT_EQ(file->meta().case_id, "c");
-  const auto observations = file->records(io::RecordKind::kObservation);
-  ASSERT_TRUE(observations.has_value());
-  ASSERT_EQ(observations->size(), 20u);
+  const auto file = value_or_fail(io::SurgeryFile::open(path));
+  EXPECT_TRUE(file.state().closed);
+  EXPECT_EQ(file.meta().case_id, "c");
+  const auto observations = value_or_fail(file.records(io::RecordKind::kObservation));
+  ASSERT_EQ(observations.size(), 20u);
   for (std::uint64_t i = 0; i < 20; ++i) {
-    EXPECT_EQ((*observations)[i].sequence, i + 1);
-    EXPECT_EQ((*observations)[i].payload, "payload " + std::to_string(i + 1));
+    EXPECT_EQ(observations[i].sequence, i + 1);
+    EXPECT_EQ(observations[i].payload, "payload " + std::to_string(i + 1));
   }
-  EXPECT_EQ(file->records(io::RecordKind::kUpdate)->size(), 20u);
+  EXPECT_EQ(file.records(io::RecordKind::kUpdate)->size(), 20u);
 }
 
 TEST_F(JournalTest, IgnoresRecordsBeforeTheFirstFile) {
@@ -409,15 +407,12 @@ TEST(JournalPath, NeverNamesAFileWhoseLogIsLeft) {
 TEST(SurgeryFileSink, NoticesThatItsFileIsGone) {
   const TemporaryFolder folder;
   const fs::path path = folder / "a.surgery";
-  auto sink = open_surgery_file(path, {});
-  ASSERT_TRUE(sink) << sink.error().message;
+  auto sink = value_or_fail(open_surgery_file(path, {}));
   const std::vector<io::SurgeryRecord> records = {{io::RecordKind::kUpdate, 1, 0, "x"}};
-  ASSERT_TRUE((*sink)->append(records));
-  EXPECT_TRUE((*sink)->check());
+  ASSERT_TRUE(sink->append(records));
+  EXPECT_TRUE(sink->check());
   fs::remove(path);
-  const Status status = (*sink)->check();
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().message,
+  EXPECT_EQ(sentence_of(sink->check()),
             path.string() + ": was deleted or replaced while it was recorded");
 }
 

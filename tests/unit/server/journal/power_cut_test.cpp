@@ -2,7 +2,6 @@
 // What the journal calls recorded survives a power cut: on a disk that keeps what was synced, and
 // of the rest whatever it likes.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 
 #include <algorithm>

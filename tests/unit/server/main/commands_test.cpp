@@ -2,9 +2,9 @@
 #include "server/main/commands.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "server/main/progress_bar.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -69,10 +69,8 @@ TEST(EndpointToAsk, IsTheDaemonsOwnOtherwise) {
 }
 
 TEST(EndpointToAsk, NeedsAPortThatIsKnown) {
-  const auto endpoint = endpoint_to_ask("tcp://127.0.0.1:*");
-  ASSERT_FALSE(endpoint);
-  EXPECT_EQ(endpoint.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(endpoint.error().message, testing::HasSubstr("tcp://127.0.0.1:*"));
+  EXPECT_THAT(refusal_of(endpoint_to_ask("tcp://127.0.0.1:*"), ErrorCode::kInvalidArgument),
+              testing::HasSubstr("tcp://127.0.0.1:*"));
 }
 
 }  // namespace

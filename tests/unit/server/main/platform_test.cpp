@@ -2,7 +2,6 @@
 #include "server/main/platform.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace brainshift::server {
 namespace {

@@ -3,7 +3,6 @@
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <prometheus/metric_family.h>
 #include <prometheus/text_serializer.h>
@@ -21,6 +20,7 @@
 #include <vector>
 
 #include "server/operations/counters.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -208,14 +208,13 @@ std::string body_of(const std::string& answer) {
 
 TEST(MetricsExporter, EveryScrapeMakesAReportAndIsReadable) {
   std::atomic<int> asked = 0;
-  auto exporter = MetricsExporter::listen("127.0.0.1:0", [&] {
+  auto exporter = value_or_fail(MetricsExporter::listen("127.0.0.1:0", [&] {
     wire::DaemonReport report;
     report.uptime_ms = static_cast<std::uint64_t>(1000 * ++asked);
     return report;
-  });
-  ASSERT_TRUE(exporter) << exporter.error().message;
+  }));
   for (int scraped = 1; scraped <= 3; ++scraped) {
-    const std::string answer = scrape(exporter->port());
+    const std::string answer = scrape(exporter.port());
     EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
     EXPECT_THAT(answer, HasSubstr("text/plain; version=0.0.4"));
     const Exposition read = read_exposition(body_of(answer));
@@ -225,14 +224,13 @@ TEST(MetricsExporter, EveryScrapeMakesAReportAndIsReadable) {
 }
 
 TEST(MetricsExporter, APortThatIsTakenIsNamedInOneLine) {
-  const auto first = MetricsExporter::listen("127.0.0.1:0", [] { return wire::DaemonReport(); });
-  ASSERT_TRUE(first) << first.error().message;
-  const std::string taken = "127.0.0.1:" + std::to_string(first->port());
-  const auto second = MetricsExporter::listen(taken, [] { return wire::DaemonReport(); });
-  ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(second.error().message, StartsWith("metrics.endpoint = " + taken));
-  EXPECT_EQ(second.error().message.find('\n'), std::string::npos);
+  const auto first =
+      value_or_fail(MetricsExporter::listen("127.0.0.1:0", [] { return wire::DaemonReport(); }));
+  const std::string taken = "127.0.0.1:" + std::to_string(first.port());
+  EXPECT_THAT(refusal_of(MetricsExporter::listen(taken, [] { return wire::DaemonReport(); }),
+                         ErrorCode::kInvalidArgument),
+              testing::AllOf(StartsWith("metrics.endpoint = " + taken),
+                             testing::Not(testing::HasSubstr("\n"))));
 }
 
 TEST(MetricsExporter, WhatIsNoAddressIsRefused) {
@@ -245,38 +243,36 @@ TEST(MetricsExporter, WhatIsNoAddressIsRefused) {
 
 TEST(MetricsExporter, OtherPathsAndGarbageAreNoReport) {
   std::atomic<int> asked = 0;
-  auto exporter = MetricsExporter::listen("127.0.0.1:0", [&] {
+  auto exporter = value_or_fail(MetricsExporter::listen("127.0.0.1:0", [&] {
     ++asked;
     return wire::DaemonReport();
-  });
-  ASSERT_TRUE(exporter) << exporter.error().message;
-  const std::string answer = exchange(
-      exporter->port(), "GET /etc/passwd HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  }));
+  const std::string answer =
+      exchange(exporter.port(), "GET /etc/passwd HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404"));
-  EXPECT_THAT(exchange(exporter->port(),
+  EXPECT_THAT(exchange(exporter.port(),
                        "DELETE /metrics HTTP/1.1\r\nHost: x\r\nConnection: "
                        "close\r\n\r\n"),
               StartsWith("HTTP/1.1 405"));
-  exchange(exporter->port(), std::string(5000, '\xff') + "\r\n\r\n");
+  exchange(exporter.port(), std::string(5000, '\xff') + "\r\n\r\n");
   EXPECT_EQ(asked, 0);
-  EXPECT_THAT(scrape(exporter->port()), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(scrape(exporter.port()), StartsWith("HTTP/1.1 200"));
 }
 
 TEST(MetricsExporter, MonitorsThatAskAtOnceAreAllAnswered) {
   std::atomic<int> inside = 0, most = 0;
-  auto exporter = MetricsExporter::listen("127.0.0.1:0", [&] {
+  auto exporter = value_or_fail(MetricsExporter::listen("127.0.0.1:0", [&] {
     most = std::max(most.load(), ++inside);
     const wire::DaemonReport report;
     --inside;
     return report;
-  });
-  ASSERT_TRUE(exporter) << exporter.error().message;
+  }));
   std::atomic<int> answered = 0;
   {
     std::vector<std::jthread> monitors;
     for (int i = 0; i < 8; ++i) {
       monitors.emplace_back(
-          [&] { answered += scrape(exporter->port()).rfind("HTTP/1.1 200", 0) == 0 ? 1 : 0; });
+          [&] { answered += scrape(exporter.port()).rfind("HTTP/1.1 200", 0) == 0 ? 1 : 0; });
     }
   }
   EXPECT_EQ(answered, 8);

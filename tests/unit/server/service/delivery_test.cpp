@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Viewers with choices of their own, at a daemon over the real socket.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "client/lib/client.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
 namespace brainshift::server {
@@ -40,9 +40,9 @@ class DeliveryTest : public TransportTest {
     ASSERT_TRUE(sender_->subscribe());
   }
   void start() {
-    const auto started = sender_->start_session({kCase, Method::kPaper, Boundary::kContact});
-    ASSERT_TRUE(started) << started.error().message;
-    session_ = started->session_id;
+    const auto started =
+        value_or_fail(sender_->start_session({kCase, Method::kPaper, Boundary::kContact}));
+    session_ = started.session_id;
   }
   Client connected() { return std::move(*Client::connect(endpoint_)); }
   Client viewer(const FieldChoice& choice, std::uint32_t window = 1) {
@@ -56,10 +56,9 @@ class DeliveryTest : public TransportTest {
     const auto taken =
         sender_->submit(in_session(session_, landmarks(++sequence_, "pointer", shift_mm)));
     EXPECT_TRUE(taken) << taken.error().message;
-    auto update = sender_->next_update(kPatient);
-    EXPECT_TRUE(update) << update.error().message;
-    EXPECT_EQ(update->update.observation_sequence, sequence_);
-    return *update;
+    auto update = value_or_fail(sender_->next_update(kPatient));
+    EXPECT_EQ(update.update.observation_sequence, sequence_);
+    return update;
   }
 
   std::optional<Client> sender_;
@@ -73,14 +72,12 @@ TEST_F(DeliveryTest, EveryViewerGetsWhatItChoseAndTheOthersEverything) {
   const auto whole = observe(2.0);
   EXPECT_EQ(whole.update.part, std::nullopt);
   EXPECT_EQ(whole.update.estimate.displacement.row(0), Eigen::RowVector4d(2, 2.2f, 2.4f, 2.6f));
-  const auto part = near.next_update(kPatient);
-  ASSERT_TRUE(part) << part.error().message;
-  EXPECT_EQ(part->update.part, (FieldPart{4, {0, 2}, 0}));
-  EXPECT_EQ(part->update.estimate.displacement.row(0), Eigen::RowVector2d(2, 2.4f));
-  EXPECT_EQ(near.latest_usable()->update.part, part->update.part);
-  const auto thinned = bare.next_update(kPatient);
-  ASSERT_TRUE(thinned) << thinned.error().message;
-  EXPECT_EQ(thinned->update.part, (FieldPart{4, {0}, 0})) << "all others are 1 mm from node 0";
+  const auto part = value_or_fail(near.next_update(kPatient));
+  EXPECT_EQ(part.update.part, (FieldPart{4, {0, 2}, 0}));
+  EXPECT_EQ(part.update.estimate.displacement.row(0), Eigen::RowVector2d(2, 2.4f));
+  EXPECT_EQ(near.latest_usable()->update.part, part.update.part);
+  const auto thinned = value_or_fail(bare.next_update(kPatient));
+  EXPECT_EQ(thinned.update.part, (FieldPart{4, {0}, 0})) << "all others are 1 mm from node 0";
 }
 
 TEST_F(DeliveryTest, ChangesBeyondATolerance) {
@@ -90,11 +87,10 @@ TEST_F(DeliveryTest, ChangesBeyondATolerance) {
   EXPECT_EQ(tolerant.next_update(kPatient)->received_nodes, 4) << "first everything";
   // Node i is now 0.2 (1 + i/10) mm from what is held: nodes 0 to 2 stay.
   observe(1.2);
-  const auto second = tolerant.next_update(kPatient);
-  ASSERT_TRUE(second) << second.error().message;
-  EXPECT_EQ(second->received_nodes, 1);
-  EXPECT_EQ(second->update.part, std::nullopt);
-  EXPECT_EQ(second->update.estimate.displacement.row(0), Eigen::RowVector4d(1, 1.1f, 1.2f, 1.56f));
+  const auto second = value_or_fail(tolerant.next_update(kPatient));
+  EXPECT_EQ(second.received_nodes, 1);
+  EXPECT_EQ(second.update.part, std::nullopt);
+  EXPECT_EQ(second.update.estimate.displacement.row(0), Eigen::RowVector4d(1, 1.1f, 1.2f, 1.56f));
 }
 
 TEST_F(DeliveryTest, ANewSessionBeginsWithEverything) {
@@ -104,11 +100,10 @@ TEST_F(DeliveryTest, ANewSessionBeginsWithEverything) {
   EXPECT_EQ(tolerant.next_update(kPatient)->received_nodes, 4);
   start();
   observe(1.5);
-  const auto first = tolerant.next_update(kPatient);
-  ASSERT_TRUE(first) << first.error().message;
-  EXPECT_EQ(first->session_id, session_);
-  EXPECT_EQ(first->received_nodes, 4);
-  EXPECT_EQ(first->update.estimate.displacement(0, 0), 1.5);
+  const auto first = value_or_fail(tolerant.next_update(kPatient));
+  EXPECT_EQ(first.session_id, session_);
+  EXPECT_EQ(first.received_nodes, 4);
+  EXPECT_EQ(first.update.estimate.displacement(0, 0), 1.5);
 }
 
 TEST_F(DeliveryTest, AnotherChoiceGetsTheLastUpdateAtOnce) {
@@ -123,15 +118,12 @@ TEST_F(DeliveryTest, AnotherChoiceGetsTheLastUpdateAtOnce) {
 TEST_F(DeliveryTest, ARegionWithoutNodesIsRefusedAndTheChoiceBeforeItGoesOn) {
   begin();
   Client choosy = viewer({.region = BallRegion{Vec3(0, 1, 0), 0.5}});
-  const Status refused = choosy.subscribe(1, {.region = BallRegion{Vec3(500, 0, 0), 1.0}});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kEmptySet);
-  EXPECT_EQ(refused.error().message,
+  EXPECT_EQ(refusal_of(choosy.subscribe(1, {.region = BallRegion{Vec3(500, 0, 0), 1.0}}),
+                       ErrorCode::kEmptySet),
             "choice: no node lies in the ball of 1 mm about (500, 0, 0) mm");
   observe(1.0);
-  const auto update = choosy.next_update(kPatient);
-  ASSERT_TRUE(update) << update.error().message;
-  EXPECT_EQ(update->update.part, (FieldPart{4, {2}, 0}));
+  const auto update = value_or_fail(choosy.next_update(kPatient));
+  EXPECT_EQ(update.update.part, (FieldPart{4, {2}, 0}));
 }
 
 TEST_F(DeliveryTest, ViewersWithChoicesThatDoNotReadDelayNobodyAndGetTheNewest) {
@@ -143,14 +135,12 @@ TEST_F(DeliveryTest, ViewersWithChoicesThatDoNotReadDelayNobodyAndGetTheNewest) 
   Client reading = viewer({.tolerance_mm = 0.5});
   for (int update = 1; update <= 30; ++update) {
     const auto whole = observe(update);
-    const auto seen = reading.next_update(kPatient);
-    ASSERT_TRUE(seen) << seen.error().message;
-    EXPECT_EQ(seen->update.sequence, whole.update.sequence);
+    const auto seen = value_or_fail(reading.next_update(kPatient));
+    EXPECT_EQ(seen.update.sequence, whole.update.sequence);
   }
   for (Client& late : stopped) {
-    const auto newest = late.next_update(kPatient);
-    ASSERT_TRUE(newest) << newest.error().message;
-    EXPECT_EQ(newest->update.estimate.displacement(0, 0), 30.0);
+    const auto newest = value_or_fail(late.next_update(kPatient));
+    EXPECT_EQ(newest.update.estimate.displacement(0, 0), 30.0);
   }
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Who receives which update, and when.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
@@ -19,6 +18,7 @@
 #include "common/core/stopwatch.hpp"
 #include "common/wire/decision.hpp"
 #include "server/operations/latency_record.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -325,11 +325,10 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
     const Received received = next(peer, MessageType::kUpdate);
     published.push_back(observation);
     published.push_back(received.payload);
-    const auto message = wire::decode_update(received.payload);
-    ASSERT_TRUE(message.has_value()) << message.error().message;
+    const auto message = value_or_fail(wire::decode_update(received.payload));
     // The bytes carry the times of their own encoding and of their observation's journalling.
-    EXPECT_GT(message->update.timings.encode_ms, 0.0);
-    EXPECT_GT(message->update.timings.journal_ms, 0.0);
+    EXPECT_GT(message.update.timings.encode_ms, 0.0);
+    EXPECT_GT(message.update.timings.journal_ms, 0.0);
   }
   stop();  // writes the journal out
   ASSERT_EQ(kept->records.size(), published.size());
@@ -338,20 +337,18 @@ TEST_F(TransportTest, TheJournalHoldsTheBytesThatClientsReceive) {
               i % 2 == 0 ? io::RecordKind::kObservation : io::RecordKind::kUpdate);
     std::string expected = published[i];
     if (i % 2 == 0) {  // an observation, to which the daemon adds its own time
-      const auto observation = wire::decode_observation(kept->records[i].payload);
-      ASSERT_TRUE(observation.has_value());
-      EXPECT_GT(observation->daemon_ns, 0);
-      wire::append_daemon_time(observation->daemon_ns, expected);
+      const auto observation = value_or_fail(wire::decode_observation(kept->records[i].payload));
+      EXPECT_GT(observation.daemon_ns, 0);
+      wire::append_daemon_time(observation.daemon_ns, expected);
     }
     EXPECT_TRUE(kept->records[i].payload == expected) << "record " << i;
   }
   ASSERT_EQ(kept->decisions.size(), 3u);
   for (std::uint64_t i = 0; i < 3; ++i) {
-    const auto decision = wire::decode_decision(kept->decisions[i].payload);
-    ASSERT_TRUE(decision.has_value()) << decision.error().message;
-    EXPECT_EQ(decision->outcome, Outcome::kUsed);
-    EXPECT_EQ(decision->observation_sequence, i + 1);
-    EXPECT_EQ(decision->update_sequence, i + 1);
+    const auto decision = value_or_fail(wire::decode_decision(kept->decisions[i].payload));
+    EXPECT_EQ(decision.outcome, Outcome::kUsed);
+    EXPECT_EQ(decision.observation_sequence, i + 1);
+    EXPECT_EQ(decision.update_sequence, i + 1);
   }
 }
 

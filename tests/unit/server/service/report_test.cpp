@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the daemon says of itself, against what its clients have seen.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <chrono>
 #include <future>
@@ -12,6 +11,7 @@
 #include <string>
 
 #include "common/wire/report.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
@@ -26,9 +26,7 @@ class ReportTest : public TransportTest {
  protected:
   static DaemonReport report_of(RawPeer& peer) {
     peer.request(MessageType::kReportRequest);
-    const auto report = wire::decode_report(next(peer, MessageType::kReportReply).payload);
-    EXPECT_TRUE(report) << report.error().message;
-    return report ? *report : DaemonReport{};
+    return value_or_fail(wire::decode_report(next(peer, MessageType::kReportReply).payload));
   }
   // Asks until it holds, for at most 10 s.
   template <typename Condition>

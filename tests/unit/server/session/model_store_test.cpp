@@ -2,13 +2,13 @@
 #include "server/session/model_store.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <utility>
 
 #include "common/fem/body_loads.hpp"
 #include "common/inversion/prepared/condense.hpp"
 #include "common/pipeline/scene.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
@@ -66,9 +66,8 @@ TEST(ModelStore, MakesASessionOfEveryMethodAndTellsItsSize) {
 
 TEST(ModelStore, CondensesWhenTheModelFileHoldsNoOperators) {
   ModelStore store(patient(), config(), {});
-  const auto made = store.make({});
-  ASSERT_TRUE(made.has_value());
-  const auto update = (*made)->pipeline.run(tumour_moved(1));
+  const auto made = value_or_fail(store.make({}));
+  const auto update = made->pipeline.run(tumour_moved(1));
   ASSERT_TRUE(update.has_value());
   EXPECT_EQ(update->estimate.status, EstimateStatus::kConverged);
 }
@@ -95,9 +94,7 @@ TEST(ModelStore, OperatorsThatCannotBeReadEndThePreparation) {
                    [](Boundary) -> Result<std::optional<CondensedOperators>> {
                      return fail(ErrorCode::kUnreadable, "toy.h5: is altered");
                    });
-  const auto made = store.make({});
-  ASSERT_FALSE(made.has_value());
-  EXPECT_EQ(made.error().message, "toy.h5: is altered");
+  EXPECT_EQ(sentence_of(store.make({})), "toy.h5: is altered");
 }
 
 TEST(ModelStore, OperatorsThatTheFileLacksAreMade) {
@@ -105,9 +102,8 @@ TEST(ModelStore, OperatorsThatTheFileLacksAreMade) {
                    [](Boundary) -> Result<std::optional<CondensedOperators>> {
                      return std::optional<CondensedOperators>();
                    });
-  const auto made = store.make({});
-  ASSERT_TRUE(made.has_value()) << made.error().message;
-  EXPECT_GT((*made)->info.prepare_s, 0.0);
+  const auto made = value_or_fail(store.make({}));
+  EXPECT_GT(made->info.prepare_s, 0.0);
 }
 
 // The default method, from Session::start() down to its loop over contact sets.
@@ -159,9 +155,7 @@ class SceneSession : public ::testing::Test {
   static Update run(const CaseConfig& config, const Vec3& shift) {
     const auto made = session(config);
     EXPECT_TRUE(made.has_value());
-    auto update = (*made)->pipeline.run(tumour_moved(1, shift));
-    EXPECT_TRUE(update.has_value()) << update.error().message;
-    return std::move(*update);
+    return value_or_fail((*made)->pipeline.run(tumour_moved(1, shift)));
   }
   static const Omission* find(const Update& update, const std::string& part) {
     for (const Omission& omission : update.left_out) {
@@ -229,9 +223,9 @@ TEST_F(SceneSession, PressureDiffersByNoMoreThanIsReported) {
     CaseConfig on = config();
     on.scene.pressure = Carry::kOn;
     on.scene.pressure_step_s = relaxations * relaxation_s;
-    const auto model = inversion::PreparedModel::prepare(patient(), on, Boundary::kContact);
-    ASSERT_TRUE(model.has_value()) << model.error().message;
-    const double missing = (drained - model->forward().solve(load)).colwise().norm().maxCoeff() /
+    const auto model =
+        value_or_fail(inversion::PreparedModel::prepare(patient(), on, Boundary::kContact));
+    const double missing = (drained - model.forward().solve(load)).colwise().norm().maxCoeff() /
                            drained.colwise().norm().maxCoeff();
     EXPECT_LE(missing, pipeline::implicit_step_fraction(on.scene.pressure_step_s, relaxation_s));
     EXPECT_GT(missing,
@@ -258,10 +252,8 @@ TEST_F(SceneSession, PressureThatIsCarriedIsNotLeftOut) {
 TEST_F(SceneSession, RefusesWhatIsNotAvailableBeforeASessionStarts) {
   CaseConfig pressure = config();
   pressure.scene.pressure = Carry::kOn;
-  const auto refused = session(pressure, Method::kIterativeSolver);
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(refused.error().message, HasSubstr("scene.pressure = on"));
+  EXPECT_THAT(refusal_of(session(pressure, Method::kIterativeSolver), ErrorCode::kInvalidArgument),
+              HasSubstr("scene.pressure = on"));
   CaseConfig contact = config();
   contact.scene.contact = Carry::kOff;
   EXPECT_FALSE(session(contact, Method::kPaper).has_value());

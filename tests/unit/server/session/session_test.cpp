@@ -2,11 +2,11 @@
 #include "server/session/session.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <utility>
 #include <vector>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/server/fake_session.hpp"
 
 namespace brainshift::server {
@@ -152,10 +152,9 @@ TEST_F(SessionTest, RefusesObservationsBeforeASessionRuns) {
 
 TEST_F(RunningSession, AnswersAnObservationWithItsUpdate) {
   EXPECT_EQ(answers_.back()->key(), (SessionKey{kBootId, 1, kModelId}));
-  const auto admission = submit(landmarks(5));
-  ASSERT_TRUE(admission.has_value());
-  EXPECT_EQ(admission->receipt.observation_sequence, 5u);
-  EXPECT_FALSE(admission->receipt.replaced_pending);
+  const auto admission = value_or_fail(submit(landmarks(5)));
+  EXPECT_EQ(admission.receipt.observation_sequence, 5u);
+  EXPECT_FALSE(admission.receipt.replaced_pending);
   const UpdateMessage message = answer();
   EXPECT_FALSE(message.error.has_value());
   EXPECT_EQ(message.session_id, 1u);
@@ -237,16 +236,14 @@ TEST_F(RunningSession, SourcesNeedNotShareAClock) {
 // A client that has lost the first answer asks again: nothing is estimated or decided twice.
 TEST_F(RunningSession, TheLastObservationOnceMoreGetsItsReceiptOnceMore) {
   ASSERT_TRUE(submit(landmarks(3)));
-  const auto first = submit(landmarks(4));
-  ASSERT_TRUE(first.has_value());
-  EXPECT_TRUE(first->receipt.replaced_pending);
+  const auto first = value_or_fail(submit(landmarks(4)));
+  EXPECT_TRUE(first.receipt.replaced_pending);
   answer();
   told();
-  const auto again = submit(landmarks(4));
-  ASSERT_TRUE(again.has_value());
-  EXPECT_TRUE(again->repeated);
-  EXPECT_EQ(again->receipt.observation_sequence, 4u);
-  EXPECT_TRUE(again->receipt.replaced_pending);
+  const auto again = value_or_fail(submit(landmarks(4)));
+  EXPECT_TRUE(again.repeated);
+  EXPECT_EQ(again.receipt.observation_sequence, 4u);
+  EXPECT_TRUE(again.receipt.replaced_pending);
   EXPECT_FALSE(next_job());
   EXPECT_THAT(told(), ElementsAre("changed tracking 1"));
   Observation other = landmarks(4);

@@ -2,11 +2,11 @@
 #include "server/session/sources.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 #include <string>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/server/sample_values.hpp"
 
 namespace brainshift::server {
@@ -39,11 +39,9 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
     SCOPED_TRACE(row.says);
     Observation observation = landmarks(2);
     row.spoil(observation);
-    const auto status = check_observation(observation, kCase, running);
-    ASSERT_FALSE(status.has_value());
-    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(status.error().message, HasSubstr(row.says));
-    EXPECT_THAT(status.error().message, testing::Not(HasSubstr("\n")));
+    EXPECT_THAT(
+        refusal_of(check_observation(observation, kCase, running), ErrorCode::kInvalidArgument),
+        testing::AllOf(HasSubstr(row.says), testing::Not(HasSubstr("\n"))));
   }
 }
 
@@ -63,9 +61,7 @@ Observation seen(std::int64_t acquired_ns, std::int64_t sent_ns = 0) {
 }
 
 void expect_refused(const Result<std::int64_t>& time, const std::string& why) {
-  ASSERT_FALSE(time);
-  EXPECT_EQ(time.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(time.error().message, HasSubstr(why));
+  EXPECT_THAT(refusal_of(time, ErrorCode::kInvalidArgument), HasSubstr(why));
 }
 
 // Whatever the source's clock shows, only differences count.
@@ -145,10 +141,9 @@ TEST(Sources, WhatIsRefusedTakesNoPlaceAndNoNumber) {
   for (std::size_t i = 0; i < Sources::kMaxSources; ++i) {
     EXPECT_TRUE(sources.admit(landmarks(1, "source " + std::to_string(i)), 0, false));
   }
-  const auto full = sources.admit(landmarks(1, "one too many"), 0, false);
-  ASSERT_FALSE(full);
-  EXPECT_EQ(full.error().code, ErrorCode::kUnavailable);
-  EXPECT_THAT(full.error().message, HasSubstr("16 other sources"));
+  EXPECT_THAT(
+      refusal_of(sources.admit(landmarks(1, "one too many"), 0, false), ErrorCode::kUnavailable),
+      HasSubstr("16 other sources"));
   EXPECT_TRUE(sources.admit(landmarks(2, "source 0"), 0, false)) << "those known go on";
 }
 
@@ -157,10 +152,10 @@ TEST(Sources, WhatIsRefusedTakesNoPlaceAndNoNumber) {
 TEST(Sources, ASequenceNumberMustBeAboveTheLastOneOfItsSource) {
   Sources sources(kMaxAge_s, false);
   const auto refused = [&](std::uint64_t sequence, const char* source, const char* says) {
-    const auto admission = sources.admit(landmarks(sequence, source), 0, false);
-    ASSERT_FALSE(admission) << sequence;
-    EXPECT_EQ(admission.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(admission.error().message, HasSubstr(says));
+    EXPECT_THAT(refusal_of(sources.admit(landmarks(sequence, source), 0, false),
+                           ErrorCode::kInvalidArgument),
+                HasSubstr(says))
+        << sequence;
   };
   const auto taken = [&](std::uint64_t sequence, const char* source) {
     return sources.admit(landmarks(sequence, source), 0, false).has_value();
@@ -182,11 +177,10 @@ TEST(Sources, ASequenceNumberMustBeAboveTheLastOneOfItsSource) {
 TEST(Sources, ARepetitionGetsTheFirstReceiptAndChangesNothing) {
   Sources sources(120.0, false);
   ASSERT_TRUE(sources.admit(landmarks(4), 0, true));
-  const auto again = sources.admit(landmarks(4), kHour, false);
-  ASSERT_TRUE(again);
-  EXPECT_TRUE(again->repeated);
-  EXPECT_EQ(again->receipt.observation_sequence, 4u);
-  EXPECT_TRUE(again->receipt.replaced_pending);
+  const auto again = value_or_fail(sources.admit(landmarks(4), kHour, false));
+  EXPECT_TRUE(again.repeated);
+  EXPECT_EQ(again.receipt.observation_sequence, 4u);
+  EXPECT_TRUE(again.receipt.replaced_pending);
   EXPECT_FALSE(sources.admit(landmarks(3), 0, false));
   EXPECT_FALSE(sources.admit(landmarks(5), 0, false)->repeated);
 }

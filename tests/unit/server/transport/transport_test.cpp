@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Requests, good, bad and malformed, and the parts of the transport.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 #include <memory>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "server/transport/peers.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/server/transport_fixture.hpp"
 
 namespace brainshift::server {
@@ -21,10 +21,10 @@ using testing::HasSubstr;
 TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
   serve(without_model());
   RawPeer peer(endpoint_);
-  const auto status = wire::decode_status(peer.ask(MessageType::kStatusRequest).payload);
-  ASSERT_TRUE(status.has_value());
-  EXPECT_FALSE(status->model_ready);
-  EXPECT_EQ(status->version, "1.2.3");
+  const auto status =
+      value_or_fail(wire::decode_status(peer.ask(MessageType::kStatusRequest).payload));
+  EXPECT_FALSE(status.model_ready);
+  EXPECT_EQ(status.version, "1.2.3");
   EXPECT_EQ(error_of(peer.ask(MessageType::kModelRequest)).code, ErrorCode::kModelNotReady);
   EXPECT_EQ(error_of(peer.hand_in(landmarks(1))).code, ErrorCode::kModelNotReady);
   const auto start = peer.start(session_of(), 77);
@@ -36,14 +36,14 @@ TEST_F(TransportTest, ADaemonWithoutAModelSaysSo) {
 TEST_F(TransportTest, AnswersStatusModelAndSession) {
   serve(with_model());
   RawPeer peer(endpoint_);
-  const auto model = wire::decode_model(peer.ask(MessageType::kModelRequest).payload);
-  ASSERT_TRUE(model.has_value());
-  EXPECT_EQ(model->mesh.nodes, small_model()->mesh.nodes);
+  const auto model =
+      value_or_fail(wire::decode_model(peer.ask(MessageType::kModelRequest).payload));
+  EXPECT_EQ(model.mesh.nodes, small_model()->mesh.nodes);
   start_session(peer);
-  const auto status = wire::decode_status(peer.ask(MessageType::kStatusRequest).payload);
-  ASSERT_TRUE(status.has_value());
-  EXPECT_TRUE(status->model_ready);
-  EXPECT_EQ(status->case_id, kCase);
+  const auto status =
+      value_or_fail(wire::decode_status(peer.ask(MessageType::kStatusRequest).payload));
+  EXPECT_TRUE(status.model_ready);
+  EXPECT_EQ(status.case_id, kCase);
   const SessionState state = renew(peer, {1, 1, 0});
   EXPECT_EQ(state.session, (SessionKey{kBootId, 1, kModelId}));
   EXPECT_EQ(state.phase, SessionPhase::kReady);
@@ -205,21 +205,16 @@ TEST(Router, RefusesAnEndpointThatIsNone) {
                                "tcp://127.0.0.1:-1", "tcp://127.0.0.1:80x", "tcp://127.0.0.1"}) {
     RouterOptions options;
     options.endpoint = endpoint;
-    const auto router = Router::bind(options);
-    ASSERT_FALSE(router.has_value()) << endpoint;
-    EXPECT_EQ(router.error().code, ErrorCode::kInvalidArgument) << endpoint;
-    EXPECT_THAT(router.error().message, HasSubstr(endpoint));
+    EXPECT_THAT(refusal_of(Router::bind(options), ErrorCode::kInvalidArgument),
+                HasSubstr(endpoint));
   }
 }
 
 TEST(Router, APortInUseIsUnavailable) {
-  const auto first = Router::bind({});
-  ASSERT_TRUE(first.has_value());
+  const auto first = value_or_fail(Router::bind({}));
   RouterOptions options;
-  options.endpoint = first->endpoint();
-  const auto second = Router::bind(options);
-  ASSERT_FALSE(second.has_value());
-  EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
+  options.endpoint = first.endpoint();
+  refusal_of(Router::bind(options), ErrorCode::kUnavailable);
 }
 
 // ---------- parts ----------

@@ -2,7 +2,6 @@
 #include "client/tools/bridge/field_stream.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 

@@ -2,13 +2,13 @@
 #include "client/tools/bridge/follower.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <future>
 #include <mutex>
 #include <thread>
 
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 
@@ -271,9 +271,7 @@ TEST(FollowerAlone, EndsWithAnErrorWhenTheOptionsCanNeverBeMet) {
   calls.show = [](PicturePtr) {};
   calls.tell = [](const std::string&) {};
   Follower follower({.endpoint = "nonsense"}, calls);
-  const Status status = follower.run({});
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  refusal_of(follower.run({}), ErrorCode::kInvalidArgument);
 }
 
 }  // namespace

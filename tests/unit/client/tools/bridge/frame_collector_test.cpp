@@ -2,7 +2,6 @@
 #include "client/tools/bridge/frame_collector.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace brainshift::client {
 namespace {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
 #include <future>
@@ -10,6 +9,7 @@
 #include "client/tools/bridge/inbox.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/igtl/surface.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/virtual_sweep.hpp"
 
@@ -286,9 +286,8 @@ TEST(InboundWorker, AnObservationNamesCaseSessionSourceAndTimes) {
 
 TEST(InboundWorker, ABoundaryFarFromTheTumourIsRefused) {
   const auto far = observation_of(boundary_at(Vec3(-130, 30, 40)), kFollowed, 1);
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(far.error().message, HasSubstr("160 mm from the tumour of case toy"));
+  EXPECT_THAT(refusal_of(far, ErrorCode::kInvalidArgument),
+              HasSubstr("160 mm from the tumour of case toy"));
   EXPECT_TRUE(observation_of(boundary_at(Vec3(-69, 30, 40)), kFollowed, 1));
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fcntl.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/socket.h>
 
 #include <array>
@@ -9,6 +8,7 @@
 #include "client/tools/bridge/peer.hpp"
 #include "client/tools/bridge/socket.hpp"
 #include "tests/support/igtl_peer.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -28,11 +28,9 @@ TEST(Address, RefusesWhatIsUnclear) {
   for (const char* text :
        {"", "18945", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", "127.0.0.1:-1",
         "127.0.0.1:80 ", "::1:18945", "[::1]", "[]:1", "a b:1", "http://a:1", "a:1:2"}) {
-    const auto address = parse_address("--listen", text);
-    ASSERT_FALSE(address) << text;
-    EXPECT_EQ(address.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(address.error().message,
-                testing::StartsWith("--listen " + std::string(text) + ": must be ADDRESS:PORT"));
+    EXPECT_THAT(refusal_of(parse_address("--listen", text), ErrorCode::kInvalidArgument),
+                testing::StartsWith("--listen " + std::string(text) + ": must be ADDRESS:PORT"))
+        << text;
   }
 }
 
@@ -205,18 +203,14 @@ TEST(Peer, HandsOnWhatIsWantedAndNoticesTheEnd) {
   EXPECT_TRUE(pair.ours.read(note));
   EXPECT_THAT(devices, testing::ElementsAre("a", "c"));
   { const IgtlPeer closes = std::move(pair.theirs); }
-  const Status ended = pair.ours.read(note);
-  ASSERT_FALSE(ended);
-  EXPECT_EQ(ended.error().code, ErrorCode::kUnavailable);
+  refusal_of(pair.ours.read(note), ErrorCode::kUnavailable);
 }
 
 TEST(Peer, WhatIsNoOpenIgtLinkEndsIt) {
   Pair pair = connected();
   pair.theirs.send(
       std::string("GET / HTTP/1.1\r\nHost: localhost\r\nAccept: everything there is\r\n"));
-  const Status status = pair.ours.read(ignore);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kProtocol);
+  refusal_of(pair.ours.read(ignore), ErrorCode::kProtocol);
 }
 
 }  // namespace

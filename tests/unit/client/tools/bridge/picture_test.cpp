@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -266,10 +265,10 @@ TEST_F(BroadcastOfAToy, ABlankPictureIsZeroAndUndeformedAndSaysWhy) {
   const auto& status = std::get<igtl::StatusReport>(all[0].message.content);
   EXPECT_EQ(status.code, igtl::kStatusNotReady);
   EXPECT_EQ(status.text, "no word from the daemon");
-  const auto json = nlohmann::json::parse(std::get<igtl::Text>(all[1].message.content).text);
-  EXPECT_EQ(json.at("blank"), true);
-  EXPECT_EQ(json.at("sequence"), 0);
-  EXPECT_EQ(json.at("grid_error_mm"), 0.0);
+  const auto said = json::parse(std::get<igtl::Text>(all[1].message.content).text);
+  EXPECT_EQ(said.at("blank"), true);
+  EXPECT_EQ(said.at("sequence"), 0);
+  EXPECT_EQ(said.at("grid_error_mm"), 0.0);
   for (const std::size_t i : {2, 3}) {
     const auto& image = std::get<igtl::Image>(all[i].message.content);
     EXPECT_EQ(image.geometry.dims, stream.grid().dims);

@@ -12,6 +12,7 @@
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/client/tools/export/small_export.hpp"
 
 namespace brainshift::client {
@@ -24,27 +25,22 @@ using testing::StartsWith;
 class ChooseUpdate : public SmallExport {
  protected:
   Result<ChosenUpdate> choose(const UpdateChoice& choice = {}) const {
-    const auto file = io::SurgeryFile::open(path);
-    EXPECT_TRUE(file);
-    return choose_update(*file, path, model.mesh.num_nodes(), choice);
+    const auto file = value_or_fail(io::SurgeryFile::open(path));
+    return choose_update(file, path, model.mesh.num_nodes(), choice);
   }
   void expect_refused(const UpdateChoice& choice, ErrorCode code, const std::string& says) const {
-    const auto chosen = choose(choice);
-    ASSERT_FALSE(chosen) << says;
-    EXPECT_EQ(chosen.error().code, code) << chosen.error().message;
-    EXPECT_THAT(chosen.error().message, HasSubstr(says));
+    EXPECT_THAT(refusal_of(choose(choice), code), HasSubstr(says));
   }
 };
 
 TEST_F(ChooseUpdate, TheLastUsableOneIsTheDefault) {
   write_updates({message(1, Quality::kGood), message(2, Quality::kCaution, 0.5),
                  message(3, Quality::kUnusable), message(4, Quality::kNotJudged)});
-  const auto chosen = choose();
-  ASSERT_TRUE(chosen) << chosen.error().message;
-  EXPECT_EQ(chosen->message.update.sequence, 2u);
-  EXPECT_EQ(chosen->message.session_id, 41u);
-  EXPECT_NEAR(chosen->time_s, 1.0, 1e-6);
-  EXPECT_TRUE(chosen->message.update.estimate.displacement.isApprox(
+  const auto chosen = value_or_fail(choose());
+  EXPECT_EQ(chosen.message.update.sequence, 2u);
+  EXPECT_EQ(chosen.message.session_id, 41u);
+  EXPECT_NEAR(chosen.time_s, 1.0, 1e-6);
+  EXPECT_TRUE(chosen.message.update.estimate.displacement.isApprox(
       test_support::toy_displacement(model.mesh.nodes, 0.5), 1e-6));
 }
 
@@ -111,9 +107,7 @@ TEST_F(ChooseUpdate, ABrokenRecordIsNamed) {
       sqlite3_exec(db, "UPDATE record SET payload = x'01' WHERE id = 3", nullptr, nullptr, nullptr),
       SQLITE_OK);
   sqlite3_close(db);
-  const auto chosen = choose();
-  ASSERT_FALSE(chosen);
-  EXPECT_THAT(chosen.error().message, AllOf(StartsWith(path.string()), HasSubstr("record 3")));
+  EXPECT_THAT(sentence_of(choose()), AllOf(StartsWith(path.string()), HasSubstr("record 3")));
 }
 
 namespace fs = std::filesystem;
@@ -157,10 +151,8 @@ class ExportSurgery : public SmallExport {
   void expect_refused(ErrorCode code, const std::string& says) const {
     const auto before = names(folder.path());
     const auto result = export_surgery(options);
-    ASSERT_FALSE(result) << says;
-    EXPECT_EQ(result.error().code, code) << result.error().message;
-    EXPECT_THAT(result.error().message, HasSubstr(says));
-    EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
+    EXPECT_THAT(refusal_of(result, code),
+                AllOf(HasSubstr(says), testing::Not(testing::HasSubstr("\n"))));
     EXPECT_THAT(names(folder.path()), testing::UnorderedElementsAreArray(before));
   }
   json manifest() const { return json::parse(content_of(options.out / "export.json")); }
@@ -171,8 +163,7 @@ class ExportSurgery : public SmallExport {
 TEST_F(ExportSurgery, TheFolderHoldsWhatTheManifestLists) {
   options.formats = parse_formats({"all"}).value();
   options.images = {write_image("t1.nii.gz")};
-  const auto made = export_surgery(options);
-  ASSERT_TRUE(made) << made.error().message;
+  const auto made = value_or_fail(export_surgery(options));
   EXPECT_THAT(names(options.out),
               UnorderedElementsAre("displacement-1007.nii.gz", "displacement-1006.nii.gz",
                                    "displacement.nrrd", "displacement.h5", "sd_mm.nii.gz",
@@ -190,7 +181,7 @@ TEST_F(ExportSurgery, TheFolderHoldsWhatTheManifestLists) {
     EXPECT_TRUE(fs::exists(options.out / file.at("file").get<std::string>())) << file;
     EXPECT_EQ(file.at("model_id"), model.model_id);
   }
-  EXPECT_EQ(made->files.size(), 10u);
+  EXPECT_EQ(made.files.size(), 10u);
 }
 
 TEST_F(ExportSurgery, FormatsChooseFiles) {
@@ -204,15 +195,13 @@ TEST_F(ExportSurgery, TheGridOfAnImageIsTaken) {
   options.like = write_image("like.nii");
   options.spacing_mm.reset();
   options.formats = {ExportFormat::kSd};
-  const auto made = export_surgery(options);
-  ASSERT_TRUE(made) << made.error().message;
-  const auto sd = io::read_nifti(options.out / "sd_mm.nii.gz");
-  ASSERT_TRUE(sd);
-  EXPECT_EQ(sd->dims, (std::array<int, 3>{30, 30, 30}));
-  EXPECT_EQ(sd->T_ras_voxel.translation(), Vec3(-10, -10, -10));
-  EXPECT_NEAR(*std::max_element(sd->values.begin(), sd->values.end()), 0.25, 1e-6);
-  EXPECT_EQ(made->voxels_in_brain,
-            static_cast<std::size_t>(std::count_if(sd->values.begin(), sd->values.end(),
+  const auto made = value_or_fail(export_surgery(options));
+  const auto sd = value_or_fail(io::read_nifti(options.out / "sd_mm.nii.gz"));
+  EXPECT_EQ(sd.dims, (std::array<int, 3>{30, 30, 30}));
+  EXPECT_EQ(sd.T_ras_voxel.translation(), Vec3(-10, -10, -10));
+  EXPECT_NEAR(*std::max_element(sd.values.begin(), sd.values.end()), 0.25, 1e-6);
+  EXPECT_EQ(made.voxels_in_brain,
+            static_cast<std::size_t>(std::count_if(sd.values.begin(), sd.values.end(),
                                                    [](float v) { return v > 0.0F; })));
 }
 
@@ -222,25 +211,23 @@ TEST_F(ExportSurgery, AnImageIsWarpedThroughTheField) {
   options.spacing_mm.reset();
   options.formats = {ExportFormat::kSd};
   ASSERT_TRUE(export_surgery(options));
-  const auto warped = io::read_nifti(options.out / "warped-t1.nii.gz");
-  ASSERT_TRUE(warped);
+  const auto warped = value_or_fail(io::read_nifti(options.out / "warped-t1.nii.gz"));
   // In the middle of the brain, of an image that rises by 1 in 2.75 mm along x. The field is that
   // of nodes 20 mm apart, hence the tolerance.
-  const Vec3 x = warped->T_ras_voxel * Vec3(15, 15, 15);
+  const Vec3 x = warped.T_ras_voxel * Vec3(15, 15, 15);
   Vec3 undeformed = x;
   for (int i = 0; i < 20; ++i) undeformed = x - Vec3(test_support::toy_displacement(undeformed));
-  EXPECT_NEAR(warped->at(15, 15, 15), 100.0 + (undeformed[0] + 10.0) / 2.75, 0.03);
+  EXPECT_NEAR(warped.at(15, 15, 15), 100.0 + (undeformed[0] + 10.0) / 2.75, 0.03);
   EXPECT_GT(x[0] - undeformed[0], 1.0);
-  EXPECT_NEAR(warped->at(0, 0, 0), 100.0, 0.2);
+  EXPECT_NEAR(warped.at(0, 0, 0), 100.0, 0.2);
 }
 
 TEST_F(ExportSurgery, SurfacesAreDeformedAndReadBack) {
   options.formats = {ExportFormat::kSurfaces};
   ASSERT_TRUE(export_surgery(options));
-  const auto tumour = io::read_surface(options.out / "tumour.vtp");
-  ASSERT_TRUE(tumour) << tumour.error().message;
-  EXPECT_EQ(tumour->num_vertices(), model.tumour.num_vertices());
-  EXPECT_LT((tumour->vertices - model.tumour.vertices).row(2).maxCoeff(), -2.0);
+  const auto tumour = value_or_fail(io::read_surface(options.out / "tumour.vtp"));
+  EXPECT_EQ(tumour.num_vertices(), model.tumour.num_vertices());
+  EXPECT_LT((tumour.vertices - model.tumour.vertices).row(2).maxCoeff(), -2.0);
 }
 
 TEST_F(ExportSurgery, TheTwoDirectionsAreOpposite) {
@@ -248,9 +235,8 @@ TEST_F(ExportSurgery, TheTwoDirectionsAreOpposite) {
   ASSERT_TRUE(export_surgery(options));
   options.direction = FieldDirection::kModeling;
   options.out = folder / "other";
-  const auto made = export_surgery(options);
-  ASSERT_TRUE(made);
-  EXPECT_EQ(made->files.at(0).direction, "modeling");
+  const auto made = value_or_fail(export_surgery(options));
+  EXPECT_EQ(made.files.at(0).direction, "modeling");
   EXPECT_NE(content_of(folder / "out" / "displacement.h5"),
             content_of(folder / "other" / "displacement.h5"));
 }
@@ -259,8 +245,7 @@ TEST_F(ExportSurgery, AnUnusableUpdateSaysSoInEveryNameAndHeader) {
   options.choice = {.sequence = 3};
   expect_refused(ErrorCode::kInvalidArgument, "update 3 is unusable (volume_lost)");
   options.choice.allow_unusable = true;
-  const auto made = export_surgery(options);
-  ASSERT_TRUE(made) << made.error().message;
+  value_or_fail(export_surgery(options));
   for (const std::string& name : names(options.out)) {
     EXPECT_THAT(name, testing::AnyOf(StartsWith("unusable-"), "export.json"));
   }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/tools/export/manifest.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -28,12 +29,10 @@ TEST(ExportFormat, AllIsMoreThanTheDefaultByTheSeries) {
 
 TEST(ExportFormat, AnotherWordIsNamedWithThoseThereAre) {
   for (const char* word : {"", "nifti", "NRRD", "sd ", "h5"}) {
-    const auto formats = parse_formats({"sd", word});
-    ASSERT_FALSE(formats) << word;
-    EXPECT_EQ(formats.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(formats.error().message, HasSubstr("--formats: \"" + std::string(word) +
-                                                   "\" is not a format: must be nifti-1007, "));
-    EXPECT_THAT(formats.error().message, HasSubstr("series, or all"));
+    EXPECT_THAT(refusal_of(parse_formats({"sd", word}), ErrorCode::kInvalidArgument),
+                testing::AllOf(HasSubstr("--formats: \"" + std::string(word) +
+                                         "\" is not a format: must be nifti-1007, "),
+                               HasSubstr("series, or all")));
   }
 }
 

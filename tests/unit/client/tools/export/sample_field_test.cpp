@@ -7,6 +7,7 @@
 #include "client/tools/export/sample_field.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -19,10 +20,9 @@ TEST(OutputGrid, LikeAnImageIsItsAffineAsItIs) {
   image.T_ras_voxel.linear() =
       Eigen::AngleAxisd(0.4, Vec3::UnitY()).toRotationMatrix() * Vec3(-1, 2, 3).asDiagonal();
   image.T_ras_voxel.translation() = Vec3(7, 8, 9);
-  const auto grid = grid_like(image);
-  ASSERT_TRUE(grid) << grid.error().message;
-  EXPECT_EQ(grid->dims, image.dims);
-  EXPECT_EQ(grid->T_ras_voxel.matrix(), image.T_ras_voxel.matrix());
+  const auto grid = value_or_fail(grid_like(image));
+  EXPECT_EQ(grid.dims, image.dims);
+  EXPECT_EQ(grid.T_ras_voxel.matrix(), image.T_ras_voxel.matrix());
 }
 
 TEST(OutputGrid, AShearedImageIsRefused) {
@@ -37,11 +37,10 @@ TEST(OutputGrid, AroundTheBrainHasRoomForTheFieldBeforeAndAfter) {
   Points u = Points::Zero(3, mesh.num_nodes());
   u.row(0).setConstant(-7.0);
   const OutsideTaper taper{4.0, 10.0};
-  const auto grid = grid_around_brain(mesh, u, 1.5, taper);
-  ASSERT_TRUE(grid) << grid.error().message;
-  EXPECT_EQ(grid->T_ras_voxel.linear(), 1.5 * Mat3::Identity());
-  const Vec3 low = grid->voxel_mm(0, 0, 0);
-  const Vec3 high = grid->voxel_mm(grid->dims[0] - 1, grid->dims[1] - 1, grid->dims[2] - 1);
+  const auto grid = value_or_fail(grid_around_brain(mesh, u, 1.5, taper));
+  EXPECT_EQ(grid.T_ras_voxel.linear(), 1.5 * Mat3::Identity());
+  const Vec3 low = grid.voxel_mm(0, 0, 0);
+  const Vec3 high = grid.voxel_mm(grid.dims[0] - 1, grid.dims[1] - 1, grid.dims[2] - 1);
   EXPECT_TRUE((low.array() <= Vec3(-17, -10, -10).array()).all()) << low.transpose();
   EXPECT_TRUE((high.array() >= Vec3(50, 60, 70).array()).all()) << high.transpose();
   EXPECT_TRUE((low.array() > Vec3(-17, -10, -10).array() - 4.0).all()) << low.transpose();
@@ -113,17 +112,16 @@ TEST(SampleField, ModelingIsTheDisplacementAtTheVoxel) {
   Mat3 gradient;
   gradient << 0.05, -0.02, 0.0, 0.01, -0.04, 0.03, 0.0, 0.02, 0.06;
   const Vec3 shift(1, -2, 3);
-  const auto samples = sample_field(mesh, affine_field(mesh, gradient, shift), {}, oblique_grid(),
-                                    FieldDirection::kModeling);
-  ASSERT_TRUE(samples) << samples.error().message;
+  const auto samples = value_or_fail(sample_field(mesh, affine_field(mesh, gradient, shift), {},
+                                                  oblique_grid(), FieldDirection::kModeling));
   std::size_t inside = 0;
-  for_each_voxel(samples->field.grid, [&](const Vec3& x, std::size_t voxel) {
+  for_each_voxel(samples.field.grid, [&](const Vec3& x, std::size_t voxel) {
     if (!in_box(x)) return;
     ++inside;
-    EXPECT_LT((value(*samples, voxel) - (gradient * x + shift)).norm(), kFloat_mm);
+    EXPECT_LT((value(samples, voxel) - (gradient * x + shift)).norm(), kFloat_mm);
   });
   EXPECT_GT(inside, 5000u);
-  EXPECT_EQ(samples->voxels_inside, inside);
+  EXPECT_EQ(samples.voxels_inside, inside);
 }
 
 // The inverse of x -> (I + G) x + s is known.
@@ -133,19 +131,18 @@ TEST(SampleField, ResamplingIsTheInverseOfAnAffineMap) {
   gradient << 0.05, -0.02, 0.0, 0.01, -0.04, 0.03, 0.0, 0.02, 0.06;
   const Vec3 shift(1, -2, 3);
   const Mat3 inverse = (Mat3::Identity() + gradient).inverse();
-  const auto samples = sample_field(mesh, affine_field(mesh, gradient, shift), {}, oblique_grid(),
-                                    FieldDirection::kResampling);
-  ASSERT_TRUE(samples) << samples.error().message;
-  EXPECT_EQ(samples->field.direction, FieldDirection::kResampling);
+  const auto samples = value_or_fail(sample_field(mesh, affine_field(mesh, gradient, shift), {},
+                                                  oblique_grid(), FieldDirection::kResampling));
+  EXPECT_EQ(samples.field.direction, FieldDirection::kResampling);
   std::size_t inside = 0;
-  for_each_voxel(samples->field.grid, [&](const Vec3& x, std::size_t voxel) {
+  for_each_voxel(samples.field.grid, [&](const Vec3& x, std::size_t voxel) {
     const Vec3 undeformed = inverse * (x - shift);
     if (!in_box(undeformed)) return;
     ++inside;
-    EXPECT_LT((x + value(*samples, voxel) - undeformed).norm(), kFloat_mm);
+    EXPECT_LT((x + value(samples, voxel) - undeformed).norm(), kFloat_mm);
   });
   EXPECT_GT(inside, 5000u);
-  EXPECT_EQ(samples->voxels_inside, inside);
+  EXPECT_EQ(samples.voxels_inside, inside);
 }
 
 TEST(SampleField, ThereAndBackThroughTheMeshEndsWhereItBegan) {
@@ -228,13 +225,12 @@ TEST(SampleField, VolumeRatiosAreDeterminants) {
 TEST(SampleField, AFoldedFieldHasNoInverseButCanBeLookedAt) {
   const TetMesh mesh = brain();
   const Points u = affine_field(mesh, Vec3(-1.5, 0, 0).asDiagonal().toDenseMatrix(), Vec3::Zero());
-  const auto back = sample_field(mesh, u, {}, oblique_grid(), FieldDirection::kResampling);
-  ASSERT_FALSE(back);
-  EXPECT_EQ(back.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(back.error().message, HasSubstr("turns 1296 of 1296 elements inside out"));
-  const auto there = sample_field(mesh, u, {}, oblique_grid(), FieldDirection::kModeling);
-  ASSERT_TRUE(there);
-  EXPECT_LT(*std::min_element(there->jacobian.values.begin(), there->jacobian.values.end()), -0.4F);
+  EXPECT_THAT(refusal_of(sample_field(mesh, u, {}, oblique_grid(), FieldDirection::kResampling),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("turns 1296 of 1296 elements inside out"));
+  const auto there =
+      value_or_fail(sample_field(mesh, u, {}, oblique_grid(), FieldDirection::kModeling));
+  EXPECT_LT(*std::min_element(there.jacobian.values.begin(), there.jacobian.values.end()), -0.4F);
 }
 
 TEST(SampleField, InvalidInputIsRefused) {
@@ -256,11 +252,10 @@ TEST(SampleField, AGridFarAwayIsZeroAndSaysThatNothingIsInside) {
   const TetMesh mesh = brain();
   io::VoxelGrid grid = oblique_grid();
   grid.T_ras_voxel.translation() += Vec3(500, 0, 0);
-  const auto samples =
-      sample_field(mesh, Points::Ones(3, mesh.num_nodes()), {}, grid, FieldDirection::kResampling);
-  ASSERT_TRUE(samples);
-  EXPECT_EQ(samples->voxels_inside, 0u);
-  EXPECT_EQ(samples->largest_mm, 0.0);
+  const auto samples = value_or_fail(
+      sample_field(mesh, Points::Ones(3, mesh.num_nodes()), {}, grid, FieldDirection::kResampling));
+  EXPECT_EQ(samples.voxels_inside, 0u);
+  EXPECT_EQ(samples.largest_mm, 0.0);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/core/random.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -51,18 +52,17 @@ TEST(HeldPoints, EveryRestIsFoundAndAveraged) {
   path.rest(Vec3(80, 0, 0), 3.0, 0.15);
   path.move(Vec3(80, 60, 20), 1.0);
   path.rest(Vec3(80, 60, 20), 1.5, 0.15);
-  const auto held = find_holds(path.samples);
-  ASSERT_TRUE(held) << held.error().message;
-  ASSERT_THAT(*held, SizeIs(3));
+  const auto held = value_or_fail(find_holds(path.samples));
+  ASSERT_THAT(held, SizeIs(3));
   const Vec3 places[] = {Vec3(0, 0, 0), Vec3(80, 0, 0), Vec3(80, 60, 20)};
   for (std::size_t i = 0; i < 3; ++i) {
     // The mean of some 25 poses is five times as near as one pose.
-    EXPECT_LT(((*held)[i].tip - places[i]).norm(), 0.15) << i;
-    EXPECT_NEAR((*held)[i].spread_mm, 0.15 * std::sqrt(3.0), 0.07) << i;
+    EXPECT_LT((held[i].tip - places[i]).norm(), 0.15) << i;
+    EXPECT_NEAR(held[i].spread_mm, 0.15 * std::sqrt(3.0), 0.07) << i;
   }
-  EXPECT_NEAR((*held)[1].from_s, 3.0, 0.11);
-  EXPECT_NEAR((*held)[1].to_s, 5.95, 0.16);
-  EXPECT_GT((*held)[1].poses, 40);
+  EXPECT_NEAR(held[1].from_s, 3.0, 0.11);
+  EXPECT_NEAR(held[1].to_s, 5.95, 0.16);
+  EXPECT_GT(held[1].poses, 40);
 }
 
 TEST(HeldPoints, TheWayThereAndBackDoesNotPullThePoint) {
@@ -70,10 +70,9 @@ TEST(HeldPoints, TheWayThereAndBackDoesNotPullThePoint) {
   path.rest(Vec3(-20, 0, 0), 0.3);
   path.move(Vec3(0, 0, 0), 2.0);  // 0.5 mm from pose to pose: the last ones lie within the radius
   path.rest(Vec3(0, 0, 0), 2.0);
-  const auto held = find_holds(path.samples);
-  ASSERT_TRUE(held);
-  ASSERT_THAT(*held, SizeIs(1));
-  EXPECT_LT((*held)[0].tip.norm(), 1e-9);
+  const auto held = value_or_fail(find_holds(path.samples));
+  ASSERT_THAT(held, SizeIs(1));
+  EXPECT_LT(held[0].tip.norm(), 1e-9);
 }
 
 TEST(HeldPoints, ASlowMotionOrAShortRestIsNoHold) {
@@ -92,10 +91,9 @@ TEST(HeldPoints, ALostTrackerEndsARunAndNotAHold) {
   path.rest(Vec3(5, 5, 5), 1.5);
   path.pause(1.0);
   path.rest(Vec3(5.3, 5, 5), 1.5);
-  const auto held = find_holds(path.samples);
-  ASSERT_TRUE(held);
-  ASSERT_THAT(*held, SizeIs(1));
-  EXPECT_NEAR((*held)[0].to_s, 3.95, 0.06);
+  const auto held = value_or_fail(find_holds(path.samples));
+  ASSERT_THAT(held, SizeIs(1));
+  EXPECT_NEAR(held[0].to_s, 3.95, 0.06);
   // Neither part is long enough by itself where the tracker was lost between them.
   HoldOptions longer;
   longer.least_s = 2.0;

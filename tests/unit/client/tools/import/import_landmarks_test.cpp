@@ -11,6 +11,7 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/model_id.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_journal.hpp"
 #include "tests/support/toy_patient.hpp"
@@ -66,10 +67,9 @@ class ImportLandmarks : public testing::Test {
   }
 
   std::string refusal() const {
-    const auto report = import_landmarks(options);
-    EXPECT_FALSE(report);
+    const std::string sentence = sentence_of(import_landmarks(options));
     EXPECT_FALSE(std::filesystem::exists(options.out)) << "something was left behind";
-    return report ? std::string() : report.error().message;
+    return sentence;
   }
 
   TemporaryFolder folder;
@@ -78,8 +78,7 @@ class ImportLandmarks : public testing::Test {
 
 TEST_F(ImportLandmarks, PairsBecomeOneObservation) {
   options.sd_mm = 0.8;
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
+  value_or_fail(import_landmarks(options));
   const Observation observation = made();
   EXPECT_EQ(observation.case_id, "toy");
   EXPECT_EQ(observation.source, "landmarks");
@@ -105,13 +104,12 @@ TEST_F(ImportLandmarks, TheRigidPartIsToldAndKept) {
                 Vec3(2, 0, 0));
   };
   options.landmarks = write_pairs("turned.csv", turned);
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
-  ASSERT_TRUE(report->rigid);
-  EXPECT_NEAR(report->rigid->rotation_deg, 6.0, 1e-4);
-  EXPECT_NEAR(report->rigid->translation_mm, 2.0, 1e-4);
-  EXPECT_LT(report->rigid->residual_mm, 1e-5);
-  EXPECT_THAT(report_lines(*report),
+  const auto report = value_or_fail(import_landmarks(options));
+  ASSERT_TRUE(report.rigid);
+  EXPECT_NEAR(report.rigid->rotation_deg, 6.0, 1e-4);
+  EXPECT_NEAR(report.rigid->translation_mm, 2.0, 1e-4);
+  EXPECT_LT(report.rigid->residual_mm, 1e-5);
+  EXPECT_THAT(report_lines(report),
               Contains(HasSubstr("rigid part: rotation 6.00 degrees, translation 2.00 mm")));
   const Observation observation = made();
   const auto& pairs = std::get<LandmarkPairs>(observation.body);
@@ -122,33 +120,30 @@ TEST_F(ImportLandmarks, TwoListsArePairedByName) {
   const auto before = folder.write("b.csv", "a,10,10,50\nb,50,12,45\nc,30,50,55\nd,25,30,20\n");
   options.landmarks_moved = folder.write("d.csv", "e,1,1,1\nc,30,50,53\nb,50,12,44\na,10,10,49\n");
   options.landmarks = before;
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->pairs, 3);
-  EXPECT_THAT(report->left_out, ElementsAre("d", "e"));
-  EXPECT_NEAR(report->mean_mm, 4.0 / 3.0, 1e-12);
-  EXPECT_NEAR(report->rms_mm, std::sqrt(2.0), 1e-12);
-  EXPECT_EQ(report->largest, "landmark \"c\"");
-  EXPECT_THAT(report_lines(*report), Contains(HasSubstr("only one file has it: \"d\"")));
+  const auto report = value_or_fail(import_landmarks(options));
+  EXPECT_EQ(report.pairs, 3);
+  EXPECT_THAT(report.left_out, ElementsAre("d", "e"));
+  EXPECT_NEAR(report.mean_mm, 4.0 / 3.0, 1e-12);
+  EXPECT_NEAR(report.rms_mm, std::sqrt(2.0), 1e-12);
+  EXPECT_EQ(report.largest, "landmark \"c\"");
+  EXPECT_THAT(report_lines(report), Contains(HasSubstr("only one file has it: \"d\"")));
 }
 
 TEST_F(ImportLandmarks, LandmarksOnALineHaveNoRigidPart) {
   options.landmarks = folder.write("l.csv", "0,0,5,0,0,5\n0,0,15,0,0,14\n0,0,25,0,0,23\n");
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_FALSE(report->rigid);
-  EXPECT_THAT(report_lines(*report), Contains(AllOf(HasSubstr("no rigid part can be computed"),
-                                                    HasSubstr("on one line"))));
+  const auto report = value_or_fail(import_landmarks(options));
+  EXPECT_FALSE(report.rigid);
+  EXPECT_THAT(report_lines(report), Contains(AllOf(HasSubstr("no rigid part can be computed"),
+                                                   HasSubstr("on one line"))));
 }
 
 TEST_F(ImportLandmarks, LandmarksBesideTheBrainAreToldAndFarOnesRefused) {
   options.landmarks =
       folder.write("out.csv", "a,10,10,50,10,10,49\nb,50,12,45,50,12,44\nc,30,30,66,30,30,65\n");
-  const auto report = import_landmarks(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->outside, 1);
-  EXPECT_NEAR(report->farthest_outside_mm, 6.0, 1e-9);
-  EXPECT_THAT(report_lines(*report), Contains(HasSubstr("at most 6.0 mm (landmark \"c\")")));
+  const auto report = value_or_fail(import_landmarks(options));
+  EXPECT_EQ(report.outside, 1);
+  EXPECT_NEAR(report.farthest_outside_mm, 6.0, 1e-9);
+  EXPECT_THAT(report_lines(report), Contains(HasSubstr("at most 6.0 mm (landmark \"c\")")));
   std::filesystem::remove(options.out);
   options.landmarks =
       folder.write("far.csv", "a,10,10,50,10,10,49\nb,50,12,45,50,12,44\nc,30,30,90,30,30,89\n");
@@ -201,14 +196,13 @@ TEST_F(ImportLandmarks, RealLandmarksHaveTheRigidPartThatIsKnownOfThem) {
   for (const int tag : {0, 1}) {
     options.landmarks = resect / (tag == 1 ? "Case4-MRI-beforeUS.tag" : "Case4-MRI-beforeUS.csv");
     options.out = folder / (tag == 1 ? "tag.surgery" : "csv.surgery");
-    const auto report = import_landmarks(options);
-    ASSERT_TRUE(report) << report.error().message;
-    EXPECT_EQ(report->pairs, 15);
-    EXPECT_NEAR(report->mean_mm, 2.986, 5e-4);
-    EXPECT_NEAR(report->rms_mm, 3.112, 5e-4);
-    ASSERT_TRUE(report->rigid);
-    EXPECT_NEAR(report->rigid->residual_mm, 1.164, 5e-4);
-    EXPECT_NEAR(report->rigid->rotation_deg, 5.9, 0.05);
+    const auto report = value_or_fail(import_landmarks(options));
+    EXPECT_EQ(report.pairs, 15);
+    EXPECT_NEAR(report.mean_mm, 2.986, 5e-4);
+    EXPECT_NEAR(report.rms_mm, 3.112, 5e-4);
+    ASSERT_TRUE(report.rigid);
+    EXPECT_NEAR(report.rigid->residual_mm, 1.164, 5e-4);
+    EXPECT_NEAR(report.rigid->rotation_deg, 5.9, 0.05);
     const Observation observation = made();
     deformed[tag] = std::get<LandmarkPairs>(observation.body).deformed;
   }

@@ -10,6 +10,7 @@
 #include "client/tools/import/import_case.hpp"
 #include "common/io/recording/surgery_file.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_journal.hpp"
 #include "tests/support/virtual_sweep.hpp"
@@ -24,10 +25,9 @@ TEST(ImportCase, APreparedModelSaysWhoseItIs) {
   const TemporaryFolder folder;
   const BrainModel model = test_support::toy_model(5);
   test_support::write_toy_model(folder / "toy.h5", model);
-  const auto known = load_import_case({}, folder / "toy.h5");
-  ASSERT_TRUE(known) << known.error().message;
-  EXPECT_LT((known->tumour_centroid() - Vec3(30, 30, 40)).norm(), 0.1);
-  const io::SurgeryMeta meta = known->meta("a sweep", "a test");
+  const auto known = value_or_fail(load_import_case({}, folder / "toy.h5"));
+  EXPECT_LT((known.tumour_centroid() - Vec3(30, 30, 40)).norm(), 0.1);
+  const io::SurgeryMeta meta = known.meta("a sweep", "a test");
   EXPECT_EQ(meta.case_id, "toy");
   EXPECT_EQ(meta.model_id, model.model_id);
   EXPECT_EQ(meta.case_file, (folder / "toy.yaml").string());
@@ -44,9 +44,7 @@ TEST(ImportCase, ExactlyOneOfTheTwoIsGiven) {
 
 TEST(ImportCase, WhatIsMissingIsNamed) {
   EXPECT_EQ(load_import_case({}, "nowhere.h5").error().code, ErrorCode::kNotFound);
-  const auto none = load_import_case("nowhere.yaml", {});
-  ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().message, HasSubstr("nowhere.yaml"));
+  EXPECT_THAT(sentence_of(load_import_case("nowhere.yaml", {})), HasSubstr("nowhere.yaml"));
 }
 
 using test_support::SequenceContent;
@@ -130,11 +128,10 @@ class Import : public testing::Test {
 };
 
 TEST_F(Import, PutsTracedContoursOntoTheSurface) {
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->frames, 21);
-  EXPECT_EQ(report->frames_used, 21);
-  EXPECT_TRUE(report->notes.empty());
+  const auto report = value_or_fail(import_recording(options));
+  EXPECT_EQ(report.frames, 21);
+  EXPECT_EQ(report.frames_used, 21);
+  EXPECT_TRUE(report.notes.empty());
   const auto made = observations();
   ASSERT_EQ(made.size(), 1U);
   EXPECT_EQ(made[0].case_id, "toy");
@@ -148,8 +145,8 @@ TEST_F(Import, PutsTracedContoursOntoTheSurface) {
   const auto file = io::SurgeryFile::open(options.out).value();
   EXPECT_EQ(file.meta().model_id, model_id);
   EXPECT_EQ(file.meta().case_id, "toy");
-  EXPECT_EQ(report->sweeps[0].points, static_cast<Eigen::Index>(mm.size()));
-  EXPECT_NEAR(report->sweeps[0].tumour_distance_mm, Vec3(2, -1, 1).norm(), 1.0);
+  EXPECT_EQ(report.sweeps[0].points, static_cast<Eigen::Index>(mm.size()));
+  EXPECT_NEAR(report.sweeps[0].tumour_distance_mm, Vec3(2, -1, 1).norm(), 1.0);
 }
 
 TEST_F(Import, TracesFromASeedWithinAPixel) {
@@ -161,9 +158,8 @@ TEST_F(Import, TracesFromASeedWithinAPixel) {
                              : write("s.igs.mha", test_support::meta_text(content, false));
     options.contours.clear();
     options.seeds = write("seeds.csv", "10,89.5,79.5\n");
-    const auto report = import_recording(options);
-    ASSERT_TRUE(report) << report.error().message;
-    EXPECT_THAT(report->notes[0], HasSubstr("bright lesion traced on frames 0 to 20"));
+    const auto report = value_or_fail(import_recording(options));
+    EXPECT_THAT(report.notes[0], HasSubstr("bright lesion traced on frames 0 to 20"));
     const auto mm = distances(observations().at(0));
     ASSERT_GT(mm.size(), 2000U);
     // A pixel is 0.2 x 0.25 mm.
@@ -177,16 +173,15 @@ TEST_F(Import, FramesThatLostTheProbeAreLeftOutAndCounted) {
   content.frames[4]["ImageStatus"] = "INVALID";
   content.frames[9]["ProbeToTrackerTransform"] = "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1";
   options.recording = write("s.mha", test_support::meta_text(content, true));
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->frames_used, 18);
-  ASSERT_EQ(report->dropped.size(), 2U);
-  EXPECT_EQ(report->dropped[0].reason, "ProbeToTracker is invalid");
-  EXPECT_EQ(report->dropped[0].count, 2);
-  EXPECT_EQ(report->dropped[0].first_frame, 3);
-  EXPECT_THAT(report->notes, testing::ElementsAre(AllOf(
-                                 HasSubstr("ProbeToTrackerTransform is not usable on 1 frames"),
-                                 HasSubstr("Seq_Frame0009_ProbeToTrackerTransform"))));
+  const auto report = value_or_fail(import_recording(options));
+  EXPECT_EQ(report.frames_used, 18);
+  ASSERT_EQ(report.dropped.size(), 2U);
+  EXPECT_EQ(report.dropped[0].reason, "ProbeToTracker is invalid");
+  EXPECT_EQ(report.dropped[0].count, 2);
+  EXPECT_EQ(report.dropped[0].first_frame, 3);
+  EXPECT_THAT(report.notes, testing::ElementsAre(AllOf(
+                                HasSubstr("ProbeToTrackerTransform is not usable on 1 frames"),
+                                HasSubstr("Seq_Frame0009_ProbeToTrackerTransform"))));
   EXPECT_LT(distances(observations().at(0)).back(), 0.01);
 }
 
@@ -230,15 +225,14 @@ TEST_F(Import, TimeGapsSplitSweeps) {
   }
   options.recording = write("s.mha", test_support::meta_text(content, true));
   options.sweep_gap_s = 2.0;
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report) << report.error().message;
+  const auto report = value_or_fail(import_recording(options));
   const auto made = observations();
   ASSERT_EQ(made.size(), 2U);
   EXPECT_EQ(made[1].sequence, 2U);
   EXPECT_NEAR(static_cast<double>(made[0].acquired_ns), 0.7e9, 1e3);
   EXPECT_NEAR(static_cast<double>(made[1].acquired_ns), 7.0e9, 1e3);
-  EXPECT_EQ(report->sweeps[0].last_frame, 7);
-  EXPECT_EQ(report->sweeps[1].first_frame, 8);
+  EXPECT_EQ(report.sweeps[0].last_frame, 7);
+  EXPECT_EQ(report.sweeps[1].first_frame, 8);
 }
 
 // Fiducials on the head, touched without error: the same surgery as
@@ -257,14 +251,13 @@ TEST_F(Import, FiducialsGiveTheRegistrationAndItsErrorAtTheTumour) {
   options.fiducials = write("fiducials.csv", text);
   options.registration.clear();
   options.out = folder / "again.surgery";
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report) << report.error().message;
+  const auto report = value_or_fail(import_recording(options));
   const Points points = std::get<TumourBoundary>(observations().front().body).points;
   EXPECT_LT((points - from_matrix).cwiseAbs().maxCoeff(), 1e-4);
-  ASSERT_TRUE(report->fiducials.has_value());
-  EXPECT_EQ(report->fiducials->count, 4);
-  EXPECT_LT(report->fiducials->tre_mm, 1e-4);
-  EXPECT_THAT(report_lines(*report), testing::Contains(HasSubstr("fiducials: 4, registration")));
+  ASSERT_TRUE(report.fiducials.has_value());
+  EXPECT_EQ(report.fiducials->count, 4);
+  EXPECT_LT(report.fiducials->tre_mm, 1e-4);
+  EXPECT_THAT(report_lines(report), testing::Contains(HasSubstr("fiducials: 4, registration")));
 }
 
 TEST_F(Import, AFarBoundaryIsRefusedWithItsDistance) {
@@ -298,9 +291,8 @@ TEST_F(Import, TrackingInMetresIsNoted) {
     }
   }
   options.recording = write("metres.mha", test_support::meta_text(content, true));
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_THAT(report->notes,
+  const auto report = value_or_fail(import_recording(options));
+  EXPECT_THAT(report.notes,
               testing::Contains(HasSubstr("ProbeToTracker is never farther than 1.54")));
 }
 
@@ -349,18 +341,15 @@ TEST_F(Import, WhenEveryContourIsLostItSaysWhy) {
 
 TEST_F(Import, NeverOverwritesASurgery) {
   std::ofstream(options.out) << "kept";
-  const auto report = import_recording(options);
-  ASSERT_FALSE(report);
-  EXPECT_EQ(report.error().code, ErrorCode::kWriteFailed);
+  refusal_of(import_recording(options), ErrorCode::kWriteFailed);
   EXPECT_EQ(test_support::content_of(options.out), "kept");
 }
 
 TEST_F(Import, ReportTellsChainFramesAndPoints) {
   content.frames[3]["ProbeToTrackerTransformStatus"] = "INVALID";
   options.recording = write("s.mha", test_support::meta_text(content, true));
-  const auto report = import_recording(options);
-  ASSERT_TRUE(report);
-  const std::string text = testing::PrintToString(report_lines(*report));
+  const auto report = value_or_fail(import_recording(options));
+  const std::string text = testing::PrintToString(report_lines(report));
   for (const char* part :
        {"chain: ImageToProbe, ProbeToTracker, ReferenceToTracker, ReferenceToRas",
         "frames: 20 of 21 with a valid chain",

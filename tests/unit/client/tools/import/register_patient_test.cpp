@@ -9,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "common/io/geometry/pose_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/virtual_sweep.hpp"
 
@@ -111,16 +112,14 @@ class RegisterPatient : public testing::Test {
   }
   // How far the registration is off at the target, in the file that was written.
   double error_mm() const {
-    const auto T = io::read_pose(options.out, "T_ras_reference");
-    EXPECT_TRUE(T) << T.error().message;
+    const auto T = value_or_fail(io::read_pose(options.out, "T_ras_reference"));
     const Vec3 reference = VirtualStylus::T_ras_reference().inverse() * *options.target;
-    return (*T * reference - *options.target).norm();
+    return (T * reference - *options.target).norm();
   }
   std::string refusal() const {
-    const auto report = register_patient(options);
-    EXPECT_FALSE(report);
+    const std::string sentence = sentence_of(register_patient(options));
     EXPECT_FALSE(std::filesystem::exists(options.out)) << "something was left behind";
-    return report ? std::string() : report.error().message;
+    return sentence;
   }
 
   TemporaryFolder folder;
@@ -129,14 +128,13 @@ class RegisterPatient : public testing::Test {
 };
 
 TEST_F(RegisterPatient, AStylusHeldStillGivesTheRegistration) {
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->poses, 245);
-  EXPECT_EQ(report->poses_used, 245);
-  EXPECT_THAT(report->held, SizeIs(5));
-  EXPECT_LT(report->fiducials.fre_mm, 1e-5);  // coordinates with six decimals
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_EQ(report.poses, 245);
+  EXPECT_EQ(report.poses_used, 245);
+  EXPECT_THAT(report.held, SizeIs(5));
+  EXPECT_LT(report.fiducials.fre_mm, 1e-5);  // coordinates with six decimals
   EXPECT_LT(error_mm(), 1e-5);
-  const auto lines = report_lines(*report);
+  const auto lines = report_lines(report);
   EXPECT_THAT(lines, Contains(HasSubstr("poses: 245 of 245 with a valid chain")));
   EXPECT_THAT(lines, Contains(HasSubstr("held still 5: ")));
   EXPECT_THAT(lines, Contains(AllOf(HasSubstr("residuals, mm: nasion 0.00"), HasSubstr("inion"))));
@@ -146,14 +144,13 @@ TEST_F(RegisterPatient, NoiseIsAveragedAndTheErrorsAreTold) {
   stylus.noise_mm = 0.2;
   stylus.rests[2] += Vec3(0, 3, 0);  // a marker that slipped
   record();
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_NEAR(report->held[0].spread_mm, 0.2 * std::sqrt(3.0), 0.08);
-  EXPECT_EQ(report->fiducials.worst, 2);
-  EXPECT_GT(report->fiducials.fre_mm, 0.5);
-  EXPECT_GT(report->fiducials.tre_mm, 0.3);
-  EXPECT_LT(error_mm(), 3.0 * report->fiducials.tre_mm);
-  EXPECT_THAT(report_lines(*report),
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_NEAR(report.held[0].spread_mm, 0.2 * std::sqrt(3.0), 0.08);
+  EXPECT_EQ(report.fiducials.worst, 2);
+  EXPECT_GT(report.fiducials.fre_mm, 0.5);
+  EXPECT_GT(report.fiducials.tre_mm, 0.3);
+  EXPECT_LT(error_mm(), 3.0 * report.fiducials.tre_mm);
+  EXPECT_THAT(report_lines(report),
               Contains(AllOf(HasSubstr("at worst (right ear)"),
                              HasSubstr("expected error at (46.0, -47.0, 9.0) "))));
 }
@@ -163,10 +160,9 @@ TEST_F(RegisterPatient, TheOrderMayBeFoundByShape) {
   stylus.rests.pop_back();  // one of the image's was not touched
   record();
   options.pairing = Pairing::kShape;
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_TRUE(report->fiducials.matched);
-  EXPECT_THAT(report->names, ElementsAre("vertex", "left ear", "right ear", "nasion"));
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_TRUE(report.fiducials.matched);
+  EXPECT_THAT(report.names, ElementsAre("vertex", "left ear", "right ear", "nasion"));
   EXPECT_LT(error_mm(), 1e-5);
 }
 
@@ -176,10 +172,9 @@ TEST_F(RegisterPatient, AHoldThatIsNoFiducialIsListedAndCanBeLeftOut) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("6 fiducials were touched"), HasSubstr("holds 5"),
                                HasSubstr("3 at 5."), HasSubstr("choose with --holds")));
   options.holds = {1, 2, 4, 5, 6};
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
+  const auto report = value_or_fail(register_patient(options));
   EXPECT_LT(error_mm(), 1e-5);
-  EXPECT_THAT(report_lines(*report),
+  EXPECT_THAT(report_lines(report),
               Contains(AllOf(HasSubstr("held still 3"), HasSubstr("not used"))));
 }
 
@@ -192,10 +187,9 @@ TEST_F(RegisterPatient, ListsOfPointsArePairedByName) {
   }
   options.recording.clear();
   options.fiducials = folder.write("touched.csv", text);
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_THAT(report->names, ElementsAre("vertex", "nasion", "inion", "left ear"));
-  EXPECT_THAT(report->left_out, ElementsAre("right ear"));
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_THAT(report.names, ElementsAre("vertex", "nasion", "inion", "left ear"));
+  EXPECT_THAT(report.left_out, ElementsAre("right ear"));
   EXPECT_LT(error_mm(), 1e-5);
   options.out = folder / "again.txt";
   options.pairing = Pairing::kOrder;
@@ -213,8 +207,7 @@ TEST_F(RegisterPatient, AListOfPairsNeedsNoOther) {
   options.recording.clear();
   options.ras.clear();
   options.fiducials = folder.write("pairs.csv", text);
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
+  value_or_fail(register_patient(options));
   EXPECT_LT(error_mm(), 1e-5);
 }
 
@@ -222,9 +215,8 @@ TEST_F(RegisterPatient, FiducialsNearlyOnALineAreWarnedOf) {
   stylus.rests = {Vec3(0, 0, 0), Vec3(0, 50, 5), Vec3(0, 100, 0)};
   record();
   options.ras = folder.write("line.csv", "0,0,0\n0,50,5\n0,100,0\n");
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  const auto lines = report_lines(*report);
+  const auto report = value_or_fail(register_patient(options));
+  const auto lines = report_lines(report);
   EXPECT_THAT(lines,
               Contains(HasSubstr("lie nearly on a line: a rotation about it is known 17 times")));
   EXPECT_THAT(lines, Contains(HasSubstr("three fiducials leave little")));
@@ -235,11 +227,10 @@ TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
   for (std::size_t i = 20; i < 25; ++i)
     content.frames[i]["StylusToTrackerTransformStatus"] = "INVALID";
   options.recording = folder.write("s.mha", test_support::meta_text(content, false));
-  const auto report = register_patient(options);
-  ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->poses_used, 240);
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_EQ(report.poses_used, 240);
   EXPECT_THAT(
-      report_lines(*report),
+      report_lines(report),
       Contains(HasSubstr("poses left out: 5 because StylusToTracker is invalid (first: pose 20)")));
   EXPECT_LT(error_mm(), 1e-5);
 }
@@ -285,10 +276,8 @@ TEST_F(RegisterPatient, NamesWhatIsMissingOrTooMuch) {
 
 TEST_F(RegisterPatient, AnExistingFileIsLeftAlone) {
   folder.write("T_ras_reference.txt", "mine");
-  const auto report = register_patient(options);
-  ASSERT_FALSE(report);
-  EXPECT_EQ(report.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(report.error().message, HasSubstr("exists already"));
+  EXPECT_THAT(refusal_of(register_patient(options), ErrorCode::kWriteFailed),
+              HasSubstr("exists already"));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "common/io/config/config_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/model/model_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/client/tools/journal/small_journal.hpp"
 
 namespace brainshift::client {
@@ -42,9 +43,8 @@ brainstem: {centre_mm: [30, 30, 0]}
 
 TEST_F(ExportJournal, TheTableHasARowPerRecord) {
   write(path, 3);
-  const auto csv = records_csv(open(), path);
-  ASSERT_TRUE(csv) << csv.error().message;
-  std::istringstream stream(*csv);
+  const auto csv = value_or_fail(records_csv(open(), path));
+  std::istringstream stream(csv);
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
   ASSERT_EQ(lines.size(), 7u);
@@ -63,10 +63,9 @@ TEST_F(ExportJournal, TheTableHasARowPerRecord) {
 
 TEST_F(ExportJournal, ADecisionIsARowWithItsOutcome) {
   {
-    auto file = io::SurgeryFile::create(path, {});
-    ASSERT_TRUE(file);
-    ASSERT_TRUE(file->append(decision(4, Outcome::kSuperseded)));
-    ASSERT_TRUE(file->close());
+    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
+    ASSERT_TRUE(file.append(decision(4, Outcome::kSuperseded)));
+    ASSERT_TRUE(file.close());
   }
   const std::string csv = records_csv(open(), path).value();
   const std::string row = csv.substr(csv.find('\n') + 1);
@@ -77,10 +76,9 @@ TEST_F(ExportJournal, ADecisionIsARowWithItsOutcome) {
 
 TEST_F(ExportJournal, ASourceWithACommaStaysOneField) {
   {
-    auto file = io::SurgeryFile::create(path, {});
-    ASSERT_TRUE(file);
-    ASSERT_TRUE(file->append(observation(1, "a \"b\", c")));
-    ASSERT_TRUE(file->close());
+    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
+    ASSERT_TRUE(file.append(observation(1, "a \"b\", c")));
+    ASSERT_TRUE(file.close());
   }
   EXPECT_THAT(records_csv(open(), path).value(), HasSubstr(",\"a \"\"b\"\", c\","));
 }
@@ -88,29 +86,24 @@ TEST_F(ExportJournal, ASourceWithACommaStaysOneField) {
 TEST_F(ExportJournal, ABrokenFileGivesNoTable) {
   write(path, 3);
   run_sql(path, "UPDATE record SET sequence = 9 WHERE id = 4");
-  const auto csv = records_csv(open(), path);
-  ASSERT_FALSE(csv);
-  EXPECT_THAT(csv.error().message, HasSubstr("record 4"));
+  EXPECT_THAT(sentence_of(records_csv(open(), path)), HasSubstr("record 4"));
 }
 
 TEST_F(ExportJournal, TheSeriesHasAFieldPerUsableUpdateAndAListByTime) {
   write(path, 2);
-  const auto recorded = recorded_model(open(), path, model_file());
-  ASSERT_TRUE(recorded) << recorded.error().message;
+  const auto recorded = value_or_fail(recorded_model(open(), path, model_file()));
   const fs::path to = folder / "fields";
-  const auto fields = write_field_series(open(), path, *recorded, to);
-  ASSERT_TRUE(fields) << fields.error().message;
-  EXPECT_EQ(*fields, 2);
+  const auto fields = value_or_fail(write_field_series(open(), path, recorded, to));
+  EXPECT_EQ(fields, 2);
   const std::string list = test_support::content_of(to / "a.pvd");
   EXPECT_THAT(list, HasSubstr("timestep=\"0.250000\" file=\"a-000001.vtu\""));
   EXPECT_THAT(list, HasSubstr("timestep=\"1.250000\" file=\"a-000002.vtu\""));
-  const auto read = io::read_vtu(to / "a-000002.vtu");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->mesh.num_nodes(), model.mesh.num_nodes());
-  ASSERT_EQ(read->node_fields.size(), 2u);
-  EXPECT_EQ(read->node_fields[0].name, "displacement");
-  EXPECT_EQ(read->node_fields[0].values(0, 5), 0.25);
-  EXPECT_EQ(read->node_fields[1].values(0, 5), 0.5);
+  const auto read = value_or_fail(io::read_vtu(to / "a-000002.vtu"));
+  EXPECT_EQ(read.mesh.num_nodes(), model.mesh.num_nodes());
+  ASSERT_EQ(read.node_fields.size(), 2u);
+  EXPECT_EQ(read.node_fields[0].name, "displacement");
+  EXPECT_EQ(read.node_fields[0].values(0, 5), 0.25);
+  EXPECT_EQ(read.node_fields[1].values(0, 5), 0.5);
 }
 
 // Read with HDF5's own high-level calls, as another program would.
@@ -128,9 +121,8 @@ std::vector<float> floats(hid_t file, const std::string& name) {
 TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
   write(path, 2);
   const fs::path out = folder / "fields.h5";
-  const auto fields = write_field_file(open(), path, model, out);
-  ASSERT_TRUE(fields) << fields.error().message;
-  EXPECT_EQ(*fields, 2);
+  const auto fields = value_or_fail(write_field_file(open(), path, model, out));
+  EXPECT_EQ(fields, 2);
   const hid_t file = H5Fopen(out.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   ASSERT_GE(file, 0);
   const auto nodes = floats(file, "mesh/nodes_mm");
@@ -148,26 +140,20 @@ TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
 
 TEST_F(ExportJournal, AFileIsNotLeftBehindHalfWritten) {
   {
-    auto file = io::SurgeryFile::create(path, {.model_id = model.model_id});
-    ASSERT_TRUE(file);
-    ASSERT_TRUE(file->append(observation(1, "ius")));
-    ASSERT_TRUE(file->close());
+    auto file = value_or_fail(io::SurgeryFile::create(path, {.model_id = model.model_id}));
+    ASSERT_TRUE(file.append(observation(1, "ius")));
+    ASSERT_TRUE(file.close());
   }
   const auto before = std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator());
-  const auto fields = write_field_file(open(), path, model, folder / "fields.h5");
-  ASSERT_FALSE(fields);
-  EXPECT_EQ(fields.error().code, ErrorCode::kEmptySet);
+  refusal_of(write_field_file(open(), path, model, folder / "fields.h5"), ErrorCode::kEmptySet);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator()), before);
 }
 
 TEST_F(ExportJournal, AnotherModelIsRefused) {
-  auto file = io::SurgeryFile::create(path, {.model_id = "other"});
-  ASSERT_TRUE(file);
-  ASSERT_TRUE(file->append(update(1, 1)));
-  const auto recorded = recorded_model(*file, path, model_file());
-  ASSERT_FALSE(recorded);
-  EXPECT_EQ(recorded.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(recorded.error().message, HasSubstr("\"other\""));
+  auto file = value_or_fail(io::SurgeryFile::create(path, {.model_id = "other"}));
+  ASSERT_TRUE(file.append(update(1, 1)));
+  EXPECT_THAT(refusal_of(recorded_model(file, path, model_file()), ErrorCode::kInvalidArgument),
+              HasSubstr("\"other\""));
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 #include "client/tools/monitor/keys.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::client {
@@ -18,9 +18,7 @@ using testing::SizeIs;
 class Keys : public testing::Test {
  protected:
   io::KeyPairFiles made(const std::string& name) {
-    const auto files = make_keys(folder_.path(), name);
-    EXPECT_TRUE(files) << files.error().message;
-    return files.value_or(io::KeyPairFiles{});
+    return value_or_fail(make_keys(folder_.path(), name));
   }
   TemporaryFolder folder_;
 };
@@ -64,10 +62,9 @@ TEST_F(Keys, ACommandTakesBothFilesOrNone) {
   const auto daemon = made("daemon");
   const auto own = made("console");
   EXPECT_FALSE(client_keys({}, {})->has_value());
-  const auto keys = client_keys(daemon.public_file, own.secret_file);
-  ASSERT_TRUE(keys) << keys.error().message;
-  EXPECT_EQ((*keys)->server_public_key, io::read_public_key(daemon.public_file).value());
-  EXPECT_EQ((*keys)->public_key, io::read_public_key(own.public_file).value());
+  const auto keys = value_or_fail(client_keys(daemon.public_file, own.secret_file));
+  EXPECT_EQ(keys->server_public_key, io::read_public_key(daemon.public_file).value());
+  EXPECT_EQ(keys->public_key, io::read_public_key(own.public_file).value());
   EXPECT_THAT(client_keys(daemon.public_file, {}).error().message, HasSubstr("need each other"));
   EXPECT_THAT(client_keys({}, own.secret_file).error().message, HasSubstr("need each other"));
   EXPECT_THAT(client_keys(daemon.public_file, own.public_file).error().message,

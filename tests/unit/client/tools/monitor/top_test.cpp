@@ -4,7 +4,6 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <pty.h>
 #include <termios.h>
@@ -17,6 +16,7 @@
 #include <string>
 #include <thread>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"
 #include "tests/unit/client/tools/monitor/sample_report.hpp"
 
@@ -181,9 +181,7 @@ TEST_F(TopTest, WithoutADaemonOnceFails) {
   TopOptions options;
   options.endpoint = endpoint;
   options.once = true;
-  const Status status = top(options);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kUnavailable);
+  refusal_of(top(options), ErrorCode::kUnavailable);
 }
 
 }  // namespace

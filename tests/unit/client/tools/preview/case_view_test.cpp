@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/results.hpp"
 #include "tests/unit/client/tools/preview/box_case.hpp"
 
 namespace brainshift::client {
@@ -105,9 +106,7 @@ TEST_F(CaseViewOf, AnOpeningInTheAirIsAProblemWithoutRoles) {
 }
 
 TEST_F(CaseViewOf, AMissingFileIsAnError) {
-  const auto missing = view_case(folder / "nowhere.yaml");
-  ASSERT_FALSE(missing);
-  EXPECT_THAT(missing.error().message, HasSubstr("nowhere.yaml"));
+  EXPECT_THAT(sentence_of(view_case(folder / "nowhere.yaml")), HasSubstr("nowhere.yaml"));
 }
 
 TEST(PlaceText, NamesTheThreeSides) {

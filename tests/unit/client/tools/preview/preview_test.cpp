@@ -8,6 +8,7 @@
 
 #include "client/tools/pictures/canvas.hpp"
 #include "common/io/files/file_access.hpp"
+#include "tests/support/results.hpp"
 #include "tests/unit/client/tools/preview/box_case.hpp"
 
 namespace brainshift::client {
@@ -33,10 +34,9 @@ int count_colour(const cv::Mat& image, const cv::Scalar& colour) {
 
 TEST(Preview, WritesPicturesAndTheFacts) {
   const TemporaryFolder folder;
-  const auto summary = write_preview(write_box_case(folder), folder / "out");
-  ASSERT_TRUE(summary) << summary.error().message;
-  EXPECT_THAT(summary->files, SizeIs(4));
-  for (const auto& file : summary->files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  const auto summary = value_or_fail(write_preview(write_box_case(folder), folder / "out"));
+  EXPECT_THAT(summary.files, SizeIs(4));
+  for (const auto& file : summary.files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   const cv::Mat slices = cv::imread((folder / "out/slices-tumour.png").string());
   EXPECT_GT(count_colour(slices, palette::kOrange), 1000);   // tumour
   EXPECT_GT(count_colour(slices, palette::kSkyBlue), 1000);  // slaves
@@ -48,9 +48,8 @@ TEST(Preview, DrawsACaseThatCannotBePrepared) {
   const TemporaryFolder folder;
   BoxCase box;
   box.tumour = "[110, -10, 20]";  // 23 mm outside
-  const auto summary = write_preview(write_box_case(folder, box), folder / "out");
-  ASSERT_TRUE(summary) << summary.error().message;
-  EXPECT_THAT(summary->problems, SizeIs(1));
+  const auto summary = value_or_fail(write_preview(write_box_case(folder, box), folder / "out"));
+  EXPECT_THAT(summary.problems, SizeIs(1));
   // The plane through the tumour's centre is widened until the tumour is in it.
   const cv::Mat slices = cv::imread((folder / "out/slices-tumour.png").string());
   EXPECT_GT(count_colour(slices, palette::kOrange), 1000);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "client/tools/replay/play.hpp"
 #include "client/tools/replay/replay.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/scripted_daemon.hpp"
 
@@ -282,37 +282,33 @@ class Resume : public testing::Test {
 };
 
 TEST_F(Resume, AJournalThatWasNotClosedSaysWhatEachSourceRecordedLast) {
-  auto file = io::SurgeryFile::create(path, {.model_id = "m"});
-  ASSERT_TRUE(file);
-  ASSERT_TRUE(file->append(resumed_record("ius", 4)));
-  ASSERT_TRUE(file->append(resumed_record("camera", 50)));
-  ASSERT_TRUE(file->append(resumed_record("ius", 6)));
-  ASSERT_TRUE(file->append({io::RecordKind::kUpdate, 3, 0, "opaque"}));
-  const auto point = read_resume_point(path);
-  ASSERT_TRUE(point) << point.error().message;
-  EXPECT_EQ(point->meta.model_id, "m");
-  EXPECT_EQ(point->records, 4u);
-  EXPECT_FALSE(point->broken);
-  EXPECT_EQ(describe(*point), "goes on after observation 50 of camera and 6 of ius, update 3");
+  auto file = value_or_fail(io::SurgeryFile::create(path, {.model_id = "m"}));
+  ASSERT_TRUE(file.append(resumed_record("ius", 4)));
+  ASSERT_TRUE(file.append(resumed_record("camera", 50)));
+  ASSERT_TRUE(file.append(resumed_record("ius", 6)));
+  ASSERT_TRUE(file.append({io::RecordKind::kUpdate, 3, 0, "opaque"}));
+  const auto point = value_or_fail(read_resume_point(path));
+  EXPECT_EQ(point.meta.model_id, "m");
+  EXPECT_EQ(point.records, 4u);
+  EXPECT_FALSE(point.broken);
+  EXPECT_EQ(describe(point), "goes on after observation 50 of camera and 6 of ius, update 3");
 }
 
 TEST_F(Resume, ABrokenJournalCountsUpToTheBreak) {
   {
-    auto file = io::SurgeryFile::create(path, {});
-    ASSERT_TRUE(file);
+    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
     std::vector<io::SurgeryRecord> records;
     for (std::uint64_t i = 1; i <= 200; ++i) records.push_back(resumed_record("ius", i));
-    ASSERT_TRUE(file->append(records));
-    ASSERT_TRUE(file->close());
+    ASSERT_TRUE(file.append(records));
+    ASSERT_TRUE(file.close());
   }
   fs::resize_file(path, fs::file_size(path) * 9 / 10);
-  const auto point = read_resume_point(path);
-  ASSERT_TRUE(point) << point.error().message;
-  ASSERT_TRUE(point->broken);
-  EXPECT_THAT(point->broken->message, HasSubstr("record "));
-  EXPECT_EQ(point->last.at("ius"), point->records);
-  EXPECT_LT(point->records, 200u);
-  EXPECT_GT(point->records, 50u);
+  const auto point = value_or_fail(read_resume_point(path));
+  ASSERT_TRUE(point.broken);
+  EXPECT_THAT(point.broken->message, HasSubstr("record "));
+  EXPECT_EQ(point.last.at("ius"), point.records);
+  EXPECT_LT(point.records, 200u);
+  EXPECT_GT(point.records, 50u);
 }
 
 TEST_F(Resume, TheLastRecordedObservationOfEverySourceIsSentAgain) {

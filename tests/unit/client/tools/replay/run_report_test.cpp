@@ -2,7 +2,6 @@
 #include "client/tools/replay/run_report.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/report_keys.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::client {
@@ -62,17 +62,16 @@ RunReport full_run() {
 TEST(RunReport, ReadsBackWhatItWrote) {
   const std::string text = to_json({full_run(), RunReport{}});
   // The empty run lacks nothing: its required keys are there, as empty strings.
-  const auto read = from_json(text, "R.json");
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_EQ(read->size(), 2u);
-  EXPECT_EQ(to_json(*read), text);
-  EXPECT_EQ((*read)[0].seed, full_run().seed);
-  EXPECT_EQ((*read)[0].trace[0].cross->mean, 1.9);
-  EXPECT_FALSE((*read)[0].trace[1].cross);
-  ASSERT_EQ((*read)[0].sources.size(), 2u);
-  EXPECT_EQ((*read)[0].sources[0].p_value, 0.125);
-  EXPECT_TRUE(std::isnan((*read)[0].sources[1].p_value));
-  EXPECT_FALSE((*read)[0].sources[1].consistent);
+  const auto read = value_or_fail(from_json(text, "R.json"));
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(to_json(read), text);
+  EXPECT_EQ(read[0].seed, full_run().seed);
+  EXPECT_EQ(read[0].trace[0].cross->mean, 1.9);
+  EXPECT_FALSE(read[0].trace[1].cross);
+  ASSERT_EQ(read[0].sources.size(), 2u);
+  EXPECT_EQ(read[0].sources[0].p_value, 0.125);
+  EXPECT_TRUE(std::isnan(read[0].sources[1].p_value));
+  EXPECT_FALSE(read[0].sources[1].consistent);
 }
 
 TEST(RunReport, HasEveryKeyOfTheContract) {
@@ -110,19 +109,17 @@ TEST(RunReport, NotApplicableAndNotFiniteAreNull) {
   EXPECT_TRUE(object["coverage_90"].is_null());
   EXPECT_TRUE(object["recovery_pct"].is_null());
   EXPECT_TRUE(object["error_mm"]["cross"]["std"].is_null());
-  const auto read = from_json(text, "R.json");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_TRUE(std::isnan((*read)[0].error_mm.cross->std));
+  const auto read = value_or_fail(from_json(text, "R.json"));
+  EXPECT_TRUE(std::isnan(read[0].error_mm.cross->std));
 }
 
 TEST(RunReport, OfAnOlderWriterHasNoQuality) {
   json runs = json::parse(to_json({full_run()}));
   for (const char* key : {"quality", "prior_strengths", "hypotheses"}) runs[0].erase(key);
-  const auto read = from_json(runs.dump(), "R.json");
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_FALSE((*read)[0].quality);
-  EXPECT_TRUE((*read)[0].prior_strengths.empty());
-  EXPECT_TRUE((*read)[0].hypotheses.empty());
+  const auto read = value_or_fail(from_json(runs.dump(), "R.json"));
+  EXPECT_FALSE(read[0].quality);
+  EXPECT_TRUE(read[0].prior_strengths.empty());
+  EXPECT_TRUE(read[0].hypotheses.empty());
 }
 
 TEST(RunReport, IgnoresKeysOfNewerWriters) {
@@ -142,12 +139,9 @@ class MalformedReport : public testing::TestWithParam<BadReport> {};
 TEST_P(MalformedReport, IsRefusedInOneLineNamingTheKey) {
   json runs = json::parse(to_json({full_run()}));
   runs[json::json_pointer(GetParam().pointer)] = json::parse(GetParam().value);
-  const auto read = from_json(runs.dump(), "R.json");
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-  EXPECT_THAT(read.error().message, HasSubstr("R.json"));
-  EXPECT_THAT(read.error().message, HasSubstr(GetParam().expected));
-  EXPECT_THAT(read.error().message, Not(HasSubstr("\n")));
+  EXPECT_THAT(refusal_of(from_json(runs.dump(), "R.json"), ErrorCode::kUnreadable),
+              testing::AllOf(HasSubstr("R.json"), HasSubstr(GetParam().expected),
+                             testing::Not(HasSubstr("\n"))));
 }
 INSTANTIATE_TEST_SUITE_P(
     Keys, MalformedReport,
@@ -170,34 +164,25 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(RunReport, MissingRequiredKeyIsNamed) {
   json runs = json::parse(to_json({full_run()}));
   runs[0].erase("boundary");
-  const auto read = from_json(runs.dump(), "R.json");
-  ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("boundary"));
+  EXPECT_THAT(sentence_of(from_json(runs.dump(), "R.json")), HasSubstr("boundary"));
 }
 
 TEST(RunReport, TextThatIsNoArrayOfRunsIsRefused) {
   for (const char* text : {"", "{", "{}", "[1]", "null", "[{}]\n]"}) {
-    const auto read = from_json(text, "R.json");
-    ASSERT_FALSE(read) << text;
-    EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-    EXPECT_THAT(read.error().message, Not(HasSubstr("\n")));
+    EXPECT_THAT(refusal_of(from_json(text, "R.json"), ErrorCode::kUnreadable), Not(HasSubstr("\n")))
+        << text;
   }
 }
 
 TEST(ReportFile, MissingFolderAndUnwritablePlacesAreNamed) {
   const test_support::TemporaryFolder temporary;
   const std::filesystem::path folder = temporary.path();
-  const auto missing = read_reports(folder / "no-such-report.json");
-  ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(missing.error().message, HasSubstr("no-such-report.json"));
-  const auto directory = read_reports(folder);
-  ASSERT_FALSE(directory);
-  EXPECT_EQ(directory.error().code, ErrorCode::kUnreadable);
-  const Status written = write_reports(folder / "no-such-folder" / "R.json", {full_run()});
-  ASSERT_FALSE(written);
-  EXPECT_EQ(written.error().code, ErrorCode::kWriteFailed);
-  EXPECT_THAT(written.error().message, HasSubstr("no-such-folder"));
+  EXPECT_THAT(refusal_of(read_reports(folder / "no-such-report.json"), ErrorCode::kNotFound),
+              HasSubstr("no-such-report.json"));
+  refusal_of(read_reports(folder), ErrorCode::kUnreadable);
+  EXPECT_THAT(refusal_of(write_reports(folder / "no-such-folder" / "R.json", {full_run()}),
+                         ErrorCode::kWriteFailed),
+              HasSubstr("no-such-folder"));
 }
 
 TEST(ReportFile, ReplacesTheOldOneAndLeavesNoTemporaryFile) {
@@ -205,9 +190,8 @@ TEST(ReportFile, ReplacesTheOldOneAndLeavesNoTemporaryFile) {
   const std::filesystem::path folder = temporary.path();
   std::ofstream(folder / "R.json") << "old";
   ASSERT_TRUE(write_reports(folder / "R.json", {full_run()}));
-  const auto read = read_reports(folder / "R.json");
-  ASSERT_TRUE(read);
-  EXPECT_EQ(read->size(), 1u);
+  const auto read = value_or_fail(read_reports(folder / "R.json"));
+  EXPECT_EQ(read.size(), 1u);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
 }
 

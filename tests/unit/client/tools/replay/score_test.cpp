@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/box.hpp"
 
@@ -124,9 +125,7 @@ TEST_F(SinkingBox, EstimateOfAnotherMeshIsRefused) {
   Estimate estimate;
   estimate.displacement = uniform(nodes - 1, Vec3(0, 0, -1));
   RunReport run;
-  const Status status = score(model, truth, estimate, run);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kProtocol);
+  refusal_of(score(model, truth, estimate, run), ErrorCode::kProtocol);
 }
 
 TEST(ScorePoints, ValueIsTheBarycentricSum) {
@@ -170,46 +169,38 @@ TEST(Angle, MatchesKnownAnglesAlsoNearZero) {
 class TruthInFile : public SinkingBox {
  protected:
   Result<std::optional<io::SurgeryTruth>> stored_and_read() {
-    auto file = io::SurgeryFile::create(path, io::SurgeryMeta{"box"});
-    EXPECT_TRUE(file);
-    EXPECT_TRUE(file->write_truth(1, truth));
-    return read_truth(*file, 1, model);
+    auto file = value_or_fail(io::SurgeryFile::create(path, io::SurgeryMeta{"box"}));
+    EXPECT_TRUE(file.write_truth(1, truth));
+    return read_truth(file, 1, model);
   }
   const test_support::TemporaryFolder folder;
   const std::filesystem::path path = folder / "truth.surgery";
 };
 
 TEST_F(TruthInFile, ComesBackAsWritten) {
-  const auto read = stored_and_read();
-  ASSERT_TRUE(read) << read.error().message;
-  ASSERT_TRUE(*read);
-  EXPECT_EQ((*read)->displacement, truth.displacement);
-  EXPECT_EQ((*read)->points.at("cross").size(), 2u);
+  const auto read = value_or_fail(stored_and_read());
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->displacement, truth.displacement);
+  EXPECT_EQ(read->points.at("cross").size(), 2u);
 }
 
 TEST_F(TruthInFile, IsAbsentForARealRecording) {
-  auto file = io::SurgeryFile::create(path, io::SurgeryMeta{"box"});
-  ASSERT_TRUE(file);
-  const auto read = read_truth(*file, 1, model);
-  ASSERT_TRUE(read) << read.error().message;
-  EXPECT_FALSE(*read);
+  auto file = value_or_fail(io::SurgeryFile::create(path, io::SurgeryMeta{"box"}));
+  const auto read = value_or_fail(read_truth(file, 1, model));
+  EXPECT_FALSE(read);
 }
 
 TEST_F(TruthInFile, OfAnotherMeshNamesBothCounts) {
   truth.displacement = uniform(nodes + 2, Vec3::Zero());
-  const auto read = stored_and_read();
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
-  EXPECT_NE(read.error().message.find(std::to_string(nodes + 2)), std::string::npos);
+  EXPECT_THAT(refusal_of(stored_and_read(), ErrorCode::kUnreadable),
+              testing::HasSubstr(std::to_string(nodes + 2)));
 }
 
 TEST_F(SinkingBox, TruthWithAPointOutsideTheMeshNamesKindAndNode) {
   truth.points["cross"][1] = at_node(nodes);
-  const Status status = check_truth(truth, nodes);
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kUnreadable);
-  EXPECT_NE(status.error().message.find("cross 1"), std::string::npos);
-  EXPECT_NE(status.error().message.find(std::to_string(nodes)), std::string::npos);
+  EXPECT_THAT(
+      refusal_of(check_truth(truth, nodes), ErrorCode::kUnreadable),
+      testing::AllOf(testing::HasSubstr("cross 1"), testing::HasSubstr(std::to_string(nodes))));
 }
 
 TEST_F(SinkingBox, TruthWithWeightsThatDoNotSumToOneIsRefused) {

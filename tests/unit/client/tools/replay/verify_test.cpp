@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "client/tools/replay/verify.hpp"
 #include "common/wire/decision.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/scripted_daemon.hpp"
 
@@ -20,9 +20,8 @@ using testing::IsEmpty;
 class Verify : public testing::Test {
  protected:
   void SetUp() override {
-    auto created = io::SurgeryFile::create(folder / "a.surgery", {.case_id = "box"});
-    ASSERT_TRUE(created);
-    file.emplace(std::move(*created));
+    auto created = value_or_fail(io::SurgeryFile::create(folder / "a.surgery", {.case_id = "box"}));
+    file.emplace(std::move(created));
     daemon.script = [this](const Observation& o) {
       sent.push_back(o.source + std::to_string(o.sequence));
       if (fails == o.sequence) return std::vector{failure(o.sequence)};
@@ -93,12 +92,11 @@ class Verify : public testing::Test {
 
 TEST_F(Verify, SendsWhatWasTriedInItsOrderAndFindsTheSameAnswers) {
   record_session();
-  const auto verification = verify();
-  ASSERT_TRUE(verification) << verification.error().message;
+  const auto verification = value_or_fail(verify());
   EXPECT_THAT(sent, ElementsAre("ius1", "ius3", "camera7"));
-  EXPECT_EQ(verification->compared, 3u);
-  EXPECT_THAT(verification->differences, IsEmpty());
-  EXPECT_THAT(report_lines(*verification),
+  EXPECT_EQ(verification.compared, 3u);
+  EXPECT_THAT(verification.differences, IsEmpty());
+  EXPECT_THAT(report_lines(verification),
               ElementsAre(HasSubstr("3 of 3 answers agree bit for bit")));
 }
 
@@ -106,21 +104,19 @@ TEST_F(Verify, NamesTheUpdatesThatDiffer) {
   record_session();
   differs = 3;
   fails = 0;
-  const auto verification = verify();
-  ASSERT_TRUE(verification) << verification.error().message;
-  EXPECT_THAT(verification->differences,
+  const auto verification = value_or_fail(verify());
+  EXPECT_THAT(verification.differences,
               ElementsAre(HasSubstr("update 2 (observation 3): displacement: 1 numbers"),
                           HasSubstr("update 3 (observation 7): failed when recorded")));
-  EXPECT_DOUBLE_EQ(verification->max_difference_mm, 0.5);
-  EXPECT_THAT(report_lines(*verification).front(), HasSubstr("1 of 3 answers agree"));
+  EXPECT_DOUBLE_EQ(verification.max_difference_mm, 0.5);
+  EXPECT_THAT(report_lines(verification).front(), HasSubstr("1 of 3 answers agree"));
 }
 
 TEST_F(Verify, AnAnswerThatFailsNowDiffers) {
   record_session();
   fails = 1;
-  const auto verification = verify();
-  ASSERT_TRUE(verification);
-  EXPECT_THAT(verification->differences.front(), HasSubstr("error: \"none\" recorded"));
+  const auto verification = value_or_fail(verify());
+  EXPECT_THAT(verification.differences.front(), HasSubstr("error: \"none\" recorded"));
 }
 
 TEST_F(Verify, AJournalThatLacksSomethingIsRefused) {

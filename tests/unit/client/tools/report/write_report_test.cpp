@@ -2,7 +2,6 @@
 #include "client/tools/report/write_report.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
@@ -11,6 +10,7 @@
 
 #include "client/tools/replay/run_report.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/box.hpp"
 #include "tests/unit/client/tools/report/small_run.hpp"
@@ -45,11 +45,10 @@ TEST_F(ReportFolder, HoldsMergedJsonPageAndPictures) {
   ASSERT_TRUE(status) << status.error().message;
 
   const fs::path out = folder / "deep" / "out";
-  const auto merged = read_reports(out / "report.json");
-  ASSERT_TRUE(merged) << merged.error().message;
-  ASSERT_EQ(merged->size(), 2u);
-  EXPECT_EQ((*merged)[1].boundary, "fixed");
-  EXPECT_TRUE(fs::exists(out / (*merged)[0].field_file));  // relative to the merged report now
+  const auto merged = value_or_fail(read_reports(out / "report.json"));
+  ASSERT_EQ(merged.size(), 2u);
+  EXPECT_EQ(merged[1].boundary, "fixed");
+  EXPECT_TRUE(fs::exists(out / merged[0].field_file));  // relative to the merged report now
   for (const char* name :
        {"recovery.png", "convergence-paper-contact.png", "convergence-paper-fixed.png"}) {
     EXPECT_GT(fs::file_size(out / name), 1000u) << name;
@@ -124,9 +123,7 @@ TEST_F(ReportFolder, MissingCaseFileIsNamed) {
 TEST_F(ReportFolder, OutThatIsAFileIsRefused) {
   ASSERT_TRUE(write_reports(folder / "a.json", {small_run("contact")}));
   std::ofstream(folder / "out") << "in the way";
-  const Status status = write_report({{folder / "a.json"}, folder / "out"});
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kWriteFailed);
+  refusal_of(write_report({{folder / "a.json"}, folder / "out"}), ErrorCode::kWriteFailed);
 }
 
 }  // namespace

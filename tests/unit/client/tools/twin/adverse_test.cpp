@@ -3,7 +3,6 @@
 #include "client/tools/twin/adverse.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <numbers>
 
@@ -11,6 +10,7 @@
 #include "client/tools/twin/surgery.hpp"
 #include "client/tools/twin/truth_load.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -65,10 +65,9 @@ TEST(Ingredients, AreNamedOnceAndNamesAreRead) {
   for (const IngredientInfo& info : all_ingredients()) {
     EXPECT_TRUE(names.insert(info.name).second) << info.name;
     EXPECT_FALSE(info.description.empty());
-    const auto alone = ingredients_from(info.name);
-    ASSERT_TRUE(alone) << alone.error().message;
-    EXPECT_EQ(*alone, Ingredients{info.ingredient});
-    EXPECT_EQ(name_of(*alone), info.name);
+    const auto alone = value_or_fail(ingredients_from(info.name));
+    EXPECT_EQ(alone, Ingredients{info.ingredient});
+    EXPECT_EQ(name_of(alone), info.name);
     list += (list.empty() ? "" : ",") + info.name;
   }
   EXPECT_EQ(list,
@@ -81,11 +80,8 @@ TEST(Ingredients, AreNamedOnceAndNamesAreRead) {
 }
 
 TEST(Ingredients, UnknownRepeatedAndMissingNamesAreRefused) {
-  const auto unknown = ingredients_from("gap,weather");
-  ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(unknown.error().message, HasSubstr("\"weather\""));
-  EXPECT_THAT(unknown.error().message, HasSubstr("partial-sweep"));
+  EXPECT_THAT(refusal_of(ingredients_from("gap,weather"), ErrorCode::kNotFound),
+              testing::AllOf(HasSubstr("\"weather\""), HasSubstr("partial-sweep")));
   EXPECT_EQ(ingredients_from("gap,gap").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ingredients_from("gap,").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ingredients_from("").error().code, ErrorCode::kInvalidArgument);
@@ -95,8 +91,7 @@ TEST(Ingredients, UnknownRepeatedAndMissingNamesAreRefused) {
 // Ingredients of the brain change the truth; those of the instruments change what is measured and
 // leave the truth alone. The case's own nodes carry the truth in either case.
 TEST(Ingredients, EachChangesWhatItIsNamedAfter) {
-  const auto plain = play({});
-  ASSERT_TRUE(plain) << plain.error().message;
+  const auto plain = value_or_fail(play({}));
   const std::set<Ingredient> of_the_brain = {Ingredient::kGap, Ingredient::kPenalty,
                                              Ingredient::kStiffness, Ingredient::kLevel,
                                              Ingredient::kGravity};
@@ -105,13 +100,13 @@ TEST(Ingredients, EachChangesWhatItIsNamedAfter) {
     ASSERT_TRUE(adverse) << name_of({ingredient}) << ": " << adverse.error().message;
     const Points& truth = adverse->truths[0].displacement;
     ASSERT_EQ(truth.cols(), adverse_patient().mesh.num_nodes());
-    const double change = (truth - plain->truths[0].displacement).colwise().norm().maxCoeff();
+    const double change = (truth - plain.truths[0].displacement).colwise().norm().maxCoeff();
     if (of_the_brain.count(ingredient) > 0) {
       EXPECT_GT(change, 0.02) << name_of({ingredient});
     } else {
       EXPECT_EQ(change, 0.0) << name_of({ingredient});
     }
-    EXPECT_NE(wire::encode(adverse->observations[0]), wire::encode(plain->observations[0]))
+    EXPECT_NE(wire::encode(adverse->observations[0]), wire::encode(plain.observations[0]))
         << name_of({ingredient});
   }
 }
@@ -153,13 +148,12 @@ TEST(Ingredients, OfALevelAndOfGravityHaveTheirSize) {
 TEST(Gap, LiesBetweenItsBoundsAndVaries) {
   const auto scenario =
       with_ingredients(pressed(), {Ingredient::kGap}, adverse_patient().gravity_direction, 3);
-  const auto brain = truth_brain(adverse_patient(), test_support::toy_config(), *scenario, 1);
-  ASSERT_TRUE(brain);
-  const auto forward = truth_forward(*brain);
-  ASSERT_TRUE(forward) << forward.error().message;
-  ASSERT_EQ(forward->contact().pairs().size(), adverse_patient().slaves.size());
+  const auto brain =
+      value_or_fail(truth_brain(adverse_patient(), test_support::toy_config(), *scenario, 1));
+  const auto forward = value_or_fail(truth_forward(brain));
+  ASSERT_EQ(forward.contact().pairs().size(), adverse_patient().slaves.size());
   double least = 100.0, most = 0.0;
-  for (const contact::ContactPair& pair : forward->contact().pairs()) {
+  for (const contact::ContactPair& pair : forward.contact().pairs()) {
     least = std::min(least, -pair.initial_penetration_mm);
     most = std::max(most, -pair.initial_penetration_mm);
   }
@@ -200,10 +194,10 @@ TEST(Probe, TrackerAndCalibrationMoveSectionsAsTheirNamesSay) {
 }
 
 TEST(Probe, APartialSweepLeavesASideOfTheTumourOut) {
-  const auto whole = play({}), partial = play({Ingredient::kPartialSweep});
-  ASSERT_TRUE(whole && partial);
-  const double share = static_cast<double>(boundary_of(*partial).cols()) /
-                       static_cast<double>(boundary_of(*whole).cols());
+  const auto whole = value_or_fail(play({}));
+  const auto partial = value_or_fail(play({Ingredient::kPartialSweep}));
+  const double share = static_cast<double>(boundary_of(partial).cols()) /
+                       static_cast<double>(boundary_of(whole).cols());
   EXPECT_GT(share, 0.4);
   EXPECT_LT(share, 0.8);
 }
@@ -212,11 +206,10 @@ TEST(Misfit, TheLoadFollowsTheDisplacementThatTheTumourMustHave) {
   for (const double wanted_mm : {1.0, 4.0}) {
     Scenario scenario = pressed();
     scenario.tumour_displacement_mm = wanted_mm;
-    const auto surgery = play({}, 1, scenario);
-    ASSERT_TRUE(surgery) << surgery.error().message;
-    EXPECT_NEAR(surgery->truths[0].scalars.at("tumour_displacement_mm"), wanted_mm,
+    const auto surgery = value_or_fail(play({}, 1, scenario));
+    EXPECT_NEAR(surgery.truths[0].scalars.at("tumour_displacement_mm"), wanted_mm,
                 0.005 * wanted_mm);
-    EXPECT_GT(surgery->truths[0].scalars.at("load_scale"), 0.0);
+    EXPECT_GT(surgery.truths[0].scalars.at("load_scale"), 0.0);
   }
 }
 
@@ -224,11 +217,8 @@ TEST(Misfit, TheLoadFollowsTheDisplacementThatTheTumourMustHave) {
 TEST(Effects, WhatDoesNothingIsAnErrorThatSaysWhy) {
   const auto refused = [](const Ingredients& ingredients, const Scenario& scenario,
                           const char* why) {
-    const auto surgery = play(ingredients, 1, scenario);
-    ASSERT_FALSE(surgery) << why;
-    EXPECT_EQ(surgery.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(surgery.error().message, HasSubstr("does nothing"));
-    EXPECT_THAT(surgery.error().message, HasSubstr(why));
+    EXPECT_THAT(refusal_of(play(ingredients, 1, scenario), ErrorCode::kInvalidArgument),
+                testing::AllOf(HasSubstr("does nothing"), HasSubstr(why)));
   };
   Scenario still = pressed();  // a little swelling, no weight
   still.fluid_levels_mm = {-300.0};
@@ -242,11 +232,10 @@ TEST(Effects, WhatDoesNothingIsAnErrorThatSaysWhy) {
 
 TEST(Effects, ATiltAboutTheAxisThatGravityLiesAlongIsAnError) {
   const Scenario& scenario = *find_scenario("joint-tangential");
-  const auto surgery =
-      play_scenario(test_support::toy_patient(6), test_support::toy_config(), scenario, 1);
-  ASSERT_FALSE(surgery);
-  EXPECT_EQ(surgery.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(surgery.error().message, HasSubstr("joint-tangential does nothing on this case"));
+  EXPECT_THAT(refusal_of(play_scenario(test_support::toy_patient(6), test_support::toy_config(),
+                                       scenario, 1),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("joint-tangential does nothing on this case"));
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
@@ -10,6 +9,7 @@
 #include "client/tools/twin/surgery.hpp"
 #include "common/fem/elasticity.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -155,11 +155,10 @@ TEST(Retraction, ThatTouchesNoExposedNodeIsAnError) {
   Scenario scenario = *find_scenario("retraction");
   scenario.fluid_levels_mm = {-20.0};
   scenario.retraction->offset_mm = Vec3(200, 0, 0);
-  const auto surgery =
-      play_scenario(test_support::toy_patient(6), test_support::toy_config(), scenario, 1);
-  ASSERT_FALSE(surgery);
-  EXPECT_EQ(surgery.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(surgery.error().message, testing::HasSubstr("presses on no node of the opening"));
+  EXPECT_THAT(refusal_of(play_scenario(test_support::toy_patient(6), test_support::toy_config(),
+                                       scenario, 1),
+                         ErrorCode::kInvalidArgument),
+              testing::HasSubstr("presses on no node of the opening"));
 }
 
 TEST(Retraction, PushesTheCortexIntoTheBrain) {
@@ -168,9 +167,7 @@ TEST(Retraction, PushesTheCortexIntoTheBrain) {
   scenario.fluid_levels_mm = {-20.0};
   scenario.retraction->angle_deg = 0.0;
   const auto play = [&] {
-    const auto surgery = play_scenario(model, test_support::toy_config(), scenario, 1);
-    EXPECT_TRUE(surgery) << surgery.error().message;
-    return *surgery;
+    return value_or_fail(play_scenario(model, test_support::toy_config(), scenario, 1));
   };
   const SimulatedSurgery pressed = play();
   scenario.retraction.reset();

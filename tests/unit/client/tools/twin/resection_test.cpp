@@ -4,7 +4,6 @@
 #include "client/tools/twin/resection.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <limits>
 #include <set>
@@ -14,6 +13,7 @@
 #include "common/core/units.hpp"
 #include "common/fem/body_loads.hpp"
 #include "common/geometry/closest_point.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -30,9 +30,7 @@ const BrainModel& resected_patient() {
 }
 
 ResectedBrain resected(double fraction, const CaseConfig& config = test_support::toy_config()) {
-  auto brain = resect(resected_patient(), config, {fraction});
-  EXPECT_TRUE(brain) << brain.error().message;
-  return std::move(*brain);
+  return value_or_fail(resect(resected_patient(), config, {fraction}));
 }
 
 Vec3 centre_of(int tet) {
@@ -108,11 +106,10 @@ TEST(Resection, TheRestOfAStiffTumourStaysStiff) {
   CaseConfig config = test_support::toy_config();
   config.material.tumour = TissueStiffness{9000.0, 0.4};
   const ResectedBrain brain = resected(0.5, config);
-  const auto is = contact::tissue_map(brain.model, brain.config.material);
-  ASSERT_TRUE(is);
+  const auto is = value_or_fail(contact::tissue_map(brain.model, brain.config.material));
   int stiff = 0, soft = 0;
   for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
-    const double pa = is->at(t).elastic.shear / units::stress_from_pa(1.0);
+    const double pa = is.at(t).elastic.shear / units::stress_from_pa(1.0);
     const bool deep = centre_of(t)[2] < kTumour[2] - 2.0;
     if ((centre_of(t) - kTumour).norm() > kRadius_mm) {
       EXPECT_NEAR(pa, 2100.0, 1e-6) << t;
@@ -131,13 +128,12 @@ TEST(Resection, TheRestOfAStiffTumourStaysStiff) {
 TEST(Resection, ComesOnTopOfStiffnessThatVaries) {
   Scenario scenario = *find_scenario("resection");
   scenario.stiffness_length_mm = 8.0;
-  const auto brain = truth_brain(resected_patient(), test_support::toy_config(), scenario, 3);
-  ASSERT_TRUE(brain) << brain.error().message;
-  const auto map = contact::tissue_map(brain->model, brain->config.material);
-  ASSERT_TRUE(map);
+  const auto brain =
+      value_or_fail(truth_brain(resected_patient(), test_support::toy_config(), scenario, 3));
+  const auto map = value_or_fail(contact::tissue_map(brain.model, brain.config.material));
   std::set<double> inside, outside;
   for (int t = 0; t < resected_patient().mesh.num_tets(); ++t) {
-    const double g = map->at(t).elastic.shear;
+    const double g = map.at(t).elastic.shear;
     ((centre_of(t) - kTumour).norm() > kRadius_mm ? outside : inside).insert(g);
   }
   EXPECT_EQ(outside.size(), 9u);  // the classes of stiffness.hpp
@@ -189,9 +185,8 @@ class ResectedSurgery : public testing::Test {
     return scenario;
   }
   static SimulatedSurgery play(const Scenario& scenario) {
-    auto surgery = play_scenario(resected_patient(), test_support::toy_config(), scenario, 1);
-    EXPECT_TRUE(surgery) << surgery.error().message;
-    return std::move(*surgery);
+    return value_or_fail(
+        play_scenario(resected_patient(), test_support::toy_config(), scenario, 1));
   }
 };
 
@@ -246,10 +241,9 @@ TEST_F(ResectedSurgery, NothingOfTheCavityIsMeasuredOrScored) {
   // Without noise every measured point lies on a triangle whose corners are scored.
   const auto& points = std::get<TumourBoundary>(surgery.observations[0].body).points;
   ASSERT_GT(points.cols(), 50);
-  const auto index = geometry::ClosestPointIndex::build(deformed);
-  ASSERT_TRUE(index);
+  const auto index = value_or_fail(geometry::ClosestPointIndex::build(deformed));
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const auto closest = index->closest(points.col(i));
+    const auto closest = index.closest(points.col(i));
     EXPECT_LT(closest.distance_mm, 1e-6);
     int corners = 0;
     for (int k = 0; k < 3; ++k) {
@@ -263,17 +257,14 @@ TEST(ResectionRefusal, NamesTheFractionAndTheEmptyTumour) {
   const CaseConfig config = test_support::toy_config();
   for (const double fraction : {0.0, -0.1, 1.01, std::numeric_limits<double>::quiet_NaN(),
                                 std::numeric_limits<double>::infinity()}) {
-    const auto brain = resect(resected_patient(), config, {fraction});
-    ASSERT_FALSE(brain) << fraction;
-    EXPECT_EQ(brain.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(brain.error().message, HasSubstr("resection.volume_fraction"));
+    EXPECT_THAT(
+        refusal_of(resect(resected_patient(), config, {fraction}), ErrorCode::kInvalidArgument),
+        HasSubstr("resection.volume_fraction"))
+        << fraction;
   }
   BrainModel elsewhere = resected_patient();
   elsewhere.tumour.vertices.colwise() += Vec3(500, 0, 0);
-  const auto brain = resect(elsewhere, config, {});
-  ASSERT_FALSE(brain);
-  EXPECT_EQ(brain.error().code, ErrorCode::kEmptySet);
-  EXPECT_THAT(brain.error().message, HasSubstr("tumour"));
+  EXPECT_THAT(refusal_of(resect(elsewhere, config, {}), ErrorCode::kEmptySet), HasSubstr("tumour"));
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "client/tools/twin/stiffness.hpp"
 #include "client/tools/twin/surgery.hpp"
 #include "client/tools/twin/truth_load.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -92,12 +92,11 @@ TEST(VariedStiffness, HasTheMeanSpreadAndLengthAskedFor) {
 // ln of the relative shear modulus of every element, with tissues told apart.
 VecX log_tissues(std::uint64_t seed) {
   const CaseConfig config = test_support::toy_config();
-  const auto varied = vary_tissues(stiffness_patient(), config, seed);
-  EXPECT_TRUE(varied) << varied.error().message;
-  VecX ln(varied->model.mesh.num_tets());
-  for (int t = 0; t < varied->model.mesh.num_tets(); ++t) {
-    const int label = varied->model.mesh.labels.at(static_cast<std::size_t>(t));
-    ln[t] = std::log(varied->config.material.regions.at(label).shear_modulus_pa /
+  const auto varied = value_or_fail(vary_tissues(stiffness_patient(), config, seed));
+  VecX ln(varied.model.mesh.num_tets());
+  for (int t = 0; t < varied.model.mesh.num_tets(); ++t) {
+    const int label = varied.model.mesh.labels.at(static_cast<std::size_t>(t));
+    ln[t] = std::log(varied.config.material.regions.at(label).shear_modulus_pa /
                      config.material.shear_modulus_pa);
   }
   return ln;
@@ -161,18 +160,15 @@ struct Played {
 
 Played solve(const BrainModel& model, const Scenario& scenario, const BrainModel* other) {
   const CaseConfig config = test_support::toy_config();
-  auto brain = truth_brain(model, config, scenario, 1, other);
-  EXPECT_TRUE(brain) << brain.error().message;
-  const auto forward = truth_forward(*brain);
-  EXPECT_TRUE(forward) << forward.error().message;
-  TruthSolver solver(*forward);
+  auto brain = value_or_fail(truth_brain(model, config, scenario, 1, other));
+  const auto forward = value_or_fail(truth_forward(brain));
+  TruthSolver solver(forward);
   const Points load =
-      gravity_load(*brain, gravity_of(brain->model, scenario), scenario.fluid_levels_mm[0]) +
-      constant_load(*brain, scenario);
-  auto truth = solver.solve(load);
-  EXPECT_TRUE(truth) << truth.error().message;
-  Points u = displacement_at_nodes(*brain, truth->displacement);
-  return {std::move(*brain), std::move(*truth), std::move(u)};
+      gravity_load(brain, gravity_of(brain.model, scenario), scenario.fluid_levels_mm[0]) +
+      constant_load(brain, scenario);
+  auto truth = value_or_fail(solver.solve(load));
+  Points u = displacement_at_nodes(brain, truth.displacement);
+  return {std::move(brain), std::move(truth), std::move(u)};
 }
 
 double difference(const Points& a, const Points& b) {
@@ -199,10 +195,9 @@ TEST(OtherMesh, TheSkullHoldsItsMiddlesOfEdges) {
   scenario.swelling = {0.5, 42.0, 9.0};
   const BrainModel model = test_support::toy_patient(6), other = test_support::toy_patient(5);
   const Played played = solve(model, scenario, &other);
-  const auto forward = truth_forward(played.brain);
-  ASSERT_TRUE(forward);
+  const auto forward = value_or_fail(truth_forward(played.brain));
   double widest = 0.0;
-  for (const contact::ContactPair& pair : forward->contact().pairs()) {
+  for (const contact::ContactPair& pair : forward.contact().pairs()) {
     EXPECT_GE(pair.slave, played.brain.elsewhere->space.num_vertices());
     EXPECT_LT(pair.initial_penetration_mm, -0.5);  // the box's edges are rounded off
     widest = std::max(widest, -pair.initial_penetration_mm);
@@ -223,41 +218,34 @@ TEST(OtherMesh, TheSkullHoldsItsMiddlesOfEdges) {
 TEST(OtherMesh, ASurgeryKeepsToTheCasesNodes) {
   const BrainModel model = test_support::toy_patient(6), other = test_support::toy_patient(5);
   const Scenario scenario = elsewhere(sag());
-  auto brain = truth_brain(model, test_support::toy_config(), scenario, 1, &other);
-  ASSERT_TRUE(brain) << brain.error().message;
-  const auto forward = truth_forward(*brain);
-  ASSERT_TRUE(forward);
-  TruthSolver solver(*forward);
-  const auto surgery = play_scenario(*brain, solver, scenario, 1);
-  ASSERT_TRUE(surgery) << surgery.error().message;
-  const io::SurgeryTruth& truth = surgery->truths[0];
+  auto brain = value_or_fail(truth_brain(model, test_support::toy_config(), scenario, 1, &other));
+  const auto forward = value_or_fail(truth_forward(brain));
+  TruthSolver solver(forward);
+  const auto surgery = value_or_fail(play_scenario(brain, solver, scenario, 1));
+  const io::SurgeryTruth& truth = surgery.truths[0];
   EXPECT_EQ(truth.displacement.cols(), model.mesh.num_nodes());
-  EXPECT_EQ(truth.scalars.at("truth_nodes"), brain->elsewhere->space.num_nodes());
+  EXPECT_EQ(truth.scalars.at("truth_nodes"), brain.elsewhere->space.num_nodes());
   for (const auto& [kind, points] : truth.points) {
     for (const io::ScorePoint& point : points) {
       EXPECT_LT(point.nodes.maxCoeff(), model.mesh.num_nodes()) << kind;
     }
   }
-  EXPECT_EQ(surgery->observations[0].case_id, model.case_id);
+  EXPECT_EQ(surgery.observations[0].case_id, model.case_id);
 }
 
 TEST(OtherMesh, AnotherHeadIsRefused) {
   const BrainModel model = test_support::toy_patient(6);
   BrainModel elsewhere = test_support::toy_patient(5);
   elsewhere.mesh.nodes.row(0).array() += 12.0;
-  const auto other = make_other_mesh(model, elsewhere);
-  ASSERT_FALSE(other);
-  EXPECT_EQ(other.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(other.error().message, testing::HasSubstr("12.0 mm"));
+  EXPECT_THAT(refusal_of(make_other_mesh(model, elsewhere), ErrorCode::kInvalidArgument),
+              testing::HasSubstr("12.0 mm"));
 }
 
 TEST(OtherMesh, ACaseWithAReadyMeshIsRefused) {
   CaseConfig config = test_support::toy_config();
   config.mesh = MeshFile{"head.msh"};
-  const auto anew = mesh_anew(config);
-  ASSERT_FALSE(anew);
-  EXPECT_EQ(anew.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(anew.error().message, testing::HasSubstr("mesh.file"));
+  EXPECT_THAT(refusal_of(mesh_anew(config), ErrorCode::kInvalidArgument),
+              testing::HasSubstr("mesh.file"));
 }
 
 // A quadratic displacement is met exactly at any place.

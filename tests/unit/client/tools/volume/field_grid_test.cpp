@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
 #include "client/tools/volume/field_grid.hpp"
+#include "tests/support/results.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -58,10 +58,7 @@ TEST(FieldGrid, RefusesWhatNoGridCanHold) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto refuse = [](const Points& points, double margin_mm, double spacing_mm, ErrorCode code,
                          const char* says) {
-    const auto grid = grid_around(points, margin_mm, spacing_mm);
-    ASSERT_FALSE(grid) << says;
-    EXPECT_EQ(grid.error().code, code) << says;
-    EXPECT_THAT(grid.error().message, HasSubstr(says));
+    EXPECT_THAT(refusal_of(grid_around(points, margin_mm, spacing_mm), code), HasSubstr(says));
   };
   const Points head = box_corners(Vec3::Zero(), Vec3::Constant(200));
   refuse(Points(3, 0), 1, 1, ErrorCode::kEmptySet, "no point");
@@ -119,9 +116,7 @@ TEST(OutsideTaper, RefusesAnOrderThatIsNone) {
   for (const OutsideTaper& bad :
        {OutsideTaper{-1, 5}, OutsideTaper{5, 5}, OutsideTaper{6, 5}, OutsideTaper{5, 1001},
         OutsideTaper{nan, 5}, OutsideTaper{5, nan}}) {
-    const Status refused = validate(bad);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+    refusal_of(validate(bad), ErrorCode::kInvalidArgument);
   }
 }
 

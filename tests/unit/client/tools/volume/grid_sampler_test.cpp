@@ -2,7 +2,6 @@
 #include "client/tools/volume/grid_sampler.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
