@@ -25,9 +25,8 @@ Status check_range(const char* name, milliseconds value) {
   // ZeroMQ takes milliseconds as int and three heartbeats make a timeout.
   constexpr milliseconds limit(std::numeric_limits<int>::max() / 4);
   if (value > milliseconds(0) && value <= limit) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              std::string(name) + " = " + std::to_string(value.count()) + " ms: must be in [1, " +
-                  std::to_string(limit.count()) + "]");
+  return invalid(std::string(name) + " = " + std::to_string(value.count()) +
+                 " ms: must be in [1, " + std::to_string(limit.count()) + "]");
 }
 
 Status validate(const ClientOptions& options) {
@@ -55,189 +54,173 @@ struct Client::Impl {
 
   // Sends a request and waits for its reply's payload. Updates met on the way are queued.
   Result<std::string> request(MessageType type, const std::string& payload, MessageType reply_type,
-                              milliseconds timeout);
+                              milliseconds timeout) {
+    if (payload.size() > wire::kMaxPayloadBytes) {
+      return invalid("request of " + std::to_string(payload.size()) + " bytes: must be at most " +
+                     std::to_string(wire::kMaxPayloadBytes));
+    }
+    const Deadline deadline = deadline_after(timeout);
+    const std::uint64_t id = ++last_request_id;
+    if (Status status = dealer->send(encode_frame(type, id, payload), deadline); !status) {
+      return tl::unexpected(status.error());
+    }
+    while (true) {
+      const auto message = dealer->receive(deadline);
+      if (!message) return tl::unexpected(message.error());
+      if (auto result = answer(*message, id, reply_type)) return *std::move(result);
+    }
+  }
+
   Result<std::string> request(MessageType type, const std::string& payload,
                               MessageType reply_type) {
     return request(type, payload, reply_type, options.request_timeout);
   }
+
   // The payload if `message` answers request `id`; nullopt if it is an update or a late reply.
   std::optional<Result<std::string>> answer(const std::string& message, std::uint64_t id,
-                                            MessageType reply_type);
-  void take_state(std::uint64_t request_id, std::string_view payload);
-  void take_update(std::string_view payload);
+                                            MessageType reply_type) {
+    const auto frame = wire::decode_frame(message);
+    if (!frame) return protocol_error(frame.error().message);
+    if (frame->type == MessageType::kUpdate) {
+      take_update(frame->payload);
+      return std::nullopt;
+    }
+    if (frame->type == MessageType::kSessionState) {
+      take_state(frame->request_id, frame->payload);
+      if (frame->request_id != id) return std::nullopt;
+    }
+    if (frame->request_id != 0 && frame->request_id < id) {
+      // A renewal that is refused: after a restart the choice may hold no node of another model.
+      const bool waiting_for_push = reply_type == MessageType::kUpdate;
+      if (frame->type == MessageType::kErrorReply && waiting_for_push &&
+          watch.refused(frame->request_id)) {
+        return tl::unexpected(wire::decode_error(frame->payload));
+      }
+      return std::nullopt;  // timed out before
+    }
+    // A daemon that could not read a request's id complains with id 0.
+    const bool complaint = frame->request_id == 0 && frame->type == MessageType::kErrorReply;
+    if (frame->request_id != id && !complaint) {
+      return protocol_error("reply to request " + std::to_string(frame->request_id) +
+                            ", which was never made");
+    }
+    if (frame->type == MessageType::kErrorReply) {
+      return tl::unexpected(wire::decode_error(frame->payload));
+    }
+    if (frame->type != reply_type) {
+      return protocol_error("reply of type " + std::to_string(static_cast<int>(frame->type)) +
+                            ", must be " + std::to_string(static_cast<int>(reply_type)));
+    }
+    return std::string(frame->payload);
+  }
+
+  void take_state(std::uint64_t request_id, std::string_view payload) {
+    const auto state = wire::decode_session_state(payload);
+    if (!state) return;  // subscribe() reports it; a renewal without an answer proves nothing
+    if (request_id == 0) {
+      watch.told(*state);
+    } else {
+      watch.answered(request_id, *state);
+    }
+    latest_usable.follow(state->session);
+  }
+
+  void take_update(std::string_view payload) {
+    if (subscription) ++subscription->received;
+    auto update = wire::decode_update(payload);
+    if (!update) {
+      // It may have been what the next changes are to be applied to.
+      if (subscription && subscription->choice.tolerance_mm > 0.0) ask_anew();
+      return updates.push(std::move(update));
+    }
+    if (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id)) return;
+    update->received_bytes = payload.size();
+    update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
+    const FieldAssembly::Outcome outcome = assembly.complete(*update);
+    if (outcome == FieldAssembly::Outcome::kLost && subscription) ask_anew();
+    if (outcome == FieldAssembly::Outcome::kWhole) updates.push(std::move(update));
+  }
+
   // The daemon is to take this for a new subscription, and to send the whole choice first.
-  void ask_anew();
+  void ask_anew() {
+    ++subscription->id;
+    subscription->received = acknowledged = 0;
+    renewed = {};
+    assembly.forget();
+  }
+
   // True when the connection was lost since the last time; the next renewal subscribes again.
-  bool notice_losses();
+  bool notice_losses() {
+    if (dealer->losses() == losses) return false;
+    losses = dealer->losses();
+    watch.lost();
+    if (subscription) ask_anew();
+    return true;
+  }
+
   // Tells the daemon what was received, and asks what is current. Waits neither for a connection
   // nor for the answer: without a connection field_status() tells in time. kUnavailable when the
   // connection was found to be lost.
-  Status renew();
-  tl::unexpected<Error> lost() const {
+  Status renew() {
+    const Deadline now = std::chrono::steady_clock::now();
+    const std::uint64_t id = ++last_request_id;
+    watch.asked(id, now);
+    renewed = now;
+    acknowledged = subscription->received;
+    static_cast<void>(dealer->send(
+        encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), now));
+    if (!notice_losses()) return {};
     return fail(ErrorCode::kUnavailable, "lost the connection to " + dealer->endpoint());
   }
-  Deadline next_renewal() const;
+
+  Deadline next_renewal() const {
+    const std::uint64_t batch = std::max<std::uint64_t>(1, subscription->window / 2);
+    if (subscription->received - acknowledged >= batch) return renewed;
+    return renewed + options.renewal_interval;
+  }
+
   // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
   // said what is newest.
-  Status confirm(Deadline deadline);
+  Status confirm(Deadline deadline) {
+    const Deadline asked = std::chrono::steady_clock::now();
+    while (!watch.as_of() || *watch.as_of() < asked) {
+      if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
+        if (auto status = renew(); !status) return status;
+      }
+      auto status = receive_push(std::min(deadline, next_renewal()));
+      if (!status && gives_up(status.error(), deadline)) return status;
+    }
+    updates.drop_older_than(*watch.state());
+    return {};
+  }
+
   // Whether a wait for a push ends with this error: not when only a renewal is due.
   bool gives_up(const Error& error, Deadline deadline) {
     return notice_losses() || error.code != ErrorCode::kUnavailable ||
            std::chrono::steady_clock::now() >= deadline;
   }
+
   // Receives one message for nobody in particular.
-  Status receive_push(Deadline deadline);
+  Status receive_push(Deadline deadline) {
+    const auto message = dealer->receive(deadline);
+    if (!message) return tl::unexpected(message.error());
+    // No request is open: a reply with an old id is late, one with the next id is unasked for.
+    const auto unexpected = answer(*message, last_request_id + 1, MessageType::kUpdate);
+    if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
+    return {};
+  }
+
   // The oldest queued update, on its way to the caller.
-  std::optional<Result<UpdateMessage>> hand_out();
+  std::optional<Result<UpdateMessage>> hand_out() {
+    auto update = updates.pop();
+    if (update && *update) latest_usable.take(**update);
+    return update;
+  }
 
   tl::unexpected<Error> protocol_error(const std::string& detail) const {
     return fail(ErrorCode::kProtocol, dealer->endpoint() + ": " + detail);
   }
 };
-
-Result<std::string> Client::Impl::request(MessageType type, const std::string& payload,
-                                          MessageType reply_type, milliseconds timeout) {
-  if (payload.size() > wire::kMaxPayloadBytes) {
-    return fail(ErrorCode::kInvalidArgument, "request of " + std::to_string(payload.size()) +
-                                                 " bytes: must be at most " +
-                                                 std::to_string(wire::kMaxPayloadBytes));
-  }
-  const Deadline deadline = deadline_after(timeout);
-  const std::uint64_t id = ++last_request_id;
-  if (Status status = dealer->send(encode_frame(type, id, payload), deadline); !status) {
-    return tl::unexpected(status.error());
-  }
-  while (true) {
-    const auto message = dealer->receive(deadline);
-    if (!message) return tl::unexpected(message.error());
-    if (auto result = answer(*message, id, reply_type)) return *std::move(result);
-  }
-}
-
-std::optional<Result<std::string>> Client::Impl::answer(const std::string& message,
-                                                        std::uint64_t id, MessageType reply_type) {
-  const auto frame = wire::decode_frame(message);
-  if (!frame) return protocol_error(frame.error().message);
-  if (frame->type == MessageType::kUpdate) {
-    take_update(frame->payload);
-    return std::nullopt;
-  }
-  if (frame->type == MessageType::kSessionState) {
-    take_state(frame->request_id, frame->payload);
-    if (frame->request_id != id) return std::nullopt;
-  }
-  if (frame->request_id != 0 && frame->request_id < id) {
-    // A renewal that is refused: after a restart the choice may hold no node of another model.
-    const bool waiting_for_push = reply_type == MessageType::kUpdate;
-    if (frame->type == MessageType::kErrorReply && waiting_for_push &&
-        watch.refused(frame->request_id)) {
-      return tl::unexpected(wire::decode_error(frame->payload));
-    }
-    return std::nullopt;  // timed out before
-  }
-  // A daemon that could not read a request's id complains with id 0.
-  const bool complaint = frame->request_id == 0 && frame->type == MessageType::kErrorReply;
-  if (frame->request_id != id && !complaint) {
-    return protocol_error("reply to request " + std::to_string(frame->request_id) +
-                          ", which was never made");
-  }
-  if (frame->type == MessageType::kErrorReply) {
-    return tl::unexpected(wire::decode_error(frame->payload));
-  }
-  if (frame->type != reply_type) {
-    return protocol_error("reply of type " + std::to_string(static_cast<int>(frame->type)) +
-                          ", must be " + std::to_string(static_cast<int>(reply_type)));
-  }
-  return std::string(frame->payload);
-}
-
-void Client::Impl::take_state(std::uint64_t request_id, std::string_view payload) {
-  const auto state = wire::decode_session_state(payload);
-  if (!state) return;  // subscribe() reports it; a renewal without an answer proves nothing
-  if (request_id == 0) {
-    watch.told(*state);
-  } else {
-    watch.answered(request_id, *state);
-  }
-  latest_usable.follow(state->session);
-}
-
-void Client::Impl::take_update(std::string_view payload) {
-  if (subscription) ++subscription->received;
-  auto update = wire::decode_update(payload);
-  if (!update) {
-    // It may have been what the next changes are to be applied to.
-    if (subscription && subscription->choice.tolerance_mm > 0.0) ask_anew();
-    return updates.push(std::move(update));
-  }
-  if (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id)) return;
-  update->received_bytes = payload.size();
-  update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
-  const FieldAssembly::Outcome outcome = assembly.complete(*update);
-  if (outcome == FieldAssembly::Outcome::kLost && subscription) ask_anew();
-  if (outcome == FieldAssembly::Outcome::kWhole) updates.push(std::move(update));
-}
-
-void Client::Impl::ask_anew() {
-  ++subscription->id;
-  subscription->received = acknowledged = 0;
-  renewed = {};
-  assembly.forget();
-}
-
-bool Client::Impl::notice_losses() {
-  if (dealer->losses() == losses) return false;
-  losses = dealer->losses();
-  watch.lost();
-  if (subscription) ask_anew();
-  return true;
-}
-
-Status Client::Impl::renew() {
-  const Deadline now = std::chrono::steady_clock::now();
-  const std::uint64_t id = ++last_request_id;
-  watch.asked(id, now);
-  renewed = now;
-  acknowledged = subscription->received;
-  static_cast<void>(dealer->send(
-      encode_frame(MessageType::kSubscribeRequest, id, wire::encode(*subscription)), now));
-  if (notice_losses()) return lost();
-  return {};
-}
-
-Deadline Client::Impl::next_renewal() const {
-  const std::uint64_t batch = std::max<std::uint64_t>(1, subscription->window / 2);
-  if (subscription->received - acknowledged >= batch) return renewed;
-  return renewed + options.renewal_interval;
-}
-
-Status Client::Impl::receive_push(Deadline deadline) {
-  const auto message = dealer->receive(deadline);
-  if (!message) return tl::unexpected(message.error());
-  // No request is open: a reply with an old id is late, one with the next id is unasked for.
-  const auto unexpected = answer(*message, last_request_id + 1, MessageType::kUpdate);
-  if (unexpected && !*unexpected) return tl::unexpected(unexpected->error());
-  return {};
-}
-
-Status Client::Impl::confirm(Deadline deadline) {
-  const Deadline asked = std::chrono::steady_clock::now();
-  while (!watch.as_of() || *watch.as_of() < asked) {
-    if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
-      if (auto status = renew(); !status) return status;
-    }
-    auto status = receive_push(std::min(deadline, next_renewal()));
-    if (!status && gives_up(status.error(), deadline)) return status;
-  }
-  updates.drop_older_than(*watch.state());
-  return {};
-}
-
-std::optional<Result<UpdateMessage>> Client::Impl::hand_out() {
-  auto update = updates.pop();
-  if (update && *update) latest_usable.take(**update);
-  return update;
-}
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::Client(Client&&) noexcept = default;
@@ -287,9 +270,8 @@ Result<BrainModel> Client::model() {
 
 Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   if (window < 1 || window > Subscription::kMaxWindow) {
-    return fail(ErrorCode::kInvalidArgument, "window = " + std::to_string(window) +
-                                                 ": must be in [1, " +
-                                                 std::to_string(Subscription::kMaxWindow) + "]");
+    return invalid("window = " + std::to_string(window) + ": must be in [1, " +
+                   std::to_string(Subscription::kMaxWindow) + "]");
   }
   if (Status status = validate(choice); !status) return status;
   Impl& self = *impl_;

@@ -26,7 +26,7 @@ Result<std::string> public_key_of(const std::string& secret_key) {
   KeyText public_key{};
   if (secret_key.size() != public_key.size() - 1 ||
       zmq_curve_public(public_key.data(), secret_key.c_str()) != 0) {
-    return fail(ErrorCode::kInvalidArgument, "the secret key must be 40 characters in Z85");
+    return invalid("the secret key must be 40 characters in Z85");
   }
   return std::string(public_key.data());
 }

@@ -89,29 +89,22 @@ Result<std::unique_ptr<Dealer>> Dealer::connect(const std::string& endpoint,
                                                 std::chrono::milliseconds heartbeat_interval,
                                                 const std::optional<ClientKeys>& keys) {
   std::unique_ptr<Dealer> dealer(new Dealer());
-  if (Status status = dealer->open(endpoint, heartbeat_interval, keys); !status) {
-    return tl::unexpected(status.error());
-  }
-  return dealer;
-}
-
-Status Dealer::open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval,
-                    const std::optional<ClientKeys>& keys) {
-  endpoint_ = endpoint;
-  context_ = zmq_ctx_new();
-  if (context_ != nullptr) socket_ = zmq_socket(context_, ZMQ_DEALER);
-  if (socket_ == nullptr || !set_options(socket_, static_cast<int>(heartbeat_interval.count()))) {
+  Dealer& self = *dealer;
+  self.endpoint_ = endpoint;
+  self.context_ = zmq_ctx_new();
+  if (self.context_ != nullptr) self.socket_ = zmq_socket(self.context_, ZMQ_DEALER);
+  if (self.socket_ == nullptr ||
+      !set_options(self.socket_, static_cast<int>(heartbeat_interval.count()))) {
     return fail(ErrorCode::kInternal, endpoint + ": cannot open a socket: " + zmq_strerror(errno));
   }
-  if (keys) {
-    if (Status status = set_keys(*keys); !status) return status;
+  Status ready = keys ? self.set_keys(*keys) : Status();
+  if (ready) ready = self.open_monitor();
+  if (!ready) return tl::unexpected(ready.error());
+  if (zmq_connect(self.socket_, endpoint.c_str()) != 0) {
+    return invalid("endpoint " + endpoint + ": " + zmq_strerror(errno) +
+                   " (e.g. tcp://127.0.0.1:5555)");
   }
-  if (Status status = open_monitor(); !status) return status;
-  if (zmq_connect(socket_, endpoint.c_str()) != 0) {
-    return fail(ErrorCode::kInvalidArgument, "endpoint " + endpoint + ": " + zmq_strerror(errno) +
-                                                 " (e.g. tcp://127.0.0.1:5555)");
-  }
-  return {};
+  return dealer;
 }
 
 Status Dealer::set_keys(const ClientKeys& keys) {
@@ -124,8 +117,7 @@ Status Dealer::set_keys(const ClientKeys& keys) {
     // ZeroMQ takes 40 characters with the zero behind them.
     if (key->size() != kKeyCharacters ||
         zmq_setsockopt(socket_, option, key->c_str(), kKeyCharacters + 1) != 0) {
-      return fail(ErrorCode::kInvalidArgument,
-                  std::string(name) + ": must be a key of 40 characters in Z85");
+      return invalid(std::string(name) + ": must be a key of 40 characters in Z85");
     }
   }
   keys_ = true;

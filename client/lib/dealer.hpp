@@ -51,8 +51,6 @@ class Dealer {
 
  private:
   Dealer() = default;
-  Status open(const std::string& endpoint, std::chrono::milliseconds heartbeat_interval,
-              const std::optional<ClientKeys>& keys);
   Status set_keys(const ClientKeys& keys);
   std::string no_daemon() const;
   Status open_monitor();

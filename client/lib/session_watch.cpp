@@ -21,14 +21,9 @@ std::string one_decimal(double value) {
 }  // namespace
 
 std::string_view to_string(Currency currency) {
-  switch (currency) {
-    case Currency::kNone: return "none";
-    case Currency::kCurrent: return "current";
-    case Currency::kSuperseded: return "superseded";
-    case Currency::kDegraded: return "degraded";
-    case Currency::kStale: return "stale";
-  }
-  return "unknown";
+  static constexpr std::string_view kNames[] = {"none", "current", "superseded", "degraded",
+                                                "stale"};
+  return enum_name<Currency::kStale>(currency, kNames);
 }
 
 void SessionWatch::asked(std::uint64_t request_id, TimePoint now) {
@@ -84,9 +79,7 @@ FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::u
   if (shown->second < state.newest_usable) {
     return {Currency::kSuperseded, "a newer field is on its way", age_s};
   }
-  if (state.newest_update > shown->second) {
-    return {Currency::kDegraded, state.reason, age_s};
-  }
+  if (state.newest_update > shown->second) return {Currency::kDegraded, state.reason, age_s};
   return {Currency::kCurrent, {}, age_s};
 }
 

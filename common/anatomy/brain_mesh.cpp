@@ -89,12 +89,10 @@ Result<TriangleSurface> make_tumour_surface(const CaseInputs& inputs) {
     return geometry::ellipsoid_surface(ellipsoid->centre_mm, ellipsoid->semi_axes_mm,
                                        kSurfaceEdge_mm);
   if (const auto* label = std::get_if<TumourLabel>(&inputs.config.tumour)) {
-    if (!inputs.tumour_labels)
-      return fail(ErrorCode::kInvalidArgument, "tumour.label_volume.file: was not read");
+    if (!inputs.tumour_labels) return invalid("tumour.label_volume.file: was not read");
     return surface_of_label(*inputs.tumour_labels, label->label, label->path.string());
   }
-  if (!inputs.tumour_surface)
-    return fail(ErrorCode::kInvalidArgument, "tumour.surface.file: was not read");
+  if (!inputs.tumour_surface) return invalid("tumour.surface.file: was not read");
   return checked_surface(*inputs.tumour_surface,
                          std::get<TumourSurfaceFile>(inputs.config.tumour).path.string());
 }
@@ -117,8 +115,7 @@ Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
       fmt::format("{}: {} of {} tumour surface points lie outside the brain, by up to {:.1f} mm",
                   tumour_key(config), outside, fitted.surface.num_vertices(), farthest);
   if (farthest > kLargestCut_mm) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("{}; at most {:g} mm are cut at the brain's surface", what, kLargestCut_mm));
   }
   fitted.note = what + "; they were moved to its surface";
@@ -146,9 +143,8 @@ Status check_extent(const Vec3& size, const std::string& what) {
     hint = "; metres instead of millimetres?";
   if (extent / 1000.0 >= kSmallestExtent_mm && extent / 1000.0 <= kLargestExtent_mm)
     hint = "; micrometres instead of millimetres?";
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("{}: brain extent {:.4g} mm must be between {} and {} mm{}", what, extent,
-                          kSmallestExtent_mm, kLargestExtent_mm, hint));
+  return invalid(fmt::format("{}: brain extent {:.4g} mm must be between {} and {} mm{}", what,
+                             extent, kSmallestExtent_mm, kLargestExtent_mm, hint));
 }
 
 // Size of the box round the voxels > 0, in mm.
@@ -291,7 +287,7 @@ Result<geometry::SizingField> sizing_field(const MeshGeneration& settings,
 Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& settings,
                          const TriangleSurface& tumour, const Progress& progress) {
   const std::string file = fmt::format("images.brain = '{}'", inputs.config.brain.string());
-  if (!inputs.brain) return fail(ErrorCode::kInvalidArgument, file + ": was not read");
+  if (!inputs.brain) return invalid(file + ": was not read");
   report(progress, "mask", 0.0);
   const auto component = geometry::largest_component(*inputs.brain);
   if (!component)
@@ -314,7 +310,7 @@ Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface&
     return generate(inputs, *settings, tumour, progress);
   const std::string file =
       fmt::format("mesh.file = '{}'", std::get<MeshFile>(inputs.config.mesh).path.string());
-  if (!inputs.mesh) return fail(ErrorCode::kInvalidArgument, file + ": was not read");
+  if (!inputs.mesh) return invalid(file + ": was not read");
   report(progress, "check mesh", 0.0);
   if (Status status = geometry::check_mesh(*inputs.mesh); !status)
     return fail(status.error().code, fmt::format("{}: {}", file, status.error().message));

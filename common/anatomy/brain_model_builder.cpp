@@ -61,10 +61,10 @@ Result<Opening> place_opening(const BrainSurface& brain, const Craniotomy& crani
   const Vec3 wanted = craniotomy.long_axis_direction.normalized();
   const Vec3 along = wanted - opening.normal * opening.normal.dot(wanted);
   if (!(along.norm() > 1e-3))
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("craniotomy.long_axis_direction = {}: is perpendicular to the brain "
-                            "surface at craniotomy.centre_mm",
-                            text(craniotomy.long_axis_direction)));
+    return invalid(
+        fmt::format("craniotomy.long_axis_direction = {}: is perpendicular to the brain "
+                    "surface at craniotomy.centre_mm",
+                    text(craniotomy.long_axis_direction)));
   opening.along = along.normalized();
   opening.across = opening.normal.cross(opening.along);
   return opening;
@@ -130,8 +130,8 @@ Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface&
   const ContactConfig& contact = inputs.config.contact;
   if (!contact.skull_file) return geometry::offset_surface(brain.surface, contact.gap_mm);
   if (!inputs.skull)
-    return fail(ErrorCode::kInvalidArgument, fmt::format("contact.skull_file = '{}': was not read",
-                                                         contact.skull_file->string()));
+    return invalid(
+        fmt::format("contact.skull_file = '{}': was not read", contact.skull_file->string()));
   return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
 }
 

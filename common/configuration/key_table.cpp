@@ -36,7 +36,6 @@ std::string range_of(const Limits& limits, const char* word) {
   switch (limits.kind) {
     case Kind::kNone:
     case Kind::kFinite: return {};
-    case Kind::kPositive: return "above 0";
     case Kind::kNotNegative: return "at least 0";
     case Kind::kDirection: return "any length but 0";
     case Kind::kBetween:
@@ -48,12 +47,15 @@ std::string range_of(const Limits& limits, const char* word) {
 
 }  // namespace
 
-void KeyChecker::check(bool ok, const std::string& key, double value,
-                       const std::string& constraint) {
-  if (ok || !message_.empty()) return;
+std::string must_be(const std::string& key, double value, const std::string& constraint) {
   std::ostringstream text;
   text << key << " = " << value << ": must be " << constraint;
-  message_ = text.str();
+  return text.str();
+}
+
+void KeyChecker::check(bool ok, const std::string& key, double value,
+                       const std::string& constraint) {
+  if (!ok && message_.empty()) message_ = must_be(key, value, constraint);
 }
 
 void KeyChecker::check(const std::string& key, double value, const Limits& limits) {
@@ -61,8 +63,6 @@ void KeyChecker::check(const std::string& key, double value, const Limits& limit
     case Kind::kNone: return;
     case Kind::kFinite:
     case Kind::kDirection: return check(std::isfinite(value), key, value, "finite");
-    case Kind::kPositive:
-      return check(std::isfinite(value) && value > 0.0, key, value, "finite and > 0");
     case Kind::kNotNegative:
       return check(std::isfinite(value) && value >= 0.0, key, value, "finite and >= 0");
     case Kind::kBetween: {
@@ -73,18 +73,8 @@ void KeyChecker::check(const std::string& key, double value, const Limits& limit
   }
 }
 
-void KeyChecker::operator()(const Key& key, double value, const Limits& limits) {
-  check(full(key), value, limits);
-}
-
-void KeyChecker::operator()(const Key& key, double value, const Limits& limits, const SameAs&) {
-  check(full(key), value, limits);
-}
-
 void KeyChecker::operator()(const Key& key, const Vec3& value, const Limits& limits, Need) {
-  for (int i = 0; i < 3; ++i) {
-    check(full(key) + "[" + std::to_string(i) + "]", value[i], limits);
-  }
+  for (int i = 0; i < 3; ++i) check(full(key) + "[" + std::to_string(i) + "]", value[i], limits);
   if (limits.kind == Kind::kDirection) {
     check(value.norm() > 1e-9, full(key) + " length", value.norm(), "> 0");
   }
@@ -107,7 +97,7 @@ void KeyChecker::require(bool ok, const std::string& key, const std::string& wha
 
 Status KeyChecker::status() const {
   if (message_.empty()) return {};
-  return fail(ErrorCode::kInvalidArgument, message_);
+  return invalid(message_);
 }
 
 void KeyDocumenter::add(const Key& key, const std::string& standard, const std::string& range) {

@@ -43,14 +43,13 @@ enum class Need { kOptional, kRequired };
 
 // What a number must be; of a vector or list, what each entry must be.
 struct Limits {
-  enum class Kind { kNone, kFinite, kPositive, kNotNegative, kBetween, kDirection };
+  enum class Kind { kNone, kFinite, kNotNegative, kBetween, kDirection };
   Kind kind = Kind::kNone;
   double low = 0.0, high = 0.0;    // kBetween; both ends are valid
   const char* high_key = nullptr;  // the key whose value `high` is, for the documentation
 };
 constexpr Limits unlimited() { return {}; }
 constexpr Limits finite() { return {Limits::Kind::kFinite}; }
-constexpr Limits positive() { return {Limits::Kind::kPositive}; }
 constexpr Limits not_negative() { return {Limits::Kind::kNotNegative}; }
 constexpr Limits direction() { return {Limits::Kind::kDirection}; }  // any length but 0
 constexpr Limits between(double low, double high, const char* high_key = nullptr) {
@@ -127,11 +126,16 @@ class KeyWalker {
   std::string prefix_;
 };
 
+// "KEY = VALUE: must be CONSTRAINT", the value with six digits.
+std::string must_be(const std::string& key, double value, const std::string& constraint);
+
 // Compares every value with its limits and keeps the first violation.
 class KeyChecker : public KeyWalker<KeyChecker> {
  public:
-  void operator()(const Key& key, double value, const Limits& limits);
-  void operator()(const Key& key, double value, const Limits& limits, const SameAs&);
+  template <typename... More>
+  void operator()(const Key& key, double value, const Limits& limits, const More&...) {
+    check(full(key), value, limits);
+  }
   void operator()(const Key& key, const Vec3& value, const Limits& limits, Need = Need::kOptional);
   void operator()(const Key& key, const std::vector<double>& value, const Limits& limits);
   // A text that is needed must not be empty.
@@ -181,9 +185,10 @@ class KeyDocumenter : public KeyWalker<KeyDocumenter> {
     for (const Word<W>& known : words) list.append(list.empty() ? "" : ", ").append(known.word);
     add(key, std::string("Default ") + word_of(value, words), "one of " + list);
   }
-  template <typename Variant>
-  void one_of(const Key& key, Need need, Variant& value) {
-    section(key, need, [&] { all_kinds(value); });
+  template <typename... Kinds>
+  void one_of(const Key& key, Need need, const std::variant<Kinds...>&) {
+    const auto document = [this](const auto& kind) { visit_kind(*this, kind); };
+    section(key, need, [&] { (document(Kinds{}), ...); });
   }
   template <typename Optional, typename Section>
   void section_if(const Key& key, Optional&, const Section& like) {
@@ -198,15 +203,6 @@ class KeyDocumenter : public KeyWalker<KeyDocumenter> {
   const std::vector<KeyDocument>& documents() const { return documents_; }
 
  private:
-  template <typename... Kinds>
-  void all_kinds(const std::variant<Kinds...>&) {
-    (one_kind<Kinds>(), ...);
-  }
-  template <typename Kind>
-  void one_kind() {
-    Kind kind;
-    visit_kind(*this, kind);
-  }
   void add(const Key& key, const std::string& standard, const std::string& range);
   std::vector<KeyDocument> documents_;
 };

@@ -2,7 +2,8 @@
 #include "common/configuration/problem_spec.hpp"
 
 #include <algorithm>
-#include <sstream>
+
+#include "common/configuration/key_table.hpp"
 
 namespace brainshift {
 namespace {
@@ -13,18 +14,22 @@ constexpr double kMaxPoissonRatio = 0.4999;
 class Checks {
  public:
   void that(bool holds, const std::string& key, double value, const std::string& constraint) {
-    if (holds || !status_) return;
-    std::ostringstream text;
-    text << key << " = " << value << ": must be " << constraint;
-    refuse(text.str());
+    if (!holds && status_) refuse(must_be(key, value, constraint));
   }
   void that(bool holds, const std::string& message) {
     if (!holds && status_) refuse(message);
   }
+  // Where it is given.
+  void positive(const std::string& key, std::optional<double> value) {
+    if (value) that(*value > 0.0, key, *value, "> 0");
+  }
+  void not_negative(const std::string& key, double value) {
+    that(value >= 0.0, key, value, ">= 0");
+  }
   Status status() const { return status_; }
 
  private:
-  void refuse(const std::string& message) { status_ = fail(ErrorCode::kInvalidArgument, message); }
+  void refuse(const std::string& message) { status_ = invalid(message); }
   Status status_;
 };
 
@@ -32,35 +37,30 @@ void check(const MaterialSpec& m, Checks& checks) {
   const std::string key = "materials." + m.name + ".";
   checks.that(m.youngs_modulus_pa.has_value() != m.shear_modulus_pa.has_value(),
               key + "youngs_modulus_pa: give this or shear_modulus_pa, not both");
-  if (m.youngs_modulus_pa) {
-    checks.that(*m.youngs_modulus_pa > 0.0, key + "youngs_modulus_pa", *m.youngs_modulus_pa, "> 0");
-  }
-  if (m.shear_modulus_pa) {
-    checks.that(*m.shear_modulus_pa > 0.0, key + "shear_modulus_pa", *m.shear_modulus_pa, "> 0");
-  }
+  checks.positive(key + "youngs_modulus_pa", m.youngs_modulus_pa);
+  checks.positive(key + "shear_modulus_pa", m.shear_modulus_pa);
   checks.that(m.poisson_ratio > -1.0 && m.poisson_ratio <= kMaxPoissonRatio, key + "poisson_ratio",
               m.poisson_ratio,
               "> -1 and <= 0.4999 (an incompressible body needs a pressure field)");
-  checks.that(m.density_kg_m3 >= 0.0, key + "density_kg_m3", m.density_kg_m3, ">= 0");
+  checks.not_negative(key + "density_kg_m3", m.density_kg_m3);
   checks.that(m.biot_coefficient >= 0.0 && m.biot_coefficient <= 1.0, key + "biot_coefficient",
               m.biot_coefficient, "between 0 and 1");
-  checks.that(m.storage_per_pa >= 0.0, key + "storage_per_pa", m.storage_per_pa, ">= 0");
-  checks.that(m.permeability_m3_s_kg >= 0.0, key + "permeability_m3_s_kg", m.permeability_m3_s_kg,
-              ">= 0");
+  checks.not_negative(key + "storage_per_pa", m.storage_per_pa);
+  checks.not_negative(key + "permeability_m3_s_kg", m.permeability_m3_s_kg);
 }
 
 void check(const GroupSpec& group, Checks& checks) {
   const std::string key = "groups." + group.name + ".";
   if (const auto* plane = std::get_if<PlaneSelector>(&group.where)) {
     checks.that(plane->normal.norm() > 0.0, key + "plane.normal: must have a length > 0");
-    checks.that(plane->tolerance_mm > 0.0, key + "plane.tolerance_mm", plane->tolerance_mm, "> 0");
+    checks.positive(key + "plane.tolerance_mm", plane->tolerance_mm);
   } else if (const auto* box = std::get_if<BoxSelector>(&group.where)) {
     checks.that((box->max_mm - box->min_mm).minCoeff() >= 0.0,
                 key + "box.max_mm: must not be below min_mm in any component");
   } else {
     const auto& sphere = std::get<SphereSelector>(group.where);
-    checks.that(sphere.radius_mm >= 0.0, key + "sphere.radius_mm", sphere.radius_mm, ">= 0");
-    checks.that(sphere.tolerance_mm > 0.0, key + "sphere.tolerance_mm", sphere.tolerance_mm, "> 0");
+    checks.not_negative(key + "sphere.radius_mm", sphere.radius_mm);
+    checks.positive(key + "sphere.tolerance_mm", sphere.tolerance_mm);
   }
 }
 
@@ -83,12 +83,9 @@ void check(const ContactSpec& contact, Checks& checks) {
   if (const auto* plane = std::get_if<PlaneObstacleSpec>(&contact.obstacle)) {
     checks.that(plane->normal.norm() > 0.0, key + "plane.normal: must have a length > 0");
   } else if (const auto* sphere = std::get_if<SphereObstacleSpec>(&contact.obstacle)) {
-    checks.that(sphere->radius_mm > 0.0, key + "sphere.radius_mm", sphere->radius_mm, "> 0");
+    checks.positive(key + "sphere.radius_mm", sphere->radius_mm);
   }
-  if (contact.penalty_pa_per_mm) {
-    checks.that(*contact.penalty_pa_per_mm > 0.0, key + "penalty_pa_per_mm",
-                *contact.penalty_pa_per_mm, "> 0");
-  }
+  checks.positive(key + "penalty_pa_per_mm", contact.penalty_pa_per_mm);
 }
 
 }  // namespace
@@ -106,9 +103,7 @@ Status validate(const ProblemSpec& problem) {
   for (const ContactSpec& contact : problem.contact) check(contact, checks);
   if (problem.time) {
     checks.that(!problem.time->steps_s.empty(), "time.steps_s: must hold at least one step");
-    for (const double step : problem.time->steps_s) {
-      checks.that(step > 0.0, "time.steps_s", step, "> 0");
-    }
+    for (const double step : problem.time->steps_s) checks.positive("time.steps_s", step);
   }
   return checks.status();
 }

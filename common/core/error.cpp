@@ -1,27 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/core/error.hpp"
 
+#include "common/core/types.hpp"
+
 namespace brainshift {
 
 std::string_view to_string(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kInvalidArgument: return "invalid_argument";
-    case ErrorCode::kNotFound: return "not_found";
-    case ErrorCode::kUnreadable: return "unreadable";
-    case ErrorCode::kWriteFailed: return "write_failed";
-    case ErrorCode::kDegenerateMesh: return "degenerate_mesh";
-    case ErrorCode::kEmptySet: return "empty_set";
-    case ErrorCode::kFloatingBody: return "floating_body";
-    case ErrorCode::kSingularMatrix: return "singular_matrix";
-    case ErrorCode::kNotFinite: return "not_finite";
-    case ErrorCode::kNotConverged: return "not_converged";
-    case ErrorCode::kModelNotReady: return "model_not_ready";
-    case ErrorCode::kProtocol: return "protocol";
-    case ErrorCode::kUnavailable: return "unavailable";
-    case ErrorCode::kNotAllowed: return "not_allowed";
-    case ErrorCode::kInternal: return "internal";
-  }
-  return "internal";
+  static constexpr std::string_view kNames[] = {
+      "invalid_argument", "not_found",     "unreadable",      "write_failed", "degenerate_mesh",
+      "empty_set",        "floating_body", "singular_matrix", "not_finite",   "not_converged",
+      "model_not_ready",  "protocol",      "unavailable",     "not_allowed",  "internal"};
+  return enum_name<ErrorCode::kInternal>(code, kNames);
 }
 
 }  // namespace brainshift

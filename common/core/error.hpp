@@ -47,5 +47,9 @@ using Status = tl::expected<void, Error>;
 inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }
+// The failure that is met most: a value, key or option that is not allowed.
+inline tl::unexpected<Error> invalid(std::string message) {
+  return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
 
 }  // namespace brainshift

@@ -17,7 +17,7 @@ Status check_finite(const Eigen::Matrix4d& matrix) {
     return fail(ErrorCode::kNotFinite, "holds a value that is not a finite number");
   }
   if (!matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-9)) {
-    return fail(ErrorCode::kInvalidArgument, "its last row is not 0 0 0 1");
+    return invalid("its last row is not 0 0 0 1");
   }
   return {};
 }
@@ -36,12 +36,9 @@ Status check_rigid(const Eigen::Matrix4d& matrix, double tolerance) {
   const Mat3 R = matrix.topLeftCorner<3, 3>();
   const double error = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
   if (error > tolerance) {
-    return fail(ErrorCode::kInvalidArgument,
-                "is no rigid motion: R^T R differs from I by " + digits(error));
+    return invalid("is no rigid motion: R^T R differs from I by " + digits(error));
   }
-  if (R.determinant() < 0.0) {
-    return fail(ErrorCode::kInvalidArgument, "is no rigid motion: it is a reflection");
-  }
+  if (R.determinant() < 0.0) return invalid("is no rigid motion: it is a reflection");
   return {};
 }
 
@@ -50,9 +47,8 @@ Status check_affine(const Eigen::Matrix4d& matrix) {
   const Mat3 linear = matrix.topLeftCorner<3, 3>();
   const Vec3 stretch = singular_values(linear).values;
   if (!(stretch[2] > 0.0) || stretch[0] > kLargestCondition * stretch[2]) {
-    return fail(ErrorCode::kInvalidArgument, "cannot be inverted: it stretches by " +
-                                                 digits(stretch[0]) + " and by " +
-                                                 digits(stretch[2]));
+    return invalid("cannot be inverted: it stretches by " + digits(stretch[0]) + " and by " +
+                   digits(stretch[2]));
   }
   return {};
 }

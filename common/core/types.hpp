@@ -9,7 +9,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 namespace brainshift {
 
@@ -26,5 +28,13 @@ using NodeIndex = int;
 // Rigid motion; rotation() orthonormal with determinant +1.
 using RigidTransform = Eigen::Isometry3d;
 using AffineTransform = Eigen::Affine3d;
+
+// The name of an enumerator: `names` has them all in their order, up to that of kLast.
+template <auto kLast, std::size_t N>
+constexpr std::string_view enum_name(decltype(kLast) value, const std::string_view (&names)[N]) {
+  static_assert(N == static_cast<std::size_t>(kLast) + 1, "a name for every enumerator");
+  const auto number = static_cast<std::size_t>(value);
+  return number < N ? names[number] : std::string_view("unknown");
+}
 
 }  // namespace brainshift

@@ -24,14 +24,18 @@ std::string_view ByteReader::take_padded(std::size_t width) {
 
 Status check_padded(std::string_view field, std::string_view text, std::size_t width) {
   if (text.size() > width) {
-    return fail(ErrorCode::kInvalidArgument,
-                std::string(field) + " has " + std::to_string(text.size()) +
-                    " bytes, must have at most " + std::to_string(width));
+    return invalid(std::string(field) + " has " + std::to_string(text.size()) +
+                   " bytes, must have at most " + std::to_string(width));
   }
   if (text.find('\0') != std::string_view::npos) {
-    return fail(ErrorCode::kInvalidArgument, std::string(field) + " holds a NUL");
+    return invalid(std::string(field) + " holds a NUL");
   }
   return {};
+}
+
+tl::unexpected<Error> does_not_fit(std::string_view what, std::uint64_t bytes, std::size_t left) {
+  return malformed(std::string(what) + " of " + std::to_string(bytes) + " bytes, " +
+                   std::to_string(left) + " are left");
 }
 
 }  // namespace brainshift::igtl

@@ -73,5 +73,7 @@ Status check_padded(std::string_view field, std::string_view text, std::size_t w
 inline tl::unexpected<Error> malformed(std::string message) {
   return fail(ErrorCode::kProtocol, std::move(message));
 }
+// kProtocol: "WHAT of N bytes, LEFT are left".
+tl::unexpected<Error> does_not_fit(std::string_view what, std::uint64_t bytes, std::size_t left);
 
 }  // namespace brainshift::igtl

@@ -45,23 +45,20 @@ std::chrono::nanoseconds to_nanoseconds(Timestamp timestamp) {
 
 Status validate(const Header& header) {
   if (header.version != 1 && header.version != 2) {
-    return fail(ErrorCode::kInvalidArgument,
-                "header version " + std::to_string(header.version) + ", must be 1 or 2");
+    return invalid("header version " + std::to_string(header.version) + ", must be 1 or 2");
   }
-  if (header.type.empty()) return fail(ErrorCode::kInvalidArgument, "message type is empty");
+  if (header.type.empty()) return invalid("message type is empty");
   if (Status status = check_padded("message type", header.type, kMaxTypeBytes); !status) {
     return status;
   }
   if (!std::all_of(header.type.begin(), header.type.end(), is_printable_ascii)) {
-    return fail(ErrorCode::kInvalidArgument,
-                "message type is not printable ASCII: 0x" + hex(header.type));
+    return invalid("message type is not printable ASCII: 0x" + hex(header.type));
   }
   if (Status status = check_padded("device name", header.device, kMaxDeviceBytes); !status) {
     return status;
   }
   if (std::any_of(header.device.begin(), header.device.end(), is_control)) {
-    return fail(ErrorCode::kInvalidArgument,
-                "device name holds a control character: 0x" + hex(header.device));
+    return invalid("device name holds a control character: 0x" + hex(header.device));
   }
   return {};
 }

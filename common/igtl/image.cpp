@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "common/core/mesh.hpp"
 #include "common/igtl/bytes.hpp"
 
 namespace brainshift::igtl {
@@ -28,12 +29,6 @@ constexpr std::uint8_t scalar_type() {
   if constexpr (std::is_same_v<T, std::uint32_t>) return 7;
   if constexpr (std::is_same_v<T, float>) return 10;
   if constexpr (std::is_same_v<T, double>) return 11;
-}
-
-// At most 65535^3 * 255 * 8 bytes < 2^59: no overflow.
-std::uint64_t product(const std::array<int, 3>& sizes) {
-  return static_cast<std::uint64_t>(sizes[0]) * static_cast<std::uint64_t>(sizes[1]) *
-         static_cast<std::uint64_t>(sizes[2]);
 }
 
 template <std::size_t Bytes>
@@ -74,14 +69,10 @@ void append_image_header(const ImageGeometry& geometry, int components, std::uin
   append_sizes(part, out);
 }
 
-tl::unexpected<Error> invalid_image(std::string message) {
-  return fail(ErrorCode::kInvalidArgument, std::move(message));
-}
-
 Status validate_image(const ImageGeometry& geometry) {
   for (const int dim : geometry.dims) {
     if (dim < 1 || dim > kMaxDim) {
-      return invalid_image("dims hold " + std::to_string(dim) + ", must be 1 to 65535");
+      return invalid("dims hold " + std::to_string(dim) + ", must be 1 to 65535");
     }
   }
   if (!geometry.steps.allFinite() || !geometry.centre.allFinite()) {
@@ -97,7 +88,7 @@ Status validate_image(const ImageGeometry& geometry) {
   }
   gram += directions.transpose() * directions;
   // sin^2 of the angle between them; single precision does not tell smaller angles from none.
-  if (!(gram.determinant() > 1e-12)) return invalid_image("two steps are parallel, or one is zero");
+  if (!(gram.determinant() > 1e-12)) return invalid("two steps are parallel, or one is zero");
   return {};
 }
 
@@ -106,18 +97,18 @@ Status validate_part(const ImageGeometry& geometry, int components,
                      std::uint64_t numbers) {
   if (Status status = validate_image(geometry); !status) return status;
   if (components < 1 || components > kMaxComponents) {
-    return invalid_image(std::to_string(components) + " components, must be 1 to 255");
+    return invalid(std::to_string(components) + " components, must be 1 to 255");
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (offset[axis] < 0 || part[axis] < 1 || part[axis] > geometry.dims[axis] - offset[axis]) {
-      return invalid_image("part of " + std::to_string(part[axis]) + " voxels from voxel " +
-                           std::to_string(offset[axis]) + " on, the volume has " +
-                           std::to_string(geometry.dims[axis]));
+      return invalid("part of " + std::to_string(part[axis]) + " voxels from voxel " +
+                     std::to_string(offset[axis]) + " on, the volume has " +
+                     std::to_string(geometry.dims[axis]));
     }
   }
-  const std::uint64_t expected = product(part) * static_cast<std::uint64_t>(components);
+  const std::uint64_t expected = grid_size(part) * static_cast<std::uint64_t>(components);
   if (numbers != expected) {
-    return invalid_image(std::to_string(numbers) + " numbers, must be " + std::to_string(expected));
+    return invalid(std::to_string(numbers) + " numbers, must be " + std::to_string(expected));
   }
   return {};
 }
@@ -164,16 +155,14 @@ bool with_type(std::uint8_t scalar, const Take& take) {
 
 }  // namespace
 
-std::size_t ImageGeometry::num_voxels() const { return product(dims); }
+std::size_t ImageGeometry::num_voxels() const { return grid_size(dims); }
 
 AffineTransform ImageGeometry::T_ras_voxel() const {
   const Vec3 middle = 0.5 * Vec3(dims[0] - 1, dims[1] - 1, dims[2] - 1);
   AffineTransform T = AffineTransform::Identity();
   T.linear() = steps.cast<double>();
   T.translation() = centre.cast<double>() - T.linear() * middle;
-  if (coordinates == Coordinates::kLps) {
-    T = AffineTransform(Eigen::Scaling(-1.0, -1.0, 1.0)) * T;
-  }
+  if (coordinates == Coordinates::kLps) T = AffineTransform(Eigen::Scaling(-1.0, -1.0, 1.0)) * T;
   return T;
 }
 
@@ -249,8 +238,9 @@ Result<Image> decode_image(std::string_view content) {
   const bool known = with_type(scalar, [&]<typename T>() {
     // In bytes first: what is no multiple of sizeof(T) cannot be the right number.
     const std::string_view bytes = reader.rest();
+    // At most 65535^3 * 255 * 8 < 2^59: no overflow.
     const std::uint64_t expected =
-        product(image.part) * static_cast<std::uint64_t>(image.components) * sizeof(T);
+        grid_size(image.part) * static_cast<std::uint64_t>(image.components) * sizeof(T);
     if (bytes.size() != expected) {
       status = malformed(std::to_string(bytes.size()) + " bytes of voxels, must be " +
                          std::to_string(expected));

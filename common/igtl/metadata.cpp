@@ -20,21 +20,15 @@ std::size_t bytes_of(const Metadata& metadata) {
   return bytes;
 }
 
-tl::unexpected<Error> entry_does_not_fit(std::string_view part, std::uint64_t bytes,
-                                         std::size_t left) {
-  return malformed(std::string(part) + " of " + std::to_string(bytes) + " bytes, " +
-                   std::to_string(left) + " are left");
-}
-
 Result<Metadata> decode_metadata(std::string_view header, std::string_view text) {
   Metadata metadata;
   if (header.empty()) return metadata;
   ByteReader entries(header);
-  if (entries.left() < kCountBytes) return entry_does_not_fit("metadata count", kCountBytes, 1);
+  if (entries.left() < kCountBytes) return does_not_fit("metadata count", kCountBytes, 1);
   const auto count = entries.number<std::uint16_t>();
   if (std::size_t{count} * kEntryBytes > entries.left()) {
-    return entry_does_not_fit("header of " + std::to_string(count) + " metadata entries",
-                              std::size_t{count} * kEntryBytes, entries.left());
+    return does_not_fit("header of " + std::to_string(count) + " metadata entries",
+                        std::size_t{count} * kEntryBytes, entries.left());
   }
   ByteReader texts(text);
   metadata.reserve(count);  // whose headers are here
@@ -42,11 +36,10 @@ Result<Metadata> decode_metadata(std::string_view header, std::string_view text)
     const auto key_bytes = entries.number<std::uint16_t>();
     const auto encoding = entries.number<std::uint16_t>();
     const auto value_bytes = entries.number<std::uint32_t>();
-    if (key_bytes > texts.left())
-      return entry_does_not_fit("metadata key", key_bytes, texts.left());
+    if (key_bytes > texts.left()) return does_not_fit("metadata key", key_bytes, texts.left());
     std::string key(texts.take(key_bytes));
     if (value_bytes > texts.left()) {
-      return entry_does_not_fit("metadata value", value_bytes, texts.left());
+      return does_not_fit("metadata value", value_bytes, texts.left());
     }
     metadata.push_back({std::move(key), std::string(texts.take(value_bytes)), encoding});
   }
@@ -63,20 +56,18 @@ const std::string* find(const Metadata& metadata, std::string_view key) {
 
 Status validate(const Metadata& metadata) {
   if (metadata.size() > kMaxMetadataEntries) {
-    return fail(ErrorCode::kInvalidArgument, std::to_string(metadata.size()) +
-                                                 " metadata entries, must be at most " +
-                                                 std::to_string(kMaxMetadataEntries));
+    return invalid(std::to_string(metadata.size()) + " metadata entries, must be at most " +
+                   std::to_string(kMaxMetadataEntries));
   }
   if (const std::size_t bytes = bytes_of(metadata); bytes > kMaxMetadataBytes) {
-    return fail(ErrorCode::kInvalidArgument, std::to_string(bytes) +
-                                                 " bytes of metadata, must be at most " +
-                                                 std::to_string(kMaxMetadataBytes));
+    return invalid(std::to_string(bytes) + " bytes of metadata, must be at most " +
+                   std::to_string(kMaxMetadataBytes));
   }
   std::set<std::string_view> keys;
   for (const MetadataEntry& entry : metadata) {
-    if (entry.key.empty()) return fail(ErrorCode::kInvalidArgument, "metadata key is empty");
+    if (entry.key.empty()) return invalid("metadata key is empty");
     if (!keys.insert(entry.key).second) {
-      return fail(ErrorCode::kInvalidArgument, "metadata key \"" + entry.key + "\" occurs twice");
+      return invalid("metadata key \"" + entry.key + "\" occurs twice");
     }
   }
   return {};
@@ -89,7 +80,7 @@ Result<Body> decode_body(std::uint16_t version, std::string_view body) {
     return parts;
   }
   if (body.size() < kExtendedHeaderBytes) {
-    return entry_does_not_fit("extended header", kExtendedHeaderBytes, body.size());
+    return does_not_fit("extended header", kExtendedHeaderBytes, body.size());
   }
   ByteReader reader(body);
   const std::size_t extended_bytes = reader.number<std::uint16_t>();
@@ -102,7 +93,7 @@ Result<Body> decode_body(std::uint16_t version, std::string_view body) {
   }
   const std::size_t left = body.size() - extended_bytes;
   if (header_bytes + metadata_bytes > left) {
-    return entry_does_not_fit("metadata", header_bytes + metadata_bytes, left);
+    return does_not_fit("metadata", header_bytes + metadata_bytes, left);
   }
   const std::size_t content_bytes = left - header_bytes - metadata_bytes;
   parts.content = body.substr(extended_bytes, content_bytes);

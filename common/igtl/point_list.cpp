@@ -14,15 +14,11 @@ constexpr std::size_t kGroupBytes = 32;
 constexpr std::size_t kOwnerBytes = 20;
 
 Status validate_point(const NamedPoint& point) {
-  if (Status status = check_padded("name of a point", point.name, kNameBytes); !status) {
-    return status;
-  }
-  if (Status status = check_padded("group of a point", point.group, kGroupBytes); !status) {
-    return status;
-  }
-  if (Status status = check_padded("owner of a point", point.owner, kOwnerBytes); !status) {
-    return status;
-  }
+  const Status texts =
+      check_padded("name of a point", point.name, kNameBytes)
+          .and_then([&] { return check_padded("group of a point", point.group, kGroupBytes); })
+          .and_then([&] { return check_padded("owner of a point", point.owner, kOwnerBytes); });
+  if (!texts) return texts;
   if (!point.position.allFinite() || !std::isfinite(point.diameter)) {
     return fail(ErrorCode::kNotFinite, "position or diameter of a point is not finite");
   }

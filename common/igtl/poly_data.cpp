@@ -18,10 +18,6 @@ constexpr int kMaxScalarComponents = 127;  // igtlPolyDataMessage.h
 constexpr std::uint8_t kOfCells = 0x10;
 constexpr std::uint8_t kKindMask = 0x0f;
 
-tl::unexpected<Error> invalid(std::string message) {
-  return fail(ErrorCode::kInvalidArgument, std::move(message));
-}
-
 std::string too_many_attributes(std::size_t count) {
   return std::to_string(count) + " attributes, must be at most " + std::to_string(kMaxAttributes);
 }
@@ -111,11 +107,6 @@ struct CellSizes {
   std::uint32_t count = 0;
   std::uint32_t bytes = 0;
 };
-
-tl::unexpected<Error> does_not_fit(std::string_view what, std::uint64_t bytes, std::size_t left) {
-  return malformed(std::string(what) + " of " + std::to_string(bytes) + " bytes, " +
-                   std::to_string(left) + " are left");
-}
 
 Result<Cells> take_cells(ByteReader& reader, const CellSizes& sizes, std::string_view name) {
   if (sizes.bytes > reader.left()) return does_not_fit(name, sizes.bytes, reader.left());
@@ -224,9 +215,7 @@ bool operator==(const PolyData& a, const PolyData& b) {
 }
 
 Status validate(const PolyData& data) {
-  if (!data.points.allFinite()) {
-    return fail(ErrorCode::kNotFinite, "a point is not finite");
-  }
+  if (!data.points.allFinite()) return fail(ErrorCode::kNotFinite, "a point is not finite");
   const auto points = static_cast<std::uint64_t>(data.points.cols());
   const std::pair<const Cells*, std::string_view> arrays[] = {
       {&data.vertices, "vertices"},

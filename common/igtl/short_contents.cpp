@@ -15,9 +15,8 @@ constexpr std::size_t kStatusHeaderBytes = 2 + 8 + kErrorNameBytes;
 
 Status validate(const Text& text) {
   if (text.text.size() > Text::kMaxBytes) {
-    return fail(ErrorCode::kInvalidArgument, "text has " + std::to_string(text.text.size()) +
-                                                 " bytes, must have at most " +
-                                                 std::to_string(Text::kMaxBytes));
+    return invalid("text has " + std::to_string(text.text.size()) + " bytes, must have at most " +
+                   std::to_string(Text::kMaxBytes));
   }
   return {};
 }
@@ -31,7 +30,7 @@ Status validate(const StatusReport& report) {
 
 Status validate(const Capability& capability) {
   for (const std::string& type : capability.types) {
-    if (type.empty()) return fail(ErrorCode::kInvalidArgument, "a message type is empty");
+    if (type.empty()) return invalid("a message type is empty");
     if (Status status = check_padded("message type", type, kMaxTypeBytes); !status) return status;
   }
   return {};
@@ -95,9 +94,7 @@ Result<Capability> decode_capability(std::string_view content) {
   for (ByteReader reader(content); reader.left() > 0;) {
     capability.types.emplace_back(reader.take_padded(kMaxTypeBytes));
   }
-  if (const Status status = validate(capability); !status) {
-    return malformed(status.error().message);
-  }
+  if (const Status status = validate(capability); !status) return malformed(status.error().message);
   return capability;
 }
 

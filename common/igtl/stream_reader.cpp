@@ -10,9 +10,6 @@
 namespace brainshift::igtl {
 
 std::uint64_t StreamLimits::limit_of(std::string_view type) const {
-  if (const auto own = body_bytes_of_type.find(type); own != body_bytes_of_type.end()) {
-    return own->second;
-  }
   const bool large = type == Image::kType || type == PolyData::kType || type == PointList::kType;
   return large ? body_bytes : small_body_bytes;
 }

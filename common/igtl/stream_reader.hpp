@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -33,8 +32,6 @@ struct StreamLimits {
   // Of the types that are small by nature (STRING, STATUS, TRANSFORM, TDATA, ...): the longest text
   // and the longest metadata fit.
   std::uint64_t small_body_bytes = 256u << 10;
-  // Of one type, in place of the two above.
-  std::map<std::string, std::uint64_t, std::less<>> body_bytes_of_type{};
   // Of a message that is skipped. More is an attack or a stream out of step.
   std::uint64_t skipped_bytes = 1u << 30;
 
@@ -59,8 +56,6 @@ class StreamReader {
   // kProtocol: the stream is broken; every later call returns the same error.
   Result<std::optional<Packet>> read(std::string_view& bytes);
 
-  // True between messages: the peer may close the connection here without losing one.
-  bool at_boundary() const { return header_bytes_.empty() && !packet_; }
   // Memory held for the message that is arriving.
   std::size_t held_bytes() const;
 

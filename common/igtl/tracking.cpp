@@ -30,8 +30,6 @@ Eigen::Matrix4d to_matrix(const Matrix34f& transform) {
   return matrix;
 }
 
-Matrix34f from_matrix(const Eigen::Matrix4d& matrix) { return matrix.topRows<3>().cast<float>(); }
-
 Status validate(const Transform& transform) {
   if (!transform.matrix.allFinite()) {
     return fail(ErrorCode::kNotFinite, "a number of the transform is not finite");
@@ -71,9 +69,7 @@ Result<Transform> decode_transform(std::string_view content) {
   }
   ByteReader reader(content);
   const Transform transform{take_matrix(reader)};
-  if (const Status status = validate(transform); !status) {
-    return malformed(status.error().message);
-  }
+  if (const Status status = validate(transform); !status) return malformed(status.error().message);
   return transform;
 }
 

@@ -25,7 +25,6 @@ using Matrix34f = Eigen::Matrix<float, 3, 4>;
 
 // 4 x 4 with the last row 0 0 0 1. common/core/rigid_motion.hpp checks whether it is a motion.
 Eigen::Matrix4d to_matrix(const Matrix34f& transform);
-Matrix34f from_matrix(const Eigen::Matrix4d& matrix);
 
 struct Transform {
   static constexpr std::string_view kType = "TRANSFORM";

@@ -117,16 +117,14 @@ StereoCalibration calibration_of(const std::vector<BoardCorners>& corners, const
 
 Status check_corners(const std::vector<BoardCorners>& corners, const ChessBoard& board) {
   if (static_cast<int>(corners.size()) < kFewestPairs) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("a {} x {} board was found in {} pairs: at least {} are needed",
-                            board.columns, board.rows, corners.size(), kFewestPairs));
+    return invalid(fmt::format("a {} x {} board was found in {} pairs: at least {} are needed",
+                               board.columns, board.rows, corners.size(), kFewestPairs));
   }
   const int expected = board.columns * board.rows;
   for (const BoardCorners& pair : corners) {
     if (pair.left.cols() == expected && pair.right.cols() == expected) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: {} and {} corners: the board has {}", pair.name, pair.left.cols(),
-                            pair.right.cols(), expected));
+    return invalid(fmt::format("{}: {} and {} corners: the board has {}", pair.name,
+                               pair.left.cols(), pair.right.cols(), expected));
   }
   return {};
 }
@@ -135,13 +133,11 @@ Status check_corners(const std::vector<BoardCorners>& corners, const ChessBoard&
 
 Status validate(const ChessBoard& board) {
   if (board.columns < 3 || board.rows < 3 || board.columns > 100 || board.rows > 100) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("board = {}x{}: must have 3 to 100 inner corners along each side",
-                            board.columns, board.rows));
+    return invalid(fmt::format("board = {}x{}: must have 3 to 100 inner corners along each side",
+                               board.columns, board.rows));
   }
   if (!(std::isfinite(board.square_mm) && board.square_mm > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("square_mm = {}: must be finite and > 0", board.square_mm));
+    return invalid(fmt::format("square_mm = {}: must be finite and > 0", board.square_mm));
   }
   return {};
 }
@@ -222,10 +218,9 @@ Result<CalibrationResult> calibrate(const std::vector<PicturePair>& pairs,
     const GrayImage& first = pairs.front().left;
     for (const GrayImage* picture : {&pair.left, &pair.right}) {
       if (picture->width == first.width && picture->height == first.height) continue;
-      return fail(
-          ErrorCode::kInvalidArgument,
-          fmt::format("{}: a picture of {} x {} px: the first one has {} x {} px", pair.name,
-                      picture->width, picture->height, first.width, first.height));
+      return invalid(fmt::format("{}: a picture of {} x {} px: the first one has {} x {} px",
+                                 pair.name, picture->width, picture->height, first.width,
+                                 first.height));
     }
     BoardCorners found{pair.name, find_corners(pair.left, board), find_corners(pair.right, board)};
     if (found.left.cols() == 0 || found.right.cols() == 0) {

@@ -20,10 +20,9 @@ namespace {
 Status check_size(const char* side, const GrayImage& picture,
                   const StereoCalibration& calibration) {
   if (picture.width == calibration.width_px && picture.height == calibration.height_px) return {};
-  return fail(
-      ErrorCode::kInvalidArgument,
-      fmt::format("the {} picture has {} x {} px: the calibration is for {} x {} px", side,
-                  picture.width, picture.height, calibration.width_px, calibration.height_px));
+  return invalid(fmt::format("the {} picture has {} x {} px: the calibration is for {} x {} px",
+                             side, picture.width, picture.height, calibration.width_px,
+                             calibration.height_px));
 }
 
 // One picture as its rectified camera sees it, and where that lies inside the original.
@@ -89,8 +88,7 @@ Result<Rectified> rectify(const GrayImage& left, const GrayImage& right,
   // OpenCV takes the larger component of the baseline. A valid calibration may still be too near
   // the diagonal.
   if (!(g.baseline_mm > 0.0) || P2.at<double>(1, 3) != 0.0) {
-    return fail(ErrorCode::kInvalidArgument,
-                "T_right_left: the cameras do not stand side by side enough to be rectified");
+    return invalid("T_right_left: the cameras do not stand side by side enough to be rectified");
   }
   resample(left, calibration.left, R1, P1, rectified.pair.left, rectified.pair.left_seen);
   resample(right, calibration.right, R2, P2, rectified.pair.right, rectified.pair.right_seen);
@@ -122,7 +120,7 @@ constexpr double kSwappedGain = 2.0;
 
 Status check_match(const RectifiedPair& pair, const MatchOptions& options) {
   const auto refuse = [](const char* name, double value, const char* must) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be {}", name, value, must));
+    return invalid(fmt::format("{} = {}: must be {}", name, value, must));
   };
   if (options.disparities < 1 || options.disparities > kMaxDisparities)
     return refuse("disparities", options.disparities, "between 1 and 2048");
@@ -130,8 +128,7 @@ Status check_match(const RectifiedPair& pair, const MatchOptions& options) {
     return refuse("max_left_right_px", options.max_left_right_px, "> 0");
   if (pair.left.empty() || pair.left.width != pair.right.width ||
       pair.left.height != pair.right.height) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("the left picture has {} x {} px, the right one {} x {} px: must be "
                     "equal and not empty",
                     pair.left.width, pair.left.height, pair.right.width, pair.right.height));
@@ -227,17 +224,15 @@ DisparityMap combine(const RectifiedPair& pair, const cv::Mat& from_left, const 
 Result<MatchOptions> within(const DepthRange& range, const RectifiedGeometry& geometry, int width,
                             MatchOptions options) {
   if (!(range.near_mm > 0.0) || !(range.far_mm > range.near_mm) || !std::isfinite(range.far_mm)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("depth range = {} to {} mm: must be 0 < near < far", range.near_mm,
-                            range.far_mm));
+    return invalid(fmt::format("depth range = {} to {} mm: must be 0 < near < far", range.near_mm,
+                               range.far_mm));
   }
   // A point nearer than this lies in one picture only.
   const double most = std::min(disparity_at(geometry, range.near_mm), static_cast<double>(width));
   const double least = std::max(disparity_at(geometry, range.far_mm), -static_cast<double>(width));
   if (!(most > least)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("depth range = {} to {} mm: no point so near lies in both pictures",
-                            range.near_mm, range.far_mm));
+    return invalid(fmt::format("depth range = {} to {} mm: no point so near lies in both pictures",
+                               range.near_mm, range.far_mm));
   }
   options.min_disparity_px = static_cast<int>(std::floor(least)) - 1;
   options.disparities = static_cast<int>(std::ceil(most)) + 2 - options.min_disparity_px;
@@ -277,10 +272,10 @@ Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayIma
   const auto turned = measure(right, left, calibration, range, options);
   if (turned && turned->map.valid_fraction >= kLeastValid &&
       turned->map.valid_fraction >= kSwappedGain * found) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("left and right pictures are swapped: {:.1f} % of the pixels match as "
-                            "given and {:.1f} % the other way round",
-                            100.0 * found, 100.0 * turned->map.valid_fraction));
+    return invalid(
+        fmt::format("left and right pictures are swapped: {:.1f} % of the pixels match as "
+                    "given and {:.1f} % the other way round",
+                    100.0 * found, 100.0 * turned->map.valid_fraction));
   }
   return fail(ErrorCode::kEmptySet,
               fmt::format("{:.1f} % of the pixels have a consistent match between {:g} and {:g} "

@@ -22,7 +22,7 @@ constexpr double kMinBlockFill = 0.5;
 
 Status check(const ReconstructOptions& options, const RigidTransform& T_ras_camera) {
   const auto refuse = [](const char* name, double value, const char* must) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be {}", name, value, must));
+    return invalid(fmt::format("{} = {}: must be {}", name, value, must));
   };
   if (!(options.spacing_mm > 0.0) || !std::isfinite(options.spacing_mm))
     return refuse("spacing_mm", options.spacing_mm, "finite and > 0");
@@ -198,9 +198,7 @@ Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const Rectifie
   if (Status ok = check(options, T_ras_camera); !ok) return tl::unexpected(ok.error());
   ReconstructedSurface result;
   PixelMap<float> kept = map.disparity_px;
-  const PartSizes parts = drop_minor_parts(kept, kMaxPartStep_px, kLeastPart);
-  result.valid_pixels = parts.left + parts.dropped;
-  result.pixels_in_small_parts = parts.dropped;
+  result.pixels_in_small_parts = drop_minor_parts(kept, kMaxPartStep_px, kLeastPart).dropped;
   std::vector<double> depths;
   for (const float d : kept.pixels)
     if (!std::isnan(d)) depths.push_back(depth_at(geometry, static_cast<double>(d)));

@@ -41,8 +41,7 @@ struct ReconstructedSurface {
   TriangleSurface surface;        // mm RAS
   VecX sd_mm;                     // per vertex, along the line of sight
   VecX confidence;                // per vertex, 0 to 1: disparity.hpp
-  int valid_pixels = 0;           // of the map
-  int pixels_in_small_parts = 0;  // of them, dropped in step 1
+  int pixels_in_small_parts = 0;  // of the map, dropped in step 1
   int outlier_points = 0;         // vertices dropped in step 3
   double median_depth_mm = 0.0;
   double median_sd_mm = 0.0;

@@ -27,8 +27,7 @@ std::string reason_of(const FramePair& link, PoseOutcome outcome) {
 Status check_options(const ChainOptions& options) {
   const auto check = [](const char* name, double value, double least, double most) -> Status {
     if (value >= least && value <= most) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{} = {} s: must be {} to {}", name, value, least, most));
+    return invalid(fmt::format("{} = {} s: must be {} to {}", name, value, least, most));
   };
   if (Status ok = check("latency", options.latency_s, -1.0, 1.0); !ok) return ok;
   if (Status ok = check("max age", options.time.max_age_s, 0.0, 60.0); !ok) return ok;

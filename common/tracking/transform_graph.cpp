@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/tracking/transform_graph.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <deque>
 #include <map>
@@ -11,22 +13,17 @@ namespace brainshift::tracking {
 namespace {
 
 std::string joined(const std::set<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 Status check_unique(const std::vector<FramePair>& links) {
   std::map<std::set<std::string>, std::string> seen;
   for (const FramePair& link : links) {
-    if (link.from == link.to) {
-      return fail(ErrorCode::kInvalidArgument, link.name() + ": leads from a frame to itself");
-    }
+    if (link.from == link.to) return invalid(link.name() + ": leads from a frame to itself");
     const auto [other, is_new] = seen.emplace(std::set{link.from, link.to}, link.name());
     if (!is_new) {
-      return fail(ErrorCode::kInvalidArgument, "frames " + link.from + " and " + link.to +
-                                                   " are linked twice, by " + other->second +
-                                                   " and " + link.name());
+      return invalid("frames " + link.from + " and " + link.to + " are linked twice, by " +
+                     other->second + " and " + link.name());
     }
   }
   return {};
@@ -66,9 +63,8 @@ tl::unexpected<Error> not_connected(const std::vector<FramePair>& links,
       if (reached.count(name) == 0) others.insert(name);
     }
   }
-  return fail(ErrorCode::kInvalidArgument, "no chain from " + from + " to " + to + ": " + from +
-                                               " is connected to " + joined(reached) +
-                                               "; other known frames: " + joined(others));
+  return invalid("no chain from " + from + " to " + to + ": " + from + " is connected to " +
+                 joined(reached) + "; other known frames: " + joined(others));
 }
 
 }  // namespace

@@ -18,9 +18,8 @@ Result<FramePair> parse_transform_name(std::string_view name) {
     }
   }
   if (found != 1 || !is_capital(name.front())) {
-    return fail(ErrorCode::kInvalidArgument,
-                "transform name \"" + std::string(name) +
-                    "\": must be two frame names with capital letters joined by one \"To\"");
+    return invalid("transform name \"" + std::string(name) +
+                   "\": must be two frame names with capital letters joined by one \"To\"");
   }
   return FramePair{std::string(name.substr(0, at)), std::string(name.substr(at + 2))};
 }

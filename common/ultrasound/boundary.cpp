@@ -14,14 +14,12 @@ constexpr double kMostPoints = 1e6;
 
 Status check_contour(const Contour& contour, double spacing_mm) {
   if (!(spacing_mm > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("boundary spacing = {} mm: must be > 0", spacing_mm));
+    return invalid(fmt::format("boundary spacing = {} mm: must be > 0", spacing_mm));
   }
   const int least = contour.closed ? 3 : 2;
   if (contour.points_px.cols() < least) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("contour of frame {} has {} points: must have at least {}",
-                            contour.frame, contour.points_px.cols(), least));
+    return invalid(fmt::format("contour of frame {} has {} points: must have at least {}",
+                               contour.frame, contour.points_px.cols(), least));
   }
   if (!contour.points_px.allFinite()) {
     return fail(ErrorCode::kNotFinite,
@@ -51,9 +49,9 @@ Result<Points> boundary_points(const Contour& contour, const AffineTransform& T_
   const double total = length.back();
   const double steps = std::max(1.0, std::round(total / spacing_mm));
   if (!(total > 0.0) || !(steps <= kMostPoints)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("contour of frame {} is {:.3g} mm long: must be > 0 and at most {:.3g}",
-                            contour.frame, total, kMostPoints * spacing_mm));
+    return invalid(
+        fmt::format("contour of frame {} is {:.3g} mm long: must be > 0 and at most {:.3g}",
+                    contour.frame, total, kMostPoints * spacing_mm));
   }
   const auto count = static_cast<Eigen::Index>(steps) + (contour.closed ? 0 : 1);
   Points points(3, count);

@@ -31,11 +31,9 @@ Result<IntensitySamples> frame_samples(const tracking::Recording& recording,
                                        int block_px) {
   const auto count = static_cast<std::size_t>(recording.num_frames());
   if (poses.size() != count)
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("samples of {} frames with {} poses", count, poses.size()));
+    return invalid(fmt::format("samples of {} frames with {} poses", count, poses.size()));
   if (block_px < 1 || block_px > 100)
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("samples of frames: block_px = {}: must be 1 to 100", block_px));
+    return invalid(fmt::format("samples of frames: block_px = {}: must be 1 to 100", block_px));
   std::vector<int> used;
   Eigen::MatrixXf largest = Eigen::MatrixXf::Zero(recording.height, recording.width);
   for (std::size_t i = 0; i < count; ++i) {

@@ -286,21 +286,18 @@ Status accept(const TracedContour& traced) {
 
 Status check_seed(const tracking::Recording& recording, const Seed& seed) {
   if (seed.frame < 0 || seed.frame >= recording.num_frames()) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("seed on frame {}: the recording has frames 0 to {}", seed.frame,
-                            recording.num_frames() - 1));
+    return invalid(fmt::format("seed on frame {}: the recording has frames 0 to {}", seed.frame,
+                               recording.num_frames() - 1));
   }
   const bool inside = seed.at_px.x() >= 0.0 && seed.at_px.x() <= recording.width - 1 &&
                       seed.at_px.y() >= 0.0 && seed.at_px.y() <= recording.height - 1;
   if (!inside) {
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format("seed at {} {} px on frame {}: the image has {} x {} pixels", seed.at_px.x(),
-                    seed.at_px.y(), seed.frame, recording.width, recording.height));
+    return invalid(fmt::format("seed at {} {} px on frame {}: the image has {} x {} pixels",
+                               seed.at_px.x(), seed.at_px.y(), seed.frame, recording.width,
+                               recording.height));
   }
   if (!recording.image_ok[static_cast<std::size_t>(seed.frame)]) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("seed on frame {}: its image is invalid", seed.frame));
+    return invalid(fmt::format("seed on frame {}: its image is invalid", seed.frame));
   }
   return {};
 }

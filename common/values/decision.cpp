@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/values/decision.hpp"
 
+#include "common/core/types.hpp"
+
 namespace brainshift {
 
 std::string_view to_string(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kUsed: return "used";
-    case Outcome::kFailed: return "failed";
-    case Outcome::kSuperseded: return "superseded";
-    case Outcome::kSkipped: return "skipped";
-  }
-  return "";
+  static constexpr std::string_view kNames[] = {"used", "failed", "superseded", "skipped"};
+  return enum_name<Outcome::kSkipped>(outcome, kNames);
 }
 
 }  // namespace brainshift

@@ -10,39 +10,21 @@ std::string_view to_string(Boundary boundary) {
 }
 
 std::string_view to_string(Method method) {
-  switch (method) {
-    case Method::kCondensed: return "condensed";
-    case Method::kPaper: return "paper";
-    case Method::kPaperWoodbury: return "paper-woodbury";
-    case Method::kIterativeSolver: return "pcg";
-  }
-  return "condensed";
+  static constexpr std::string_view kNames[] = {"condensed", "paper", "paper-woodbury", "pcg"};
+  return enum_name<Method::kIterativeSolver>(method, kNames);
 }
 
 std::string_view to_string(PriorPart part) {
-  switch (part) {
-    case PriorPart::kAlongGravity: return "along_gravity";
-    case PriorPart::kAcrossGravity: return "across_gravity";
-    case PriorPart::kTumourVolume: return "tumour_volume";
-    case PriorPart::kBrainVolume: return "brain_volume";
-    case PriorPart::kResection: return "resection";
-    case PriorPart::kOpening: return "opening";
-    case PriorPart::kFine: return "fine";
-    case PriorPart::kMedium: return "medium";
-    case PriorPart::kCoarse: return "coarse";
-  }
-  return "fine";
+  static constexpr std::string_view kNames[] = {"along_gravity", "across_gravity", "tumour_volume",
+                                                "brain_volume",  "resection",      "opening",
+                                                "fine",          "medium",         "coarse"};
+  return enum_name<PriorPart::kCoarse>(part, kNames);
 }
 
 std::string_view to_string(EstimateStatus status) {
-  switch (status) {
-    case EstimateStatus::kNotRun: return "not_run";
-    case EstimateStatus::kIterating: return "iterating";
-    case EstimateStatus::kConverged: return "converged";
-    case EstimateStatus::kIterationLimit: return "iteration_limit";
-    case EstimateStatus::kDeadline: return "deadline";
-  }
-  return "not_run";
+  static constexpr std::string_view kNames[] = {"not_run", "iterating", "converged",
+                                                "iteration_limit", "deadline"};
+  return enum_name<EstimateStatus::kDeadline>(status, kNames);
 }
 
 std::string sentence(const AnswerTime& time) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/values/quality.hpp"
 
+#include "common/core/types.hpp"
+
 namespace brainshift {
 namespace {
 
@@ -9,13 +11,8 @@ constexpr std::uint32_t kUnusableBits = 0xffff0000u;
 }  // namespace
 
 std::string_view to_string(Quality quality) {
-  switch (quality) {
-    case Quality::kNotJudged: return "not_judged";
-    case Quality::kGood: return "good";
-    case Quality::kCaution: return "caution";
-    case Quality::kUnusable: return "unusable";
-  }
-  return "not_judged";
+  static constexpr std::string_view kNames[] = {"not_judged", "good", "caution", "unusable"};
+  return enum_name<Quality::kUnusable>(quality, kNames);
 }
 
 std::string_view to_string(QualityFlag flag) {

@@ -23,7 +23,7 @@ Status check_range(std::string_view name, double value, double lowest, bool incl
   if (above && value <= highest) return {};
   std::string bound = inclusive ? "[" : "(";
   bound += text(lowest) + ", " + text(highest) + "]";
-  return fail(ErrorCode::kInvalidArgument, named + ": must be in " + bound);
+  return invalid(named + ": must be in " + bound);
 }
 
 Status validate(const Region& region) {
@@ -44,15 +44,9 @@ Status validate(const Region& region) {
 }  // namespace
 
 std::string_view to_string(SessionPhase phase) {
-  switch (phase) {
-    case SessionPhase::kEmpty: return "empty";
-    case SessionPhase::kPreparing: return "preparing";
-    case SessionPhase::kReady: return "ready";
-    case SessionPhase::kTracking: return "tracking";
-    case SessionPhase::kDegraded: return "degraded";
-    case SessionPhase::kClosed: return "closed";
-  }
-  return "unknown";
+  static constexpr std::string_view kNames[] = {"empty",    "preparing", "ready",
+                                                "tracking", "degraded",  "closed"};
+  return enum_name<SessionPhase::kClosed>(phase, kNames);
 }
 
 bool RecordingState::holds(std::string_view source, std::uint64_t sequence) const {

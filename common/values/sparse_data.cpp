@@ -35,9 +35,7 @@ SparseData combine(const std::vector<SparseData>& parts) {
       all.common_error.block(3 * first, column, 3 * count, errors) = part.common_error;
       column += errors;
     }
-    if (part.sources.empty()) {
-      all.sources.push_back({"", static_cast<int>(first), part.size()});
-    }
+    if (part.sources.empty()) all.sources.push_back({"", static_cast<int>(first), part.size()});
     for (DataSource source : part.sources) {
       source.first += static_cast<int>(first);
       all.sources.push_back(std::move(source));

@@ -53,15 +53,13 @@ Result<SessionRequest> decode_session_request(std::string_view payload) {
   if (!method) {
     std::string names;
     for (const Method known : kAllMethods) names += ' ' + std::string(to_string(known));
-    return fail(
-        ErrorCode::kInvalidArgument,
-        "start_session.method = " + in_quotes(message.method()) + ": must be one of" + names);
+    return invalid("start_session.method = " + in_quotes(message.method()) + ": must be one of" +
+                   names);
   }
   const auto boundary = boundary_from(message.boundary());
   if (!boundary) {
-    return fail(ErrorCode::kInvalidArgument,
-                "start_session.boundary = " + in_quotes(message.boundary()) +
-                    ": must be \"contact\" or \"fixed\"");
+    return invalid("start_session.boundary = " + in_quotes(message.boundary()) +
+                   ": must be \"contact\" or \"fixed\"");
   }
   return SessionRequest{message.case_id(),  *method,
                         *boundary,          message.publish_iterates(),

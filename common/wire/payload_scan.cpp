@@ -75,9 +75,7 @@ class Scanner {
       if (!take_varint(bytes, tag) || tag > UINT32_MAX || (tag >> 3) == 0) {
         return refuse(type.name(), "malformed field tag");
       }
-      if (++fields_ > kMaxFields) {
-        return refuse(type.name(), more_than(kMaxFields, " fields"));
-      }
+      if (++fields_ > kMaxFields) return refuse(type.name(), more_than(kMaxFields, " fields"));
       const auto wire = static_cast<WireType>(tag & 7u);
       const gp::FieldDescriptor* field = type.FindFieldByNumber(static_cast<int>(tag >> 3));
       std::string_view value;

@@ -8,8 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "common/wire/frame.hpp"
-
 namespace brainshift::server {
 namespace {
 
@@ -18,10 +16,7 @@ using wire::PublishedUpdate;
 // Above this share of the choice, changes with their node numbers save little over all of it.
 constexpr double kMostOfTheChoice = 0.9;
 
-Bytes frame(const std::string& payload) {
-  return std::make_shared<const std::string>(
-      wire::encode_frame(wire::MessageType::kUpdate, 0, payload));
-}
+Bytes frame(const std::string& payload) { return framed(wire::MessageType::kUpdate, 0, payload); }
 
 // The field of the update at the nodes of the choice.
 std::shared_ptr<HeldField> all_of(const PublishedUpdate& update, const Selection& selection) {
@@ -87,6 +82,10 @@ Parcel make_parcel(const Bytes& whole, const PublishedUpdate& update, const Sele
 }
 
 }  // namespace
+
+Bytes framed(wire::MessageType type, std::uint64_t request_id, std::string_view payload) {
+  return std::make_shared<const std::string>(wire::encode_frame(type, request_id, payload));
+}
 
 Parcels::Entry& Parcels::entry(const Bytes& whole) {
   const auto known = std::find_if(entries_.begin(), entries_.end(),

@@ -21,15 +21,18 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/values/session_state.hpp"
+#include "common/wire/frame.hpp"
 #include "common/wire/published_update.hpp"
 
 namespace brainshift::server {
 
 // A complete frame (common/wire/frame.hpp), shared by all to whom it goes.
 using Bytes = std::shared_ptr<const std::string>;
+Bytes framed(wire::MessageType type, std::uint64_t request_id, std::string_view payload);
 
 // What a viewer holds once it has received what it was sent; of a choice with a tolerance.
 struct HeldField {

@@ -47,29 +47,230 @@ struct Guard::Impl {
     watch(wake, EPOLLIN, EPOLL_CTL_ADD);
     watch(listener.fd(), EPOLLIN, EPOLL_CTL_ADD);
   }
+
   ~Impl() {
     connections.clear();
     ::close(epoll);
     ::close(wake);
   }
+
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  void watch(int fd, std::uint32_t events, int operation) const;
-  void work();
-  void nudge() const;
+  void watch(int fd, std::uint32_t events, int operation) const {
+    epoll_event event{};
+    event.events = events;
+    event.data.fd = fd;
+    epoll_ctl(epoll, operation, fd, &event);
+  }
 
-  void accept_all();
-  bool make_room();
-  void open(int peer);
-  void serve(Connection& connection, bool hung_up);
-  bool pump(Connection& connection, Lane& lane, int from, int to);
-  bool within_bounds(Connection& connection);
-  void listen_again(bool wanted);
-  void tick();
-  void end(Connection& connection, std::uint64_t* counter, const std::string& why);
+  void work() {
+    std::array<epoll_event, 64> events{};
+    auto next_tick = Clock::now() + kTick;
+    while (!stopping) {
+      // Nobody connected: nothing to look after.
+      const int wait = connections.empty() && listening ? -1 : static_cast<int>(kTick.count());
+      const int count = epoll_wait(epoll, events.data(), static_cast<int>(events.size()), wait);
+      for (int i = 0; i < count; ++i) {
+        const epoll_event& event = events[static_cast<std::size_t>(i)];
+        const int fd = event.data.fd;
+        if (fd == wake) {
+          std::uint64_t value = 0;
+          [[maybe_unused]] const auto got = read(wake, &value, sizeof value);
+          next_tick = Clock::now();
+        } else if (fd == listener.fd()) {
+          accept_all();
+        } else if (const auto found = by_fd.find(fd); found != by_fd.end()) {
+          serve(*found->second, (event.events & (EPOLLHUP | EPOLLERR)) != 0);
+        }
+      }
+      if (Clock::now() >= next_tick) {
+        tick();
+        next_tick = Clock::now() + kTick;
+      }
+    }
+  }
 
-  std::shared_ptr<Account> account_of(int inner_fd);
+  void nudge() const {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = write(wake, &one, sizeof one);
+  }
+
+  void accept_all() {
+    // Not all at once: those that are connected get their turn.
+    for (int i = 0; i < 16; ++i) {
+      if (!make_room()) return listen_again(false);  // they wait in the kernel's queue
+      const int peer = accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+      if (peer < 0) {
+        if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS) {
+          listen_again(false);  // until the next tick
+        }
+        return;
+      }
+      open(peer);
+    }
+  }
+
+  // Whether one more connection may be had. A newcomer has a tick to say something, and libzmq that
+  // time to close what it had of the one that makes room: its descriptors must not pile up.
+  bool make_room() {
+    if (connections.size() < static_cast<std::size_t>(options.max_connections)) return true;
+    Connection* oldest = nullptr;
+    for (const auto& [name, connection] : connections) {
+      if (connection->account->served) continue;
+      if (oldest == nullptr || connection->opened < oldest->opened) oldest = connection.get();
+    }
+    if (oldest == nullptr || Clock::now() - oldest->opened < kTick) return false;
+    end(*oldest, &counts.closed_for_room, "room is needed");
+    return true;
+  }
+
+  void open(int peer) {
+    auto connection = std::make_unique<Connection>(
+        ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+    connection->peer = peer;
+    connection->inner = connect_inner(inner);
+    if (connection->inner < 0) return;  // closes it
+    const int yes = 1;
+    setsockopt(peer, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for ipc, which has none
+    connection->name = socket_name(connection->inner, &getsockname);
+    Connection& added = *connection;
+    by_fd[added.peer] = by_fd[added.inner] = &added;
+    {
+      const std::lock_guard lock(mutex);
+      accounts[added.name] = added.account;
+      ++counts.accepted;
+    }
+    connections[added.name] = std::move(connection);
+    watch(added.peer, EPOLLIN, EPOLL_CTL_ADD);
+    watch(added.inner, EPOLLIN, EPOLL_CTL_ADD);
+  }
+
+  // hung_up: an end has gone; what it left is passed on, if the other end takes it.
+  void serve(Connection& connection, bool hung_up) {
+    if (!pump(connection, connection.down, connection.inner, connection.peer)) return;
+    if (!pump(connection, connection.up, connection.peer, connection.inner)) return;
+    if (hung_up && connection.stuck()) return end(connection, nullptr, {});
+    const auto interest = [](bool in, bool out) {
+      return (in ? static_cast<std::uint32_t>(EPOLLIN) : 0u) |
+             (out ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
+    };
+    const bool read_peer = connection.up.empty() && !connection.account->throttled;
+    watch(connection.peer, interest(read_peer, !connection.down.empty()), EPOLL_CTL_MOD);
+    watch(connection.inner, interest(connection.down.empty(), !connection.up.empty()),
+          EPOLL_CTL_MOD);
+  }
+
+  // Passes bytes on in one direction: writes out what the lane holds, as far as the socket takes
+  // it, then reads into it; up, to libzmq, within the bounds. False when the connection has ended.
+  bool pump(Connection& connection, Lane& lane, int from, int to) {
+    const bool up = &lane == &connection.up;
+    const auto gone = [&] {
+      end(connection, nullptr, {});
+      return false;
+    };
+    for (int i = 0; i < kReadsPerTurn; ++i) {
+      bool more = true;
+      if (up) {
+        held += connection.settle(Clock::now());
+        more = connection.held <= options.max_message_bytes + kSlack;
+        connection.account->throttled = !more;
+      }
+      while (!lane.empty()) {
+        const auto sent = send(to, &lane.bytes[lane.begin], lane.end - lane.begin, MSG_NOSIGNAL);
+        if (sent < 0 && errno == EINTR) continue;
+        if (sent < 0) return errno == EAGAIN || gone();
+        lane.begin += static_cast<std::size_t>(sent);
+      }
+      if (!more) return true;
+      const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
+      if (got < 0) return errno == EAGAIN || errno == EINTR || gone();
+      if (got == 0) return gone();
+      lane.begin = 0;
+      lane.end = static_cast<std::size_t>(got);
+      if (up && !within_bounds(connection)) return false;
+    }
+    return true;
+  }
+
+  // Takes in what has just come up from a peer: ZMTP, a routing id of its own, memory. False when
+  // `connection` was closed.
+  bool within_bounds(Connection& connection) {
+    std::string wrong = connection.stream.take({connection.up.bytes.data(), connection.up.end});
+    const std::string& id = connection.stream.routing_id();
+    if (wrong.empty() && !id.empty() &&
+        routing_ids.emplace(id, &connection).first->second != &connection) {
+      wrong = "another's routing id";
+    }
+    if (!wrong.empty()) {
+      end(connection, &counts.closed_for_breach, "a peer sent " + wrong);
+      return false;
+    }
+    held += connection.settle(Clock::now());
+    while (held > options.held_bytes) {
+      Connection* longest = nullptr;
+      for (const auto& [name, other] : connections) {
+        held += other->settle(Clock::now());
+        if (other->held == 0) continue;
+        if (longest == nullptr || other->moved < longest->moved) longest = other.get();
+      }
+      if (longest == nullptr || held <= options.held_bytes) return true;
+      const bool self = longest == &connection;
+      end(*longest, &counts.closed_for_memory, "peers hold too much of the daemon's memory");
+      if (self) return false;
+    }
+    return true;
+  }
+
+  void listen_again(bool wanted) {
+    if (listening == wanted) return;
+    listening = wanted;
+    watch(listener.fd(), wanted ? static_cast<std::uint32_t>(EPOLLIN) : 0u, EPOLL_CTL_MOD);
+  }
+
+  void tick() {
+    listen_again(true);
+    std::vector<std::string> names;
+    for (const auto& [name, connection] : connections) names.push_back(name);
+    const auto now = Clock::now();
+    for (const std::string& name : names) {
+      const auto found = connections.find(name);
+      if (found == connections.end()) continue;
+      Connection& connection = *found->second;
+      held += connection.settle(Clock::now());
+      if (connection.account->to_close) {
+        end(connection, nullptr, {});
+      } else if (connection.held > 0 && now - connection.moved > options.patience) {
+        end(connection, &counts.closed_for_silence, "nothing of a peer could be delivered");
+      } else if (connection.account->throttled) {
+        serve(connection, false);
+      }
+    }
+  }
+
+  void end(Connection& connection, std::uint64_t* counter, const std::string& why) {
+    {
+      const std::lock_guard lock(mutex);
+      accounts.erase(connection.name);
+      if (counter != nullptr && std::has_single_bit(++*counter)) {
+        spdlog::warn("connection closed times={} reason=\"{}\"", *counter, why);
+      }
+    }
+    held -= connection.held;
+    by_fd.erase(connection.peer);
+    by_fd.erase(connection.inner);
+    const auto claimed = routing_ids.find(connection.stream.routing_id());
+    if (claimed != routing_ids.end() && claimed->second == &connection) routing_ids.erase(claimed);
+    connections.erase(std::string(connection.name));
+    listen_again(true);
+  }
+
+  std::shared_ptr<Account> account_of(int inner_fd) {
+    const std::string name = socket_name(inner_fd, &getpeername);
+    const std::lock_guard lock(mutex);
+    const auto found = accounts.find(name);
+    return found == accounts.end() ? nullptr : found->second;
+  }
 
   Listener listener;
   const std::string inner;
@@ -89,220 +290,6 @@ struct Guard::Impl {
 
   std::thread thread;
 };
-
-void Guard::Impl::watch(int fd, std::uint32_t events, int operation) const {
-  epoll_event event{};
-  event.events = events;
-  event.data.fd = fd;
-  epoll_ctl(epoll, operation, fd, &event);
-}
-
-void Guard::Impl::nudge() const {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = write(wake, &one, sizeof one);
-}
-
-void Guard::Impl::work() {
-  std::array<epoll_event, 64> events{};
-  auto next_tick = Clock::now() + kTick;
-  while (!stopping) {
-    // Nobody connected: nothing to look after.
-    const int wait = connections.empty() && listening ? -1 : static_cast<int>(kTick.count());
-    const int count = epoll_wait(epoll, events.data(), static_cast<int>(events.size()), wait);
-    for (int i = 0; i < count; ++i) {
-      const epoll_event& event = events[static_cast<std::size_t>(i)];
-      const int fd = event.data.fd;
-      if (fd == wake) {
-        std::uint64_t value = 0;
-        [[maybe_unused]] const auto got = read(wake, &value, sizeof value);
-        next_tick = Clock::now();
-      } else if (fd == listener.fd()) {
-        accept_all();
-      } else if (const auto found = by_fd.find(fd); found != by_fd.end()) {
-        serve(*found->second, (event.events & (EPOLLHUP | EPOLLERR)) != 0);
-      }
-    }
-    if (Clock::now() >= next_tick) {
-      tick();
-      next_tick = Clock::now() + kTick;
-    }
-  }
-}
-
-void Guard::Impl::listen_again(bool wanted) {
-  if (listening == wanted) return;
-  listening = wanted;
-  watch(listener.fd(), wanted ? static_cast<std::uint32_t>(EPOLLIN) : 0u, EPOLL_CTL_MOD);
-}
-
-// Whether one more connection may be had. A newcomer has a tick to say something, and libzmq that
-// time to close what it had of the one that makes room: its descriptors must not pile up.
-bool Guard::Impl::make_room() {
-  if (connections.size() < static_cast<std::size_t>(options.max_connections)) return true;
-  Connection* oldest = nullptr;
-  for (const auto& [name, connection] : connections) {
-    if (connection->account->served) continue;
-    if (oldest == nullptr || connection->opened < oldest->opened) oldest = connection.get();
-  }
-  if (oldest == nullptr || Clock::now() - oldest->opened < kTick) return false;
-  end(*oldest, &counts.closed_for_room, "room is needed");
-  return true;
-}
-
-void Guard::Impl::accept_all() {
-  // Not all at once: those that are connected get their turn.
-  for (int i = 0; i < 16; ++i) {
-    if (!make_room()) return listen_again(false);  // they wait in the kernel's queue
-    const int peer = accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (peer < 0) {
-      if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS) {
-        listen_again(false);  // until the next tick
-      }
-      return;
-    }
-    open(peer);
-  }
-}
-
-void Guard::Impl::open(int peer) {
-  auto connection = std::make_unique<Connection>(
-      ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
-  connection->peer = peer;
-  connection->inner = connect_inner(inner);
-  if (connection->inner < 0) return;  // closes it
-  const int yes = 1;
-  setsockopt(peer, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for ipc, which has none
-  connection->name = socket_name(connection->inner, &getsockname);
-  Connection& added = *connection;
-  by_fd[added.peer] = by_fd[added.inner] = &added;
-  {
-    const std::lock_guard lock(mutex);
-    accounts[added.name] = added.account;
-    ++counts.accepted;
-  }
-  connections[added.name] = std::move(connection);
-  watch(added.peer, EPOLLIN, EPOLL_CTL_ADD);
-  watch(added.inner, EPOLLIN, EPOLL_CTL_ADD);
-}
-
-void Guard::Impl::end(Connection& connection, std::uint64_t* counter, const std::string& why) {
-  {
-    const std::lock_guard lock(mutex);
-    accounts.erase(connection.name);
-    if (counter != nullptr && std::has_single_bit(++*counter)) {
-      spdlog::warn("connection closed times={} reason=\"{}\"", *counter, why);
-    }
-  }
-  held -= connection.held;
-  by_fd.erase(connection.peer);
-  by_fd.erase(connection.inner);
-  const auto claimed = routing_ids.find(connection.stream.routing_id());
-  if (claimed != routing_ids.end() && claimed->second == &connection) routing_ids.erase(claimed);
-  connections.erase(std::string(connection.name));
-  listen_again(true);
-}
-
-// Takes in what has just come up from a peer: ZMTP, a routing id of its own, memory. False when
-// `connection` was closed.
-bool Guard::Impl::within_bounds(Connection& connection) {
-  std::string wrong = connection.stream.take({connection.up.bytes.data(), connection.up.end});
-  const std::string& id = connection.stream.routing_id();
-  if (wrong.empty() && !id.empty() &&
-      routing_ids.emplace(id, &connection).first->second != &connection) {
-    wrong = "another's routing id";
-  }
-  if (!wrong.empty()) {
-    end(connection, &counts.closed_for_breach, "a peer sent " + wrong);
-    return false;
-  }
-  held += connection.settle(Clock::now());
-  while (held > options.held_bytes) {
-    Connection* longest = nullptr;
-    for (const auto& [name, other] : connections) {
-      held += other->settle(Clock::now());
-      if (other->held == 0) continue;
-      if (longest == nullptr || other->moved < longest->moved) longest = other.get();
-    }
-    if (longest == nullptr || held <= options.held_bytes) return true;
-    const bool self = longest == &connection;
-    end(*longest, &counts.closed_for_memory, "peers hold too much of the daemon's memory");
-    if (self) return false;
-  }
-  return true;
-}
-
-// Passes bytes on in one direction: writes out what the lane holds, as far as the socket takes it,
-// then reads into it; up, to libzmq, within the bounds. False when the connection has ended.
-bool Guard::Impl::pump(Connection& connection, Lane& lane, int from, int to) {
-  const bool up = &lane == &connection.up;
-  const auto gone = [&] {
-    end(connection, nullptr, {});
-    return false;
-  };
-  for (int i = 0; i < kReadsPerTurn; ++i) {
-    bool more = true;
-    if (up) {
-      held += connection.settle(Clock::now());
-      more = connection.held <= options.max_message_bytes + kSlack;
-      connection.account->throttled = !more;
-    }
-    while (!lane.empty()) {
-      const auto sent = send(to, &lane.bytes[lane.begin], lane.end - lane.begin, MSG_NOSIGNAL);
-      if (sent < 0 && errno == EINTR) continue;
-      if (sent < 0) return errno == EAGAIN || gone();
-      lane.begin += static_cast<std::size_t>(sent);
-    }
-    if (!more) return true;
-    const auto got = recv(from, lane.bytes.data(), lane.bytes.size(), 0);
-    if (got < 0) return errno == EAGAIN || errno == EINTR || gone();
-    if (got == 0) return gone();
-    lane.begin = 0;
-    lane.end = static_cast<std::size_t>(got);
-    if (up && !within_bounds(connection)) return false;
-  }
-  return true;
-}
-
-// hung_up: an end has gone; what it left is passed on, if the other end takes it.
-void Guard::Impl::serve(Connection& connection, bool hung_up) {
-  if (!pump(connection, connection.down, connection.inner, connection.peer)) return;
-  if (!pump(connection, connection.up, connection.peer, connection.inner)) return;
-  if (hung_up && connection.stuck()) return end(connection, nullptr, {});
-  const auto interest = [](bool in, bool out) {
-    return (in ? static_cast<std::uint32_t>(EPOLLIN) : 0u) |
-           (out ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
-  };
-  const bool read_peer = connection.up.empty() && !connection.account->throttled;
-  watch(connection.peer, interest(read_peer, !connection.down.empty()), EPOLL_CTL_MOD);
-  watch(connection.inner, interest(connection.down.empty(), !connection.up.empty()), EPOLL_CTL_MOD);
-}
-
-void Guard::Impl::tick() {
-  listen_again(true);
-  std::vector<std::string> names;
-  for (const auto& [name, connection] : connections) names.push_back(name);
-  const auto now = Clock::now();
-  for (const std::string& name : names) {
-    const auto found = connections.find(name);
-    if (found == connections.end()) continue;
-    Connection& connection = *found->second;
-    held += connection.settle(Clock::now());
-    if (connection.account->to_close) {
-      end(connection, nullptr, {});
-    } else if (connection.held > 0 && now - connection.moved > options.patience) {
-      end(connection, &counts.closed_for_silence, "nothing of a peer could be delivered");
-    } else if (connection.account->throttled) {
-      serve(connection, false);
-    }
-  }
-}
-
-std::shared_ptr<Account> Guard::Impl::account_of(int inner_fd) {
-  const std::string name = socket_name(inner_fd, &getpeername);
-  const std::lock_guard lock(mutex);
-  const auto found = accounts.find(name);
-  return found == accounts.end() ? nullptr : found->second;
-}
 
 Guard::Guard(Listener listener, std::string inner, const GuardOptions& options)
     : impl_(std::make_unique<Impl>(std::move(listener), std::move(inner), options)) {

@@ -56,9 +56,7 @@ Status check_ipc_path(const std::string& endpoint) {
   if (type != fs::file_type::socket) {
     return refuse(ErrorCode::kInvalidArgument, "the file is no socket, and would be removed");
   }
-  if (has_listener(path)) {
-    return refuse(ErrorCode::kUnavailable, "another process listens there");
-  }
+  if (has_listener(path)) return refuse(ErrorCode::kUnavailable, "another process listens there");
   return {};
 }
 

@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
 #include "common/io/files/checksum.hpp"
+#include "common/io/files/csv_numbers.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -17,16 +19,10 @@ std::string_view value_of(std::string_view text, std::string_view key) {
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
     const std::size_t colon = line.find(':');
-    if (colon != std::string_view::npos) {
-      std::string_view name = line.substr(0, colon);
-      while (!name.empty() && (name.back() == '\t' || name.back() == ' ')) name.remove_suffix(1);
-      if (name == key) {
-        std::string_view value = line.substr(colon + 1);
-        while (!value.empty() && value.front() == ' ') value.remove_prefix(1);
-        return value;
-      }
+    if (colon != std::string_view::npos && io::trimmed(line.substr(0, colon)) == key) {
+      return io::trimmed(line.substr(colon + 1));
     }
-    text.remove_prefix(line.size() < text.size() ? line.size() + 1 : text.size());
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
   }
   return {};
 }

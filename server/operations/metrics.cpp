@@ -282,15 +282,8 @@ std::vector<MetricFamily> metric_families(const wire::DaemonReport& report) {
 }
 
 struct MetricsExporter::Impl {
-  explicit Impl(Ask asked) : ask(std::move(asked)) {}
-  ~Impl() {
-    if (server != nullptr) MHD_stop_daemon(server);
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
   Ask ask;
-  MHD_Daemon* server = nullptr;
+  std::unique_ptr<MHD_Daemon, decltype(&MHD_stop_daemon)> server;  // the last: it calls `ask`
 };
 
 MetricsExporter::MetricsExporter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -299,18 +292,18 @@ MetricsExporter::~MetricsExporter() = default;
 
 Result<MetricsExporter> MetricsExporter::listen(const std::string& endpoint, Ask ask) {
   const auto refuse = [&](const std::string& reason) {
-    return fail(ErrorCode::kInvalidArgument, "metrics.endpoint = " + endpoint + ": " + reason);
+    return invalid("metrics.endpoint = " + endpoint + ": " + reason);
   };
   const auto address = address_of(endpoint);
   if (!address) return refuse("must be HOST:PORT with an address in numbers");
-  auto impl = std::make_unique<Impl>(std::move(ask));
+  auto impl = std::make_unique<Impl>(Impl{std::move(ask), {nullptr, &MHD_stop_daemon}});
   unsigned flags = MHD_USE_AUTO | MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_ITC;
   if (address->ss_family == AF_INET6) flags |= MHD_USE_IPv6;
   errno = 0;
-  impl->server =
-      MHD_start_daemon(flags, 0, nullptr, nullptr, &answer, &impl->ask, MHD_OPTION_SOCK_ADDR,
-                       &*address, MHD_OPTION_CONNECTION_LIMIT, kMaxConnections,
-                       MHD_OPTION_CONNECTION_TIMEOUT, kIdleLimit_s, MHD_OPTION_END);
+  impl->server.reset(MHD_start_daemon(flags, 0, nullptr, nullptr, &answer, &impl->ask,
+                                      MHD_OPTION_SOCK_ADDR, &*address, MHD_OPTION_CONNECTION_LIMIT,
+                                      kMaxConnections, MHD_OPTION_CONNECTION_TIMEOUT, kIdleLimit_s,
+                                      MHD_OPTION_END));
   if (impl->server == nullptr) {
     return refuse(std::string("nothing can listen there: ") + std::strerror(errno));
   }
@@ -318,7 +311,7 @@ Result<MetricsExporter> MetricsExporter::listen(const std::string& endpoint, Ask
 }
 
 int MetricsExporter::port() const {
-  const MHD_DaemonInfo* info = MHD_get_daemon_info(impl_->server, MHD_DAEMON_INFO_BIND_PORT);
+  const MHD_DaemonInfo* info = MHD_get_daemon_info(impl_->server.get(), MHD_DAEMON_INFO_BIND_PORT);
   return info == nullptr ? 0 : info->port;
 }
 

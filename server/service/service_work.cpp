@@ -112,25 +112,21 @@ SessionState Service::state_now() const {
 
 void Service::push_state() {
   const SessionState state = state_now();
-  auto frame = std::make_shared<const std::string>(
-      wire::encode_frame(MessageType::kSessionState, 0, wire::encode(state)));
+  Bytes frame = framed(MessageType::kSessionState, 0, wire::encode(state));
   outbox_.post({Delivery::kState, {}, std::move(frame), state.session.session_id});
 }
 
 void Service::reply(const StartTicket& ticket, const Result<SessionInfo>& info) {
-  std::string bytes;
+  Bytes bytes;
   if (info) {
     spdlog::info("session ready session={} prepare_s={:.2f}", info->session_id, info->prepare_s);
-    bytes =
-        wire::encode_frame(MessageType::kStartSessionReply, ticket.request_id, wire::encode(*info));
+    bytes = framed(MessageType::kStartSessionReply, ticket.request_id, wire::encode(*info));
   } else {
     spdlog::warn("session refused code={} reason=\"{}\"", to_string(info.error().code),
                  info.error().message);
-    bytes =
-        wire::encode_frame(MessageType::kErrorReply, ticket.request_id, wire::encode(info.error()));
+    bytes = framed(MessageType::kErrorReply, ticket.request_id, wire::encode(info.error()));
   }
-  outbox_.post(
-      {Delivery::kReply, ticket.client, std::make_shared<const std::string>(std::move(bytes))});
+  outbox_.post({Delivery::kReply, ticket.client, std::move(bytes)});
 }
 
 void Service::begin_journal(const SessionRequest& request, const SessionInfo& info) {
@@ -174,8 +170,7 @@ void Service::publish(UpdateMessage message, const Job& job) {
     update.answer_time = usual_time_.answer(message.session_id, ms, estimated);
   }
   wire::append_timings(update, payload);
-  auto frame =
-      std::make_shared<const std::string>(wire::encode_frame(MessageType::kUpdate, 0, payload));
+  Bytes frame = framed(MessageType::kUpdate, 0, payload);
   if (estimated && journal_) {
     journal_->append({io::RecordKind::kUpdate, update.sequence, 0, std::move(payload)});
   }

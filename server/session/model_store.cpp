@@ -65,9 +65,7 @@ Result<std::shared_ptr<const PreparedModel>> ModelStore::factorised(Boundary bou
 
 Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
     Boundary boundary, const std::stop_token& stop) {
-  if (const auto found = condensed_.find(boundary); found != condensed_.end()) {
-    return found->second;
-  }
+  if (const auto found = condensed_.find(boundary); found != condensed_.end()) return found->second;
   if (read_) {
     spdlog::info("reading boundary={}", to_string(boundary));
     auto read = read_(boundary);

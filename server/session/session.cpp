@@ -42,9 +42,9 @@ void Session::refuse(const Start& start, const std::string& why) {
 void Session::start(const SessionRequest& request, const StartTicket& ticket) {
   Start start{request, ticket, ticket.client};
   if (request.case_id != case_id_) {
-    return answer(start, fail(ErrorCode::kInvalidArgument,
-                              fmt::format("start_session.case_id = {}: the loaded model is for {}",
-                                          in_quotes(request.case_id), in_quotes(case_id_))));
+    return answer(start,
+                  invalid(fmt::format("start_session.case_id = {}: the loaded model is for {}",
+                                      in_quotes(request.case_id), in_quotes(case_id_))));
   }
   if (stopped_) return refuse(start, kStopping);
   const std::string* current = owner();
@@ -88,9 +88,7 @@ void Session::prepared(Result<std::unique_ptr<SessionModel>> made) {
   const SessionRequest& request = of.start.request;
   if (stopped_) return refuse(of.start, kStopping);
   SessionModel* model = nullptr;
-  if (made) {
-    model = (models_[{request.boundary, request.method}] = std::move(*made)).get();
-  }
+  if (made) model = (models_[{request.boundary, request.method}] = std::move(*made)).get();
   if (of.stop.stop_requested()) return refuse(of.start, asked_ ? kSuperseded : kLeft);
   if (!made) return answer(of.start, tl::unexpected(made.error()));
   make_ready(of.start, model);

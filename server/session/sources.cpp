@@ -16,15 +16,14 @@ double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
 Status check_stamp(const char* name, std::int64_t stamp_ns) {
   if (stamp_ns >= -SourceClock::kMaxStamp_ns && stamp_ns <= SourceClock::kMaxStamp_ns) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation.{} = {}: no monotonic clock shows this, must be within {}",
-                          name, stamp_ns, SourceClock::kMaxStamp_ns));
+  return invalid(
+      fmt::format("observation.{} = {}: no monotonic clock shows this, must be within {}", name,
+                  stamp_ns, SourceClock::kMaxStamp_ns));
 }
 
 tl::unexpected<Error> refuse(const Observation& observation, const std::string& why) {
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("observation.acquired_ns = {} of {}: {}", observation.acquired_ns,
-                          in_quotes(observation.source), why));
+  return invalid(fmt::format("observation.acquired_ns = {} of {}: {}", observation.acquired_ns,
+                             in_quotes(observation.source), why));
 }
 
 }  // namespace
@@ -32,43 +31,38 @@ tl::unexpected<Error> refuse(const Observation& observation, const std::string& 
 Status check_observation(const Observation& observation, std::string_view case_id,
                          const SessionKey& running) {
   if (observation.case_id != case_id) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.case_id = {}: the running session is for {}",
-                            in_quotes(observation.case_id), in_quotes(case_id)));
+    return invalid(fmt::format("observation.case_id = {}: the running session is for {}",
+                               in_quotes(observation.case_id), in_quotes(case_id)));
   }
   if (const SessionKey& given = observation.session; given != running) {
     if (given == SessionKey{}) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "observation.session is absent: must name the session that it is for");
+      return invalid("observation.session is absent: must name the session that it is for");
     }
     if (given.boot_id != running.boot_id) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, "
-                              "or this is another one ({:x})",
-                              given.boot_id, running.boot_id));
+      return invalid(
+          fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, "
+                      "or this is another one ({:x})",
+                      given.boot_id, running.boot_id));
     }
     if (given.model_id != running.model_id) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("observation.session.model_id = {}: the daemon serves model {}",
-                              in_quotes(given.model_id), in_quotes(running.model_id)));
+      return invalid(fmt::format("observation.session.model_id = {}: the daemon serves model {}",
+                                 in_quotes(given.model_id), in_quotes(running.model_id)));
     }
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.session.session_id = {}: the running session is {}",
-                            given.session_id, running.session_id));
+    return invalid(fmt::format("observation.session.session_id = {}: the running session is {}",
+                               given.session_id, running.session_id));
   }
   if (observation.frame != "ras") {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("observation.frame = {}: must be \"ras\"",
-                                                         in_quotes(observation.frame)));
+    return invalid(
+        fmt::format("observation.frame = {}: must be \"ras\"", in_quotes(observation.frame)));
   }
   if (observation.source.empty() || observation.source.size() > kMaxSourceLength) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.source = {}: must have 1 to {} characters",
-                            in_quotes(observation.source), kMaxSourceLength));
+    return invalid(fmt::format("observation.source = {}: must have 1 to {} characters",
+                               in_quotes(observation.source), kMaxSourceLength));
   }
   if (std::holds_alternative<PatientPose>(observation.body)) {
-    return fail(ErrorCode::kInvalidArgument,
-                "observation.patient_pose: a change of pose is not assimilated in this version; "
-                "start a session on a model prepared for the new pose");
+    return invalid(
+        "observation.patient_pose: a change of pose is not assimilated in this version; "
+        "start a session on a model prepared for the new pose");
   }
   return {};
 }
@@ -147,15 +141,14 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
     return Admission{source.receipt, 0, true};
   }
   if (observation.sequence > kMaxSequence) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.sequence = {}: must be at most {}", observation.sequence,
-                            kMaxSequence));
+    return invalid(fmt::format("observation.sequence = {}: must be at most {}",
+                               observation.sequence, kMaxSequence));
   }
   if (observation.sequence <= last_sequence) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
-                            "from {}",
-                            observation.sequence, last_sequence, in_quotes(observation.source)));
+    return invalid(
+        fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
+                    "from {}",
+                    observation.sequence, last_sequence, in_quotes(observation.source)));
   }
   const auto daemon_ns = recorded_clock_ ? recorded_time(observation)
                                          : source.clock.to_daemon(observation, arrived_ns);

@@ -27,8 +27,7 @@ constexpr std::chrono::milliseconds kTurnInterval{100};
 constexpr std::size_t kMostParts = ZmtpStream::Bounds{}.parts;
 
 Bytes error_frame(std::uint64_t request_id, const Error& error) {
-  return std::make_shared<const std::string>(
-      wire::encode_frame(wire::MessageType::kErrorReply, request_id, wire::encode(error)));
+  return framed(wire::MessageType::kErrorReply, request_id, wire::encode(error));
 }
 
 Roles roles_of(const RouterOptions& options) {
@@ -54,19 +53,200 @@ struct Router::Impl {
     guard.emplace(std::move(listener), socket.bind(), guarding);
   }
 
-  void answer(const Incoming& incoming);
-  Status enter(const Incoming& incoming);
-  void subscribe(const std::string& routing_id, const Reply& answer);
-  void reply(const std::string& routing_id, const Bytes& bytes);
-  void deliver(const Outgoing& message);
-  void forget_session();
-  void iterate(const std::string& routing_id, Viewer& viewer, const Bytes& bytes);
-  void pay_owed();
-  void pay(const std::string& routing_id);
-  void remove(const std::string& routing_id);
-  void forget_closed();
-  void turned();
-  std::chrono::milliseconds longest_wait() const;
+  void answer(const Incoming& incoming) {
+    const auto complain = [&](const Error& error) { reply(incoming.peer, error_frame(0, error)); };
+    if (incoming.parts != 1) {
+      return complain({ErrorCode::kProtocol,
+                       fmt::format("a message has 1 part, this one has {}", incoming.parts)});
+    }
+    const auto frame = wire::decode_frame(incoming.payload.to_string_view());
+    if (!frame) {
+      spdlog::debug("malformed frame: {}", frame.error().message);
+      return complain(frame.error());
+    }
+    const Peer* known = peers.find(incoming.peer);
+    if (known == nullptr || known->connection_fd != incoming.connection_fd) {
+      if (Status entered = enter(incoming); !entered) return complain(entered.error());
+      known = peers.find(incoming.peer);
+    }
+    std::optional<Reply> answer;
+    try {
+      if (Status may = gate.admit(known->caller, *frame, std::chrono::steady_clock::now()); !may) {
+        answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
+      } else {
+        if (frame->type == wire::MessageType::kReportRequest) turned();
+        answer = handler->handle(incoming.peer, *frame);
+      }
+    } catch (const std::exception& exception) {
+      spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
+                    exception.what());
+      const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
+      answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
+    }
+    if (!answer) return;
+    reply(incoming.peer, framed(answer->type, frame->request_id, answer->payload));
+    if (answer->subscription) subscribe(incoming.peer, *answer);
+  }
+
+  // The peer of a first message that is well-formed is added.
+  Status enter(const Incoming& incoming) {
+    // With keys a message counts for its key, without for its connection.
+    const std::string& caller = options.keys ? incoming.user_id : incoming.peer;
+    if (peers.find(incoming.peer) == nullptr) {
+      if (Status more = gate.enter(caller, peers.connections_of(caller)); !more) return more;
+    }
+    Peer* peer = peers.add(incoming.peer, incoming.connection_fd);
+    if (peer == nullptr) {
+      return fail(ErrorCode::kUnavailable,
+                  fmt::format("{} clients are connected already", options.max_clients));
+    }
+    peer->caller = caller;
+    guard->served(incoming.connection_fd);
+    return {};
+  }
+
+  void subscribe(const std::string& routing_id, const Reply& answer) {
+    Peer* peer = peers.find(routing_id);
+    if (peer == nullptr) return;  // gone: the reply found no route
+    if (!peer->viewer) peer->viewer.emplace();
+    const bool anew = peer->viewer->renew(*answer.subscription, answer.selection);
+    if (anew && answer.session == session) {
+      if (last_final) peer->viewer->owe_usable(last_final);
+      if (failure_since) peer->viewer->owe_failure(failure_since);
+    }
+    pay(routing_id);
+  }
+
+  void reply(const std::string& routing_id, const Bytes& bytes) {
+    Peer* peer = peers.find(routing_id);
+    const bool behind = peer != nullptr && !peer->replies.empty();
+    const Sent sent = behind ? Sent::kQueueFull : socket.send(routing_id, bytes);
+    if (sent == Sent::kYes) return;
+    if (sent == Sent::kPeerGone) {
+      spdlog::debug("reply lost: the peer is gone");
+      return remove(routing_id);
+    }
+    if (peer != nullptr && peer->may_wait(bytes)) {
+      peer->replies.push_back(bytes);
+      peer->reply_bytes += bytes->size();
+    } else {
+      spdlog::debug("reply lost: the peer does not read");
+    }
+  }
+
+  void deliver(const Outgoing& message) {
+    if (message.delivery == Delivery::kReply) return reply(message.peer, message.bytes);
+    if (message.session != session) {
+      forget_session();
+      session = message.session;
+    }
+    if (message.delivery == Delivery::kFinal) {
+      last_final = message.bytes;
+      failure_since.reset();
+    }
+    if (message.delivery == Delivery::kFailure) failure_since = message.bytes;
+    for (auto next = peers.all().begin(); next != peers.all().end();) {
+      auto& [routing_id, peer] = *next++;  // which may be removed here
+      if (!peer.viewer) continue;
+      switch (message.delivery) {
+        case Delivery::kReply: break;
+        case Delivery::kState: reply(routing_id, message.bytes); break;
+        case Delivery::kIterate: iterate(routing_id, *peer.viewer, message.bytes); break;
+        case Delivery::kFinal:
+          peer.viewer->owe_usable(message.bytes);
+          pay(routing_id);
+          break;
+        case Delivery::kFailure:
+          peer.viewer->owe_failure(message.bytes);
+          pay(routing_id);
+          break;
+      }
+    }
+  }
+
+  void forget_session() {
+    last_final.reset();
+    failure_since.reset();
+    parcels.forget_session();
+    for (auto& [routing_id, peer] : peers.all()) {
+      if (peer.viewer) peer.viewer->owe_nothing();
+    }
+  }
+
+  void iterate(const std::string& routing_id, Viewer& viewer, const Bytes& bytes) {
+    if (!viewer.may_iterate()) return;
+    const auto parcel = parcels.make(bytes, viewer.selection(), viewer.held());
+    if (!parcel) return;
+    const Sent sent = socket.send(routing_id, parcel->bytes);
+    if (sent == Sent::kYes) viewer.iterate_sent();
+    if (sent == Sent::kPeerGone) remove(routing_id);
+  }
+
+  void pay_owed() {
+    std::vector<std::string> all;
+    for (const auto& [routing_id, peer] : peers.all()) all.push_back(routing_id);
+    for (const std::string& routing_id : all) pay(routing_id);
+  }
+
+  // Replies first: they tell a viewer what to make of the updates behind them.
+  void pay(const std::string& routing_id) {
+    Peer* peer = peers.find(routing_id);
+    if (peer == nullptr) return;
+    while (!peer->replies.empty()) {
+      const Sent sent = socket.send(routing_id, peer->replies.front());
+      if (sent == Sent::kQueueFull) return;
+      if (sent == Sent::kPeerGone) return remove(routing_id);
+      peer->reply_bytes -= peer->replies.front()->size();
+      peer->replies.pop_front();
+    }
+    if (!peer->viewer) return;
+    Viewer& viewer = *peer->viewer;
+    while (const Bytes next = viewer.next()) {
+      const auto parcel = parcels.make(next, viewer.selection(), viewer.held());
+      if (!parcel) return;  // in the next turn
+      const Sent sent = socket.send(routing_id, parcel->bytes);
+      if (sent == Sent::kQueueFull) return;
+      if (sent == Sent::kPeerGone) return remove(routing_id);
+      viewer.sent(parcel->held);
+    }
+  }
+
+  // The name may be the removed peer's own: it is copied first.
+  void remove(const std::string& routing_id) {
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
+    const std::string name = routing_id;
+    if (peers.find(name) == nullptr) return;
+    peers.remove(name);
+    gate.left(name);
+    handler->left(name);
+  }
+
+  void forget_closed() {
+    for (const int descriptor : monitor.closed()) {
+      for (const std::string& name : peers.remove_connection(descriptor)) {
+        spdlog::debug("peer left");
+        gate.left(name);
+        handler->left(name);
+      }
+    }
+  }
+
+  void turned() {
+    last_turn = std::chrono::steady_clock::now();
+    const GuardCounts counts = guard->counts();
+    const Refusals& refusals = gate.refusals();
+    handler->turned(peers, {counts.accepted, counts.closed_for_breach, counts.closed_for_memory,
+                            counts.closed_for_silence, counts.closed_for_room, guard->held_bytes(),
+                            zap ? zap->refused() : 0, refusals.not_allowed, refusals.connections,
+                            refusals.observations, refusals.session_starts});
+  }
+
+  std::chrono::milliseconds longest_wait() const {
+    if (parcels.spent()) return std::chrono::milliseconds(0);
+    const auto idle = options.longest_wait;
+    if (!peers.anything_owed()) return idle;
+    return idle.count() < 0 ? kRetryInterval : std::min(idle, kRetryInterval);
+  }
 
   RouterOptions options;
   zmq::context_t context;
@@ -135,202 +315,6 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
     }
   } catch (const zmq::error_t& error) {
     return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", endpoint(), error.what()));
-  }
-}
-
-std::chrono::milliseconds Router::Impl::longest_wait() const {
-  if (parcels.spent()) return std::chrono::milliseconds(0);
-  const auto idle = options.longest_wait;
-  if (!peers.anything_owed()) return idle;
-  return idle.count() < 0 ? kRetryInterval : std::min(idle, kRetryInterval);
-}
-
-void Router::Impl::turned() {
-  last_turn = std::chrono::steady_clock::now();
-  const GuardCounts counts = guard->counts();
-  const Refusals& refusals = gate.refusals();
-  handler->turned(peers, {counts.accepted, counts.closed_for_breach, counts.closed_for_memory,
-                          counts.closed_for_silence, counts.closed_for_room, guard->held_bytes(),
-                          zap ? zap->refused() : 0, refusals.not_allowed, refusals.connections,
-                          refusals.observations, refusals.session_starts});
-}
-
-void Router::Impl::answer(const Incoming& incoming) {
-  const auto complain = [&](const Error& error) { reply(incoming.peer, error_frame(0, error)); };
-  if (incoming.parts != 1) {
-    return complain({ErrorCode::kProtocol,
-                     fmt::format("a message has 1 part, this one has {}", incoming.parts)});
-  }
-  const auto frame = wire::decode_frame(incoming.payload.to_string_view());
-  if (!frame) {
-    spdlog::debug("malformed frame: {}", frame.error().message);
-    return complain(frame.error());
-  }
-  const Peer* known = peers.find(incoming.peer);
-  if (known == nullptr || known->connection_fd != incoming.connection_fd) {
-    if (Status entered = enter(incoming); !entered) return complain(entered.error());
-    known = peers.find(incoming.peer);
-  }
-  std::optional<Reply> answer;
-  try {
-    if (Status may = gate.admit(known->caller, *frame, std::chrono::steady_clock::now()); !may) {
-      answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
-    } else {
-      if (frame->type == wire::MessageType::kReportRequest) turned();
-      answer = handler->handle(incoming.peer, *frame);
-    }
-  } catch (const std::exception& exception) {
-    spdlog::error("request failed type={} reason=\"{}\"", static_cast<int>(frame->type),
-                  exception.what());
-    const Error error{ErrorCode::kInternal, "the request failed unexpectedly"};
-    answer = Reply{wire::MessageType::kErrorReply, wire::encode(error)};
-  }
-  if (!answer) return;
-  reply(incoming.peer, std::make_shared<const std::string>(
-                           wire::encode_frame(answer->type, frame->request_id, answer->payload)));
-  if (answer->subscription) subscribe(incoming.peer, *answer);
-}
-
-// The peer of a first message that is well-formed is added.
-Status Router::Impl::enter(const Incoming& incoming) {
-  // With keys a message counts for its key, without for its connection.
-  const std::string& caller = options.keys ? incoming.user_id : incoming.peer;
-  if (peers.find(incoming.peer) == nullptr) {
-    if (Status more = gate.enter(caller, peers.connections_of(caller)); !more) return more;
-  }
-  Peer* peer = peers.add(incoming.peer, incoming.connection_fd);
-  if (peer == nullptr) {
-    return fail(ErrorCode::kUnavailable,
-                fmt::format("{} clients are connected already", options.max_clients));
-  }
-  peer->caller = caller;
-  guard->served(incoming.connection_fd);
-  return {};
-}
-
-void Router::Impl::subscribe(const std::string& routing_id, const Reply& answer) {
-  Peer* peer = peers.find(routing_id);
-  if (peer == nullptr) return;  // gone: the reply found no route
-  if (!peer->viewer) peer->viewer.emplace();
-  const bool anew = peer->viewer->renew(*answer.subscription, answer.selection);
-  if (anew && answer.session == session) {
-    if (last_final) peer->viewer->owe_usable(last_final);
-    if (failure_since) peer->viewer->owe_failure(failure_since);
-  }
-  pay(routing_id);
-}
-
-void Router::Impl::reply(const std::string& routing_id, const Bytes& bytes) {
-  Peer* peer = peers.find(routing_id);
-  const bool behind = peer != nullptr && !peer->replies.empty();
-  const Sent sent = behind ? Sent::kQueueFull : socket.send(routing_id, bytes);
-  if (sent == Sent::kYes) return;
-  if (sent == Sent::kPeerGone) {
-    spdlog::debug("reply lost: the peer is gone");
-    return remove(routing_id);
-  }
-  if (peer != nullptr && peer->may_wait(bytes)) {
-    peer->replies.push_back(bytes);
-    peer->reply_bytes += bytes->size();
-  } else {
-    spdlog::debug("reply lost: the peer does not read");
-  }
-}
-
-void Router::Impl::deliver(const Outgoing& message) {
-  if (message.delivery == Delivery::kReply) return reply(message.peer, message.bytes);
-  if (message.session != session) {
-    forget_session();
-    session = message.session;
-  }
-  if (message.delivery == Delivery::kFinal) {
-    last_final = message.bytes;
-    failure_since.reset();
-  }
-  if (message.delivery == Delivery::kFailure) failure_since = message.bytes;
-  for (auto next = peers.all().begin(); next != peers.all().end();) {
-    auto& [routing_id, peer] = *next++;  // which may be removed here
-    if (!peer.viewer) continue;
-    switch (message.delivery) {
-      case Delivery::kReply: break;
-      case Delivery::kState: reply(routing_id, message.bytes); break;
-      case Delivery::kIterate: iterate(routing_id, *peer.viewer, message.bytes); break;
-      case Delivery::kFinal:
-        peer.viewer->owe_usable(message.bytes);
-        pay(routing_id);
-        break;
-      case Delivery::kFailure:
-        peer.viewer->owe_failure(message.bytes);
-        pay(routing_id);
-        break;
-    }
-  }
-}
-
-void Router::Impl::forget_session() {
-  last_final.reset();
-  failure_since.reset();
-  parcels.forget_session();
-  for (auto& [routing_id, peer] : peers.all()) {
-    if (peer.viewer) peer.viewer->owe_nothing();
-  }
-}
-
-void Router::Impl::iterate(const std::string& routing_id, Viewer& viewer, const Bytes& bytes) {
-  if (!viewer.may_iterate()) return;
-  const auto parcel = parcels.make(bytes, viewer.selection(), viewer.held());
-  if (!parcel) return;
-  const Sent sent = socket.send(routing_id, parcel->bytes);
-  if (sent == Sent::kYes) viewer.iterate_sent();
-  if (sent == Sent::kPeerGone) remove(routing_id);
-}
-
-// Replies first: they tell a viewer what to make of the updates behind them.
-void Router::Impl::pay(const std::string& routing_id) {
-  Peer* peer = peers.find(routing_id);
-  if (peer == nullptr) return;
-  while (!peer->replies.empty()) {
-    const Sent sent = socket.send(routing_id, peer->replies.front());
-    if (sent == Sent::kQueueFull) return;
-    if (sent == Sent::kPeerGone) return remove(routing_id);
-    peer->reply_bytes -= peer->replies.front()->size();
-    peer->replies.pop_front();
-  }
-  if (!peer->viewer) return;
-  Viewer& viewer = *peer->viewer;
-  while (const Bytes next = viewer.next()) {
-    const auto parcel = parcels.make(next, viewer.selection(), viewer.held());
-    if (!parcel) return;  // in the next turn
-    const Sent sent = socket.send(routing_id, parcel->bytes);
-    if (sent == Sent::kQueueFull) return;
-    if (sent == Sent::kPeerGone) return remove(routing_id);
-    viewer.sent(parcel->held);
-  }
-}
-
-void Router::Impl::pay_owed() {
-  std::vector<std::string> all;
-  for (const auto& [routing_id, peer] : peers.all()) all.push_back(routing_id);
-  for (const std::string& routing_id : all) pay(routing_id);
-}
-
-// The name may be the removed peer's own: it is copied first.
-void Router::Impl::remove(const std::string& routing_id) {
-  // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
-  const std::string name = routing_id;
-  if (peers.find(name) == nullptr) return;
-  peers.remove(name);
-  gate.left(name);
-  handler->left(name);
-}
-
-void Router::Impl::forget_closed() {
-  for (const int descriptor : monitor.closed()) {
-    for (const std::string& name : peers.remove_connection(descriptor)) {
-      spdlog::debug("peer left");
-      gate.left(name);
-      handler->left(name);
-    }
   }
 }
 

@@ -94,25 +94,17 @@ void ZapHandler::answer() {
   const bool admit = known != names_.end();
   const std::string name = admit ? known->second : std::string();
   if (admit) {
-    ++admitted_;
     spdlog::debug("key admitted name={}", name);
   } else if (std::has_single_bit(++refused_)) {
     // A stranger that repeats itself fills no log. Public keys are no secret.
     spdlog::warn("unknown key refused times={} key={}", refused_.load(), key.value_or("none"));
   }
   constexpr auto kMore = zmq::send_flags::sndmore;
-  std::string code = "400";
-  std::string text = "unknown key";
-  if (admit) {
-    code = "200";
-    text = "OK";
+  const std::string code = admit ? "200" : "400", text = admit ? "OK" : "unknown key";
+  for (const std::string& part :
+       {std::string(kVersion), parts[kRequestId].to_string(), code, text, name}) {
+    socket_.send(zmq::buffer(part), kMore);
   }
-  const std::string version = kVersion;
-  socket_.send(zmq::buffer(version), kMore);
-  socket_.send(zmq::buffer(parts[kRequestId].data(), parts[kRequestId].size()), kMore);
-  socket_.send(zmq::buffer(code), kMore);
-  socket_.send(zmq::buffer(text), kMore);
-  socket_.send(zmq::buffer(name), kMore);
   socket_.send(zmq::message_t(), zmq::send_flags::none);  // no metadata
 }
 

@@ -25,8 +25,7 @@ class ZapHandler {
   ZapHandler(const ZapHandler&) = delete;
   ZapHandler& operator=(const ZapHandler&) = delete;
 
-  std::uint64_t admitted() const { return admitted_; }  // handshakes
-  std::uint64_t refused() const { return refused_; }
+  std::uint64_t refused() const { return refused_; }  // handshakes
 
  private:
   void work();
@@ -35,7 +34,6 @@ class ZapHandler {
   const KeyNames names_;
   zmq::socket_t socket_;
   int stop_fd_ = -1;
-  std::atomic<std::uint64_t> admitted_{0};
   std::atomic<std::uint64_t> refused_{0};
   std::thread thread_;
 };

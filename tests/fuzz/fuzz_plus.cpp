@@ -7,10 +7,10 @@
 namespace brainshift::fuzz {
 
 void run(std::string_view bytes) {
-  const auto config = io::read_plus_config(scratch_file("device.xml", bytes));
-  if (!config) return;
-  for (const io::PlusTransform& transform : config->transforms) {
-    require(transform.link.T_to_from.matrix().allFinite(), "a transform goes somewhere");
+  const auto links = io::read_plus_config(scratch_file("device.xml", bytes));
+  if (!links) return;
+  for (const tracking::ConstantLink& link : *links) {
+    require(link.T_to_from.matrix().allFinite(), "a transform goes somewhere");
   }
 }
 

@@ -152,18 +152,13 @@ double best_move(const std::string& series, const CompoundedVolume& ours,
 
 struct Sweep {
   tracking::Recording recording;
-  io::PlusConfig config;
   tracking::Chain chain;
 };
 
 Sweep read_sweep(const fs::path& recording, const fs::path& config,
                  const std::string& image_frame) {
-  Sweep sweep{
-      value_or_exit(io::read_sequence(recording)), value_or_exit(io::read_plus_config(config)), {}};
-  std::vector<tracking::ConstantLink> constants;
-  for (const io::PlusTransform& transform : sweep.config.transforms) {
-    constants.push_back(transform.link);
-  }
+  Sweep sweep{value_or_exit(io::read_sequence(recording)), {}};
+  const auto constants = value_or_exit(io::read_plus_config(config));
   sweep.chain =
       value_or_exit(tracking::evaluate_chain(sweep.recording, constants, image_frame, "Reference"));
   std::string links;
@@ -251,7 +246,7 @@ void study_spine(const fs::path& folder) {
       value_or_exit(read_answer(folder / "SpinePhantomFreehandReconstructed.mha"));
   const ultrasound::PixelWindow window{0, 0, sweep.recording.width, sweep.recording.height};
   const auto grid = value_or_exit(test_support::enclosing_grid(
-      sweep.recording, sweep.chain.T_target_source, window, *sweep.config.output_spacing_mm));
+      sweep.recording, sweep.chain.T_target_source, window, answer.grid.spacing_mm));
   const double origin_mm = (grid.origin_mm - answer.grid.origin_mm).cwiseAbs().maxCoeff();
   check("spine origin of the enclosing grid against PLUS's mm", origin_mm, "<= 0.001",
         origin_mm <= 0.001, "Offset in PLUS's volume (6 digits)");

@@ -47,12 +47,8 @@ Status check_one_case(const fs::path& case_file, const fs::path& model) {
 }
 
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {
-  std::vector<tracking::ConstantLink> links;
-  if (device.empty()) return links;
-  const auto config = io::read_plus_config(device);
-  if (!config) return tl::unexpected(config.error());
-  for (const io::PlusTransform& transform : config->transforms) links.push_back(transform.link);
-  return links;
+  if (device.empty()) return std::vector<tracking::ConstantLink>{};
+  return io::read_plus_config(device);
 }
 
 Status check_new(const fs::path& out) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/config/config_file.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
 #include "common/configuration/case_keys.hpp"
@@ -24,17 +25,8 @@ Vec3 unit(const Vec3& direction) {
   return std::abs(length - 1.0) < 1e-15 ? direction : direction / length;
 }
 
-std::string exact_digits(double value) {
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.17g", value);
-  return buffer;
-}
-
 std::string yaml_list(const std::vector<double>& values) {
-  std::string items;
-  for (const double value : values)
-    items.append(items.empty() ? "" : ", ").append(exact_digits(value));
-  return "[" + items + "]";
+  return fmt::format("[{:.17g}]", fmt::join(values, ", "));
 }
 
 // Double-quoted YAML: only these need an escape in printable text; control characters by number.
@@ -45,9 +37,7 @@ std::string quoted(const std::string& value) {
       out += '\\';
       out += c;
     } else if (static_cast<unsigned char>(c) < 0x20) {
-      char buffer[8];
-      std::snprintf(buffer, sizeof buffer, "\\x%02x", static_cast<unsigned>(c));
-      out += buffer;
+      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
     } else {
       out += c;
     }
@@ -61,7 +51,7 @@ class KeyWriter : public KeyWalker<KeyWriter> {
  public:
   template <typename... More>
   void operator()(const Key& key, double value, const Limits&, const More&...) {
-    line(key, exact_digits(value));
+    line(key, fmt::format("{:.17g}", value));
   }
   void operator()(const Key& key, int value, const Limits&) { line(key, std::to_string(value)); }
   void operator()(const Key& key, const Vec3& value, const Limits&, Need = Need::kOptional) {
@@ -76,10 +66,8 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   void operator()(const Key& key, const fs::path& value, Need = Need::kOptional) {
     line(key, quoted(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
   }
-  void operator()(const Key& key, const std::optional<fs::path>& value) {
-    if (value) (*this)(key, *value);
-  }
-  void operator()(const Key& key, const std::optional<std::string>& value) {
+  template <typename T>
+  void operator()(const Key& key, const std::optional<T>& value) {
     if (value) (*this)(key, *value);
   }
   template <typename T, typename W, std::size_t N>

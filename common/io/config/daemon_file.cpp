@@ -122,7 +122,7 @@ Status validate(const DaemonConfig& config) {
 
 Status check_endpoint(const std::string& endpoint, bool allow_remote) {
   const auto refuse = [&](const std::string& reason) {
-    return fail(ErrorCode::kInvalidArgument, "endpoint = " + endpoint + ": " + reason);
+    return invalid("endpoint = " + endpoint + ": " + reason);
   };
   const std::string ipc = "ipc://";
   if (endpoint.rfind(ipc, 0) == 0 && endpoint.size() > ipc.size()) {
@@ -140,7 +140,7 @@ Status check_endpoint(const std::string& endpoint, bool allow_remote) {
 
 Status check_security(const DaemonConfig& config) {
   const auto missing = [](const std::string& key, const std::string& why) {
-    return fail(ErrorCode::kInvalidArgument, "security." + key + " is missing: " + why);
+    return invalid("security." + key + " is missing: " + why);
   };
   const SecurityConfig& security = config.security;
   if (security.on()) return {};
@@ -158,7 +158,7 @@ Status check_security(const DaemonConfig& config) {
 
 Status check_metrics_endpoint(const std::string& endpoint, bool allow_remote) {
   const auto refuse = [&](const std::string& reason) {
-    return fail(ErrorCode::kInvalidArgument, "metrics.endpoint = " + endpoint + ": " + reason);
+    return invalid("metrics.endpoint = " + endpoint + ": " + reason);
   };
   const std::string host = tcp_host("tcp://" + endpoint);
   const std::string port = endpoint.substr(endpoint.rfind(':') + 1);

@@ -16,6 +16,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/descriptor.hpp"
 #include "common/io/files/file_access.hpp"
 
@@ -32,8 +33,8 @@ constexpr std::uintmax_t kMaxFileBytes = 1u << 20;
 
 Status check_name(std::string_view name) {
   if (is_key_name(name)) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("name: must be 1 to {} letters, digits, '-', '_' or '.'", kMaxKeyName));
+  return invalid(
+      fmt::format("name: must be 1 to {} letters, digits, '-', '_' or '.'", kMaxKeyName));
 }
 
 std::string mode_text(mode_t mode) { return fmt::format("{:o}", mode & 0777); }
@@ -44,7 +45,7 @@ Result<std::string> read_guarded(const fs::path& path, mode_t forbidden,
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) {
-    return file_error(ErrorCode::kUnreadable, path, std::generic_category().message(errno));
+    return unreadable(path, std::generic_category().message(errno));
   }
   if ((status.st_mode & forbidden) != 0) {
     return file_error(ErrorCode::kInvalidArgument, path,
@@ -56,23 +57,8 @@ Result<std::string> read_guarded(const fs::path& path, mode_t forbidden,
   return read_file(path);
 }
 
-// Every line that is no comment, with its number; without spaces at its ends.
-std::vector<std::pair<int, std::string>> content_lines(const std::string& text) {
-  std::vector<std::pair<int, std::string>> lines;
-  std::istringstream in(text);
-  int number = 0;
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    const auto first = line.find_first_not_of(" \t\r");
-    if (first == std::string::npos || line[first] == '#') continue;
-    const auto last = line.find_last_not_of(" \t\r");
-    lines.emplace_back(number, line.substr(first, last - first + 1));
-  }
-  return lines;
-}
-
 tl::unexpected<Error> line_error(const fs::path& path, int line, const std::string& message) {
-  return fail(ErrorCode::kInvalidArgument, fmt::format("{}:{}: {}", path.string(), line, message));
+  return invalid(fmt::format("{}:{}: {}", path.string(), line, message));
 }
 
 // "name", "public" and perhaps "secret", each once.
@@ -226,7 +212,7 @@ bool is_key_name(std::string_view name) {
 Result<KeyPairFiles> write_key_pair(const fs::path& folder, const KeyPair& pair) {
   if (Status name = check_name(pair.name); !name) return tl::unexpected(name.error());
   if (!is_key(pair.public_key) || !is_key(pair.secret_key)) {
-    return fail(ErrorCode::kInvalidArgument, "a key must be 40 characters of Z85");
+    return invalid("a key must be 40 characters of Z85");
   }
   KeyPairFiles files{folder / (pair.name + ".public"), folder / (pair.name + ".secret")};
   if (Status secret = write_new(files.secret_file, secret_text(pair), kForOwner); !secret) {
@@ -255,11 +241,9 @@ Result<KeyPair> read_secret_key(const fs::path& path) {
 }
 
 Result<std::string> read_public_key(const fs::path& path) {
-  const auto text = read_guarded(path, 0, {});
-  if (!text) return tl::unexpected(text.error());
-  auto fields = key_fields(path, *text);
-  if (!fields) return tl::unexpected(fields.error());
-  return (*fields)["public"];
+  return read_guarded(path, 0, {})
+      .and_then([&](const std::string& text) { return key_fields(path, text); })
+      .map([](std::map<std::string, std::string> fields) { return fields["public"]; });
 }
 
 Result<std::vector<AllowedKey>> read_allow_list(const fs::path& path) {
@@ -276,8 +260,7 @@ Result<std::vector<AllowedKey>> read_allow_list(const fs::path& path) {
 Status add_allowed_key(const fs::path& path, const AllowedKey& key) {
   if (Status name = check_name(key.name); !name) return name;
   if (!is_key(key.public_key)) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("the public key of {} must be {} characters of Z85", key.name, kKeyCharacters));
   }
   std::error_code ignored;

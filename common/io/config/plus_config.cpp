@@ -4,89 +4,54 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <pugixml.hpp>
 #include <sstream>
+#include <string>
+#include <utility>
 
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
 namespace {
 
-// Exactly N numbers and nothing else.
-template <int N>
-std::optional<std::array<double, N>> parse_numbers(const char* text) {
+// Exactly 16 numbers, row by row, and nothing else.
+std::optional<Eigen::Matrix4d> parse_matrix(const char* text) {
   std::istringstream in(text);
-  std::array<double, N> numbers{};
-  for (double& number : numbers) {
-    if (!(in >> number)) return std::nullopt;
+  Eigen::Matrix4d matrix;
+  for (int i = 0; i < 16; ++i) {
+    if (!(in >> matrix(i / 4, i % 4))) return std::nullopt;
   }
   std::string more;
   if (in >> more) return std::nullopt;
-  return numbers;
+  return matrix;
 }
 
-Result<PlusTransform> read_transform(const pugi::xml_node& node) {
-  PlusTransform transform;
-  tracking::FramePair& frames = transform.link.frames;
+Result<tracking::ConstantLink> read_transform(const pugi::xml_node& node) {
+  tracking::ConstantLink link;
+  tracking::FramePair& frames = link.frames;
   frames.from = node.attribute("From").value();
   frames.to = node.attribute("To").value();
-  if (frames.from.empty() || frames.to.empty()) {
-    return unreadable("a Transform without From or To");
-  }
+  if (frames.from.empty() || frames.to.empty()) return unreadable("a Transform without From or To");
   const std::string name = "Transform " + frames.name();
-  const auto numbers = parse_numbers<16>(node.attribute("Matrix").value());
-  if (!numbers) return unreadable(name + ": Matrix is not 16 numbers");
-  const Eigen::Matrix4d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
+  const auto matrix = parse_matrix(node.attribute("Matrix").value());
+  if (!matrix) return unreadable(name + ": Matrix is not 16 numbers");
   const bool scales = tracking::is_image_frame(frames.from) || tracking::is_image_frame(frames.to);
-  const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
-  if (!usable) {
-    return unreadable(name + ": Matrix " + usable.error().message);
-  }
+  const Status usable = scales ? check_affine(*matrix) : check_rigid(*matrix);
+  if (!usable) return unreadable(name + ": Matrix " + usable.error().message);
   if (scales) {
-    transform.link.T_to_from.matrix() = matrix;
+    link.T_to_from.matrix() = *matrix;
   } else {
-    transform.link.T_to_from = nearest_rigid(matrix);
+    link.T_to_from = nearest_rigid(*matrix);
   }
-  if (const auto error = parse_numbers<1>(node.attribute("Error").value())) {
-    transform.error = error->front();
-  }
-  transform.date = node.attribute("Date").value();
-  return transform;
-}
-
-Status read_reconstruction(const pugi::xml_node& node, PlusConfig& config) {
-  const char* origin_text = node.attribute("ClipRectangleOrigin").value();
-  const char* size_text = node.attribute("ClipRectangleSize").value();
-  if (*origin_text != '\0' || *size_text != '\0') {
-    const auto origin = parse_numbers<2>(origin_text);
-    const auto size = parse_numbers<2>(size_text);
-    const auto pixels = [](double value) { return value >= 0.0 && value <= 1e5; };
-    if (!origin || !size || !pixels((*origin)[0]) || !pixels((*origin)[1]) || !pixels((*size)[0]) ||
-        !pixels((*size)[1])) {
-      return unreadable(
-          fmt::format("ClipRectangleOrigin = \"{}\", ClipRectangleSize = \"{}\": must be two "
-                      "numbers of pixels each",
-                      origin_text, size_text));
-    }
-    config.clip = ClipRectangle{{static_cast<int>((*origin)[0]), static_cast<int>((*origin)[1])},
-                                {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])}};
-  }
-  const char* spacing_text = node.attribute("OutputSpacing").value();
-  if (*spacing_text == '\0') return {};
-  const auto spacing = parse_numbers<3>(spacing_text);
-  if (!spacing || !((*spacing)[0] > 0.0 && (*spacing)[1] > 0.0 && (*spacing)[2] > 0.0)) {
-    return unreadable(
-        fmt::format("OutputSpacing = \"{}\": must be three lengths in mm", spacing_text));
-  }
-  config.output_spacing_mm = Vec3((*spacing)[0], (*spacing)[1], (*spacing)[2]);
-  return {};
+  return link;
 }
 
 }  // namespace
 
-Result<PlusConfig> read_plus_config(const std::filesystem::path& path) {
-  return parse_file(path, [](const std::string& content) -> Result<PlusConfig> {
+Result<std::vector<tracking::ConstantLink>> read_plus_config(const std::filesystem::path& path) {
+  using Links = std::vector<tracking::ConstantLink>;
+  return parse_file(path, [](const std::string& content) -> Result<Links> {
     pugi::xml_document document;
     const pugi::xml_parse_result parsed = document.load_buffer(content.data(), content.size());
     if (!parsed) {
@@ -95,15 +60,13 @@ Result<PlusConfig> read_plus_config(const std::filesystem::path& path) {
     }
     const pugi::xml_node root = document.child("PlusConfiguration");
     if (!root) return unreadable("has no element PlusConfiguration");
-    PlusConfig config;
+    Links links;
     for (const pugi::xml_node& node : root.child("CoordinateDefinitions").children("Transform")) {
       auto transform = read_transform(node);
       if (!transform) return tl::unexpected(transform.error());
-      config.transforms.push_back(std::move(*transform));
+      links.push_back(std::move(*transform));
     }
-    const Status ok = read_reconstruction(root.child("VolumeReconstruction"), config);
-    if (!ok) return tl::unexpected(ok.error());
-    return config;
+    return links;
   });
 }
 

@@ -15,9 +15,8 @@ constexpr std::size_t kLongestNote = 56;
 Status check_values(const VoxelGrid& grid, const std::vector<float>& values,
                     std::size_t components) {
   if (values.size() != components * grid.num_voxels()) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("volume has {} values: must have {} for each of {} voxels",
-                            values.size(), components, grid.num_voxels()));
+    return invalid(fmt::format("volume has {} values: must have {} for each of {} voxels",
+                               values.size(), components, grid.num_voxels()));
   }
   const auto bad =
       std::find_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
@@ -33,9 +32,8 @@ Status check_note(const std::string& note) {
   const bool printable =
       std::all_of(note.begin(), note.end(), [](char c) { return c >= ' ' && c <= '~'; });
   if (printable && note.size() <= kLongestNote) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("note of {} characters: must be at most {} of printable ASCII",
-                          note.size(), kLongestNote));
+  return invalid(fmt::format("note of {} characters: must be at most {} of printable ASCII",
+                             note.size(), kLongestNote));
 }
 
 }  // namespace
@@ -43,29 +41,27 @@ Status check_note(const std::string& note) {
 Status validate(const VoxelGrid& grid) {
   const auto [nx, ny, nz] = grid.dims;
   const std::string size = fmt::format("grid of {} x {} x {} voxels", nx, ny, nz);
-  if (std::min({nx, ny, nz}) < 1)
-    return fail(ErrorCode::kInvalidArgument, size + ": must have at least 1 along every axis");
+  if (std::min({nx, ny, nz}) < 1) return invalid(size + ": must have at least 1 along every axis");
   if (std::max({nx, ny, nz}) > VoxelGrid::kMaxVoxelsAlongAxis) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: must have at most {} along an axis",
-                                                         size, VoxelGrid::kMaxVoxelsAlongAxis));
+    return invalid(fmt::format("{}: must have at most {} along an axis", size,
+                               VoxelGrid::kMaxVoxelsAlongAxis));
   }
   if (grid.num_voxels() > VoxelGrid::kMaxVoxels) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: must have at most {} voxels in all", size, VoxelGrid::kMaxVoxels));
+    return invalid(
+        fmt::format("{}: must have at most {} voxels in all", size, VoxelGrid::kMaxVoxels));
   }
   if (!grid.T_ras_voxel.affine().allFinite()) {
     return fail(ErrorCode::kNotFinite, "affine of the grid: an entry is not finite");
   }
   if (!(grid.spacing_mm().minCoeff() > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument, "affine of the grid: a voxel axis has no length");
+    return invalid("affine of the grid: a voxel axis has no length");
   }
   const Mat3 directions = grid.directions();
   for (int a = 0; a < 3; ++a) {
     for (int b = a + 1; b < 3; ++b) {
       const double cosine = std::abs(directions.col(a).dot(directions.col(b)));
       if (cosine <= kMostCosine) continue;
-      return fail(
-          ErrorCode::kInvalidArgument,
+      return invalid(
           fmt::format("affine of the grid: voxel axes {} and {} are {:.3g} degrees off a right "
                       "angle: ITK's "
                       "files cannot hold a sheared grid",

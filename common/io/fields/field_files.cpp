@@ -39,11 +39,43 @@ class GzipOutput {
  public:
   // Begins with `plain`; all that write() adds is compressed if `compressed`. The same bytes give
   // the same file: no time stands in it. kWriteFailed.
-  static Result<GzipOutput> create(const fs::path& path, std::string_view plain, bool compressed);
+  static Result<GzipOutput> create(const fs::path& path, std::string_view plain, bool compressed) {
+    auto pending = PendingFile::create(path);
+    if (!pending) return tl::unexpected(pending.error());
+    {
+      std::ofstream head(pending->temporary_path(), std::ios::binary);
+      head.write(plain.data(), static_cast<std::streamsize>(plain.size()));
+      head.close();
+      if (!head) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
+    }
+    gzFile_s* stream =
+        gzopen(pending->temporary_path().c_str(), compressed ? kAppendCompressed : kAppendPlain);
+    if (stream == nullptr) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
+    gzbuffer(stream, 1u << 18);
+    return GzipOutput(path, std::move(*pending), stream);
+  }
 
-  Status write(const void* bytes, std::size_t size);
+  Status write(const void* bytes, std::size_t size) {
+    constexpr std::size_t kPiece = std::size_t{1} << 30;  // gzwrite counts with an int
+    const auto* at = static_cast<const char*>(bytes);
+    while (size > 0) {
+      const std::size_t piece = std::min(size, kPiece);
+      errno = 0;
+      if (gzwrite(stream_.get(), at, static_cast<unsigned>(piece)) != static_cast<int>(piece)) {
+        return failed(errno);
+      }
+      at += piece;
+      size -= piece;
+    }
+    return {};
+  }
+
   // The file is there now.
-  Status commit();
+  Status commit() {
+    errno = 0;
+    if (gzclose(stream_.release()) != Z_OK) return failed(errno);
+    return pending_.commit();
+  }
 
  private:
   struct Close {
@@ -52,56 +84,16 @@ class GzipOutput {
 
   GzipOutput(fs::path path, PendingFile pending, gzFile_s* stream)
       : path_(std::move(path)), pending_(std::move(pending)), stream_(stream) {}
-  Status failed(int error) const;
+  Status failed(int error) const {
+    return file_error(ErrorCode::kWriteFailed, path_,
+                      std::string("cannot be written: ") +
+                          (error != 0 ? std::strerror(error) : "the compressor failed"));
+  }
 
   fs::path path_;
   PendingFile pending_;
   std::unique_ptr<gzFile_s, Close> stream_;
 };
-
-Status GzipOutput::failed(int error) const {
-  return file_error(ErrorCode::kWriteFailed, path_,
-                    std::string("cannot be written: ") +
-                        (error != 0 ? std::strerror(error) : "the compressor failed"));
-}
-
-Result<GzipOutput> GzipOutput::create(const fs::path& path, std::string_view plain,
-                                      bool compressed) {
-  auto pending = PendingFile::create(path);
-  if (!pending) return tl::unexpected(pending.error());
-  {
-    std::ofstream head(pending->temporary_path(), std::ios::binary);
-    head.write(plain.data(), static_cast<std::streamsize>(plain.size()));
-    head.close();
-    if (!head) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
-  }
-  gzFile_s* stream =
-      gzopen(pending->temporary_path().c_str(), compressed ? kAppendCompressed : kAppendPlain);
-  if (stream == nullptr) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
-  gzbuffer(stream, 1u << 18);
-  return GzipOutput(path, std::move(*pending), stream);
-}
-
-Status GzipOutput::write(const void* bytes, std::size_t size) {
-  constexpr std::size_t kPiece = std::size_t{1} << 30;  // gzwrite counts with an int
-  const auto* at = static_cast<const char*>(bytes);
-  while (size > 0) {
-    const std::size_t piece = std::min(size, kPiece);
-    errno = 0;
-    if (gzwrite(stream_.get(), at, static_cast<unsigned>(piece)) != static_cast<int>(piece)) {
-      return failed(errno);
-    }
-    at += piece;
-    size -= piece;
-  }
-  return {};
-}
-
-Status GzipOutput::commit() {
-  errno = 0;
-  if (gzclose(stream_.release()) != Z_OK) return failed(errno);
-  return pending_.commit();
-}
 
 // ---- NIfTI ----
 
@@ -163,7 +155,7 @@ Result<GzipOutput> begin(const fs::path& path, const nifti_1_header& header) {
   const std::string name = path.filename().string();
   const bool compressed = name.ends_with(".nii.gz");
   if (!compressed && !name.ends_with(".nii")) {
-    return file_error(ErrorCode::kUnreadable, path, "must end in .nii or .nii.gz");
+    return unreadable(path, "must end in .nii or .nii.gz");
   }
   auto file = GzipOutput::create(path, {}, compressed);
   if (!file) return file;
@@ -241,9 +233,7 @@ Status write_nifti(const fs::path& path, const ScalarVolume& volume) {
 
 Status write_nrrd(const fs::path& path, const DisplacementField& field) {
   if (Status ok = validate(field); !ok) return file_error(path, ok.error());
-  if (path.extension() != ".nrrd") {
-    return file_error(ErrorCode::kUnreadable, path, "must end in .nrrd");
-  }
+  if (path.extension() != ".nrrd") return unreadable(path, "must end in .nrrd");
   auto file = GzipOutput::create(path, nrrd_header_of(field), true);
   if (!file) return tl::unexpected(file.error());
   const std::size_t slice = 3 * grid_size({field.grid.dims[0], field.grid.dims[1], 1});

@@ -78,9 +78,7 @@ void write_parameters(hid_t file, const std::vector<float>& ras_mm) {
 
 Status write_itk_transform(const std::filesystem::path& path, const DisplacementField& field) {
   if (Status ok = validate(field); !ok) return file_error(path, ok.error());
-  if (path.extension() != ".h5") {
-    return file_error(ErrorCode::kUnreadable, path, "must end in .h5");
-  }
+  if (path.extension() != ".h5") return unreadable(path, "must end in .h5");
   auto pending = PendingFile::create(path);
   if (!pending) return tl::unexpected(pending.error());
   try {

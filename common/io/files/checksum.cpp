@@ -54,7 +54,7 @@ Result<FileChecksum> file_checksum(const std::filesystem::path& path, std::uint6
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   const off_t size = file.get() < 0 ? -1 : ::lseek(file.get(), 0, SEEK_END);
-  if (size < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+  if (size < 0) return unreadable(path, "cannot be opened");
   FileChecksum result;
   result.bytes = static_cast<std::uint64_t>(size);
   const std::uint64_t length = result.bytes - std::min(result.bytes, offset);
@@ -70,7 +70,7 @@ Result<FileChecksum> file_checksum(const std::filesystem::path& path, std::uint6
   };
   team.run(task);
   for (const Piece& piece : pieces) {
-    if (!piece.whole) return file_error(ErrorCode::kUnreadable, path, "cannot be read to its end");
+    if (!piece.whole) return unreadable(path, "cannot be read to its end");
     result.crc32 = static_cast<std::uint32_t>(
         crc32_combine(result.crc32, piece.crc, static_cast<z_off_t>(piece.end - piece.begin)));
   }

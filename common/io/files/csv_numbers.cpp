@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/files/csv_numbers.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <sstream>
+
+#include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
 
@@ -11,6 +16,28 @@ std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+std::vector<std::pair<int, std::string>> content_lines(const std::string& text) {
+  std::vector<std::pair<int, std::string>> lines;
+  std::istringstream in(text);
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const std::string_view content = trimmed(line);
+    if (!content.empty() && content.front() != '#') lines.emplace_back(number, content);
+  }
+  return lines;
+}
+
+tl::unexpected<Error> bad_line(int number, std::string_view line, std::string_view problem) {
+  return unreadable(fmt::format("line {}: \"{}\" {}", number, line.substr(0, 60), problem));
+}
+
+std::optional<std::string_view> assigned_value(std::string_view line, std::string_view name) {
+  if (!line.starts_with(name)) return std::nullopt;
+  line = trimmed(line.substr(name.size()));
+  if (!line.starts_with('=')) return std::nullopt;
+  return trimmed(line.substr(1));
 }
 
 bool parse_number(std::string_view text, double& number) {

@@ -1,15 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cells of the small .csv files that people write by hand.
+// Lines and cells of the small files that people write by hand.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include "common/core/error.hpp"
 
 namespace brainshift::io {
 
 // Without blanks at either end.
 std::string_view trimmed(std::string_view text);
+// Every line that is neither empty nor a comment behind #, trimmed, with its number from 1.
+std::vector<std::pair<int, std::string>> content_lines(const std::string& text);
+// kUnreadable: "line 3: "the start of it" must be ...".
+tl::unexpected<Error> bad_line(int number, std::string_view line, std::string_view problem);
+// The VALUE of a line "NAME = VALUE", trimmed; none for any other line.
+std::optional<std::string_view> assigned_value(std::string_view line, std::string_view name);
 // The whole text is one finite number.
 bool parse_number(std::string_view text, double& number);
 // Between commas, trimmed; at least one.

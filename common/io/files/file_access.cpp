@@ -50,24 +50,22 @@ Status check_regular_file(const fs::path& path) {
   if (status.type() == fs::file_type::not_found) {
     return file_error(ErrorCode::kNotFound, path, "no such file");
   }
-  if (error) return file_error(ErrorCode::kUnreadable, path, error.message());
-  if (status.type() != fs::file_type::regular) {
-    return file_error(ErrorCode::kUnreadable, path, "not a regular file");
-  }
+  if (error) return unreadable(path, error.message());
+  if (status.type() != fs::file_type::regular) return unreadable(path, "not a regular file");
   return {};
 }
 
 Result<std::string> read_file(const fs::path& path) {
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
   std::ifstream in(path, std::ios::binary);
-  if (!in) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+  if (!in) return unreadable(path, "cannot be opened");
   std::error_code error;
   const auto size = fs::file_size(path, error);
-  if (error) return file_error(ErrorCode::kUnreadable, path, error.message());
+  if (error) return unreadable(path, error.message());
   std::string content(static_cast<std::size_t>(size), '\0');
   in.read(content.data(), static_cast<std::streamsize>(content.size()));
   if (in.bad() || in.gcount() != static_cast<std::streamsize>(content.size())) {
-    return file_error(ErrorCode::kUnreadable, path, "cannot be read to its end");
+    return unreadable(path, "cannot be read to its end");
   }
   return content;
 }

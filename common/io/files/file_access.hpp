@@ -56,6 +56,11 @@ inline tl::unexpected<Error> file_error(const std::filesystem::path& path, const
 inline tl::unexpected<Error> unreadable(std::string message) {
   return fail(ErrorCode::kUnreadable, std::move(message));
 }
+// The same with the path in front.
+inline tl::unexpected<Error> unreadable(const std::filesystem::path& path,
+                                        const std::string& message) {
+  return file_error(ErrorCode::kUnreadable, path, message);
+}
 
 // What `parse` makes of the bytes of a regular file: a Result. Errors of read_file, and those of
 // `parse` with the path in front.

@@ -48,8 +48,7 @@ Status check_writable(std::string_view option, const fs::path& path, const fs::p
 
 Status check_output_file(std::string_view option, const fs::path& path) {
   if (!path.has_filename()) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: \"{}\" must name a file", option, path.string()));
+    return invalid(fmt::format("{}: \"{}\" must name a file", option, path.string()));
   }
   std::error_code error;
   const fs::file_type type = fs::status(path, error).type();
@@ -69,9 +68,7 @@ Status check_output_file(std::string_view option, const fs::path& path) {
 }
 
 Status check_output_folder(std::string_view option, const fs::path& path) {
-  if (path.empty()) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: must name a folder", option));
-  }
+  if (path.empty()) return invalid(fmt::format("{}: must name a folder", option));
   std::error_code ignored;
   fs::path existing = fs::absolute(path, ignored);
   while (!fs::exists(fs::symlink_status(existing, ignored)) && existing.has_relative_path()) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/files/yaml_section.hpp"
 
+#include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -135,9 +136,7 @@ bool parse_finite(const YAML::Node& node, double& value) {
 }
 
 std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
-  return text;
+  return fmt::format("{}", fmt::join(words, ", "));
 }
 
 }  // namespace
@@ -171,7 +170,7 @@ YamlSection YamlDocument::root() {
 
 Status YamlDocument::status() const {
   if (state_->problem.empty()) return {};
-  return fail(ErrorCode::kInvalidArgument, state_->problem);
+  return invalid(state_->problem);
 }
 
 Error YamlDocument::locate(const Error& error) const {
@@ -209,8 +208,6 @@ int YamlSection::line_of_key(const std::string& key) const {
   return state_->line_of(full_key(key));
 }
 
-int YamlSection::own_line() const { return state_->line_of(prefix_); }
-
 void YamlSection::refuse_value(const std::string& key, const Node& node, const std::string& what) {
   state_->fail_at(line_of_key(key), full_key(key) + " = " + shown_value(node.yaml) + ": " + what);
 }
@@ -225,7 +222,7 @@ bool YamlSection::has(const std::string& key) {
 std::shared_ptr<YamlSection::Node> YamlSection::take(const std::string& key, Presence presence) {
   if (!has(key)) {
     if (presence == Presence::kRequired) {
-      state_->fail_at(own_line(), full_key(key) + ": key is missing");
+      state_->fail_at(state_->line_of(prefix_), full_key(key) + ": key is missing");
     }
     return nullptr;
   }
@@ -252,7 +249,7 @@ std::string YamlSection::one_of(const std::vector<std::string>& keys, Presence p
   if (present.size() == 1) return present.front();
   if (present.empty() && presence == Presence::kOptional) return {};
   const std::string found = present.empty() ? "none" : joined(present);
-  state_->fail_at(own_line(),
+  state_->fail_at(state_->line_of(prefix_),
                   prefix_ + " has " + found + ": must have exactly one of " + joined(keys));
   return {};
 }
@@ -299,9 +296,7 @@ void YamlSection::path(const std::string& key, fs::path& value, Presence presenc
   if (!node->yaml.IsNull()) text(key, name);
   if (name.empty()) {
     value.clear();
-    if (presence == Presence::kRequired) {
-      state_->fail_at(line_of_key(key), full_key(key) + ": must name a file");
-    }
+    if (presence == Presence::kRequired) fail(key, "must name a file");
     return;
   }
   value = (fs::absolute(state_->file).parent_path() / name).lexically_normal();

@@ -84,10 +84,7 @@ class YamlSection {
   // The value of a key, or null (and an error, if required).
   std::shared_ptr<Node> take(const std::string& key, Presence presence);
   std::string full_key(const std::string& key) const;
-  // Lines for messages, 0 if unknown: of a key, and of the section's heading (where a missing key
-  // belongs).
-  int line_of_key(const std::string& key) const;
-  int own_line() const;
+  int line_of_key(const std::string& key) const;  // for messages; 0 if unknown
   // "KEY = VALUE: what".
   void refuse_value(const std::string& key, const Node& node, const std::string& what);
 

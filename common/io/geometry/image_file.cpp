@@ -195,17 +195,16 @@ double largest_content(const fs::path& path) {
 Status check_nifti_header(const fs::path& path) {
   const std::unique_ptr<char, Free> header_file(nifti_findhdrname(path.c_str()));
   const auto header = header_file ? parse(first_bytes(header_file.get())) : std::nullopt;
-  if (!header) return file_error(ErrorCode::kUnreadable, path, "is not a NIfTI image");
+  if (!header) return unreadable(path, "is not a NIfTI image");
   for (const auto check : {check_dimensions, check_datatype, check_offset}) {
     if (const std::string problem = check(*header); !problem.empty()) {
-      return file_error(ErrorCode::kUnreadable, path, problem);
+      return unreadable(path, problem);
     }
   }
   const double most = header->single_file ? largest_content(header_file.get()) : header->vox_offset;
   if (header->vox_offset > most) {
-    return file_error(
-        ErrorCode::kUnreadable, path,
-        fmt::format("vox_offset is {}: beyond the end of the file", header->vox_offset));
+    return unreadable(
+        path, fmt::format("vox_offset is {}: beyond the end of the file", header->vox_offset));
   }
   return {};
 }
@@ -220,12 +219,11 @@ using ImageHandle = std::unique_ptr<nifti_image, FreeImage>;
 // The sform when there is one, else the qform; NIfTI-1 "method 3" before "method 2".
 Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path) {
   if (image.xyz_units != NIFTI_UNITS_MM && image.xyz_units != NIFTI_UNITS_UNKNOWN) {
-    return file_error(
-        ErrorCode::kUnreadable, path,
-        std::string("spatial unit is '") + nifti_units_string(image.xyz_units) + "': must be mm");
+    return unreadable(path, std::string("spatial unit is '") + nifti_units_string(image.xyz_units) +
+                                "': must be mm");
   }
   if (image.sform_code <= 0 && image.qform_code <= 0) {
-    return file_error(ErrorCode::kUnreadable, path,
+    return unreadable(path,
                       "has no affine (sform_code and qform_code are 0), so its place is unknown");
   }
   const bool use_sform = image.sform_code > 0;
@@ -236,12 +234,12 @@ Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path
   }
   const std::string name = use_sform ? "sform" : "qform";
   if (!affine.matrix().allFinite()) {
-    return file_error(ErrorCode::kUnreadable, path, name + " has entries that are not finite");
+    return unreadable(path, name + " has entries that are not finite");
   }
   // Relative to the voxel edges, so that the test does not depend on the voxel size.
   const double volume = affine.linear().colwise().norm().prod();
   if (!(std::abs(affine.linear().determinant()) > 1e-6 * volume)) {
-    return file_error(ErrorCode::kUnreadable, path, name + " is singular");
+    return unreadable(path, name + " is singular");
   }
   return affine;
 }
@@ -254,9 +252,8 @@ Status check_voxels(const nifti_image& image, const fs::path& path) {
   const double needed = static_cast<double>(image.nvox) * image.nbyper;
   const double available = largest_content(data_file) - static_cast<double>(image.iname_offset);
   if (needed > available) {
-    return file_error(
-        ErrorCode::kUnreadable, path,
-        fmt::format("is truncated: the header promises {:.0f} bytes of voxels", needed));
+    return unreadable(
+        path, fmt::format("is truncated: the header promises {:.0f} bytes of voxels", needed));
   }
   return {};
 }
@@ -271,7 +268,7 @@ Result<VoxelImage> read_nifti(const fs::path& path) {
   // libnifti also reads ANALYZE 7.5 (which has no affine) and an ASCII form that nobody writes.
   const bool is_nifti =
       image && image->nifti_type != NIFTI_FTYPE_ANALYZE && image->nifti_type != NIFTI_FTYPE_ASCII;
-  if (!is_nifti) return file_error(ErrorCode::kUnreadable, path, "is not a NIfTI image");
+  if (!is_nifti) return unreadable(path, "is not a NIfTI image");
   if (Status voxels = check_voxels(*image, path); !voxels) return tl::unexpected(voxels.error());
   Result<AffineTransform> affine = affine_of(*image, path);
   if (!affine) return tl::unexpected(affine.error());
@@ -280,11 +277,10 @@ Result<VoxelImage> read_nifti(const fs::path& path) {
   const double slope = image->scl_slope == 0.0 ? 1.0 : image->scl_slope;
   const double intercept = image->scl_slope == 0.0 ? 0.0 : image->scl_inter;
   if (!std::isfinite(slope) || !std::isfinite(intercept)) {
-    return file_error(ErrorCode::kUnreadable, path, "scl_slope or scl_inter is not finite");
+    return unreadable(path, "scl_slope or scl_inter is not finite");
   }
   if (nifti_image_load(image.get()) != 0 || image->data == nullptr) {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "is truncated or damaged: voxels cannot be read");
+    return unreadable(path, "is truncated or damaged: voxels cannot be read");
   }
 
   VoxelImage result;

@@ -212,9 +212,7 @@ Result<std::optional<Segment>> chosen_segment(const std::vector<Segment>& segmen
     chosen = segment;
     ++found;
   }
-  const auto refuse = [](const std::string& text) {
-    return fail(ErrorCode::kInvalidArgument, text);
-  };
+  const auto refuse = [](const std::string& text) { return invalid(text); };
   if (segments.empty() && !name.empty()) {
     return refuse(fmt::format("names no segments, so there is none called \"{}\"", name));
   }

@@ -94,8 +94,7 @@ Result<GroupedMesh> read_grouped_mesh(const fs::path& path) {
   if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
   const std::string extension = lower_extension(path);
   if (extension != ".msh" && extension != ".vtu") {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "unknown mesh format '" + extension + "': must be .msh or .vtu");
+    return unreadable(path, "unknown mesh format '" + extension + "': must be .msh or .vtu");
   }
   return parse_file(path, [&](std::string content) -> Result<GroupedMesh> {
     auto read = extension == ".msh" ? parse_gmsh(content) : parse_grouped_vtu(std::move(content));
@@ -131,15 +130,13 @@ std::string lower_extension(const fs::path& path) {
 
 Result<TriangleSurface> read_surface_or_points(const fs::path& path) {
   auto surface = load_surface(path, is_point_format(lower_extension(path)));
-  if (surface && surface->num_vertices() == 0)
-    return file_error(ErrorCode::kUnreadable, path, "has no point");
+  if (surface && surface->num_vertices() == 0) return unreadable(path, "has no point");
   return surface;
 }
 
 Result<TriangleSurface> read_surface(const fs::path& path) {
   auto surface = load_surface(path, false);
-  if (surface && surface->num_triangles() == 0)
-    return file_error(ErrorCode::kUnreadable, path, "has no triangle");
+  if (surface && surface->num_triangles() == 0) return unreadable(path, "has no triangle");
   return surface;
 }
 

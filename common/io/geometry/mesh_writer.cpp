@@ -106,10 +106,9 @@ Status check_vtk_fields(const std::filesystem::path& path, const std::vector<Nod
                         Eigen::Index columns, const std::string& what) {
   for (const NodeField& field : fields) {
     if (field.values.cols() == columns && field.values.rows() > 0) continue;
-    return fail(ErrorCode::kInvalidArgument, path.string() + ": field '" + field.name + "' has " +
-                                                 std::to_string(field.values.cols()) +
-                                                 " columns: must have one per " + what + ", " +
-                                                 std::to_string(columns));
+    return invalid(path.string() + ": field '" + field.name + "' has " +
+                   std::to_string(field.values.cols()) + " columns: must have one per " + what +
+                   ", " + std::to_string(columns));
   }
   return {};
 }
@@ -133,9 +132,8 @@ Result<std::string> ply_text(const TriangleSurface& surface, const std::vector<N
                      "\nproperty double x\nproperty double y\nproperty double z\n";
   for (const NodeField& field : fields) {
     if (field.values.rows() != 1 || field.name.find_first_of(" \t\n") != std::string::npos) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "field '" + field.name +
-                      "': a PLY file takes one number per vertex, of a name without blanks");
+      return invalid("field '" + field.name +
+                     "': a PLY file takes one number per vertex, of a name without blanks");
     }
     text += "property double " + field.name + "\n";
   }
@@ -182,7 +180,7 @@ Status write_surface(const std::filesystem::path& path, const TriangleSurface& s
   const std::string extension = lower_extension(path);
   if (extension == ".vtp") return write_file(path, vtp_text(surface, vertex_fields));
   if (extension != ".ply") {
-    return file_error(ErrorCode::kUnreadable, path,
+    return unreadable(path,
                       "unknown surface format '" + extension + "' to write: must be .ply or .vtp");
   }
   const auto text = ply_text(surface, vertex_fields);

@@ -98,9 +98,7 @@ TriangleSurface read_stl_ascii(std::string_view text) {
     }
     builder.add_corner(p[0], p[1], p[2]);
   }
-  if (!ended || builder.corners() != 3 * loops) {
-    refuse_format("ends before endsolid");
-  }
+  if (!ended || builder.corners() != 3 * loops) refuse_format("ends before endsolid");
   return builder.surface();
 }
 

@@ -124,27 +124,163 @@ std::string read_block(ByteSource&& source, const Encoding& encoding) {
 class VtkXmlFile {
  public:
   // `content` is the whole file; `grid` the data set type, e.g. "UnstructuredGrid".
-  VtkXmlFile(std::string content, const std::string& grid);
+  VtkXmlFile(std::string content, const std::string& grid) : content_(std::move(content)) {
+    cut_appended();
+    std::string xml_text = content_;
+    if (appended_.data() != nullptr) {
+      xml_text.resize(xml_text.find("<AppendedData"));
+      xml_text += "</VTKFile>";
+    }
+    const pugi::xml_parse_result parsed = xml_.load_buffer(xml_text.data(), xml_text.size());
+    if (!parsed) refuse_format(std::string("is not well-formed XML: ") + parsed.description());
+    find_piece(grid);
+  }
 
   // What SPACE, a string array of the field data, says. It must be text, and one text.
-  PointSpace space() const;
+  PointSpace space() const {
+    for (const pugi::xml_node& node : grid_.child("FieldData").children()) {
+      if (std::string_view(node.attribute("Name").as_string()) != "SPACE") continue;
+      return value_of(
+          parse_point_space(placed("FieldData array 'SPACE' ", [&] { return text_of(node); })));
+    }
+    return PointSpace::kUnsaid;
+  }
+
   // An integer attribute of the piece, e.g. "NumberOfPoints"; 0 when absent.
-  std::int64_t count(const std::string& attribute) const;
+  std::int64_t count(const std::string& attribute) const {
+    const std::string text = piece_.attribute(attribute.c_str()).as_string("0");
+    std::vector<std::int64_t> values;
+    // Mesh indices are int.
+    if (!parse_numbers(text, values) || values.size() != 1 || values[0] < 0 ||
+        values[0] > std::numeric_limits<int>::max()) {
+      refuse_format(attribute + " = " + text + ": must be a count");
+    }
+    return values[0];
+  }
+
   // Arrays of a section of the piece ("Points", "Cells", "PointData"), without decoding.
-  std::vector<pugi::xml_node> arrays(const std::string& section) const;
+  std::vector<pugi::xml_node> arrays(const std::string& section) const {
+    const auto nodes = piece_.child(section.c_str()).children("DataArray");
+    return {nodes.begin(), nodes.end()};
+  }
+
   // The index-th array of a section; `tuples` is the expected number, or -1 to take what the file
   // has (connectivity, whose length no attribute tells).
-  VtkArray array(const std::string& section, std::size_t index, std::int64_t tuples) const;
+  VtkArray array(const std::string& section, std::size_t index, std::int64_t tuples) const {
+    const std::vector<pugi::xml_node> nodes = arrays(section);
+    if (index >= nodes.size()) refuse_format(section + " has no array");
+    const pugi::xml_node& node = nodes[index];
+    VtkArray array;
+    array.name = node.attribute("Name").as_string();
+    array.type = node.attribute("type").as_string();
+    array.components = node.attribute("NumberOfComponents").as_int(1);
+    const std::string place = section + " array '" + array.name + "'";
+    if (vtk_type(array.type) == nullptr) {
+      refuse_format(place + " has unknown type '" + array.type + "'");
+    }
+    if (array.components < 1) refuse_format(place + " has no components");
+    placed(place + ": ", [&] { fill(node, array); });
+    const std::size_t size = array.is_real() ? array.reals.size() : array.integers.size();
+    if (tuples >= 0 &&
+        size != static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array.components)) {
+      refuse_format(place + " has " + std::to_string(size) + " numbers: must have " +
+                    std::to_string(tuples) + " x " + std::to_string(array.components));
+    }
+    return array;
+  }
+
   // By name.
-  VtkArray array(const std::string& section, const std::string& name, std::int64_t tuples) const;
+  VtkArray array(const std::string& section, const std::string& name, std::int64_t tuples) const {
+    const std::vector<pugi::xml_node> nodes = arrays(section);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (nodes[i].attribute("Name").as_string() == name) return array(section, i, tuples);
+    }
+    refuse_format(section + " has no array '" + name + "'");
+  }
 
  private:
   // Raw appended data are no XML, so they are cut out before parsing.
-  void cut_appended();
-  void find_piece(const std::string& grid_name);
-  std::string bytes_of(const pugi::xml_node& node) const;
-  std::string text_of(const pugi::xml_node& node) const;
-  void fill(const pugi::xml_node& node, VtkArray& array) const;
+  void cut_appended() {
+    const std::size_t begin = content_.find("<AppendedData");
+    if (begin == std::string::npos) return;
+    const std::size_t close = content_.find('>', begin);
+    const std::size_t underscore = content_.find('_', close);
+    if (close == std::string::npos || underscore == std::string::npos) {
+      refuse_format("AppendedData has no data");
+    }
+    appended_is_raw_ =
+        content_.substr(begin, close - begin).find("\"base64\"") == std::string::npos;
+    appended_ = std::string_view(content_).substr(underscore + 1);
+    if (!appended_is_raw_) appended_ = appended_.substr(0, appended_.find('<'));
+  }
+
+  void find_piece(const std::string& grid_name) {
+    const pugi::xml_node root = xml_.child("VTKFile");
+    if (!root) refuse_format("is not a VTK XML file");
+    const std::string type = root.attribute("type").as_string();
+    if (type != grid_name) refuse_format("holds '" + type + "': must be '" + grid_name + "'");
+    const std::string compressor = root.attribute("compressor").as_string();
+    if (!compressor.empty() && compressor != "vtkZLibDataCompressor") {
+      refuse_format("compressor '" + compressor + "' is not supported: must be zlib or none");
+    }
+    const std::string_view order = root.attribute("byte_order").as_string("LittleEndian");
+    encoding_.swap = (order == "BigEndian") == (std::endian::native == std::endian::little);
+    const std::string_view numbers = root.attribute("header_type").as_string("UInt32");
+    encoding_.wide_header = numbers == "UInt64";
+    encoding_.compressed = !compressor.empty();
+    grid_ = root.child(grid_name.c_str());
+    piece_ = grid_.child("Piece");
+    if (!piece_) refuse_format("has no Piece");
+    if (piece_.next_sibling("Piece")) refuse_format("has several pieces: must have one");
+  }
+
+  std::string bytes_of(const pugi::xml_node& node) const {
+    const std::string format = node.attribute("format").as_string();
+    if (format == "binary") return read_block(Base64Source(node.text().get()), encoding_);
+    if (format != "appended") refuse_format("format '" + format + "' is unknown");
+    const auto offset =
+        node.attribute("offset").as_ullong(std::numeric_limits<std::uint64_t>::max());
+    if (offset >= appended_.size()) refuse_format("offset lies behind the appended data");
+    const std::string_view from = appended_.substr(offset);
+    return appended_is_raw_ ? read_block(RawSource(from), encoding_)
+                            : read_block(Base64Source(from), encoding_);
+  }
+
+  // VTK writes a text as the codes of its characters and a 0: as numbers (ascii) or as bytes.
+  std::string text_of(const pugi::xml_node& node) const {
+    const std::string type = node.attribute("type").as_string();
+    if (type != "String") refuse_format("has type '" + type + "': must be String");
+    std::string text;
+    if (std::string(node.attribute("format").as_string("ascii")) == "ascii") {
+      std::vector<int> codes;
+      if (!parse_numbers(std::string_view(node.text().get()), codes)) {
+        refuse_format("holds something that is not the code of a character");
+      }
+      for (const int code : codes) {
+        if (code < 0 || code > 255) refuse_format("holds a code that is no character");
+        text.push_back(static_cast<char>(code));
+      }
+    } else {
+      text = bytes_of(node);
+    }
+    if (!text.empty() && text.back() == '\0') text.pop_back();
+    if (text.find('\0') != std::string::npos) refuse_format("holds several texts: must be one");
+    return text;
+  }
+
+  void fill(const pugi::xml_node& node, VtkArray& array) const {
+    const VtkType& type = *vtk_type(array.type);
+    if (std::string(node.attribute("format").as_string("ascii")) == "ascii") {
+      const std::string_view text = node.text().get();
+      const bool ok =
+          array.is_real() ? parse_numbers(text, array.reals) : parse_numbers(text, array.integers);
+      if (!ok) refuse_format("holds something that is not a number of type " + array.type);
+      return;
+    }
+    const std::string bytes = bytes_of(node);
+    if (bytes.size() % type.bytes != 0) refuse_format("ends inside a number");
+    type.append(bytes, encoding_.swap, array);
+  }
 
   std::string content_;
   pugi::xml_document xml_;
@@ -154,157 +290,6 @@ class VtkXmlFile {
   std::string_view appended_;  // of content_, after the underscore
   bool appended_is_raw_ = false;
 };
-
-VtkXmlFile::VtkXmlFile(std::string content, const std::string& grid)
-    : content_(std::move(content)) {
-  cut_appended();
-  std::string xml_text = content_;
-  if (appended_.data() != nullptr) {
-    xml_text.resize(xml_text.find("<AppendedData"));
-    xml_text += "</VTKFile>";
-  }
-  const pugi::xml_parse_result parsed = xml_.load_buffer(xml_text.data(), xml_text.size());
-  if (!parsed) refuse_format(std::string("is not well-formed XML: ") + parsed.description());
-  find_piece(grid);
-}
-
-void VtkXmlFile::cut_appended() {
-  const std::size_t begin = content_.find("<AppendedData");
-  if (begin == std::string::npos) return;
-  const std::size_t close = content_.find('>', begin);
-  const std::size_t underscore = content_.find('_', close);
-  if (close == std::string::npos || underscore == std::string::npos) {
-    refuse_format("AppendedData has no data");
-  }
-  appended_is_raw_ = content_.substr(begin, close - begin).find("\"base64\"") == std::string::npos;
-  appended_ = std::string_view(content_).substr(underscore + 1);
-  if (!appended_is_raw_) appended_ = appended_.substr(0, appended_.find('<'));
-}
-
-void VtkXmlFile::find_piece(const std::string& grid_name) {
-  const pugi::xml_node root = xml_.child("VTKFile");
-  if (!root) refuse_format("is not a VTK XML file");
-  const std::string type = root.attribute("type").as_string();
-  if (type != grid_name) refuse_format("holds '" + type + "': must be '" + grid_name + "'");
-  const std::string compressor = root.attribute("compressor").as_string();
-  if (!compressor.empty() && compressor != "vtkZLibDataCompressor") {
-    refuse_format("compressor '" + compressor + "' is not supported: must be zlib or none");
-  }
-  const std::string_view order = root.attribute("byte_order").as_string("LittleEndian");
-  encoding_.swap = (order == "BigEndian") == (std::endian::native == std::endian::little);
-  const std::string_view numbers = root.attribute("header_type").as_string("UInt32");
-  encoding_.wide_header = numbers == "UInt64";
-  encoding_.compressed = !compressor.empty();
-  grid_ = root.child(grid_name.c_str());
-  piece_ = grid_.child("Piece");
-  if (!piece_) refuse_format("has no Piece");
-  if (piece_.next_sibling("Piece")) refuse_format("has several pieces: must have one");
-}
-
-std::string VtkXmlFile::bytes_of(const pugi::xml_node& node) const {
-  const std::string format = node.attribute("format").as_string();
-  if (format == "binary") return read_block(Base64Source(node.text().get()), encoding_);
-  if (format != "appended") refuse_format("format '" + format + "' is unknown");
-  const auto offset = node.attribute("offset").as_ullong(std::numeric_limits<std::uint64_t>::max());
-  if (offset >= appended_.size()) refuse_format("offset lies behind the appended data");
-  const std::string_view from = appended_.substr(offset);
-  return appended_is_raw_ ? read_block(RawSource(from), encoding_)
-                          : read_block(Base64Source(from), encoding_);
-}
-
-// VTK writes a text as the codes of its characters and a 0: as numbers (ascii) or as bytes.
-std::string VtkXmlFile::text_of(const pugi::xml_node& node) const {
-  const std::string type = node.attribute("type").as_string();
-  if (type != "String") refuse_format("has type '" + type + "': must be String");
-  std::string text;
-  if (std::string(node.attribute("format").as_string("ascii")) == "ascii") {
-    std::vector<int> codes;
-    if (!parse_numbers(std::string_view(node.text().get()), codes)) {
-      refuse_format("holds something that is not the code of a character");
-    }
-    for (const int code : codes) {
-      if (code < 0 || code > 255) refuse_format("holds a code that is no character");
-      text.push_back(static_cast<char>(code));
-    }
-  } else {
-    text = bytes_of(node);
-  }
-  if (!text.empty() && text.back() == '\0') text.pop_back();
-  if (text.find('\0') != std::string::npos) refuse_format("holds several texts: must be one");
-  return text;
-}
-
-void VtkXmlFile::fill(const pugi::xml_node& node, VtkArray& array) const {
-  const VtkType& type = *vtk_type(array.type);
-  if (std::string(node.attribute("format").as_string("ascii")) == "ascii") {
-    const std::string_view text = node.text().get();
-    const bool ok =
-        array.is_real() ? parse_numbers(text, array.reals) : parse_numbers(text, array.integers);
-    if (!ok) refuse_format("holds something that is not a number of type " + array.type);
-    return;
-  }
-  const std::string bytes = bytes_of(node);
-  if (bytes.size() % type.bytes != 0) refuse_format("ends inside a number");
-  type.append(bytes, encoding_.swap, array);
-}
-
-PointSpace VtkXmlFile::space() const {
-  for (const pugi::xml_node& node : grid_.child("FieldData").children()) {
-    if (std::string_view(node.attribute("Name").as_string()) != "SPACE") continue;
-    return value_of(
-        parse_point_space(placed("FieldData array 'SPACE' ", [&] { return text_of(node); })));
-  }
-  return PointSpace::kUnsaid;
-}
-
-std::int64_t VtkXmlFile::count(const std::string& attribute) const {
-  const std::string text = piece_.attribute(attribute.c_str()).as_string("0");
-  std::vector<std::int64_t> values;
-  // Mesh indices are int.
-  if (!parse_numbers(text, values) || values.size() != 1 || values[0] < 0 ||
-      values[0] > std::numeric_limits<int>::max()) {
-    refuse_format(attribute + " = " + text + ": must be a count");
-  }
-  return values[0];
-}
-
-std::vector<pugi::xml_node> VtkXmlFile::arrays(const std::string& section) const {
-  const auto nodes = piece_.child(section.c_str()).children("DataArray");
-  return {nodes.begin(), nodes.end()};
-}
-
-VtkArray VtkXmlFile::array(const std::string& section, std::size_t index,
-                           std::int64_t tuples) const {
-  const std::vector<pugi::xml_node> nodes = arrays(section);
-  if (index >= nodes.size()) refuse_format(section + " has no array");
-  const pugi::xml_node& node = nodes[index];
-  VtkArray array;
-  array.name = node.attribute("Name").as_string();
-  array.type = node.attribute("type").as_string();
-  array.components = node.attribute("NumberOfComponents").as_int(1);
-  const std::string place = section + " array '" + array.name + "'";
-  if (vtk_type(array.type) == nullptr) {
-    refuse_format(place + " has unknown type '" + array.type + "'");
-  }
-  if (array.components < 1) refuse_format(place + " has no components");
-  placed(place + ": ", [&] { fill(node, array); });
-  const std::size_t size = array.is_real() ? array.reals.size() : array.integers.size();
-  if (tuples >= 0 &&
-      size != static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array.components)) {
-    refuse_format(place + " has " + std::to_string(size) + " numbers: must have " +
-                  std::to_string(tuples) + " x " + std::to_string(array.components));
-  }
-  return array;
-}
-
-VtkArray VtkXmlFile::array(const std::string& section, const std::string& name,
-                           std::int64_t tuples) const {
-  const std::vector<pugi::xml_node> nodes = arrays(section);
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (nodes[i].attribute("Name").as_string() == name) return array(section, i, tuples);
-  }
-  refuse_format(section + " has no array '" + name + "'");
-}
 
 Points read_points(const VtkXmlFile& file) {
   const std::int64_t count = file.count("NumberOfPoints");
@@ -388,9 +373,7 @@ GroupedMesh read_grouped(const VtkXmlFile& file) {
                     std::to_string(cells.size(cell)) + " vertices: must have " +
                     std::to_string(vertices));
     }
-    for (int k = 0; k < vertices; ++k) {
-      (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
-    }
+    for (int k = 0; k < vertices; ++k) (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
     if (labels.empty()) continue;
     (tetra ? mesh.labels : result.triangle_labels).push_back(static_cast<int>(labels[cell]));
   }

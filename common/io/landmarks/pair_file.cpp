@@ -68,14 +68,10 @@ std::optional<Columns> columns_of_size(std::size_t cells) {
 }
 
 Result<NamedPairs> parse_csv(const std::string& content) {
-  std::istringstream lines(content);
-  std::string line;
   std::optional<Columns> columns;
   std::size_t expected = 0;
   NamedPairs pairs;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    const std::string_view text = trimmed(line);
-    if (text.empty() || text.front() == '#') continue;
+  for (const auto& [number, text] : content_lines(content)) {
     const auto cells = quoted_cells_of(text);
     const bool first = expected == 0;
     const bool heading = first && !has_number(cells);
@@ -85,10 +81,9 @@ Result<NamedPairs> parse_csv(const std::string& content) {
       if (!columns) columns = columns_of_size(cells.size());
     }
     if (!columns) {
-      return unreadable(
-          fmt::format("line {}: \"{}\" must be 6 numbers (before x, y, z, during x, y, z), a name "
-                      "and 6 numbers, or a heading with x_before, ..., z_during",
-                      number, text.substr(0, 60)));
+      return bad_line(number, text,
+                      "must be 6 numbers (before x, y, z, during x, y, z), a name and 6 numbers, "
+                      "or a heading with x_before, ..., z_during");
     }
     if (heading) continue;
     std::array<double, 6> values{};
@@ -97,9 +92,8 @@ Result<NamedPairs> parse_csv(const std::string& content) {
       good = parse_number(cells[columns->at[i]], values[i]);
     }
     if (!good) {
-      return unreadable(
-          fmt::format("line {}: \"{}\" must have {} cells, six of them finite numbers", number,
-                      text.substr(0, 60), expected));
+      return bad_line(number, text,
+                      fmt::format("must have {} cells, six of them finite numbers", expected));
     }
     pairs.add(columns->name ? cells[*columns->name] : std::string(),
               Vec3(values[0], values[1], values[2]), Vec3(values[3], values[4], values[5]));
@@ -133,12 +127,9 @@ bool parse_tag(std::string_view text, NamedPairs& pairs) {
 
 // The value of "NAME = VALUE", with or without the semicolon behind it.
 std::optional<std::string_view> value_of(std::string_view line, std::string_view name) {
-  if (!line.starts_with(name)) return std::nullopt;
-  line = trimmed(line.substr(name.size()));
-  if (!line.starts_with('=')) return std::nullopt;
-  line = trimmed(line.substr(1));
-  if (line.ends_with(';')) line = trimmed(line.substr(0, line.size() - 1));
-  return line;
+  auto value = assigned_value(line, name);
+  if (value && value->ends_with(';')) value = trimmed(value->substr(0, value->size() - 1));
+  return value;
 }
 
 Result<NamedPairs> parse_tag_file(const std::string& content) {
@@ -150,9 +141,7 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
   for (int number = 1; std::getline(lines, line); ++number) {
     std::string_view text = trimmed(line);
     if (text.empty() || text.front() == '%' || text.front() == '#') continue;
-    const auto refuse = [&](const char* what) {
-      return unreadable(fmt::format("line {}: \"{}\" {}", number, text.substr(0, 60), what));
-    };
+    const auto refuse = [&](const char* what) { return bad_line(number, text, what); };
     if (at == At::kStart) {
       if (text != kMagic) return unreadable("is no MNI tag point file");
       at = At::kHeader;
@@ -191,12 +180,10 @@ Result<Index> index_of(const NamedPoints& list, const char* what) {
   Index index;
   for (std::size_t i = 0; i < list.names.size(); ++i) {
     if (list.names[i].empty()) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("point {} of the {} list has no name", i + 1, what));
+      return invalid(fmt::format("point {} of the {} list has no name", i + 1, what));
     }
     if (!index.emplace(list.names[i], i).second) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("the {} list has two points called \"{}\"", what, list.names[i]));
+      return invalid(fmt::format("the {} list has two points called \"{}\"", what, list.names[i]));
     }
   }
   return index;
@@ -237,12 +224,12 @@ Result<NamedPairs> pair_by_name(const NamedPoints& first, const NamedPoints& sec
 Result<NamedPairs> read_pairs(const fs::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".json" || extension == ".fcsv") {
-    return file_error(ErrorCode::kUnreadable, path,
+    return unreadable(path,
                       "holds where the landmarks were at one time: a second file must say where "
                       "they were found during surgery");
   }
   if (extension != ".csv" && extension != ".tag") {
-    return file_error(ErrorCode::kUnreadable, path, "landmarks must be a .csv or .tag file");
+    return unreadable(path, "landmarks must be a .csv or .tag file");
   }
   return parse_file(path, [&](const std::string& content) {
     return extension == ".csv" ? parse_csv(content) : parse_tag_file(content);

@@ -75,16 +75,6 @@ std::size_t column_of(const std::vector<std::string>& columns, const char* name)
                                   columns.begin());
 }
 
-// The value behind "NAME =" in a comment line, if it is one of that name.
-std::optional<std::string> setting(std::string_view line, std::string_view name) {
-  line.remove_prefix(1);  // '#'
-  line = trimmed(line);
-  if (!line.starts_with(name)) return std::nullopt;
-  line = trimmed(line.substr(name.size()));
-  if (!line.starts_with('=')) return std::nullopt;
-  return std::string(trimmed(line.substr(1)));
-}
-
 Result<NamedPoints> parse_markups_json(const std::string& content) {
   const json document = json::parse(content, nullptr, false);
   const auto list = document.is_object() ? document.find("markups") : document.end();
@@ -125,8 +115,9 @@ Result<NamedPoints> parse_fcsv(const std::string& content) {
     const std::string_view text = trimmed(line);
     if (text.empty()) continue;
     if (text.front() == '#') {
-      if (const auto value = setting(text, "CoordinateSystem")) system = *value;
-      if (const auto value = setting(text, "columns")) columns = quoted_cells_of(*value);
+      const std::string_view comment = trimmed(text.substr(1));
+      if (const auto value = assigned_value(comment, "CoordinateSystem")) system = *value;
+      if (const auto value = assigned_value(comment, "columns")) columns = quoted_cells_of(*value);
       continue;
     }
     const auto signs = signs_to_ras(system);
@@ -139,8 +130,7 @@ Result<NamedPoints> parse_fcsv(const std::string& content) {
     Vec3 point;
     if (!parse_number(cell("x"), point[0]) || !parse_number(cell("y"), point[1]) ||
         !parse_number(cell("z"), point[2])) {
-      return unreadable(fmt::format("line {}: \"{}\" must have finite numbers as x, y and z",
-                                    number, text.substr(0, 60)));
+      return bad_line(number, text, "must have finite numbers as x, y and z");
     }
     named.add(cell("label"), signs->cwiseProduct(point));
   }
@@ -192,15 +182,11 @@ PointColumnsOf point_columns_of_size(std::size_t cells) {
 }
 
 Result<NamedPoints> parse_points(const std::string& content) {
-  std::istringstream lines(content);
-  std::string line;
   std::optional<PointColumnsOf> columns;
   std::size_t expected = 0;  // cells of a row; 0: a heading decides
   NamedPoints named;
   bool first = true;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    const std::string_view text = trimmed(line);
-    if (text.empty() || text.front() == '#') continue;
+  for (const auto& [number, text] : content_lines(content)) {
     const auto cells = quoted_cells_of(text);
     const bool heading = first && !has_number(cells);
     if (first && !heading && (cells.size() == 3 || cells.size() == 4)) {
@@ -210,10 +196,9 @@ Result<NamedPoints> parse_points(const std::string& content) {
     }
     first = false;
     if (!columns) {
-      return unreadable(
-          fmt::format("line {}: \"{}\" must be x,y,z or name,x,y,z, or a heading with the "
-                      "columns x,y,z or r,a,s or l,p,s",
-                      number, text.substr(0, 60)));
+      return bad_line(number, text,
+                      "must be x,y,z or name,x,y,z, or a heading with the columns x,y,z or r,a,s "
+                      "or l,p,s");
     }
     if (heading) continue;
     const auto cell = [&](std::size_t at) { return at < cells.size() ? cells[at] : std::string(); };
@@ -222,9 +207,10 @@ Result<NamedPoints> parse_points(const std::string& content) {
                          parse_number(cell(columns->at[1]), point[1]) &&
                          parse_number(cell(columns->at[2]), point[2]);
     if (!numbers || (expected != 0 && cells.size() != expected)) {
-      return unreadable(fmt::format("line {}: \"{}\" must have three finite numbers{}", number,
-                                    text.substr(0, 60),
-                                    expected == 4 ? " behind a name, as the rows above" : ""));
+      return bad_line(number, text,
+                      expected == 4
+                          ? "must have three finite numbers behind a name, as the rows above"
+                          : "must have three finite numbers");
     }
     named.add(columns->name ? cell(*columns->name) : std::string(),
               columns->signs.cwiseProduct(point));
@@ -255,8 +241,7 @@ Points columns_of(const std::vector<Vec3>& points) {
 Result<NamedPoints> read_points(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".json" && extension != ".fcsv" && extension != ".csv") {
-    return file_error(ErrorCode::kUnreadable, path,
-                      "points must be a .mrk.json, .fcsv or .csv file");
+    return unreadable(path, "points must be a .mrk.json, .fcsv or .csv file");
   }
   return parse_file(path, [&](const std::string& content) {
     return extension == ".json"   ? parse_markups_json(content)

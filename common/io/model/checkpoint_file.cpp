@@ -131,123 +131,116 @@ struct CheckpointFile::Impl {
         ErrorCode::kWriteFailed, path,
         "cannot " + action + ": " + std::error_code(errno, std::generic_category()).message());
   }
-  Status start(std::uint64_t key);
-  void find_blocks(std::uint64_t size);
-  template <typename Matrix>
-  Status append(int index, const Matrix& matrix);
-  template <typename Matrix>
-  Status read(int index, Matrix& out) const;
-  Result<Block> find(int index) const;
-};
 
-// Header read, or written where there is none of this key; what is no whole block cut off.
-Status CheckpointFile::Impl::start(std::uint64_t key) {
-  const off_t size = ::lseek(file.get(), 0, SEEK_END);
-  if (size < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be read");
-  FileHeader found{};
-  const std::size_t known = std::min(static_cast<std::size_t>(size), sizeof kCheckpointMagic);
-  if (!read_at(file.get(), &found, std::min(static_cast<std::size_t>(size), sizeof found), 0) ||
-      std::memcmp(found.magic, kCheckpointMagic, known) != 0) {
-    return file_error(ErrorCode::kUnreadable, path, "is there but is no checkpoint file");
-  }
-  FileHeader header{};
-  std::memcpy(header.magic, kCheckpointMagic, sizeof kCheckpointMagic);
-  header.key = key;
-  header.version = kVersion;
-  header.crc = header_crc(header);
-  end = sizeof header;
-  if (static_cast<std::size_t>(size) >= sizeof header &&
-      std::memcmp(&found, &header, sizeof header) == 0) {
-    find_blocks(static_cast<std::uint64_t>(size));
-  } else if (::ftruncate(file.get(), 0) != 0 || !write_at(file.get(), &header, sizeof header, 0)) {
-    return write_error("start");
-  }
-  if (::ftruncate(file.get(), static_cast<off_t>(end)) != 0) return write_error("cut");
-  return {};
-}
-
-void CheckpointFile::Impl::find_blocks(std::uint64_t size) {
-  Block block{};
-  while (end < size && whole_block(file.get(), end, size, block)) {
-    blocks.insert_or_assign(static_cast<int>(block.header.index), block);
-    end = block.payload_at + payload_bytes(block.header);
-  }
-}
-
-template <typename Matrix>
-Status CheckpointFile::Impl::append(int index, const Matrix& matrix) {
-  using Scalar = typename Matrix::Scalar;
-  const Pieces pieces(matrix);
-  const auto piece = [&](Eigen::Index i) { return matrix.data() + i * matrix.outerStride(); };
-  Block block{};
-  block.header.index = index;
-  block.header.scalar_bytes = sizeof(Scalar);
-  block.header.rows = static_cast<std::uint64_t>(matrix.rows());
-  block.header.columns = static_cast<std::uint64_t>(matrix.cols());
-  for (Eigen::Index i = 0; i < pieces.count; ++i) {
-    block.header.payload_crc = crc32_of(piece(i), pieces.bytes, block.header.payload_crc);
-  }
-  block.header.crc = header_crc(block.header);
-
-  const std::lock_guard lock(mutex);
-  if (blocks.count(index) != 0) {
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      "has block " + std::to_string(index) + " already");
-  }
-  block.payload_at = end + sizeof block.header;
-  bool good = write_at(file.get(), &block.header, sizeof block.header, end);
-  for (Eigen::Index i = 0; good && i < pieces.count; ++i) {
-    good = write_at(file.get(), piece(i), pieces.bytes, block.payload_at + pieces.from(i));
-  }
-  if (!good) {
-    const auto error = write_error("append block " + std::to_string(index));
-    // What is left when this fails too is dropped on the next opening.
-    [[maybe_unused]] const int cut = ::ftruncate(file.get(), static_cast<off_t>(end));
-    return error;
-  }
-  end = block.payload_at + payload_bytes(block.header);
-  blocks.emplace(index, block);
-  return {};
-}
-
-Result<Block> CheckpointFile::Impl::find(int index) const {
-  const std::lock_guard lock(mutex);
-  const auto found = blocks.find(index);
-  if (found != blocks.end()) return found->second;
-  return file_error(ErrorCode::kNotFound, path, "has no block " + std::to_string(index));
-}
-
-template <typename Matrix>
-Status CheckpointFile::Impl::read(int index, Matrix& out) const {
-  using Scalar = typename Matrix::Scalar;
-  const auto found = find(index);
-  if (!found) return tl::unexpected(found.error());
-  const Block& block = *found;
-  const BlockHeader& header = block.header;
-  if (header.scalar_bytes != sizeof(Scalar) ||
-      header.rows != static_cast<std::uint64_t>(out.rows()) ||
-      header.columns != static_cast<std::uint64_t>(out.cols())) {
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      "block " + std::to_string(index) + " is " + std::to_string(header.rows) +
-                          " x " + std::to_string(header.columns) + " numbers of " +
-                          std::to_string(header.scalar_bytes) + " bytes, asked for " +
-                          std::to_string(out.rows()) + " x " + std::to_string(out.cols()) + " of " +
-                          std::to_string(sizeof(Scalar)));
-  }
-  const Pieces pieces(out);
-  std::uint32_t crc = 0;
-  for (Eigen::Index i = 0; i < pieces.count; ++i) {
-    Scalar* piece = out.data() + i * out.outerStride();
-    if (!read_at(file.get(), piece, pieces.bytes, block.payload_at + pieces.from(i))) {
-      return file_error(ErrorCode::kUnreadable, path,
-                        "block " + std::to_string(index) + " cannot be read");
+  // Header read, or written where there is none of this key; what is no whole block cut off.
+  Status start(std::uint64_t key) {
+    const off_t size = ::lseek(file.get(), 0, SEEK_END);
+    if (size < 0) return unreadable(path, "cannot be read");
+    FileHeader found{};
+    const std::size_t known = std::min(static_cast<std::size_t>(size), sizeof kCheckpointMagic);
+    if (!read_at(file.get(), &found, std::min(static_cast<std::size_t>(size), sizeof found), 0) ||
+        std::memcmp(found.magic, kCheckpointMagic, known) != 0) {
+      return unreadable(path, "is there but is no checkpoint file");
     }
-    crc = crc32_of(piece, pieces.bytes, crc);
+    FileHeader header{};
+    std::memcpy(header.magic, kCheckpointMagic, sizeof kCheckpointMagic);
+    header.key = key;
+    header.version = kVersion;
+    header.crc = header_crc(header);
+    end = sizeof header;
+    if (static_cast<std::size_t>(size) >= sizeof header &&
+        std::memcmp(&found, &header, sizeof header) == 0) {
+      find_blocks(static_cast<std::uint64_t>(size));
+    } else if (::ftruncate(file.get(), 0) != 0 ||
+               !write_at(file.get(), &header, sizeof header, 0)) {
+      return write_error("start");
+    }
+    if (::ftruncate(file.get(), static_cast<off_t>(end)) != 0) return write_error("cut");
+    return {};
   }
-  if (crc == header.payload_crc) return {};
-  return file_error(ErrorCode::kUnreadable, path,
-                    "block " + std::to_string(index) + " was altered while the file was open");
-}
+
+  void find_blocks(std::uint64_t size) {
+    Block block{};
+    while (end < size && whole_block(file.get(), end, size, block)) {
+      blocks.insert_or_assign(static_cast<int>(block.header.index), block);
+      end = block.payload_at + payload_bytes(block.header);
+    }
+  }
+
+  template <typename Matrix>
+  Status append(int index, const Matrix& matrix) {
+    using Scalar = typename Matrix::Scalar;
+    const Pieces pieces(matrix);
+    const auto piece = [&](Eigen::Index i) { return matrix.data() + i * matrix.outerStride(); };
+    Block block{};
+    block.header.index = index;
+    block.header.scalar_bytes = sizeof(Scalar);
+    block.header.rows = static_cast<std::uint64_t>(matrix.rows());
+    block.header.columns = static_cast<std::uint64_t>(matrix.cols());
+    for (Eigen::Index i = 0; i < pieces.count; ++i) {
+      block.header.payload_crc = crc32_of(piece(i), pieces.bytes, block.header.payload_crc);
+    }
+    block.header.crc = header_crc(block.header);
+
+    const std::lock_guard lock(mutex);
+    if (blocks.count(index) != 0) {
+      return file_error(ErrorCode::kInvalidArgument, path,
+                        "has block " + std::to_string(index) + " already");
+    }
+    block.payload_at = end + sizeof block.header;
+    bool good = write_at(file.get(), &block.header, sizeof block.header, end);
+    for (Eigen::Index i = 0; good && i < pieces.count; ++i) {
+      good = write_at(file.get(), piece(i), pieces.bytes, block.payload_at + pieces.from(i));
+    }
+    if (!good) {
+      const auto error = write_error("append block " + std::to_string(index));
+      // What is left when this fails too is dropped on the next opening.
+      [[maybe_unused]] const int cut = ::ftruncate(file.get(), static_cast<off_t>(end));
+      return error;
+    }
+    end = block.payload_at + payload_bytes(block.header);
+    blocks.emplace(index, block);
+    return {};
+  }
+
+  template <typename Matrix>
+  Status read(int index, Matrix& out) const {
+    using Scalar = typename Matrix::Scalar;
+    const auto found = find(index);
+    if (!found) return tl::unexpected(found.error());
+    const Block& block = *found;
+    const BlockHeader& header = block.header;
+    if (header.scalar_bytes != sizeof(Scalar) ||
+        header.rows != static_cast<std::uint64_t>(out.rows()) ||
+        header.columns != static_cast<std::uint64_t>(out.cols())) {
+      return file_error(ErrorCode::kInvalidArgument, path,
+                        "block " + std::to_string(index) + " is " + std::to_string(header.rows) +
+                            " x " + std::to_string(header.columns) + " numbers of " +
+                            std::to_string(header.scalar_bytes) + " bytes, asked for " +
+                            std::to_string(out.rows()) + " x " + std::to_string(out.cols()) +
+                            " of " + std::to_string(sizeof(Scalar)));
+    }
+    const Pieces pieces(out);
+    std::uint32_t crc = 0;
+    for (Eigen::Index i = 0; i < pieces.count; ++i) {
+      Scalar* piece = out.data() + i * out.outerStride();
+      if (!read_at(file.get(), piece, pieces.bytes, block.payload_at + pieces.from(i))) {
+        return unreadable(path, "block " + std::to_string(index) + " cannot be read");
+      }
+      crc = crc32_of(piece, pieces.bytes, crc);
+    }
+    if (crc == header.payload_crc) return {};
+    return unreadable(path,
+                      "block " + std::to_string(index) + " was altered while the file was open");
+  }
+
+  Result<Block> find(int index) const {
+    const std::lock_guard lock(mutex);
+    const auto found = blocks.find(index);
+    if (found != blocks.end()) return found->second;
+    return file_error(ErrorCode::kNotFound, path, "has no block " + std::to_string(index));
+  }
+};
 
 CheckpointFile::CheckpointFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 CheckpointFile::CheckpointFile(CheckpointFile&&) noexcept = default;
@@ -310,8 +303,7 @@ Status CheckpointFile::read_columns(int index, Eigen::Index first, Eigen::Matrix
               block->payload_at + begin * header.rows * sizeof(float))) {
     return {};
   }
-  return file_error(ErrorCode::kUnreadable, impl_->path,
-                    "block " + std::to_string(index) + " cannot be read");
+  return unreadable(impl_->path, "block " + std::to_string(index) + " cannot be read");
 }
 
 Status CheckpointFile::remove() {

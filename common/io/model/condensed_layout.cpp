@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "common/core/thread_team.hpp"
 
@@ -15,21 +16,14 @@ namespace {
 
 // A number is finite unless all bits of its exponent are set. Whole-number arithmetic without
 // branches, so that the compiler vectorises it: the loop runs as fast as memory.
-bool finite(const float* values, std::size_t count) {
-  constexpr std::uint32_t kExponent = 0x7f800000u;
-  std::uint32_t bad = 0;
+template <typename T>
+bool finite(const T* values, std::size_t count) {
+  constexpr bool kSingle = std::is_same_v<T, float>;
+  using Bits = std::conditional_t<kSingle, std::uint32_t, std::uint64_t>;
+  constexpr auto kExponent = static_cast<Bits>(kSingle ? 0x7f800000u : 0x7ff0000000000000u);
+  Bits bad = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    std::uint32_t bits;
-    std::memcpy(&bits, values + i, sizeof bits);
-    bad |= (bits & kExponent) == kExponent ? 1u : 0u;
-  }
-  return bad == 0;
-}
-bool finite(const double* values, std::size_t count) {
-  constexpr std::uint64_t kExponent = 0x7ff0000000000000u;
-  std::uint64_t bad = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::uint64_t bits;
+    Bits bits;
     std::memcpy(&bits, values + i, sizeof bits);
     bad |= (bits & kExponent) == kExponent ? 1u : 0u;
   }
@@ -257,8 +251,7 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   int left = static_cast<int>(r);
   for (int part = 0; part < kPriorParts; ++part) {
     const int columns = operators.part_columns[static_cast<std::size_t>(part)];
-    const std::string name = std::string(to_string(static_cast<PriorPart>(part))) + "_modes";
-    check.that(columns >= 0 && columns <= left, name,
+    check.that(columns >= 0 && columns <= left, modes_of(part),
                "= " + std::to_string(columns) + ": must be from 0 to the " + std::to_string(left) +
                    " modes that the parts before it leave");
     left -= std::max(0, columns);
@@ -266,9 +259,7 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   check.that(left == 0, "responses",
              "has " + std::to_string(left) + " columns of no part of the prior");
   check.matrix("compliance", operators.compliance, s, s);
-  if (!check.found()) {
-    check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
-  }
+  if (!check.found()) check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
   check.that(
       operators.num_modes() == r, "slave_modes",
       "has " + std::to_string(operators.num_modes()) + " columns: must have " + std::to_string(r));

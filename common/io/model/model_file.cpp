@@ -165,9 +165,7 @@ Status check_header(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   std::string header(kHeaderSize, '\0');
   in.read(header.data(), static_cast<std::streamsize>(header.size()));
-  const auto refuse = [&path](const std::string& reason) {
-    return file_error(ErrorCode::kUnreadable, path, reason);
-  };
+  const auto refuse = [&path](const std::string& reason) { return unreadable(path, reason); };
   if (std::string_view(header).substr(0, kMagic.size()) != kMagic) {
     return refuse("is not a model file");
   }
@@ -262,7 +260,7 @@ Result<T> read_once(const fs::path& path, const Read& read) {
     check_hdf5(H5Fget_filesize(h5.get(), &size), "its size is unknown");
     return read(Hdf5Reader(h5.get(), size));
   } catch (const Hdf5Problem& problem) {
-    return file_error(ErrorCode::kUnreadable, path, "is no usable model file: " + problem.message);
+    return unreadable(path, "is no usable model file: " + problem.message);
   }
 }
 
@@ -282,11 +280,11 @@ Result<T> read_file(const fs::path& path, const Read& read) {
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (Status regular = check_regular_file(path); !regular) return tl::unexpected(regular.error());
     const Descriptor held(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (held.get() < 0) return file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+    if (held.get() < 0) return unreadable(path, "cannot be opened");
     Result<T> value = read_once<T>(path, read);
     if (is_still(path, held)) return value;
   }
-  return file_error(ErrorCode::kUnreadable, path, "is replaced all the time while it is read");
+  return unreadable(path, "is replaced all the time while it is read");
 }
 
 }  // namespace

@@ -21,9 +21,7 @@ FileChecksum case_checksum(const CaseConfig& config) {
 // A case that cannot be read any more differs from the one that could.
 Result<FileChecksum> checksum_now(const InputFile& input) {
   if (input.key != kCase) return file_checksum(input.path);
-  Result<CaseConfig> config = read_case_config(input.path);
-  if (!config) return tl::unexpected(config.error());
-  return case_checksum(*config);
+  return read_case_config(input.path).map(case_checksum);
 }
 
 }  // namespace
@@ -54,10 +52,9 @@ Result<std::vector<std::string>> check_inputs(const std::vector<InputFile>& inpu
     }
     const Result<FileChecksum> now = checksum_now(input);
     if (now && now->bytes == input.bytes && now->crc32 == input.crc32) continue;
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         input.key + ": " + input.path.string() +
-            " has changed since the model was prepared from it: run brainshiftd prepare again");
+        " has changed since the model was prepared from it: run brainshiftd prepare again");
   }
   return notes;
 }

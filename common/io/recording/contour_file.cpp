@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
@@ -39,20 +38,16 @@ bool parse_row(std::string_view text, Row& row) {
 
 Result<std::vector<Row>> read_rows(const std::string& content) {
   std::vector<Row> rows;
-  std::istringstream lines(content);
-  std::string text;
   bool heading_allowed = true;
-  for (int line = 1; std::getline(lines, text); ++line) {
+  for (const auto& [line, text] : content_lines(content)) {
     const std::string_view cells = trimmed(std::string_view(text).substr(0, text.find('#')));
-    if (cells.empty()) continue;
     Row row;
     row.line = line;
     const bool heading = heading_allowed && cells == "frame,u_px,v_px";
     heading_allowed = false;
     if (heading) continue;
     if (!parse_row(cells, row)) {
-      return unreadable(fmt::format("line {}: \"{}\" must be frame,u_px,v_px with a frame from 0",
-                                    line, cells.substr(0, 60)));
+      return bad_line(line, cells, "must be frame,u_px,v_px with a frame from 0");
     }
     rows.push_back(row);
   }
@@ -123,9 +118,7 @@ Result<std::vector<ultrasound::Contour>> contours_of_json(const std::string& con
   for (std::size_t i = 0; i < list->size(); ++i) {
     ultrasound::Contour contour;
     const std::string problem = read_entry((*list)[i], contour);
-    if (!problem.empty()) {
-      return unreadable(fmt::format("contours[{}]: {}", i, problem));
-    }
+    if (!problem.empty()) return unreadable(fmt::format("contours[{}]: {}", i, problem));
     contours.push_back(std::move(contour));
   }
   if (contours.empty()) return fail(ErrorCode::kEmptySet, "holds no contour");

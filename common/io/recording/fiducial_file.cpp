@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/recording/fiducial_file.hpp"
 
-#include <fmt/format.h>
-
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/landmarks/point_file.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -38,40 +36,28 @@ bool take_row(const std::vector<std::string_view>& cells, Rows& rows) {
   return true;
 }
 
-Points columns(const std::vector<Vec3>& points) {
-  Points matrix(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
-  }
-  return matrix;
-}
-
 }  // namespace
 
 Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
   return parse_file(path, [](const std::string& content) -> Result<FiducialFile> {
     Rows rows;
-    std::istringstream lines(content);
-    std::string text;
     bool heading_allowed = true;
-    for (int line = 1; std::getline(lines, text); ++line) {
+    for (const auto& [line, text] : content_lines(content)) {
       const std::string_view row = trimmed(std::string_view(text).substr(0, text.find('#')));
-      if (row.empty()) continue;
       const bool taken = take_row(cells_of(row), rows);
       double number = 0.0;
       const bool heading = heading_allowed && !taken && !parse_number(cells_of(row).back(), number);
       heading_allowed = false;
       if (heading) continue;
       if (!taken || (rows.paired && rows.single)) {
-        return unreadable(
-            fmt::format("line {}: \"{}\" must be 6 numbers (reference x, y, z, RAS x, y, z), or "
-                        "reference,x,y,z and ras,x,y,z in every row",
-                        line, row.substr(0, 60)));
+        return bad_line(line, row,
+                        "must be 6 numbers (reference x, y, z, RAS x, y, z), or reference,x,y,z "
+                        "and ras,x,y,z in every row");
       }
     }
-    auto fit = rows.single
-                   ? registration::match_fiducials(columns(rows.reference), columns(rows.ras))
-                   : registration::register_fiducials(columns(rows.reference), columns(rows.ras));
+    const Points reference = columns_of(rows.reference), ras = columns_of(rows.ras);
+    auto fit = rows.single ? registration::match_fiducials(reference, ras)
+                           : registration::register_fiducials(reference, ras);
     if (!fit) return tl::unexpected(fit.error());
     return FiducialFile{std::move(*fit), rows.single};
   });

@@ -80,9 +80,7 @@ Status read_link(const FrameFields& fields, int frame, int count, const std::str
       std::string_view(name).substr(0, name.size() - kTransform.size()));
   if (!frames) return bad_field(frame, name, "cannot be read: " + frames.error().message);
   const auto numbers = parse_numbers(fields.at(name));
-  if (!numbers || numbers->size() != 16) {
-    return bad_field(frame, name, "is not 16 numbers");
-  }
+  if (!numbers || numbers->size() != 16) return bad_field(frame, name, "is not 16 numbers");
   tracking::Link& link =
       series_of(recording, *frames, count).samples[static_cast<std::size_t>(frame)];
   const auto status = fields.find(name + std::string(kStatus));
@@ -265,7 +263,7 @@ Result<tracking::Recording> read_sequence(const std::filesystem::path& path,
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (extension != ".mha" && extension != ".nrrd") {
-    return file_error(ErrorCode::kUnreadable, path, "must be a sequence file .mha or .nrrd");
+    return unreadable(path, "must be a sequence file .mha or .nrrd");
   }
   return parse_file(path, [&](const std::string& content) {
     return parse_sequence(content, extension == ".nrrd", options);

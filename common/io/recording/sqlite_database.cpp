@@ -70,9 +70,7 @@ Status SqliteDatabase::connect(Access access) {
 }
 
 Status SqliteDatabase::close() {
-  if (!in_place()) {
-    sqlite3_db_config(db_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  }
+  if (!in_place()) sqlite3_db_config(db_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   if (sqlite3_close(db_) != SQLITE_OK) return write_failure("surgery file");
   db_ = nullptr;
   log_id_.reset();

@@ -73,127 +73,118 @@ struct SurgeryFile::Impl {
   Tail tail;                          // of a file that is written
   std::unique_ptr<Statement> insert;  // goes before the database
 
-  static Result<std::unique_ptr<Impl>> open(const fs::path& path, Access access);
-  Status describe_state(bool damaged);
-  Status check_length() const;
-  Status check_writable(std::string_view what) const;
-  Status insert_records(std::span<const SurgeryRecord> records, Tail& end);
-  Result<Tail> walk(const std::function<Status(const SurgeryRecord&)>& visitor) const;
-  Status check_end(const Tail& end) const;
+  static Result<std::unique_ptr<Impl>> open(const fs::path& path, Access access) {
+    const bool damaged = access == Access::kReadDamaged;
+    if (Status ok = check_regular_file(path); !ok) return tl::unexpected(ok.error());
+    auto impl = std::make_unique<Impl>(path);
+    if (Status ok = impl->database.connect(access); !ok) return tl::unexpected(ok.error());
+    auto header = read_header(impl->database, damaged);
+    if (!header) return tl::unexpected(header.error());
+    impl->header = std::move(*header);
+    if (Status ok = impl->describe_state(damaged); !ok) return tl::unexpected(ok.error());
+    return impl;
+  }
+
+  Status describe_state(bool damaged) {
+    state.log_beside = database.has_log();
+    if (!damaged) {
+      if (Status ok = check_length(); !ok) return ok;
+    }
+    const auto seal = read_closed_seal(database);
+    const auto last = database.query("SELECT coalesce(max(id), 0) FROM record");
+    if (damaged) {
+      state.closed = seal && seal->has_value();
+      state.records = last ? std::stoull(*last) : 0;
+      return {};
+    }
+    if (!seal) return tl::unexpected(seal.error());
+    if (!last) return database.read_failure("records");
+    state.closed = seal->has_value();
+    state.records = std::stoull(*last);
+    if (state.closed && (*seal)->records != state.records) {
+      return database.unreadable(
+          fmt::format("was closed with {} records, but holds {}", (*seal)->records, state.records));
+    }
+    return {};
+  }
+
+  // SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file
+  // itself may rightly be torn, and the log mends it.
+  Status check_length() const {
+    const auto page_size = database.query("PRAGMA page_size");
+    std::error_code ignored;
+    const auto bytes = fs::file_size(database.path(), ignored);
+    if (!page_size || (!state.log_beside && bytes % std::stoull(*page_size) != 0)) {
+      return database.unreadable("is truncated");
+    }
+    return {};
+  }
+
+  Status check_writable(std::string_view what) const {
+    if (database.handle() == nullptr) return database.write_failure(what);
+    if (!writable) {
+      return file_error(ErrorCode::kWriteFailed, database.path(),
+                        "cannot write " + std::string(what) + ": opened for reading");
+    }
+    return {};
+  }
+
+  Status insert_records(std::span<const SurgeryRecord> records, Tail& end) {
+    if (!insert) insert = std::make_unique<Statement>(database.handle(), kInsert);
+    for (const SurgeryRecord& record : records) {
+      end = {end.records + 1, chain_link(end.crc, record)};
+      insert->bind_text(1, to_string(record.kind))
+          .bind(2, static_cast<std::int64_t>(record.sequence))
+          .bind(3, record.recorded_ns)
+          .bind_blob(4, record.payload.data(), record.payload.size())
+          .bind(5, std::int64_t{end.crc});
+      if (!insert->run()) return database.write_failure("record");
+    }
+    return {};
+  }
+
+  Result<Tail> walk(const std::function<Status(const SurgeryRecord&)>& visitor) const {
+    Tail end{0, header.chain_start};
+    Statement select(database.handle(), kSelect);
+    while (select.row()) {
+      const std::uint64_t id = end.records + 1;
+      const auto kind = kind_of(select.bytes(1));
+      if (!kind) return broken(id, "its kind is unknown");
+      const SurgeryRecord record{*kind, static_cast<std::uint64_t>(select.integer(2)),
+                                 select.integer(3), select.bytes(4)};
+      end = {id, chain_link(end.crc, record)};
+      if (select.integer(0) != static_cast<std::int64_t>(id)) {
+        return broken(id, fmt::format("is missing; record {} follows", select.integer(0)));
+      }
+      if (select.integer(5) != std::int64_t{end.crc}) {
+        return broken(id, "the checksum does not match; it, or the order, was changed");
+      }
+      if (Status ok = visitor(record); !ok) return tl::unexpected(ok.error());
+    }
+    if (!select.ok()) {
+      return broken(end.records + 1,
+                    std::string("cannot be read: ") + sqlite3_errmsg(database.handle()));
+    }
+    return end;
+  }
+
+  Status check_end(const Tail& end) const {
+    const auto seal = read_closed_seal(database);
+    if (!seal) return tl::unexpected(seal.error());
+    if (!*seal) return {};
+    const Seal expected{end.records, chain_end(end.crc, end.records)};
+    if ((*seal)->records != expected.records) {
+      return broken(end.records + 1, fmt::format("is missing; the file was closed with {} records",
+                                                 (*seal)->records));
+    }
+    if ((*seal)->crc != expected.crc) return database.unreadable("the closing seal does not match");
+    return {};
+  }
+
   tl::unexpected<Error> broken(std::uint64_t id, const std::string& reason) const {
     return database.unreadable(fmt::format("record {}: {}", id, reason));
   }
 };
-
-Result<std::unique_ptr<SurgeryFile::Impl>> SurgeryFile::Impl::open(const fs::path& path,
-                                                                   Access access) {
-  const bool damaged = access == Access::kReadDamaged;
-  if (Status ok = check_regular_file(path); !ok) return tl::unexpected(ok.error());
-  auto impl = std::make_unique<Impl>(path);
-  if (Status ok = impl->database.connect(access); !ok) return tl::unexpected(ok.error());
-  auto header = read_header(impl->database, damaged);
-  if (!header) return tl::unexpected(header.error());
-  impl->header = std::move(*header);
-  if (Status ok = impl->describe_state(damaged); !ok) return tl::unexpected(ok.error());
-  return impl;
-}
-
-Status SurgeryFile::Impl::describe_state(bool damaged) {
-  state.log_beside = database.has_log();
-  if (!damaged) {
-    if (Status ok = check_length(); !ok) return ok;
-  }
-  const auto seal = read_closed_seal(database);
-  const auto last = database.query("SELECT coalesce(max(id), 0) FROM record");
-  if (damaged) {
-    state.closed = seal && seal->has_value();
-    state.records = last ? std::stoull(*last) : 0;
-    return {};
-  }
-  if (!seal) return tl::unexpected(seal.error());
-  if (!last) return database.read_failure("records");
-  state.closed = seal->has_value();
-  state.records = std::stoull(*last);
-  if (state.closed && (*seal)->records != state.records) {
-    return database.unreadable(
-        fmt::format("was closed with {} records, but holds {}", (*seal)->records, state.records));
-  }
-  return {};
-}
-
-// SQLite notices missing pages but fills up a torn last one; with a write-ahead log the file
-// itself may rightly be torn, and the log mends it.
-Status SurgeryFile::Impl::check_length() const {
-  const auto page_size = database.query("PRAGMA page_size");
-  std::error_code ignored;
-  const auto bytes = fs::file_size(database.path(), ignored);
-  if (!page_size || (!state.log_beside && bytes % std::stoull(*page_size) != 0)) {
-    return database.unreadable("is truncated");
-  }
-  return {};
-}
-
-Status SurgeryFile::Impl::check_writable(std::string_view what) const {
-  if (database.handle() == nullptr) return database.write_failure(what);
-  if (!writable) {
-    return file_error(ErrorCode::kWriteFailed, database.path(),
-                      "cannot write " + std::string(what) + ": opened for reading");
-  }
-  return {};
-}
-
-Status SurgeryFile::Impl::insert_records(std::span<const SurgeryRecord> records, Tail& end) {
-  if (!insert) insert = std::make_unique<Statement>(database.handle(), kInsert);
-  for (const SurgeryRecord& record : records) {
-    end = {end.records + 1, chain_link(end.crc, record)};
-    insert->bind_text(1, to_string(record.kind))
-        .bind(2, static_cast<std::int64_t>(record.sequence))
-        .bind(3, record.recorded_ns)
-        .bind_blob(4, record.payload.data(), record.payload.size())
-        .bind(5, std::int64_t{end.crc});
-    if (!insert->run()) return database.write_failure("record");
-  }
-  return {};
-}
-
-Result<SurgeryFile::Impl::Tail> SurgeryFile::Impl::walk(
-    const std::function<Status(const SurgeryRecord&)>& visitor) const {
-  Tail end{0, header.chain_start};
-  Statement select(database.handle(), kSelect);
-  while (select.row()) {
-    const std::uint64_t id = end.records + 1;
-    const auto kind = kind_of(select.bytes(1));
-    if (!kind) return broken(id, "its kind is unknown");
-    const SurgeryRecord record{*kind, static_cast<std::uint64_t>(select.integer(2)),
-                               select.integer(3), select.bytes(4)};
-    end = {id, chain_link(end.crc, record)};
-    if (select.integer(0) != static_cast<std::int64_t>(id)) {
-      return broken(id, fmt::format("is missing; record {} follows", select.integer(0)));
-    }
-    if (select.integer(5) != std::int64_t{end.crc}) {
-      return broken(id, "the checksum does not match; it, or the order, was changed");
-    }
-    if (Status ok = visitor(record); !ok) return tl::unexpected(ok.error());
-  }
-  if (!select.ok()) {
-    return broken(end.records + 1,
-                  std::string("cannot be read: ") + sqlite3_errmsg(database.handle()));
-  }
-  return end;
-}
-
-Status SurgeryFile::Impl::check_end(const Tail& end) const {
-  const auto seal = read_closed_seal(database);
-  if (!seal) return tl::unexpected(seal.error());
-  if (!*seal) return {};
-  const Seal expected{end.records, chain_end(end.crc, end.records)};
-  if ((*seal)->records != expected.records) {
-    return broken(end.records + 1,
-                  fmt::format("is missing; the file was closed with {} records", (*seal)->records));
-  }
-  if ((*seal)->crc != expected.crc) return database.unreadable("the closing seal does not match");
-  return {};
-}
 
 SurgeryFile::SurgeryFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SurgeryFile::SurgeryFile(SurgeryFile&&) noexcept = default;
@@ -229,15 +220,15 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta&
 }
 
 Result<SurgeryFile> SurgeryFile::open(const fs::path& path) {
-  auto impl = Impl::open(path, Access::kRead);
-  if (!impl) return tl::unexpected(impl.error());
-  return SurgeryFile(std::move(*impl));
+  return Impl::open(path, Access::kRead).map([](std::unique_ptr<Impl> impl) {
+    return SurgeryFile(std::move(impl));
+  });
 }
 
 Result<SurgeryFile> SurgeryFile::open_damaged(const fs::path& path) {
-  auto impl = Impl::open(path, Access::kReadDamaged);
-  if (!impl) return tl::unexpected(impl.error());
-  return SurgeryFile(std::move(*impl));
+  return Impl::open(path, Access::kReadDamaged).map([](std::unique_ptr<Impl> impl) {
+    return SurgeryFile(std::move(impl));
+  });
 }
 
 Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {

@@ -232,9 +232,7 @@ Result<SurgeryHeader> create_layout(SqliteDatabase& database, const SurgeryMeta&
   SurgeryHeader header;
   header.meta = meta;
   // Not in the log yet: a copy that was made without the log must still know what it is.
-  if (!database.execute("PRAGMA synchronous = FULL")) {
-    return database.write_failure("surgery file");
-  }
+  if (!database.execute("PRAGMA synchronous = FULL")) return database.write_failure("surgery file");
   const std::string stamp = "PRAGMA application_id = " + std::to_string(kApplicationId) +
                             "; PRAGMA user_version = " + std::to_string(kSurgeryVersion) + ";";
   if (!database.execute("BEGIN IMMEDIATE") || !database.execute(kSchema) ||

@@ -24,7 +24,7 @@ struct Tissue {
 };
 struct Values {
   std::string name = "n";
-  double any = 0.0, finite = 0.0, positive = 1.0, not_negative = 0.0, low = 2.0, high = 3.0;
+  double any = 0.0, finite = 0.0, not_negative = 0.0, low = 2.0, high = 3.0;
   double like_low = 2.0;
   Vec3 towards = Vec3(0, 1, 0);
   std::vector<double> levels = {1.0, 1e6};
@@ -60,8 +60,7 @@ void visit(A& a, V& v) {
   a.section({"numbers", "", "All numbers"}, Need::kOptional, [&] {
     a({"any", "mm", "Any number", "", "Even nan."}, v.any, unlimited());
     a({"finite"}, v.finite, finite());
-    a({"positive", "", "More than nothing", "a source"}, v.positive, positive());
-    a({"not_negative", "", "Not less than nothing"}, v.not_negative, not_negative());
+    a({"not_negative", "", "Not less than nothing", "a source"}, v.not_negative, not_negative());
     a({"low", "", "The lower one"}, v.low, between(1e-7, v.high, "high"));
     a({"like_low", "", "As low"}, v.like_low, between(0.0, 10.0), SameAs{v.low, "low"});
     a({"towards", "", "A direction"}, v.towards, direction());
@@ -109,8 +108,6 @@ TEST(KeyChecker, NamesKeyValueAndConstraint) {
   EXPECT_EQ(problem_after([](Values& v) { v.name.clear(); }), "name: must not be empty");
   EXPECT_EQ(problem_after([](Values& v) { v.finite = 1.0 / 0.0; }),
             "numbers.finite = inf: must be finite");
-  EXPECT_EQ(problem_after([](Values& v) { v.positive = 0.0; }),
-            "numbers.positive = 0: must be finite and > 0");
   EXPECT_EQ(problem_after([](Values& v) { v.not_negative = -0.5; }),
             "numbers.not_negative = -0.5: must be finite and >= 0");
   EXPECT_EQ(problem_after([](Values& v) { v.low = 3.5; }),
@@ -139,13 +136,13 @@ TEST(KeyChecker, NamesKeyValueAndConstraint) {
 
 TEST(KeyChecker, KeepsTheFirstProblem) {
   Values values;
-  values.positive = -1.0;
+  values.not_negative = -1.0;
   values.low = -1.0;
-  EXPECT_EQ(problem_of(values), "numbers.positive = -1: must be finite and > 0");
+  EXPECT_EQ(problem_of(values), "numbers.not_negative = -1: must be finite and >= 0");
   KeyChecker checker;
   visit(checker, values);
   checker.require(false, "name", "must be another");
-  EXPECT_EQ(checker.status().error().message, "numbers.positive = -1: must be finite and > 0");
+  EXPECT_EQ(checker.status().error().message, "numbers.not_negative = -1: must be finite and >= 0");
 }
 
 TEST(KeyChecker, TakesRulesAboutSeveralKeys) {
@@ -170,8 +167,7 @@ TEST(KeyDocumenter, SaysMeaningUnitDefaultSourceRangeAndNote) {
       ElementsAre(
           "name | A name. No default; not empty.", "numbers | All numbers.",
           "numbers.any | Any number, mm. Default 0. Even nan.", "numbers.finite |  Default 0.",
-          "numbers.positive | More than nothing. Default 1 (a source); above 0.",
-          "numbers.not_negative | Not less than nothing. Default 0; at least 0.",
+          "numbers.not_negative | Not less than nothing. Default 0 (a source); at least 0.",
           "numbers.low | The lower one. Default 2; range 1e-7 to high.",
           "numbers.like_low | As low. Default low; range 0 to 10.",
           "numbers.towards | A direction. Default [0, 1, 0]; any length but 0.",

@@ -43,7 +43,6 @@ TEST(Tracking, TheMatrixHasTheLastRowOfAnAffineMap) {
   EXPECT_EQ(matrix.row(3), Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0));
   EXPECT_EQ(matrix(0, 3), 12.5);
   EXPECT_EQ(matrix(1, 0), 1.0);
-  EXPECT_EQ(from_matrix(matrix), test_example::matrix());
 }
 
 TEST(Tracking, AnotherSizeIsRefused) {

@@ -163,7 +163,7 @@ class InboxSweep : public testing::Test {
     std::istringstream stream(numbers);
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column) stream >> matrix(row, column);
-    return igtl::from_matrix(matrix);
+    return matrix.topRows<3>().cast<float>();
   }
   // The messages of all frames; the last one's time.
   Inbox::TimePoint play(Inbox& inbox) {
