@@ -11,6 +11,7 @@
 #include "common/contact/penalty.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::contact {
@@ -264,7 +265,9 @@ TEST(ContactSearch, RejectsWhatItCannotSearch) {
 }
 
 using test_support::box_mesh;
+using test_support::ContactSolution;
 using test_support::nodes_where;
+using test_support::solve_with_contact;
 
 TEST(PenaltyContact, PenetrationFollowsEquation11) {
   // One slave 1 mm below a ceiling whose normal points down into the body.
@@ -370,7 +373,7 @@ TEST(ForwardModel, ContactSolutionPressesActiveSlavesAndLeavesTheOthersOpen) {
   ASSERT_TRUE(forward.has_value()) << forward.error().message;
   Points load = Points::Zero(3, model.mesh.num_nodes());
   load.row(2).setConstant(0.02);  // lift, so that part of the dome touches
-  const auto solution = forward->solve_with_contact(load);
+  const auto solution = solve_with_contact(*forward, load);
   ASSERT_TRUE(solution.has_value());
   EXPECT_TRUE(solution->converged);
   const int active = count(solution->active);

@@ -12,6 +12,7 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::inversion {
@@ -63,7 +64,7 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     const Points load =
         fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                            brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-    const auto truth = model.forward().solve_with_contact(40.0 * load);
+    const auto truth = test_support::solve_with_contact(model.forward(), 40.0 * load);
     EXPECT_TRUE(truth.has_value());
     Random random(seed);
     const auto& region = operators(boundary)->region;

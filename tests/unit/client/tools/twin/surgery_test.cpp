@@ -12,6 +12,7 @@
 #include "common/geometry/closest_point.hpp"
 #include "common/registration/surface_distances.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::client {
@@ -68,7 +69,7 @@ TEST_F(TruthSolverTest, EqualsASearchFromTheEmptySetForEveryLoadOfASeries) {
     const Points b = load(20.0, strain);
     const auto truth = solver.solve(b);
     ASSERT_TRUE(truth) << truth.error().message;
-    const auto reference = forward->solve_with_contact(b);
+    const auto reference = test_support::solve_with_contact(*forward, b);
     ASSERT_TRUE(reference);
     ASSERT_TRUE(reference->converged);
     EXPECT_EQ(truth->active, contact::count(reference->active));
