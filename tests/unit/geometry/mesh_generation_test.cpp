@@ -13,10 +13,14 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/mesh_figures.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::geometry {
 namespace {
+
+using test_support::mesh_quality;
+using test_support::MeshQuality;
 
 using balls::Ball;
 
@@ -27,9 +31,9 @@ SizingField uniform(double edge) {
 // A ball of radius 20 mm, off the origin, in an oblique left-handed frame with 1.5 mm voxels.
 const Ball kBall{Vec3(30, -10, 45), 20.0};
 VoxelImage ball_mask() {
-  return balls::soft_balls(balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2),
-                                              balls::oblique_left_handed(1.5)),
-                           {kBall}, 6.0);
+  return balls::soft_balls(
+      balls::empty_image(36, kBall.centre + Vec3(0.3, -0.4, 0.2), balls::oblique_left_handed(1.5)),
+      {kBall}, 6.0);
 }
 
 TetMesh meshed(const VoxelImage& mask, const SizingField& edge) {

@@ -8,9 +8,13 @@
 #include <string>
 
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/mesh_figures.hpp"
 
 namespace brainshift::geometry {
 namespace {
+
+using test_support::mesh_quality;
+using test_support::MeshQuality;
 
 TetMesh regular_tetrahedron(double edge) {
   TetMesh mesh;
