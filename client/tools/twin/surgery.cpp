@@ -279,15 +279,4 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   return play_scenario(*brain, solver, scenario, seed, progress);
 }
 
-Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const contact::ForwardModel& forward,
-                                       const Scenario& scenario, std::uint64_t seed,
-                                       const Progress& progress) {
-  if (!keeps_the_brain(scenario)) return play_scenario(model, config, scenario, seed, progress);
-  const auto brain = truth_brain(model, config, scenario, seed);
-  if (!brain) return tl::unexpected(brain.error());
-  TruthSolver solver(forward);
-  return play_scenario(*brain, solver, scenario, seed, progress);
-}
-
 }  // namespace brainshift::client
