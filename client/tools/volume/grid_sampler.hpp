@@ -47,8 +47,8 @@ class GridSampler {
   // fade or the rim among the eight around them.
   const std::vector<NodeIndex>& interior() const { return interior_; }
 
-  // u: 3 x nodes of the mesh, mm. xyz: 3 * grid().num_voxels() floats, the vector of a voxel in one piece.
-  // Precondition: the columns of nodes_used() are finite.
+  // u: 3 x nodes of the mesh, mm. xyz: 3 * grid().num_voxels() floats, the vector of a voxel in one
+  // piece. Precondition: the columns of nodes_used() are finite.
   void sample(const Points& u, float* xyz) const;
   // values: one per mesh node. out: one float per voxel; 0 outside of the brain and in the rim; not
   // faded.
