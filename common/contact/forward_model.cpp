@@ -100,39 +100,6 @@ Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& mat
               "there (mesh.generate.tumour_edge_mm)");
 }
 
-Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
-                                           const fem::StiffnessFactor& factor,
-                                           const fem::DofMap& dofs, const PenaltyContact& contact,
-                                           const Points& load) {
-  ContactSolution solution;
-  solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
-  fem::StiffnessFactor penalised = factor.clone_analysis();
-  while (solution.iterations < kMostContactIterations && !solution.converged) {
-    VecX unknowns;
-    Result<linalg::SolveQuality> quality;
-    if (count(solution.active) == 0) {
-      quality = fem::checked_solve(stiffness, linalg::max_norm(stiffness), factor,
-                                   dofs.restrict_to(load), unknowns);
-    } else {
-      linalg::SymmetricMatrix k_p = stiffness;
-      contact.add_stiffness(k_p, dofs, solution.active);
-      Points b_p = load;
-      contact.add_load(b_p, solution.active);
-      if (auto status = penalised.refactorise(k_p); !status) return tl::unexpected(status.error());
-      quality = fem::checked_solve(k_p, linalg::max_norm(k_p), penalised, dofs.restrict_to(b_p),
-                                   unknowns);
-    }
-    if (!quality) return tl::unexpected(quality.error());
-    solution.backward_error = std::max(solution.backward_error, quality->backward_error);
-    dofs.expand(unknowns, solution.displacement);
-    ++solution.iterations;
-    ActiveSet next = contact.penetrating(solution.displacement);
-    solution.converged = next == solution.active;
-    solution.active = std::move(next);
-  }
-  return solution;
-}
-
 ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs,
                            const linalg::SymmetricMatrix& stiffness, fem::StiffnessFactor factor,
                            PenaltyContact contact, double assemble_s)
@@ -202,10 +169,6 @@ Status ForwardModel::solve(const Points& load, Points& u) const {
 
 Points ForwardModel::solve(const Points& load) const {
   return dofs_.expand(factor_.solve(dofs_.restrict_to(load)));
-}
-
-Result<ContactSolution> ForwardModel::solve_with_contact(const Points& load) const {
-  return contact::solve_with_contact(stiffness_, factor_, dofs_, contact_, load);
 }
 
 double measure_full_solve_ms(const ForwardModel& forward) {

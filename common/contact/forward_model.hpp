@@ -45,31 +45,6 @@ namespace brainshift::contact {
 // kEmptySet: no tetrahedron has its centre in the tumour.
 Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
 
-// Forward problem with contact: K u = b subject to penalty contact, iterated until the active set
-// repeats (paper section 2.4: trial and error from an empty set; Le Tallec 1994).
-//
-// Each iteration refactorises K_p for the current active set, solves, and takes the slaves that
-// penetrate as the next set. For a fixed right-hand side this is a semi-smooth Newton method on
-// the penalty equations. So a set that repeats is a solution: every active slave is pressed,
-// every other one is open.
-struct ContactSolution {
-  Points displacement;  // 3 x n, mm
-  ActiveSet active;
-  int iterations = 0;  // linear solves
-  bool converged = false;
-  double backward_error = 0.0;  // the largest of all solves
-};
-
-inline constexpr int kMostContactIterations = 40;
-
-// stiffness: K (lower), with its factor, dofs and contact; load: 3 x n, N.
-// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error:
-// the result holds the last iterate, and `converged` is false.
-Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
-                                           const fem::StiffnessFactor& factor,
-                                           const fem::DofMap& dofs, const PenaltyContact& contact,
-                                           const Points& load);
-
 class ForwardModel {
  public:
   // kFloatingBody, kSingularMatrix, kNotFinite: as StiffnessFactor. kEmptySet and
@@ -101,8 +76,6 @@ class ForwardModel {
   Status solve(const Points& load, Points& u) const;
   // The same without the check of the residual.
   Points solve(const Points& load) const;
-  // u with contact iterated to a stable active set; without slaves the same as solve().
-  Result<ContactSolution> solve_with_contact(const Points& load) const;
 
  private:
   ForwardModel(Boundary boundary, fem::DofMap dofs, const linalg::SymmetricMatrix& stiffness,

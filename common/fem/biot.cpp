@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/fem/biot.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 namespace brainshift::fem {
@@ -12,9 +13,7 @@ namespace {
 
 tl::unexpected<Error> invalid(const std::string& what, double value,
                               const std::string& constraint) {
-  std::ostringstream text;
-  text << what << " = " << value << ": " << constraint;
-  return fail(ErrorCode::kInvalidArgument, text.str());
+  return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {:g}: {}", what, value, constraint));
 }
 
 Status check_material(const PoroMaterial& material, std::size_t index) {

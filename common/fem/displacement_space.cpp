@@ -56,12 +56,17 @@ void add_edge_points(std::vector<TetPoint>& rule, double a, double weight) {
   }
 }
 
-void add_triangle_points(std::vector<TrianglePoint>& rule, double b, double weight) {
-  for (int k = 0; k < 3; ++k) {
-    Eigen::Vector3d l = Eigen::Vector3d::Constant(b);
-    l[k] = 1.0 - 2.0 * b;
-    rule.push_back({l, weight});
+// For each (b, weight) all points that permute (a, b, b).
+std::vector<TrianglePoint> triangle_rule(const std::vector<std::pair<double, double>>& orbits) {
+  std::vector<TrianglePoint> rule;
+  for (const auto& [b, weight] : orbits) {
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d l = Eigen::Vector3d::Constant(b);
+      l[k] = 1.0 - 2.0 * b;
+      rule.push_back({l, weight});
+    }
   }
+  return rule;
 }
 
 }  // namespace
@@ -159,21 +164,13 @@ const std::vector<TetPoint>& fine_tet_rule() {
 }
 
 const std::vector<TrianglePoint>& coarse_triangle_rule() {
-  static const std::vector<TrianglePoint> points = [] {
-    std::vector<TrianglePoint> rule;
-    add_triangle_points(rule, 1.0 / 6.0, 1.0 / 3.0);
-    return rule;
-  }();
+  static const auto points = triangle_rule({{1.0 / 6.0, 1.0 / 3.0}});
   return points;
 }
 
 const std::vector<TrianglePoint>& fine_triangle_rule() {
-  static const std::vector<TrianglePoint> points = [] {
-    std::vector<TrianglePoint> rule;
-    add_triangle_points(rule, 0.44594849091596488632, 0.22338158967801146570);
-    add_triangle_points(rule, 0.09157621350977074346, 0.10995174365532186764);
-    return rule;
-  }();
+  static const auto points = triangle_rule({{0.44594849091596488632, 0.22338158967801146570},
+                                            {0.09157621350977074346, 0.10995174365532186764}});
   return points;
 }
 

@@ -66,7 +66,6 @@ class StiffnessFactor {
   const linalg::SparseCholesky* drained() const {
     return std::get_if<linalg::SparseCholesky>(&factor_);
   }
-  bool carries_pressure() const { return std::holds_alternative<BiotFactor>(factor_); }
 
   // As SparseCholesky. With pressure, a solve that fails its checks is NaN everywhere.
   Status refactorise(const linalg::SymmetricMatrix& stiffness) {
@@ -89,12 +88,6 @@ class StiffnessFactor {
     } else {
       std::get<BiotFactor>(factor_).solve_rows(b, x);
     }
-  }
-  Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& b) const {
-    Workspace workspace;
-    Eigen::MatrixXd x;
-    solve_rows(b, x, workspace);
-    return x;
   }
 
   int size() const {

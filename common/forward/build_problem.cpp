@@ -27,9 +27,7 @@ std::array<int, 3> sorted(const Eigen::Vector3i& face) {
 }
 
 std::string listed(const std::set<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 Faces matrix_of(const std::vector<Eigen::Vector3i>& list) {

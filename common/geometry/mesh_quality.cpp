@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -54,31 +53,6 @@ double longest_edge(const TetMesh& mesh, int tet) {
     longest = std::max(
         longest, (mesh.nodes.col(mesh.tets(a, tet)) - mesh.nodes.col(mesh.tets(b, tet))).norm());
   return longest;
-}
-
-// Angle between the two faces that meet in edge (a, b): seen along the edge, the angle between
-// the directions to the two other nodes.
-double dihedral_deg(const TetMesh& mesh, int tet, int edge) {
-  const auto [a, b] = kEdges[static_cast<std::size_t>(edge)];
-  const auto [c, d] = kEdges[static_cast<std::size_t>(5 - edge)];  // the opposite edge
-  const Vec3 xa = mesh.nodes.col(mesh.tets(a, tet));
-  const Vec3 e = (mesh.nodes.col(mesh.tets(b, tet)) - xa).normalized();
-  const Vec3 to_c = mesh.nodes.col(mesh.tets(c, tet)) - xa;
-  const Vec3 to_d = mesh.nodes.col(mesh.tets(d, tet)) - xa;
-  const Vec3 u = to_c - e * e.dot(to_c);
-  const Vec3 v = to_d - e * e.dot(to_d);
-  return std::atan2(u.cross(v).norm(), u.dot(v)) * 180.0 / std::numbers::pi;
-}
-
-std::vector<std::pair<int, int>> unique_edges(const TetMesh& mesh) {
-  std::vector<std::pair<int, int>> edges;
-  edges.reserve(6 * static_cast<std::size_t>(mesh.num_tets()));
-  for (int t = 0; t < mesh.num_tets(); ++t)
-    for (const auto& [a, b] : kEdges)
-      edges.emplace_back(std::minmax(mesh.tets(a, t), mesh.tets(b, t)));
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  return edges;
 }
 
 Status check_nodes(const TetMesh& mesh) {
@@ -174,32 +148,6 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) 
     ++result.sizes[static_cast<std::size_t>(component)];
   }
   return result;
-}
-
-MeshQuality mesh_quality(const TetMesh& mesh) {
-  MeshQuality quality;
-  if (mesh.num_tets() == 0) return quality;
-  quality.min_dihedral_deg = 180.0;
-  for (int t = 0; t < mesh.num_tets(); ++t) {
-    quality.volume_mm3 += tet_volume(mesh, t);
-    for (int edge = 0; edge < 6; ++edge) {
-      const double angle = dihedral_deg(mesh, t, edge);
-      quality.min_dihedral_deg = std::min(quality.min_dihedral_deg, angle);
-      quality.max_dihedral_deg = std::max(quality.max_dihedral_deg, angle);
-    }
-  }
-  const auto edges = unique_edges(mesh);
-  double sum = 0.0;
-  double shortest = std::numeric_limits<double>::infinity();
-  for (const auto& [a, b] : edges) {
-    const double length = (mesh.nodes.col(a) - mesh.nodes.col(b)).norm();
-    sum += length;
-    shortest = std::min(shortest, length);
-    quality.max_edge_mm = std::max(quality.max_edge_mm, length);
-  }
-  quality.min_edge_mm = shortest;
-  quality.mean_edge_mm = sum / static_cast<double>(edges.size());
-  return quality;
 }
 
 Status check_mesh(const TetMesh& mesh) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quality figures of a tetrahedral mesh, and the check that it can carry a finite-element model.
+// The check that a tetrahedral mesh can carry a finite-element model.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,16 +20,6 @@ struct TetComponents {
 
 // Precondition: node indices are >= 0.
 TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets);
-
-struct MeshQuality {
-  double volume_mm3 = 0.0;
-  double min_dihedral_deg = 0.0;
-  double max_dihedral_deg = 0.0;
-  double min_edge_mm = 0.0;
-  double mean_edge_mm = 0.0;
-  double max_edge_mm = 0.0;
-};
-MeshQuality mesh_quality(const TetMesh& mesh);
 
 // Ok, or one sentence that names the first offender.
 //   kNotFinite        a node

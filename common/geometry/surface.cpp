@@ -161,11 +161,10 @@ TriangleSurface boundary_surface(const TetMesh& mesh, std::vector<NodeIndex>* no
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   std::vector<int> vertex_of_node(static_cast<std::size_t>(mesh.num_nodes()), -1);
-  surface.vertices.resize(3, static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t v = 0; v < nodes.size(); ++v) {
     vertex_of_node[static_cast<std::size_t>(nodes[v])] = static_cast<int>(v);
-    surface.vertices.col(static_cast<Eigen::Index>(v)) = mesh.nodes.col(nodes[v]);
   }
+  surface.vertices = mesh.nodes(Eigen::all, nodes);
   for (int& index : surface.triangles.reshaped())
     index = vertex_of_node[static_cast<std::size_t>(index)];
   if (node_of_vertex) *node_of_vertex = std::move(nodes);

@@ -40,10 +40,6 @@ std::vector<Omission> Evidence::put(RegisteredObservation observation) {
   return omissions;
 }
 
-void Evidence::quarantine(const std::string& source) { quarantined_.insert(source); }
-
-void Evidence::trust() { quarantined_.clear(); }
-
 std::vector<Omission> Evidence::drop_quarantined(const std::string& source, std::int64_t now_ns) {
   std::vector<Omission> omissions;
   for (const std::string& other : std::set<std::string>(quarantined_)) {

@@ -32,9 +32,9 @@ class Evidence {
   // Forgets the source's observation: no estimate could be made with it.
   void drop(const std::string& source) { newest_.erase(source); }
   // No usable estimate could be made with the source's observation and the others.
-  void quarantine(const std::string& source);
+  void quarantine(const std::string& source) { quarantined_.insert(source); }
   // A usable estimate was made with all that are fresh.
-  void trust();
+  void trust() { quarantined_.clear(); }
   // Forgets the quarantined ones that are fresh, but not that of `source`. Which they were and why
   // they are not used, for Update::left_out; empty when there was none.
   std::vector<Omission> drop_quarantined(const std::string& source, std::int64_t now_ns);

@@ -44,18 +44,13 @@ std::vector<int> some_of(const std::vector<int>& points, int wanted) {
 SparseData select(const SparseData& data, const std::vector<int>& columns) {
   const auto size = static_cast<Eigen::Index>(columns.size());
   SparseData subset;
-  subset.positions.resize(3, size);
-  subset.displacements.resize(3, size);
-  subset.sd_mm.resize(size);
+  subset.positions = data.positions(Eigen::all, columns);
+  subset.displacements = data.displacements(Eigen::all, columns);
+  subset.sd_mm = data.sd_mm(columns);
   subset.common_error.resize(data.common_error.rows() > 0 ? 3 * size : 0, data.common_error.cols());
-  for (Eigen::Index i = 0; i < size; ++i) {
+  for (Eigen::Index i = 0; 3 * i < subset.common_error.rows(); ++i) {
     const int column = columns[static_cast<std::size_t>(i)];
-    subset.positions.col(i) = data.positions.col(column);
-    subset.displacements.col(i) = data.displacements.col(column);
-    subset.sd_mm(i) = data.sd_mm(column);
-    if (subset.common_error.rows() > 0) {
-      subset.common_error.middleRows<3>(3 * i) = data.common_error.middleRows<3>(3 * column);
-    }
+    subset.common_error.middleRows<3>(3 * i) = data.common_error.middleRows<3>(3 * column);
   }
   return subset;
 }

@@ -89,13 +89,6 @@ Status check_points(const Points& points, const RigidTransform& T) {
   return {};
 }
 
-// Ok, or the error that align() returns.
-Status check_alignment(const Points& points, const RigidTransform& T_surface_points_initial,
-                       const IcpOptions& options) {
-  if (Status status = check_options(options); !status) return status;
-  return check_points(points, T_surface_points_initial);
-}
-
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 // The Welsch scale starts at this multiple of the median residual: half of the points then pull
 // with at least 0.88 of their weight. It shrinks by the factor per step until it is the one asked
@@ -324,8 +317,9 @@ double Icp::left_out_rotation(const Fit& fit, const PoseInformation& data, doubl
 
 Result<IcpResult> align(const Points& points, const TargetSurface& surface,
                         const RigidTransform& T_surface_points_initial, const IcpOptions& options) {
-  if (auto status = check_alignment(points, T_surface_points_initial, options); !status)
-    return tl::unexpected(status.error());
+  Status status = check_options(options);
+  if (status) status = check_points(points, T_surface_points_initial);
+  if (!status) return tl::unexpected(status.error());
   return Icp(points, surface, T_surface_points_initial, options).run();
 }
 

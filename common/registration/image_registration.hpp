@@ -130,8 +130,6 @@ class ImageRegistrar {
   // best pose lies at the edge of the search.
   Result<ImageRegistration> align(const IntensitySamples& samples) const;
 
-  const ImageRegistrationOptions& options() const { return options_; }
-
  private:
   ImageRegistrar() = default;
   ImageRegistrationOptions options_;

@@ -15,6 +15,7 @@
 #include "common/inversion/inverter.hpp"
 #include "tests/sensing/estimate_studies.hpp"
 #include "tests/sensing/sensing_head.hpp"
+#include "tests/simulation/variation.hpp"
 #include "tests/support/study_record.hpp"
 
 namespace brainshift::sensing {

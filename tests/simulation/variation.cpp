@@ -155,6 +155,20 @@ Scenario vary(const Scenario& scenario, std::uint64_t seed) {
   return varied;
 }
 
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const contact::ForwardModel& forward,
+                                       const Scenario& scenario, std::uint64_t seed) {
+  const Adversity& adverse = scenario.adverse;
+  const bool keeps_the_brain = scenario.stiffness_sd == 0.0 && !scenario.resection &&
+                               !adverse.other_mesh && !adverse.gap_seed && !adverse.tissue_seed &&
+                               adverse.penalty_factor == 1.0 && adverse.segmentation_sd_mm == 0.0;
+  if (!keeps_the_brain) return play_scenario(model, config, scenario, seed);
+  const auto brain = truth_brain(model, config, scenario, seed);
+  if (!brain) return tl::unexpected(brain.error());
+  TruthSolver solver(forward);
+  return play_scenario(*brain, solver, scenario, seed);
+}
+
 Result<CaseConfig> vary_patient(const CaseConfig& config, const TetMesh& brain,
                                 std::uint64_t seed) {
   const auto head = Head::build(brain);

@@ -29,7 +29,9 @@
 #include <cstdint>
 
 #include "client/tools/twin/scenario.hpp"
+#include "client/tools/twin/surgery.hpp"
 #include "common/configuration/case_config.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
@@ -47,6 +49,13 @@ inline constexpr double kLeastResected = 0.6, kMostResected = 0.8;
 // The same seed gives the same variation. It promises no contact-free brain, whatever the scenario
 // promised.
 Scenario vary(const Scenario& scenario, std::uint64_t seed);
+
+// play_scenario with a forward model that exists already. Precondition: it was built for this model
+// and case with the contact boundary. Where the scenario changes the brain (stiffness, resection),
+// the truth needs another one.
+Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
+                                       const contact::ForwardModel& forward,
+                                       const Scenario& scenario, std::uint64_t seed);
 
 // Another patient on the same head: another tumour, the opening over it, and the position of the
 // head.

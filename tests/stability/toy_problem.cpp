@@ -13,6 +13,7 @@
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/reference_descent.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/toy_patient.hpp"
 
 namespace brainshift::stability {
@@ -35,7 +36,7 @@ void spoil_contact(inversion::PreparedModel& model, Fault fault, const std::vect
 }
 
 int most_pressing(const inversion::PreparedModel& model, const Points& load) {
-  const auto solution = model.forward().solve_with_contact(load);
+  const auto solution = test_support::solve_with_contact(model.forward(), load);
   if (!solution) return 0;
   Eigen::Index slave = 0;
   model.forward().contact().penetration(solution->displacement).maxCoeff(&slave);
@@ -158,8 +159,8 @@ Points sagging_load(const ToyProblem& problem, double largest_mm) {
 }
 
 Result<SparseData> sagging_data(const ToyProblem& problem, const DataOptions& options) {
-  const auto truth =
-      problem.truth->forward().solve_with_contact(sagging_load(problem, options.largest_mm));
+  const auto truth = test_support::solve_with_contact(problem.truth->forward(),
+                                                      sagging_load(problem, options.largest_mm));
   if (!truth) return tl::unexpected(truth.error());
   const std::vector<NodeIndex> region = inversion::data_region(*problem.brain);
   Random random(options.seed);
@@ -239,7 +240,7 @@ void solve_and_record(ToyProblem& problem, const Points& load, Point point,
                       const Options& options) {
   point.unit = "relative";
   point.rcond = problem.model->forward().factor().rcond();
-  const auto solution = problem.model->forward().solve_with_contact(load);
+  const auto solution = test_support::solve_with_contact(problem.model->forward(), load);
   if (!solution) return options.record_refused(solution.error(), point);
   point.answered = true;
   point.warned = !solution->converged;

@@ -43,7 +43,7 @@ INSTANTIATE_TEST_SUITE_P(Physics, Adjoint,
 
 TEST_P(Adjoint, OfThePenalisedSystemIsItself) {
   const PreparedModel prepared = model();
-  ASSERT_EQ(prepared.forward().factor().carries_pressure(), GetParam().pressure == Carry::kOn);
+  ASSERT_EQ(prepared.forward().factor().drained() == nullptr, GetParam().pressure == Carry::kOn);
   contact::RefactorisedSystem refactorised(prepared.forward());
   contact::WoodburySystem woodbury(prepared.forward());
   const Points f = random_points(2), g = random_points(3);

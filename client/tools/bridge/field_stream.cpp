@@ -38,10 +38,7 @@ Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOpti
   }
   const auto nodes = geometry::nodes_in_region(model, options.region, tumour_distance_mm);
   if (!nodes) return fail(nodes.error().code, "--region: " + nodes.error().message);
-  Points places(3, static_cast<Eigen::Index>(nodes->size()));
-  for (Eigen::Index i = 0; i < places.cols(); ++i) {
-    places.col(i) = model.mesh.nodes.col((*nodes)[static_cast<std::size_t>(i)]);
-  }
+  const Points places = model.mesh.nodes(Eigen::all, *nodes);
   const auto grid = grid_around(places, options.margin_mm, options.spacing_mm);
   if (!grid) return tl::unexpected(grid.error());
   const geometry::TetLocator locator(model.mesh);

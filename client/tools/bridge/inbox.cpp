@@ -53,17 +53,12 @@ Points points_of(const igtl::PointList& list) {
   return points;
 }
 
-CollectorOptions collector_options(const InboxOptions& options) {
-  CollectorOptions collector;
-  collector.image_device = options.image_device;
-  collector.keep_pixels = !options.seeds.empty();
-  return collector;
-}
-
 }  // namespace
 
 Inbox::Inbox(InboxOptions options)
-    : options_(std::move(options)), collector_(collector_options(options_)) {}
+    : options_(std::move(options)),
+      collector_(CollectorOptions{.image_device = options_.image_device,
+                                  .keep_pixels = !options_.seeds.empty()}) {}
 
 Result<Inbox> Inbox::open(const InboxOptions& options) {
   if (auto ok = check(options); !ok) return tl::unexpected(ok.error());

@@ -95,7 +95,6 @@ class Upstream {
 
   // -1 while there is no connection under way.
   int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
-  bool connected() const { return connected_; }
   bool wants_to_write() const { return socket_ && (!connected_ || !unsent_.empty()); }
 
   // Begins to connect when it is time. A sentence when something is to be told.

@@ -37,14 +37,10 @@ Status check_landmarks_alone(const ImportArguments& arguments) {
 
 Status run_landmarks(const ImportArguments& arguments) {
   if (Status ok = check_landmarks_alone(arguments); !ok) return ok;
-  LandmarkOptions options;
-  options.landmarks = arguments.landmarks;
-  options.landmarks_moved = arguments.landmarks_moved;
-  options.case_file = arguments.options.case_file;
-  options.model = arguments.options.model;
-  options.out = arguments.options.out;
-  options.sd_mm = arguments.options.sd_mm;
-  const auto report = import_landmarks(options, terminal_progress());
+  const ImportOptions& given = arguments.options;
+  const auto report = import_landmarks({arguments.landmarks, arguments.landmarks_moved,
+                                        given.case_file, given.model, given.out, given.sd_mm},
+                                       terminal_progress());
   if (!report) return tl::unexpected(report.error());
   print_lines(report_lines(*report));
   return {};

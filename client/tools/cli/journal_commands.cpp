@@ -37,9 +37,6 @@ struct JournalArguments {
 // Every file is reported; the first that is not good decides how the command ends.
 Status run_check(const std::vector<fs::path>& files) {
   Status status;
-  const auto keep_first = [&](const Error& error) {
-    if (status) status = tl::unexpected(error);
-  };
   for (const fs::path& file : files) {
     const auto checked = check_journal(file);
     if (!checked) {
@@ -48,7 +45,7 @@ Status run_check(const std::vector<fs::path>& files) {
       continue;
     }
     print_lines(report_lines(*checked));
-    if (checked->broken) keep_first(*checked->broken);
+    if (status && checked->broken) status = tl::unexpected(*checked->broken);
   }
   return status;
 }

@@ -41,10 +41,9 @@ struct StatusArguments {
 };
 
 struct TopArguments {
-  std::string endpoint = kEndpoint;
+  TopOptions options{.endpoint = kEndpoint};
   KeyOptions keys;
   double interval_s = 1.0;
-  bool once = false;
 };
 
 Status show_status(const StatusArguments& arguments) {
@@ -71,10 +70,8 @@ Status show_top(const TopArguments& arguments) {
   if (!std::isfinite(arguments.interval_s)) {  // CLI::Range lets NaN pass
     return fail(ErrorCode::kInvalidArgument, "--interval must be a number of seconds");
   }
-  TopOptions options;
-  options.endpoint = arguments.endpoint;
+  TopOptions options = arguments.options;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
-  options.once = arguments.once;
   if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   return top(options);
 }
@@ -207,13 +204,14 @@ Examples:
 
 void add_top(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<TopArguments>();
+  TopOptions& options = arguments->options;
   CLI::App* command = app.add_subcommand(
       "top", "Watch a running daemon: rates, latencies, sources, viewers, journal.");
-  add_with_default(*command, "--endpoint", arguments->endpoint, "where brainshiftd listens");
+  add_with_default(*command, "--endpoint", options.endpoint, "where brainshiftd listens");
   add_key_options(*command, arguments->keys);
   add_with_default(*command, "--interval", arguments->interval_s, "between two pages, s")
       ->check(CLI::Range(0.1, 3600.0));
-  command->add_flag("--once", arguments->once, "print one page with the rates of one interval");
+  command->add_flag("--once", options.once, "print one page with the rates of one interval");
   command->footer(
       R"(On a terminal the page is drawn in place; q or Ctrl-C ends it. On a pipe every interval prints
 one line. What needs attention stands in capitals: ATTENTION, STALE, NOT RECORDING, HANGS.

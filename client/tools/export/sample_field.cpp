@@ -16,8 +16,7 @@ namespace brainshift::client {
 namespace {
 
 Result<io::VoxelGrid> checked(const io::VoxelGrid& grid) {
-  if (Status ok = validate(grid); !ok) return tl::unexpected(ok.error());
-  return grid;
+  return validate(grid).map([&] { return grid; });
 }
 
 using io::FieldDirection;

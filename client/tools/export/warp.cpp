@@ -109,14 +109,8 @@ DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const 
 DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm) {
   std::vector<NodeIndex> node_of_vertex;
   TriangleSurface surface = geometry::boundary_surface(model.mesh, &node_of_vertex);
-  Points at_vertices(3, surface.num_vertices());
-  VecX sd(sd_mm.size() > 0 ? surface.num_vertices() : 0);
-  for (int v = 0; v < surface.num_vertices(); ++v) {
-    const NodeIndex node = node_of_vertex[static_cast<std::size_t>(v)];
-    at_vertices.col(v) = u.col(node);
-    if (sd.size() > 0) sd[v] = sd_mm[node];
-  }
-  return moved(std::move(surface), at_vertices, sd);
+  return moved(std::move(surface), u(Eigen::all, node_of_vertex),
+               sd_mm.size() > 0 ? VecX(sd_mm(node_of_vertex)) : VecX());
 }
 
 }  // namespace brainshift::client

@@ -9,6 +9,7 @@
 
 #include "client/tools/import/import_boundaries.hpp"
 #include "client/tools/import/import_case.hpp"
+#include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/io/recording/fiducial_file.hpp"
@@ -37,27 +38,22 @@ Status check_import(const ImportOptions& options) {
        {std::pair{"--recording", options.recording}, std::pair{"--out", options.out}}) {
     if (path.empty()) return fail(ErrorCode::kInvalidArgument, std::string(name) + " is required");
   }
-  if (Status ok =
-          one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
-      !ok) {
-    return ok;
-  }
-  if (Status ok = one_of(!options.registration.empty(), !options.fiducials.empty(),
-                         "--registration and --fiducials");
-      !ok) {
-    return ok;
-  }
-  if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
   const auto range = [](const char* name, double value, double least, double most) -> Status {
     if (value >= least && value <= most) return {};
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("{} {}: must be {} to {}", name, value, least, most));
   };
-  if (Status ok = range("--sd-mm", options.sd_mm, 0.01, kMostSd_mm); !ok) return ok;
-  if (Status ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0); !ok) return ok;
-  if (Status ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0); !ok) return ok;
-  if (Status ok = range("--sweeps", options.sweep_gap_s, 0.0, 86400.0); !ok) return ok;
-  return check_new(options.out);
+  Status ok = one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
+  if (ok) {
+    ok = one_of(!options.registration.empty(), !options.fiducials.empty(),
+                "--registration and --fiducials");
+  }
+  if (ok) ok = check_one_case(options.case_file, options.model);
+  if (ok) ok = range("--sd-mm", options.sd_mm, 0.01, kMostSd_mm);
+  if (ok) ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0);
+  if (ok) ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
+  if (ok) ok = range("--sweeps", options.sweep_gap_s, 0.0, 86400.0);
+  return ok ? check_new(options.out) : ok;
 }
 
 // T_ras_reference, from the file or from fiducials.
@@ -163,10 +159,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   boundary.chain.time.max_age_s = 1e-3 * options.max_age_ms;
   boundary.sweep_gap_s = options.sweep_gap_s;
   const auto boundaries = boundaries_in_ras(*recording, *constants, *contours, boundary);
-  if (!boundaries) {
-    return fail(boundaries.error().code,
-                options.recording.string() + ": " + boundaries.error().message);
-  }
+  if (!boundaries) return io::file_error(options.recording, boundaries.error());
   told.frames = recording->num_frames();
   told.frames_used = boundaries->chain.used;
   told.links = boundaries->chain.links;
@@ -178,10 +171,7 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
     told.fiducials = describe(fiducials->fit, fiducials->matched, patient->tumour_centroid());
   }
   const auto observations = observations_of(*boundaries, *patient, options.sd_mm, told);
-  if (!observations) {
-    return fail(observations.error().code,
-                options.recording.string() + ": " + observations.error().message);
-  }
+  if (!observations) return io::file_error(options.recording, observations.error());
   const auto meta = patient->meta(options.recording.stem().string(), "brainshift import");
   if (Status ok = write_surgery(options.out, meta, *observations); !ok) {
     return tl::unexpected(ok.error());
@@ -201,9 +191,8 @@ std::vector<std::string> report_lines(const ImportReport& report) {
     }
   };
   if (report.fiducials) {
-    for (std::string& line : fiducial_lines(*report.fiducials, {}, "the tumour")) {
-      lines.push_back(std::move(line));
-    }
+    const auto told = fiducial_lines(*report.fiducials, {}, "the tumour");
+    lines.insert(lines.end(), told.begin(), told.end());
   }
   tell("frames left out", report.dropped);
   tell("contours left out", report.lost_contours);

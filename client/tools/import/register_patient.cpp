@@ -62,7 +62,7 @@ Result<std::vector<TipSample>> tip_path(const RegisterOptions& options, Register
   if (!constants) return tl::unexpected(constants.error());
   const auto chain =
       tracking::evaluate_chain(*recording, *constants, options.tip_frame, options.reference_frame);
-  if (!chain) return io::file_error(chain.error().code, options.recording, chain.error().message);
+  if (!chain) return io::file_error(options.recording, chain.error());
   std::vector<TipSample> path;
   for (int frame = 0; frame < recording->num_frames(); ++frame) {
     const auto i = static_cast<std::size_t>(frame);
@@ -109,7 +109,7 @@ Result<io::NamedPoints> touched_points(const RegisterOptions& options, RegisterR
   const auto path = tip_path(options, report);
   if (!path) return tl::unexpected(path.error());
   auto held = find_holds(*path, options.hold);
-  if (!held) return io::file_error(held.error().code, options.recording, held.error().message);
+  if (!held) return io::file_error(options.recording, held.error());
   report.held = std::move(*held);
   if (report.held.empty()) {
     std::string reasons;
@@ -137,9 +137,7 @@ struct Fit {
 
 Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& touched,
                       const io::NamedPoints& ras, RegisterReport& report) {
-  const auto failed = [&](const Error& error) {
-    return io::file_error(error.code, options.ras, error.message);
-  };
+  const auto failed = [&](const Error& error) { return io::file_error(options.ras, error); };
   const bool named = touched.all_named() && ras.all_named();
   const bool by_name =
       options.pairing == Pairing::kName || (options.pairing == Pairing::kAuto && named);
@@ -255,9 +253,8 @@ std::vector<std::string> report_lines(const RegisterReport& report) {
                     named ? report.names[i] : std::to_string(i + 1), report.residuals_mm[i]);
   }
   lines.push_back("residuals, mm: " + residuals);
-  for (std::string& line : fiducial_lines(report.fiducials, report.names, report.target)) {
-    lines.push_back(std::move(line));
-  }
+  const auto told = fiducial_lines(report.fiducials, report.names, report.target);
+  lines.insert(lines.end(), told.begin(), told.end());
   return lines;
 }
 

@@ -133,8 +133,4 @@ void draw_right_axis(cv::Mat& image, const Frame& frame, const cv::Scalar& colou
                      frame.y.axis.label, {.cap_px = 21.0, .colour = colour});
 }
 
-void draw_border(cv::Mat& image, const Frame& frame) {
-  cv::rectangle(image, frame.area, palette::kGrey, 2);
-}
-
 }  // namespace brainshift::client

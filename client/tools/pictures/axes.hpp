@@ -63,6 +63,5 @@ cv::Rect draw_legend(cv::Mat& image, const std::vector<LegendSample>& samples,
 void draw_x_axis(cv::Mat& image, const Frame& frame);
 void draw_y_axis(cv::Mat& image, const Frame& frame);
 void draw_right_axis(cv::Mat& image, const Frame& frame, const cv::Scalar& colour);
-void draw_border(cv::Mat& image, const Frame& frame);
 
 }  // namespace brainshift::client

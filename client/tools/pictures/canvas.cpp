@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/pictures/canvas.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -47,6 +48,10 @@ Result<std::string> encode_png(const std::string& name, const cv::Mat& image) {
     return fail(ErrorCode::kInternal, name + ": cannot be encoded as PNG");
   }
   return std::string(bytes.begin(), bytes.end());
+}
+
+TextStyle on_picture(double cap_px, bool bold) {
+  return {cap_px, palette::kWhite, Align::kCentre, bold, true};
 }
 
 int text_width(const std::string& text, const TextStyle& style) {
@@ -174,8 +179,7 @@ void draw_colour_bar(cv::Mat& image, const cv::Rect& bar, const ColourScale& sca
     cv::line(image, {bar.x, bar.y + y}, {bar.x + bar.width - 1, bar.y + y}, magnitude_colour(t));
   }
   cv::rectangle(image, bar, ink, 2);
-  TextStyle style{
-      .cap_px = 20.0, .colour = ink, .align = Align::kLeft, .bold = false, .halo = false};
+  const TextStyle style{.cap_px = 20.0, .colour = ink};
   const std::vector<double> ticks = nice_ticks(scale.min, scale.max, 6);
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : scale.max - scale.min;
   int widest = 0;
@@ -238,9 +242,7 @@ std::vector<double> log_ticks(double min, double max) {
 }
 
 std::string fixed_decimals(double value, int decimals) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
-  return buffer;
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 std::string tick_label(double value, double step) {
@@ -250,9 +252,7 @@ std::string tick_label(double value, double step) {
 }
 
 std::string log_tick_label(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.4g", value);
-  const std::string text = buffer;
+  const std::string text = fmt::format("{:.4g}", value);
   const bool exponent = text.find('e') != std::string::npos;
   return exponent && value >= 1.0 && value < 1e6 ? fixed_decimals(value, 0) : text;
 }
@@ -260,11 +260,7 @@ std::string log_tick_label(double value) {
 void draw_gravity_arrow(cv::Mat& image, cv::Point2d along) {
   constexpr double kHalf_px = 44.0;
   constexpr double kLeastSeen = 0.1;
-  const TextStyle style{.cap_px = 18.0,
-                        .colour = palette::kWhite,
-                        .align = Align::kCentre,
-                        .bold = false,
-                        .halo = true};
+  const TextStyle style = on_picture(18.0);
   const cv::Point2d centre(86.0, 100.0);
   draw_text(image, {static_cast<int>(centre.x), 34}, "gravity", style);
   if (cv::norm(along) < kLeastSeen) {

@@ -46,6 +46,8 @@ struct TextStyle {
   bool halo = false;  // black rim, for text on images
 };
 
+// White and centred, with a halo: for words on pictures of a head.
+TextStyle on_picture(double cap_px, bool bold = false);
 // Width in pixels.
 int text_width(const std::string& text, const TextStyle& style);
 // `at` is the baseline's left end, middle or right end, as style.align says.

@@ -191,7 +191,7 @@ cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area) {
   right.y = {spec.right, padded(ranges.right, spec.right)};
   draw_y_axis(image, left);
   draw_x_axis(image, left);
-  draw_border(image, left);
+  cv::rectangle(image, left.area, palette::kGrey, 2);
   if (has_right) draw_right_axis(image, right, on_the_right->colour);
 
   Labels labels(image, left.area);
@@ -224,7 +224,7 @@ cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area) {
   frame.x = {{}, {0.0, groups}};
   frame.y = {{spec.y_label}, {spec.y_min, spec.y_max}};
   draw_y_axis(image, frame);
-  draw_border(image, frame);
+  cv::rectangle(image, frame.area, palette::kGrey, 2);
   if (spec.y_min < 0.0) {
     draw_polyline(image, {frame(0.0, 0.0), frame(groups, 0.0)}, {palette::kInk, 2, 0.0});
   }

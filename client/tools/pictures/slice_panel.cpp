@@ -184,11 +184,7 @@ void SlicePanel::draw_section(const TriangleSurface& surface, const Stroke& stro
 void SlicePanel::draw_orientation(double bar_mm) {
   const bool axial = window_.plane == Plane::kAxial;
   const bool sagittal = window_.plane == Plane::kSagittal;
-  const TextStyle letter{.cap_px = 26.0,
-                         .colour = palette::kWhite,
-                         .align = Align::kCentre,
-                         .bold = true,
-                         .halo = true};
+  const TextStyle letter = on_picture(26.0, true);
   const int w = image_.cols;
   const int h = image_.rows;
   draw_text(image_, {24, h / 2 + 13}, sagittal ? "A" : "R", letter);
@@ -200,12 +196,7 @@ void SlicePanel::draw_orientation(double bar_mm) {
   draw_polyline(image_, {start, start + cv::Point2d(length, 0)}, {palette::kBlack, 10, 0.0});
   draw_polyline(image_, {start, start + cv::Point2d(length, 0)}, {palette::kWhite, 5, 0.0});
   draw_text(image_, {static_cast<int>(start.x + length / 2), h - 44},
-            fixed_decimals(bar_mm, 0) + " mm",
-            {.cap_px = 20.0,
-             .colour = palette::kWhite,
-             .align = Align::kCentre,
-             .bold = false,
-             .halo = true});
+            fixed_decimals(bar_mm, 0) + " mm", on_picture(20.0));
 }
 
 void SlicePanel::draw_gravity(const Vec3& direction) {

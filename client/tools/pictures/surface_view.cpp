@@ -140,12 +140,7 @@ void SurfaceView::draw_axes() {
     draw_arrow(image_, origin, origin + kLength_px * along, {palette::kWhite, 4, 0.0}, 14.0, 2);
     const cv::Point2d letter = origin + (kLength_px + 22.0) * along;
     draw_text(image_, {static_cast<int>(letter.x), static_cast<int>(letter.y) + 12},
-              letters[static_cast<std::size_t>(axis)],
-              {.cap_px = 24.0,
-               .colour = palette::kWhite,
-               .align = Align::kCentre,
-               .bold = true,
-               .halo = true});
+              letters[static_cast<std::size_t>(axis)], on_picture(24.0, true));
   }
 }
 

@@ -54,10 +54,7 @@ TriangleSurface part_with_role(const CaseView& view, NodeRole role) {
   for (int t = 0; t < view.brain.num_triangles(); ++t) {
     if (role_of_triangle(view, t) == role) kept.push_back(t);
   }
-  part.triangles.resize(3, static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    part.triangles.col(static_cast<Eigen::Index>(i)) = view.brain.triangles.col(kept[i]);
-  }
+  part.triangles = view.brain.triangles(Eigen::all, kept);
   return part;
 }
 

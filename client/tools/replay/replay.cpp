@@ -31,7 +31,7 @@ struct Surgery {
 
 Status check_given(const fs::path& path, const char* key, const std::string& value) {
   if (!value.empty()) return {};
-  return fail(ErrorCode::kUnreadable, path.string() + ": meta." + key + " is missing");
+  return io::file_error(ErrorCode::kUnreadable, path, fmt::format("meta.{} is missing", key));
 }
 
 Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
@@ -42,14 +42,14 @@ Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile
   for (const io::SurgeryRecord& record : *records) {
     auto observation = wire::decode_observation(record.payload);
     if (!observation) {
-      return fail(ErrorCode::kUnreadable, path.string() + ": observation " +
-                                              std::to_string(record.sequence) + ": " +
-                                              observation.error().message);
+      return io::file_error(
+          ErrorCode::kUnreadable, path,
+          fmt::format("observation {}: {}", record.sequence, observation.error().message));
     }
     observations.push_back({record.recorded_ns, for_replay(std::move(*observation))});
   }
   if (observations.empty()) {
-    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation");
+    return io::file_error(ErrorCode::kEmptySet, path, "holds no observation");
   }
   return observations;
 }
@@ -63,10 +63,9 @@ Status keep_sources(const fs::path& path, const std::vector<std::string>& wanted
     return recorded.count(source) == 0;
   });
   if (missing != wanted.end()) {
-    std::string known;
-    for (const std::string& one : recorded) known.append(known.empty() ? "" : ", ").append(one);
-    return fail(ErrorCode::kEmptySet, path.string() + ": holds no observation of source \"" +
-                                          *missing + "\"; it has: " + known);
+    return io::file_error(ErrorCode::kEmptySet, path,
+                          fmt::format("holds no observation of source \"{}\"; it has: {}", *missing,
+                                      fmt::join(recorded, ", ")));
   }
   std::erase_if(observations, [&](const RecordedObservation& one) {
     return std::find(wanted.begin(), wanted.end(), one.observation.source) == wanted.end();
@@ -99,20 +98,14 @@ Result<Surgery> open_surgery(const ReplayOptions& options) {
   std::vector<std::string> notes;
   if (!state.closed) notes.push_back(path.string() + ": " + describe(state));
   io::SurgeryMeta meta = file->meta();
-  if (Status ok = check_given(path, "case_id", meta.case_id); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  if (Status ok = check_given(path, "model_id", meta.model_id); !ok) {
-    return tl::unexpected(ok.error());
-  }
+  Status ok = check_given(path, "case_id", meta.case_id);
+  if (ok) ok = check_given(path, "model_id", meta.model_id);
+  if (!ok) return tl::unexpected(ok.error());
   auto observations = read_observations(*file, path);
   if (!observations) return tl::unexpected(observations.error());
-  if (Status ok = keep_sources(path, options.sources, *observations); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  if (Status ok = resume(options, meta, *observations, notes); !ok) {
-    return tl::unexpected(ok.error());
-  }
+  ok = keep_sources(path, options.sources, *observations);
+  if (ok) ok = resume(options, meta, *observations, notes);
+  if (!ok) return tl::unexpected(ok.error());
 
   if (meta.scenario.empty()) meta.scenario = path.stem().string();
   return Surgery{std::move(*file), std::move(meta), std::move(*observations), std::move(notes)};
@@ -128,9 +121,9 @@ Result<DaemonStatus> check_daemon(Client& client, const Surgery& surgery,
   }
   const auto differs = [&](const char* key, const std::string& recorded,
                            const std::string& served) {
-    return fail(ErrorCode::kInvalidArgument, options.surgery.string() + ": meta." + key + " is \"" +
-                                                 recorded + "\", but the daemon at " +
-                                                 options.endpoint + " serves \"" + served + "\"");
+    return io::file_error(ErrorCode::kInvalidArgument, options.surgery,
+                          fmt::format("meta.{} is \"{}\", but the daemon at {} serves \"{}\"", key,
+                                      recorded, options.endpoint, served));
   };
   if (status->case_id != surgery.meta.case_id)
     return differs("case_id", surgery.meta.case_id, status->case_id);
@@ -203,10 +196,10 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
                 const fs::path& field_file, RunReport& run) {
   const Update& update = *played.last;
   if (update.estimate.displacement.cols() != model.mesh.num_nodes()) {
-    return fail(ErrorCode::kProtocol,
-                "update " + std::to_string(update.sequence) + ": displacement of " +
-                    std::to_string(update.estimate.displacement.cols()) + " nodes, the model has " +
-                    std::to_string(model.mesh.num_nodes()));
+    return fail(
+        ErrorCode::kProtocol,
+        fmt::format("update {}: displacement of {} nodes, the model has {}", update.sequence,
+                    update.estimate.displacement.cols(), model.mesh.num_nodes()));
   }
   const auto truth = read_truth(surgery.file, played.last_recorded_sequence, model);
   if (!truth) return tl::unexpected(truth.error());
@@ -273,34 +266,29 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 }
 
 Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
-  const std::string given = "repeat = " + std::to_string(options.repeat) + ": ";
-  if (options.repeat < 1) return fail(ErrorCode::kInvalidArgument, given + "must be at least 1");
+  const auto refuse = [&](const std::string& why) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("repeat = {}: {}", options.repeat, why));
+  };
+  if (options.repeat < 1) return refuse("must be at least 1");
   if (options.repeat == 1) return {};
-  if (!options.resume.empty()) {
-    return fail(ErrorCode::kInvalidArgument, given + "a surgery that goes on is played once");
-  }
-  if (options.speed != Speed::kMax) {
-    return fail(ErrorCode::kInvalidArgument, given + "--repeat requires --speed max");
-  }
+  if (!options.resume.empty()) return refuse("a surgery that goes on is played once");
+  if (options.speed != Speed::kMax) return refuse("--repeat requires --speed max");
   // Without this the cycles would overlap or leave the range of a surgery file's sequences.
   const std::uint64_t first = surgery.observations.front().observation.sequence;
   const std::uint64_t last = surgery.observations.back().observation.sequence;
   const std::uint64_t limit = std::numeric_limits<std::int64_t>::max();
   const auto more_cycles = static_cast<std::uint64_t>(options.repeat - 1);
   if (last < first || last > limit || more_cycles > (limit - last) / (last - first + 1)) {
-    return fail(ErrorCode::kInvalidArgument,
-                given + "observation sequences " + std::to_string(first) + " to " +
-                    std::to_string(last) + " of " + options.surgery.string() +
-                    " cannot go on counting up");
+    return refuse(fmt::format("observation sequences {} to {} of {} cannot go on counting up",
+                              first, last, options.surgery.string()));
   }
   return {};
 }
 
 bool is_local(const std::string& endpoint) {
-  for (const char* start : {"ipc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"}) {
-    if (endpoint.rfind(start, 0) == 0) return true;
-  }
-  return false;
+  const auto starts = {"ipc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"};
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](const char* start) { return endpoint.starts_with(start); });
 }
 
 }  // namespace
@@ -324,10 +312,10 @@ Status replay(const ReplayOptions& options, const Progress& progress,
   for (const RunReport& run : runs) {
     if (run.updates > 0) continue;
     const std::string cause = run.failures.empty() ? "" : ": " + run.failures.front().message;
-    return fail(ErrorCode::kNotConverged, options.surgery.string() +
-                                              ": no observation was answered with an "
-                                              "estimate under the " +
-                                              run.boundary + " boundary" + cause);
+    return io::file_error(
+        ErrorCode::kNotConverged, options.surgery,
+        fmt::format("no observation was answered with an estimate under the {} boundary{}",
+                    run.boundary, cause));
   }
   return {};
 }

@@ -55,10 +55,7 @@ Status score_craniotomy(const BrainModel& model, const io::SurgeryTruth& truth,
 
   std::vector<NodeIndex> node_of_vertex;
   TriangleSurface deformed = geometry::boundary_surface(model.mesh, &node_of_vertex);
-  for (std::size_t v = 0; v < node_of_vertex.size(); ++v) {
-    deformed.vertices.col(static_cast<Eigen::Index>(v)) +=
-        truth.displacement.col(node_of_vertex[v]);
-  }
+  deformed.vertices += truth.displacement(Eigen::all, node_of_vertex);
   const auto surface = geometry::ClosestPointIndex::build(deformed);
   if (!surface) return tl::unexpected(surface.error());
   const Points undeformed = at_points(model.mesh.nodes, *points);

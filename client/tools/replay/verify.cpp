@@ -45,8 +45,8 @@ class Comparison {
     words("status", to_string(a.status), to_string(b.status));
     words("quality", to_string(a.quality.quality), to_string(b.quality.quality));
     if (!(a.quality.flags == b.quality.flags)) differs("quality flags");
-    field(a.displacement, b.displacement);
-    values("sd_mm", a.sd_mm, b.sd_mm);
+    found_.displacement_mm = entries("displacement", a.displacement, b.displacement);
+    entries("sd_mm", a.sd_mm, b.sd_mm);
     if (a.active_slaves != b.active_slaves) {
       differs(fmt::format("active slaves: {} recorded, {} now, or others", a.contact.active,
                           b.contact.active));
@@ -81,13 +81,9 @@ class Comparison {
     if (count > 0) differs(fmt::format("{}: {} numbers by up to {:.3g}", name, count, greatest));
     return greatest;
   }
-  void field(const Points& a, const Points& b) {
-    found_.displacement_mm = entries("displacement", a, b);
-  }
-  void values(const char* name, const VecX& a, const VecX& b) { entries(name, a, b); }
 
   void exact(const Estimate& a, const Estimate& b) {
-    values("contact forces", a.contact_force_n, b.contact_force_n);
+    entries("contact forces", a.contact_force_n, b.contact_force_n);
     if (!same(a.initial_misfit_mm, b.initial_misfit_mm)) differs("initial misfit");
     if (!same(a.misfit_mm, b.misfit_mm)) differs("misfit");
     if (!same(a.contact.max_penetration_mm, b.contact.max_penetration_mm)) differs("penetration");

@@ -90,9 +90,7 @@ SlicePanel background(const Scene& scene, const SliceWindow& window, double brig
 
 TriangleSurface moved_brain(const Scene& scene, const Points& displacement) {
   TriangleSurface moved = scene.brain;
-  for (std::size_t v = 0; v < scene.node_of_vertex.size(); ++v) {
-    moved.vertices.col(static_cast<Eigen::Index>(v)) += displacement.col(scene.node_of_vertex[v]);
-  }
+  moved.vertices += displacement(Eigen::all, scene.node_of_vertex);
   return moved;
 }
 

@@ -25,12 +25,7 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run) {
   spec.right = {.label = "nodes penetrating the skull", .counts = true};
 
   const auto series = [](const char* legend, const cv::Scalar& colour, Marker marker) {
-    Series made;
-    made.legend = legend;
-    made.colour = colour;
-    made.marker = marker;
-    made.line = true;
-    return made;
+    return Series{.legend = legend, .colour = colour, .marker = marker, .line = true, .points = {}};
   };
   const auto add = [](Series& to, int iteration, double value) {
     to.points.push_back({static_cast<double>(iteration), value, ""});

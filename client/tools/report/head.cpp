@@ -33,11 +33,7 @@ Result<Head> load_head(const std::filesystem::path& case_file, const Progress& p
     if (!mri) return tl::unexpected(mri.error());
     head.mri = std::move(*mri);
   }
-  Points craniotomy(3, static_cast<Eigen::Index>(model.craniotomy.size()));
-  for (std::size_t i = 0; i < model.craniotomy.size(); ++i) {
-    craniotomy.col(static_cast<Eigen::Index>(i)) = model.mesh.nodes.col(model.craniotomy[i]);
-  }
-  head.craniotomy_centre = mean_of(craniotomy);
+  head.craniotomy_centre = mean_of(model.mesh.nodes(Eigen::all, model.craniotomy));
   head.model_id = model.model_id;
   head.tumour = std::move(model.tumour);
   head.tumour_centre = mean_of(head.tumour.vertices);

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 
 #include "client/tools/report/html_table.hpp"
 #include "common/io/files/binary_codec.hpp"
@@ -63,9 +62,7 @@ constexpr const char* kCitation =
 std::string scalar_list(const RunReport& run) {
   std::string text;
   for (const auto& [name, value] : run.truth_scalars) {
-    char buffer[64];
-    std::snprintf(buffer, sizeof buffer, "%.4g", value);
-    text += (text.empty() ? "" : ", ") + escape_html(name) + " = " + buffer;
+    text += fmt::format("{}{} = {:.4g}", text.empty() ? "" : ", ", escape_html(name), value);
   }
   return text;
 }

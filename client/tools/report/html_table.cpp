@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/report/html_table.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
-#include <cstdio>
 
 namespace brainshift::client {
 
@@ -22,10 +23,7 @@ std::string escape_html(std::string_view text) {
 }
 
 std::string number(double value, int decimals) {
-  if (!std::isfinite(value)) return kNothing;
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, "%.*f", decimals, value);
-  return buffer;
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : kNothing;
 }
 
 std::string number(const std::optional<double>& value, int decimals) {

@@ -118,14 +118,11 @@ std::string name_of(const Ingredients& ingredients) {
 
 Result<Scenario> with_ingredients(const Scenario& scenario, const Ingredients& ingredients,
                                   const Vec3& gravity, std::uint64_t seed) {
-  const auto cannot = [&](const char* ingredient, const char* why) {
-    return fail(ErrorCode::kInvalidArgument, std::string("adverse ingredient ") + ingredient +
-                                                 " does nothing in scenario " + scenario.name +
-                                                 ": " + why);
-  };
   if (ingredients.count(Ingredient::kSegmentation) > 0 &&
       scenario.measurement != Measurement::kProbeSections) {
-    return cannot("segmentation", "it measures displacements, not an outline");
+    return fail(ErrorCode::kInvalidArgument,
+                "adverse ingredient segmentation does nothing in scenario " + scenario.name +
+                    ": it measures displacements, not an outline");
   }
   if (ingredients.count(Ingredient::kMesh) > 0 && scenario.resection) {
     return fail(ErrorCode::kInvalidArgument, "adverse ingredient mesh: scenario " + scenario.name +

@@ -72,13 +72,8 @@ io::SurgeryTruth record_truth(const TruthBrain& brain, const Scenario& scenario,
 // Every point is a section of its own to the probe's errors.
 LandmarkPairs measure_sparse(const BrainModel& model, const Scenario& scenario,
                              const Moment& moment, ProbeError& error, Random& random) {
-  Points undeformed(3, static_cast<Eigen::Index>(moment.sparse.size()));
-  Points displacement(3, undeformed.cols());
-  for (Eigen::Index k = 0; k < undeformed.cols(); ++k) {
-    const int i = moment.sparse[static_cast<std::size_t>(k)];
-    undeformed.col(k) = model.tumour.vertices.col(i);
-    displacement.col(k) = moment.tumour_displacement.col(i);
-  }
+  const Points undeformed = model.tumour.vertices(Eigen::all, moment.sparse);
+  const Points displacement = moment.tumour_displacement(Eigen::all, moment.sparse);
   LandmarkPairs pairs =
       measure_displacements(undeformed, displacement, scenario.noise_sd_mm, random);
   const Vec3 centre = undeformed.rowwise().mean(), probe = craniotomy_centre(model);
@@ -112,17 +107,13 @@ TumourBoundary measure_sections(const TruthBrain& brain, const Scenario& scenari
   return measure_probe_sections(deformed, craniotomy_centre(brain.model), scenario, error, random);
 }
 
-Points at_nodes(const Points& nodal, const std::vector<NodeIndex>& nodes) {
-  return nodal(Eigen::all, nodes);
-}
-
 // The exposed cortex of the body that was solved for, as a camera sees it.
 CorticalSurface view_cortex(const TruthBrain& brain, const CortexView& view, const Moment& moment,
                             Random& random) {
   const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
   const registration::SurfacePatch patch = registration::craniotomy_patch(body);
   const TriangleSurface deformed{
-      patch.surface.vertices + at_nodes(moment.truth.displacement, patch.nodes),
+      patch.surface.vertices + moment.truth.displacement(Eigen::all, patch.nodes),
       patch.surface.triangles};
   return measure_cortex(deformed, view, random);
 }
@@ -133,7 +124,7 @@ LandmarkPairs track_cortex(const BrainModel& model, const CortexView& view, cons
   const registration::SurfacePatch patch = registration::craniotomy_patch(model);
   const int available = static_cast<int>(patch.nodes.size());
   const std::vector<int> chosen = random.choose(view.tracks, available);
-  const Points u = at_nodes(moment.displacement, patch.nodes);
+  const Points u = moment.displacement(Eigen::all, patch.nodes);
   return measure_displacements(patch.surface.vertices(Eigen::all, chosen), u(Eigen::all, chosen),
                                view.track_noise_sd_mm, random);
 }
@@ -285,17 +276,6 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   const auto forward = truth_forward(*brain, progress);
   if (!forward) return tl::unexpected(forward.error());
   TruthSolver solver(*forward);
-  return play_scenario(*brain, solver, scenario, seed, progress);
-}
-
-Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const contact::ForwardModel& forward,
-                                       const Scenario& scenario, std::uint64_t seed,
-                                       const Progress& progress) {
-  if (!keeps_the_brain(scenario)) return play_scenario(model, config, scenario, seed, progress);
-  const auto brain = truth_brain(model, config, scenario, seed);
-  if (!brain) return tl::unexpected(brain.error());
-  TruthSolver solver(forward);
   return play_scenario(*brain, solver, scenario, seed, progress);
 }
 

@@ -9,7 +9,6 @@
 #include "client/tools/twin/truth.hpp"
 #include "client/tools/twin/truth_brain.hpp"
 #include "common/configuration/case_config.hpp"
-#include "common/contact/forward_model.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
 #include "common/io/recording/surgery_file.hpp"
@@ -37,13 +36,6 @@ struct SimulatedSurgery {
 // kInvalidArgument when a scenario that promises no contact has some; kNotConverged when a contact
 // search does not settle. Other errors: of truth_brain and contact::ForwardModel.
 Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const Scenario& scenario, std::uint64_t seed,
-                                       const Progress& progress = {});
-// The same with a forward model that exists already. Precondition: it was built for this model and
-// case with the contact boundary. Where the scenario changes the brain (stiffness, resection), the
-// truth needs another one.
-Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig& config,
-                                       const contact::ForwardModel& forward,
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 // The same with a brain and a solver that exist already, for several scenarios on one brain.

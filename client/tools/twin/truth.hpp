@@ -2,12 +2,11 @@
 // What the brain of a surgery does under a load: its forward model, and TruthSolver, which solves
 // K u = b with penalty contact for one load after the other.
 //
-// It solves the same penalty equations as contact::solve_with_contact (paper section 2.4): solve
-// for the active set, take the slaves that penetrate as the next set, until the set repeats. The
-// linear solver is contact::WoodburySystem, which checks each of its solves, and every load
-// starts from the set of the load before. So a load that changes little costs a few solves
-// instead of a search from the empty set. A set that repeats is a solution of the penalty
-// equations wherever the search began.
+// It solves the penalty equations as the paper does (section 2.4): solve for the active set, take
+// the slaves that penetrate as the next set, until the set repeats. The linear solver is
+// contact::WoodburySystem, which checks each of its solves, and every load starts from the set of
+// the load before. So a load that changes little costs a few solves instead of a search from the
+// empty set. A set that repeats is a solution of the penalty equations wherever the search began.
 #pragma once
 
 #include "client/tools/twin/truth_brain.hpp"

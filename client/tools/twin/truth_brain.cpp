@@ -79,13 +79,6 @@ Status set_adversity(const Scenario& scenario, std::uint64_t seed, const BrainMo
 
 }  // namespace
 
-bool keeps_the_brain(const Scenario& scenario) {
-  const Adversity& adverse = scenario.adverse;
-  return scenario.stiffness_sd == 0.0 && !scenario.resection && !adverse.other_mesh &&
-         !adverse.gap_seed && !adverse.tissue_seed && adverse.penalty_factor == 1.0 &&
-         adverse.segmentation_sd_mm == 0.0;
-}
-
 Result<TruthBrain> truth_brain(const BrainModel& model, const CaseConfig& config,
                                const Scenario& scenario, std::uint64_t seed,
                                const BrainModel* other) {

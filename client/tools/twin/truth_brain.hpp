@@ -34,9 +34,6 @@ struct TruthBrain {
   std::optional<std::uint64_t> gap_seed;  // Adversity::gap_seed
 };
 
-// True when the scenario leaves brain and contact as the case describes them.
-bool keeps_the_brain(const Scenario& scenario);
-
 // The stiffness of the scenario and the seed, then the resection. other: the head meshed anew, for
 // a scenario with Adversity::other_mesh; without it mesh_anew() makes it. Errors as resect() and
 // make_other_mesh(); kEmptySet when nothing of the tumour's surface is left to see.

@@ -50,13 +50,9 @@ Status validate(const FieldGrid& grid) {
 Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spacing_mm) {
   if (points.cols() == 0) return fail(ErrorCode::kEmptySet, "grid: there is no point to hold");
   if (!points.allFinite()) return fail(ErrorCode::kNotFinite, "grid: a point is not finite");
-  if (auto ok = check_range("grid margin in mm", margin_mm, 0.0, kMostMargin_mm); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  if (auto ok = check_range("grid spacing in mm", spacing_mm, kLeastSpacing_mm, kMostSpacing_mm);
-      !ok) {
-    return tl::unexpected(ok.error());
-  }
+  Status ok = check_range("grid margin in mm", margin_mm, 0.0, kMostMargin_mm);
+  if (ok) ok = check_range("grid spacing in mm", spacing_mm, kLeastSpacing_mm, kMostSpacing_mm);
+  if (!ok) return tl::unexpected(ok.error());
   const Vec3 low = points.rowwise().minCoeff().array() - margin_mm;
   const Vec3 high = points.rowwise().maxCoeff().array() + margin_mm;
   FieldGrid grid;
@@ -74,8 +70,7 @@ Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spa
     grid.dims[static_cast<std::size_t>(axis)] = static_cast<int>(count);
     grid.origin_mm[axis] = 0.5 * (low[axis] + high[axis]) - 0.5 * (count - 1.0) * spacing_mm;
   }
-  if (auto ok = validate(grid); !ok) return tl::unexpected(ok.error());
-  return grid;
+  return validate(grid).map([&] { return grid; });
 }
 
 double OutsideTaper::factor(double distance_mm) const {

@@ -126,10 +126,7 @@ void GridSampler::find_interior(const geometry::TetLocator& mesh, double fade_mm
     const double from_rim_mm = std::min(low.minCoeff(), high.minCoeff()) - grid_.spacing_mm;
     if (from_rim_mm >= std::max(fade_mm, grid_.spacing_mm)) interior_.push_back(node);
   }
-  interior_mm_ = Points(3, static_cast<Eigen::Index>(interior_.size()));
-  for (Eigen::Index i = 0; i < interior_mm_.cols(); ++i) {
-    interior_mm_.col(i) = mesh.nodes().col(interior_[static_cast<std::size_t>(i)]);
-  }
+  interior_mm_ = mesh.nodes()(Eigen::all, interior_);
 }
 
 void GridSampler::find_nodes_used() {

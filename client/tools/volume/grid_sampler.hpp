@@ -41,15 +41,14 @@ class GridSampler {
                                    const SamplerOptions& options = {});
 
   const FieldGrid& grid() const { return grid_; }
-  int mesh_nodes() const { return mesh_nodes_; }
   // Nodes of which a voxel or the interpolation error depends, ascending: all that must be known.
   const std::vector<NodeIndex>& nodes_used() const { return nodes_used_; }
   // Mesh nodes that a viewer's interpolation must reproduce, ascending: those with no voxel of the
   // fade or the rim among the eight around them.
   const std::vector<NodeIndex>& interior() const { return interior_; }
 
-  // u: 3 x mesh_nodes, mm. xyz: 3 * grid().num_voxels() floats, the vector of a voxel in one piece.
-  // Precondition: the columns of nodes_used() are finite.
+  // u: 3 x nodes of the mesh, mm. xyz: 3 * grid().num_voxels() floats, the vector of a voxel in one
+  // piece. Precondition: the columns of nodes_used() are finite.
   void sample(const Points& u, float* xyz) const;
   // values: one per mesh node. out: one float per voxel; 0 outside of the brain and in the rim; not
   // faded.

@@ -15,6 +15,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/values/model_id.hpp"
+#include "tests/support/mesh_figures.hpp"
 #include "tests/support/results.hpp"
 #include "tests/unit/anatomy/ball_case.hpp"
 
@@ -279,7 +280,7 @@ TEST(RealHead, CoarseDefaultCaseGivesAWholeModel) {
   const auto inputs = value_or_fail(io::load_case_inputs(config));
   const auto model = value_or_fail(build_brain_model(inputs));
 
-  const geometry::MeshQuality quality = geometry::mesh_quality(model.mesh);
+  const test_support::MeshQuality quality = test_support::mesh_quality(model.mesh);
   // 1,736,387 voxels of 1 mm^3; smoothing and 12 mm facets may change 3 %.
   EXPECT_NEAR(quality.volume_mm3, 1736387.0, 0.03 * 1736387.0);
   EXPECT_NEAR(quality.mean_edge_mm, 12.0, 1.2);

@@ -11,6 +11,7 @@
 #include "common/contact/penalty.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -262,7 +263,9 @@ TEST(ContactSearch, RejectsWhatItCannotSearch) {
 }
 
 using test_support::box_mesh;
+using test_support::ContactSolution;
 using test_support::nodes_where;
+using test_support::solve_with_contact;
 
 TEST(PenaltyContact, PenetrationFollowsEquation11) {
   // One slave 1 mm below a ceiling whose normal points down into the body.
@@ -366,7 +369,7 @@ TEST(ForwardModel, ContactSolutionPressesActiveSlavesAndLeavesTheOthersOpen) {
       value_or_fail(ForwardModel::build(model, test_support::toy_config(), Boundary::kContact));
   Points load = Points::Zero(3, model.mesh.num_nodes());
   load.row(2).setConstant(0.02);  // lift, so that part of the dome touches
-  const auto solution = value_or_fail(forward.solve_with_contact(load));
+  const auto solution = value_or_fail(solve_with_contact(forward, load));
   EXPECT_TRUE(solution.converged);
   const int active = count(solution.active);
   EXPECT_GT(active, 0);

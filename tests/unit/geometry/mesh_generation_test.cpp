@@ -13,11 +13,15 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/mesh_quality.hpp"
 #include "common/geometry/surface.hpp"
+#include "tests/support/mesh_figures.hpp"
 #include "tests/support/results.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::geometry {
 namespace {
+
+using test_support::mesh_quality;
+using test_support::MeshQuality;
 
 using balls::Ball;
 

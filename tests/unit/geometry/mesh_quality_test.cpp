@@ -8,10 +8,14 @@
 #include <string>
 
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/mesh_figures.hpp"
 #include "tests/support/results.hpp"
 
 namespace brainshift::geometry {
 namespace {
+
+using test_support::mesh_quality;
+using test_support::MeshQuality;
 
 TetMesh regular_tetrahedron(double edge) {
   TetMesh mesh;

@@ -11,6 +11,7 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/condensed/condensed_inverter.hpp"
 #include "common/inversion/prepared/condense.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
@@ -62,7 +63,8 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     const Points load =
         fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                            brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-    const auto truth = value_or_fail(model.forward().solve_with_contact(40.0 * load));
+    const auto truth =
+        value_or_fail(test_support::solve_with_contact(model.forward(), 40.0 * load));
     Random random(seed);
     const auto& region = operators(boundary)->region;
     const auto m = static_cast<Eigen::Index>(region.size());

@@ -12,6 +12,7 @@
 #include "common/fem/sampling.hpp"
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/values/sparse_data.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
@@ -36,7 +37,7 @@ inline SparseData sagging_data(const PreparedModel& model, double noise_mm) {
   const Points load =
       fem::buoyancy_load(brain.mesh, model.config().material, brain.gravity_direction,
                          brain.fluid_plane_depth_mm + 25.0, brain.gravity_direction);
-  const auto truth = value_or_fail(model.forward().solve_with_contact(40.0 * load));
+  const auto truth = value_or_fail(test_support::solve_with_contact(model.forward(), 40.0 * load));
   Random random(4);
   SparseData data;
   data.positions = brain.tumour.vertices;

@@ -83,7 +83,7 @@ contact::ActiveSet active_set(const PreparedModel& model, const Estimate& estima
 
 TEST(Pressure, SystemsWithAndWithoutRefactorisationEqualTheDenseOne) {
   const PreparedModel model = prepare(Boundary::kContact, with_pressure(0.2));
-  ASSERT_TRUE(model.forward().factor().carries_pressure());
+  ASSERT_EQ(model.forward().factor().drained(), nullptr);
   contact::RefactorisedSystem refactorised(model.forward());
   contact::WoodburySystem woodbury(model.forward());
   const contact::ActiveSet active = some_active(model);
@@ -190,7 +190,7 @@ TEST(Pressure, EveryDescentWithAFactorCarriesIt) {
 
 TEST(Pressure, FixedBoundaryCarriesItToo) {
   const PreparedModel model = prepare(Boundary::kFixed, with_pressure(0.2));
-  EXPECT_TRUE(model.forward().factor().carries_pressure());
+  EXPECT_EQ(model.forward().factor().drained(), nullptr);
   const SparseData data = sagging_data(model, 0.1);
   const Estimate estimate = condensed_estimate(model, data);
   EXPECT_EQ(estimate.status, EstimateStatus::kConverged);

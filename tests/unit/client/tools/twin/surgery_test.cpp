@@ -11,6 +11,7 @@
 #include "common/geometry/closest_point.hpp"
 #include "common/registration/surface_distances.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/support/contact_search.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/toy_patient.hpp"
 
@@ -67,7 +68,7 @@ TEST_F(TruthSolverTest, EqualsASearchFromTheEmptySetForEveryLoadOfASeries) {
     SCOPED_TRACE(strain);
     const Points b = load(20.0, strain);
     const auto truth = value_or_fail(solver.solve(b));
-    const auto reference = value_or_fail(forward->solve_with_contact(b));
+    const auto reference = value_or_fail(test_support::solve_with_contact(*forward, b));
     ASSERT_TRUE(reference.converged);
     EXPECT_EQ(truth.active, contact::count(reference.active));
     EXPECT_LT((truth.displacement - reference.displacement).norm(),
