@@ -24,7 +24,7 @@ namespace {
 constexpr double kLargestHeight_mm = 15.0;
 // cos 60 degrees. A node whose normal turns further belongs to the wall of a sulcus or the far
 // side.
-constexpr double kLeastCosine = 0.5;
+constexpr double kMinCosine = 0.5;
 
 enum class Role { kNone, kCraniotomy, kBrainstem };
 
@@ -76,7 +76,7 @@ bool in_opening(const Opening& opening, const Craniotomy& craniotomy, const Vec3
   const double u = offset.dot(opening.along) / (0.5 * craniotomy.long_axis_mm);
   const double v = offset.dot(opening.across) / (0.5 * craniotomy.short_axis_mm);
   return u * u + v * v <= 1.0 && std::abs(offset.dot(opening.normal)) <= kLargestHeight_mm &&
-         normal.dot(opening.normal) >= kLeastCosine;
+         normal.dot(opening.normal) >= kMinCosine;
 }
 
 // Roles of the surface vertices as far as their place decides them.

@@ -129,10 +129,10 @@ namespace {
 constexpr int kFewestPoints = 50;
 // Extent over the craniotomy's size. A camera may see only a part of the craniotomy, or also drapes
 // and skin around it.
-constexpr double kLeastExtent = 0.2, kMostExtent = 6.0;
+constexpr double kMinExtent = 0.2, kMaxExtent = 6.0;
 // The brain sinks by up to 20 mm (Roberts et al. 1998). A surface farther away has a wrong pose.
 constexpr double kFarthest_mm = 25.0;
-constexpr double kLeastCosine = 0.3;
+constexpr double kMinCosine = 0.3;
 
 Vec3 face_area_vector(const Points& vertices, const Eigen::Vector3i& t) {
   const Vec3 a = vertices.col(t[0]);
@@ -150,8 +150,8 @@ Status check_points(const Points& points) {
 }
 
 Status check_extent(double extent_mm, const CorticalSite& site) {
-  const double least = kLeastExtent * site.size_mm;
-  const double most = kMostExtent * site.size_mm;
+  const double least = kMinExtent * site.size_mm;
+  const double most = kMaxExtent * site.size_mm;
   if (extent_mm >= least && extent_mm <= most) return {};
   const auto fits = [&](double factor) {
     return factor * extent_mm >= least && factor * extent_mm <= most;
@@ -180,11 +180,11 @@ Status orient(CheckedSurface& checked, const CorticalSite& site) {
     area += n.norm();
   }
   const double cosine = area > 0.0 ? along / area : 0.0;
-  if (std::abs(cosine) < kLeastCosine) {
+  if (std::abs(cosine) < kMinCosine) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
                             "mean cosine {:.2f}, must be at least {:g} either way",
-                            cosine, kLeastCosine));
+                            cosine, kMinCosine));
   }
   if (cosine > 0.0) return {};
   surface.triangles.row(1).swap(surface.triangles.row(2));

@@ -118,7 +118,7 @@ SupernodalView view_of(const cholmod_factor& factor) {
 // leaves a pivot wrong by some 1e-14 K_jj (`make stability`, weak support: 85 unit roundoffs), so
 // with a ratio below this its error is more than a thousandth. Unlike the reciprocal condition
 // this ratio does not depend on units: stiff contact springs do not lower it.
-constexpr double kLeastPivotShare = 1e-11;
+constexpr double kMinPivotShare = 1e-11;
 
 double least_pivot_share(const cholmod_factor& factor, const SymmetricMatrix& lower) {
   const SupernodalView view = view_of(factor);
@@ -281,10 +281,10 @@ Status SparseCholesky::refactorise(const SymmetricMatrix& lower) {
     return fail(ErrorCode::kFloatingBody, text.str());
   }
   const double share = least_pivot_share(*impl_->factor, lower);
-  if (!(share >= kLeastPivotShare)) {
+  if (!(share >= kMinPivotShare)) {
     std::ostringstream text;
     text << "stiffness matrix: elimination leaves " << share << " of a diagonal entry, below "
-         << kLeastPivotShare << advice;
+         << kMinPivotShare << advice;
     return fail(ErrorCode::kFloatingBody, text.str());
   }
   return {};

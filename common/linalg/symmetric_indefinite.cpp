@@ -21,8 +21,8 @@
 namespace brainshift::linalg {
 namespace {
 
-constexpr int kBlock = 64;       // right-hand sides that MUMPS works on at once
-constexpr int kMostRefined = 2;  // steps of iterative refinement
+constexpr int kBlock = 64;      // right-hand sides that MUMPS works on at once
+constexpr int kMaxRefined = 2;  // steps of iterative refinement
 // Quasi-definite matrices have an L D L^T in any order. The swaps that MUMPS makes with its usual
 // threshold cost no measurable time and keep extreme steps accurate.
 constexpr double kPivotThreshold = 0.01;
@@ -242,7 +242,7 @@ double SymmetricIndefinite::Impl::estimate_rcond() const {
 Status SymmetricIndefinite::Impl::refine(const VecX& b, VecX& x, SolveCheck& check) const {
   VecX residual;
   check = {backward_error(b, x, residual), 0};
-  while (check.backward_error > kMaxBackwardError && check.refinements < kMostRefined) {
+  while (check.backward_error > kMaxBackwardError && check.refinements < kMaxRefined) {
     raw_solve(residual.data(), 1);
     x += residual;
     check.backward_error = backward_error(b, x, residual);

@@ -62,7 +62,7 @@ using Eigen::MatrixXf;
 
 // Root mean square, over the columns, of a row that the basis may leave out: as much as rounding.
 constexpr double kLeft = 0.29;
-constexpr double kMostByte = 127.0, kMostWord = 32767.0;
+constexpr double kMaxByte = 127.0, kMaxWord = 32767.0;
 
 // What one block adds to the arrays of CompactParts.
 struct Block {
@@ -96,7 +96,7 @@ MatrixXd pivoted_cholesky(MatrixXd& w, double least) {
 }
 
 // Directions in the order in which the block keeps them: first those with a coefficient beyond
-// kMostWord (`wide` of them), and of each kind those first that the columns need most, so that what
+// kMaxWord (`wide` of them), and of each kind those first that the columns need most, so that what
 // comes last can be left out of quiet columns. coefficients: columns x rank.
 std::vector<Index> by_need(const MatrixXd& coefficients, int& wide) {
   std::vector<Index> order(static_cast<std::size_t>(coefficients.cols()));
@@ -105,7 +105,7 @@ std::vector<Index> by_need(const MatrixXd& coefficients, int& wide) {
   std::stable_sort(order.begin(), order.end(),
                    [&](Index a, Index b) { return squares[a] > squares[b]; });
   const auto middle = std::stable_partition(order.begin(), order.end(), [&](Index i) {
-    return coefficients.col(i).cwiseAbs().maxCoeff() > kMostWord;
+    return coefficients.col(i).cwiseAbs().maxCoeff() > kMaxWord;
   });
   wide = static_cast<int>(middle - order.begin());
   return order;
@@ -118,12 +118,12 @@ VecX keep_direction(const VecX& direction, bool wide, Block& block) {
     block.wide_basis.insert(block.wide_basis.end(), single.begin(), single.end());
     return single.cast<double>();
   }
-  const auto scale = static_cast<float>(direction.cwiseAbs().maxCoeff() / kMostWord);
+  const auto scale = static_cast<float>(direction.cwiseAbs().maxCoeff() / kMaxWord);
   block.basis_scales.push_back(scale);
   VecX kept(direction.size());
   for (Index i = 0; i < direction.size(); ++i) {
     const double whole =
-        std::clamp(std::rint(direction[i] / static_cast<double>(scale)), -kMostWord, kMostWord);
+        std::clamp(std::rint(direction[i] / static_cast<double>(scale)), -kMaxWord, kMaxWord);
     block.basis.push_back(static_cast<std::int16_t>(whole));
     kept[i] = static_cast<double>(scale) * whole;
   }
@@ -139,8 +139,8 @@ int eights_above(const VecX& coefficients, double limit) {
 
 // Appends a column's whole-numbered coefficients.
 void keep_coefficients(const VecX& coefficients, Block& block) {
-  const int longs = eights_above(coefficients, kMostWord);
-  const int words = std::max(longs, eights_above(coefficients, kMostByte));
+  const int longs = eights_above(coefficients, kMaxWord);
+  const int words = std::max(longs, eights_above(coefficients, kMaxByte));
   const int bytes = std::max(words, eights_above(coefficients, 0.0));
   for (const int length : {longs, words - longs, bytes - words}) {
     block.lengths.push_back(static_cast<std::int8_t>(length));
@@ -202,7 +202,7 @@ class Encoder {
         fill(basis, coefficients, block, decoded);
       }
       const double worst = worst_error(rows, decoded);
-      if (worst <= kMostErrorSteps) return block;
+      if (worst <= kMaxErrorSteps) return block;
       if (factor.cols() == rows.rows() || least == 0.0) {
         return fail(ErrorCode::kInternal,
                     "compact columns: a number is off by " + std::to_string(worst) + " steps");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // MatrixXf -> CompactColumns: fields of one mesh, [U G] of a patient, made small.
 //
-// The columns of a group (U, G) have one step. A number is off by kMostErrorSteps at most (checked
+// The columns of a group (U, G) have one step. A number is off by kMaxErrorSteps at most (checked
 // against the numbers given), by 0.4 steps typically. Steps of less than kFinest of the greatest
 // number are finer than sums in single precision: the limit is then that of kFinest.
 // docs/decisions/0028 says what that does to fields.
@@ -10,7 +10,7 @@
 // = M_b M_b^T is factorised by Cholesky with pivoting until the rows that are left are below kLeft
 // in the root mean square, W ~ L L^T (Harbrecht, Peters and Schneider 2012, Appl. Numer. Math.
 // 62:428); the basis is that of L's columns (Householder), and the coefficients are Q^T M_b,
-// rounded. Where a number is still off by more than kMostErrorSteps, the block is done again with
+// rounded. Where a number is still off by more than kMaxErrorSteps, the block is done again with
 // more columns.
 #pragma once
 
@@ -44,7 +44,7 @@ struct SpatialBlocks {
 // the same size. The result depends on the points alone. points: 3 x n. most >= 1.
 SpatialBlocks spatial_blocks(const Points& points, int most);
 
-inline constexpr double kMostErrorSteps = 4.0;     // steps
+inline constexpr double kMaxErrorSteps = 4.0;      // steps
 inline constexpr float kFinest = 1.0F / 16777216;  // 2^-24
 
 // Columns that need not lie in memory: they are read once, by the rows of a block.
@@ -67,7 +67,7 @@ SpatialBlocks node_blocks(const Points& nodes);
 
 // groups: one after the other. nodes: node_blocks() of the mesh. Dealt to the team by blocks; the
 // result does not depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
-// kMostErrorSteps is not kept; errors of the groups. progress: stage "compact columns".
+// kMaxErrorSteps is not kept; errors of the groups. progress: stage "compact columns".
 Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
                                       const std::vector<ColumnGroup>& groups, ThreadTeam& team,
                                       const Progress& progress = {},

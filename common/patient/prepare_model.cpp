@@ -79,11 +79,11 @@ using FactorisedLater = std::future<Result<contact::ForwardModel>>;
 
 // Meshes up to this size have both factors made at once, since one leaves a core idle. Both are in
 // memory until one is condensed: 0.9 GiB for 18 thousand nodes, 3 GiB for 40.
-constexpr int kMostNodesForTwoFactors = 40000;
+constexpr int kMaxNodesForTwoFactors = 40000;
 
 FactorisedLater factorise_beside(const std::shared_ptr<const BrainModel>& model,
                                  const CaseConfig& config, Boundary boundary) {
-  if (model->mesh.num_nodes() > kMostNodesForTwoFactors) return {};
+  if (model->mesh.num_nodes() > kMaxNodesForTwoFactors) return {};
   return std::async(std::launch::async, [model, config, boundary] {
     return contact::ForwardModel::build(*model, config, boundary);
   });

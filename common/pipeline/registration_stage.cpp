@@ -19,7 +19,7 @@ constexpr std::uint64_t kSubsetSeed = 20090627;
 
 // Welsch weight exp(-r^2 / 2 s^2) of a point two scales off. A point with less lies on something
 // else.
-const double kLeastWelschWeight = std::exp(-2.0);
+const double kMinWelschWeight = std::exp(-2.0);
 
 // The scale of a Welsch kernel in units of the median residual (2.7 standard deviations of a
 // Gaussian, whose median is 0.6745) and, at least, of the points' own standard deviation: either
@@ -93,7 +93,7 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
   if (!icp) return tl::unexpected(icp.error());
   std::vector<int> inliers;
   for (int i = 0; i < icp->weights.size(); ++i) {
-    if (icp->weights[i] >= kLeastWelschWeight) inliers.push_back(i);
+    if (icp->weights[i] >= kMinWelschWeight) inliers.push_back(i);
   }
   if (inliers.size() < 3) {
     return fail(

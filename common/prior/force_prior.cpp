@@ -73,7 +73,7 @@ ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, d
   const double wanted =
       kCentresPerLength * nodal_volumes.sum() / (length_mm * length_mm * length_mm);
   const int count =
-      static_cast<int>(std::clamp(wanted, double{kFewestCentres}, double{kMostCentres}));
+      static_cast<int>(std::clamp(wanted, double{kFewestCentres}, double{kMaxCentres}));
   const Points centres = nodes(Eigen::all, geometry::spread_nodes(nodes, count));
   const Eigen::Index m = centres.cols();
   Eigen::MatrixXd among(m, m);

@@ -62,7 +62,7 @@ class ForceKernel {
 
   static constexpr double kSupportOverLength = 4.2;
   static constexpr double kCentresPerLength = 3.0;
-  static constexpr int kFewestCentres = 48, kMostCentres = 500;
+  static constexpr int kFewestCentres = 48, kMaxCentres = 500;
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

@@ -17,7 +17,7 @@ namespace brainshift::registration {
 namespace {
 
 constexpr double kArmijo = 1e-4;
-constexpr int kMostHalvings = 12;
+constexpr int kMaxHalvings = 12;
 
 // Updates the inverse Hessian of -f: s the step taken, y the change of the gradient of -f.
 void bfgs_update(Mat6& H, const Vec6& s, const Vec6& y, bool first) {
@@ -56,7 +56,7 @@ PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial,
     PoseValue next;
     RigidTransform T_next;
     bool uphill = false;
-    for (int halving = 0; halving < kMostHalvings && !uphill; ++halving) {
+    for (int halving = 0; halving < kMaxHalvings && !uphill; ++halving) {
       if (halving > 0) step *= 0.5;
       T_next = rigid_increment(scale.cwiseProduct(step), result.T * centre) * result.T;
       next = function(T_next, T_next * centre);
@@ -82,18 +82,18 @@ PoseAscent ascend(const PoseFunction& function, const RigidTransform& T_initial,
 
 namespace {
 
-constexpr Eigen::Index kLeastSamples = 500;  // some thirty in each of half the bins
+constexpr Eigen::Index kMinSamples = 500;  // some thirty in each of half the bins
 
 Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
 
 Status check_registrar(const ImageRegistrationOptions& options) {
   if (options.levels.empty()) return refuse("image registration: levels: none given");
   for (const ImageLevel& level : options.levels)
-    if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kLeastSamples)
+    if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kMinSamples)
       return refuse(
           fmt::format("image registration: level of smoothing_mm = {:g} and samples = {}: must be "
                       "0 to 20 and at least {}",
-                      level.smoothing_mm, level.samples, kLeastSamples));
+                      level.smoothing_mm, level.samples, kMinSamples));
   if (options.bins < 8 || options.bins > 256)
     return refuse(fmt::format("image registration: bins = {}: must be 8 to 256", options.bins));
   if (!(options.low_quantile >= 0.0 && options.low_quantile < options.high_quantile &&
@@ -145,9 +145,9 @@ Status check_samples(const IntensitySamples& samples) {
   if (samples.intensities.size() != count)
     return refuse(fmt::format("image registration: {} positions and {} intensities", count,
                               samples.intensities.size()));
-  if (count < kLeastSamples)
+  if (count < kMinSamples)
     return refuse(
-        fmt::format("image registration: {} samples: at least {} needed", count, kLeastSamples));
+        fmt::format("image registration: {} samples: at least {} needed", count, kMinSamples));
   for (Eigen::Index i = 0; i < count; ++i)
     if (!samples.positions.col(i).allFinite() || !std::isfinite(samples.intensities[i]))
       return fail(ErrorCode::kNotFinite,

@@ -108,7 +108,7 @@ constexpr int kBlock_px = 5;  // odd; larger blocks smooth over vessels
 constexpr double kMaxStep_px = 1.0;
 // With a smaller valid fraction, left and right are no pair. Measured on synthetic pairs: 0.78 to
 // 0.93 for a pair of its rig, at most 0.006 for one that is swapped or lies at another depth.
-constexpr double kLeastValid = 0.10;
+constexpr double kMinValid = 0.10;
 // SGBM's own check is off: it guesses the right picture's disparities from the left one's costs,
 // and takes -1 for 1 px. Here both pictures are matched.
 constexpr int kNoOwnCheck = 10000;
@@ -267,10 +267,10 @@ Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayIma
                                             const StereoCalibration& calibration,
                                             const DepthRange& range, const MatchOptions& options) {
   auto measured = measure(left, right, calibration, range, options);
-  if (!measured || measured->map.valid_fraction >= kLeastValid) return measured;
+  if (!measured || measured->map.valid_fraction >= kMinValid) return measured;
   const double found = measured->map.valid_fraction;
   const auto turned = measure(right, left, calibration, range, options);
-  if (turned && turned->map.valid_fraction >= kLeastValid &&
+  if (turned && turned->map.valid_fraction >= kMinValid &&
       turned->map.valid_fraction >= kSwappedGain * found) {
     return invalid(
         fmt::format("left and right pictures are swapped: {:.1f} % of the pixels match as "
@@ -281,7 +281,7 @@ Result<MeasuredDisparity> measure_disparity(const GrayImage& left, const GrayIma
               fmt::format("{:.1f} % of the pixels have a consistent match between {:g} and {:g} "
                           "mm: must be at least {:g} %; too little texture, another depth, or "
                           "another calibration?",
-                          100.0 * found, range.near_mm, range.far_mm, 100.0 * kLeastValid));
+                          100.0 * found, range.near_mm, range.far_mm, 100.0 * kMinValid));
 }
 
 }  // namespace brainshift::stereo

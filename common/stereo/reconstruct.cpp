@@ -198,7 +198,7 @@ Result<ReconstructedSurface> reconstruct(const DisparityMap& map, const Rectifie
   if (Status ok = check(options, T_ras_camera); !ok) return tl::unexpected(ok.error());
   ReconstructedSurface result;
   PixelMap<float> kept = map.disparity_px;
-  result.pixels_in_small_parts = drop_minor_parts(kept, kMaxPartStep_px, kLeastPart).dropped;
+  result.pixels_in_small_parts = drop_minor_parts(kept, kMaxPartStep_px, kMinPart).dropped;
   std::vector<double> depths;
   for (const float d : kept.pixels)
     if (!std::isnan(d)) depths.push_back(depth_at(geometry, static_cast<double>(d)));

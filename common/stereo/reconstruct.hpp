@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A disparity map -> triangles in patient RAS, with the standard deviation of every vertex.
 //
-// 1. Parts of the map (parts.hpp, kMaxPartStep_px) smaller than kLeastPart of the largest are
+// 1. Parts of the map (parts.hpp, kMaxPartStep_px) smaller than kMinPart of the largest are
 //    dropped: instruments, specks.
 // 2. A block of step x step pixels becomes one vertex where at least half of it is valid: the mean
 //    position and mean disparity of its pixels within kMaxPartStep_px of their median. spacing_mm
@@ -26,7 +26,7 @@
 namespace brainshift::stereo {
 
 inline constexpr double kMaxPartStep_px = 2.0;
-inline constexpr double kLeastPart = 0.05;
+inline constexpr double kMinPart = 0.05;
 inline constexpr double kOutlierSds = 3.0;
 inline constexpr double kMaxViewAngle_deg = 75.0;
 inline constexpr int kFewestPoints = 50;

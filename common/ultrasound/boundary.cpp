@@ -10,7 +10,7 @@
 namespace brainshift::ultrasound {
 namespace {
 
-constexpr double kMostPoints = 1e6;
+constexpr double kMaxPoints = 1e6;
 
 Status check_contour(const Contour& contour, double spacing_mm) {
   if (!(spacing_mm > 0.0)) {
@@ -48,10 +48,10 @@ Result<Points> boundary_points(const Contour& contour, const AffineTransform& T_
   }
   const double total = length.back();
   const double steps = std::max(1.0, std::round(total / spacing_mm));
-  if (!(total > 0.0) || !(steps <= kMostPoints)) {
+  if (!(total > 0.0) || !(steps <= kMaxPoints)) {
     return invalid(
         fmt::format("contour of frame {} is {:.3g} mm long: must be > 0 and at most {:.3g}",
-                    contour.frame, total, kMostPoints * spacing_mm));
+                    contour.frame, total, kMaxPoints * spacing_mm));
   }
   const auto count = static_cast<Eigen::Index>(steps) + (contour.closed ? 0 : 1);
   Points points(3, count);

@@ -129,8 +129,8 @@ constexpr int kBlur = 2;
 // than the significance counts.
 constexpr double kSmoothing_px = 2.0;
 constexpr int kRays = 96;
-constexpr int kLeastRadius_px = 6;  // smaller ones are speckle
-constexpr int kMostRadius_px = 150;
+constexpr int kMinRadius_px = 6;  // smaller ones are speckle
+constexpr int kMaxRadius_px = 150;
 constexpr int kEdgeWidth_px = 6;
 constexpr double kStiffness = 0.3;      // of the image's sd, per pixel of radius from ray to ray
 constexpr double kRadiusChange = 0.35;  // from image to image, of the radius
@@ -221,7 +221,7 @@ Eigen::Vector2d centroid(const Eigen::Matrix2Xd& polygon) {
 
 TracedContour search_once(const Eigen::MatrixXf& image, const Search& search) {
   const PolarImage polar =
-      polar_image(image, search.centre_px, kRays, kMostRadius_px + kEdgeWidth_px + 2);
+      polar_image(image, search.centre_px, kRays, kMaxRadius_px + kEdgeWidth_px + 2);
   Eigen::MatrixXf gain = edge_strength(polar, kEdgeWidth_px);
   if (!search.bright) gain = -gain;
   const double mean = image.mean();
@@ -239,7 +239,7 @@ TracedContour search_once(const Eigen::MatrixXf& image, const Search& search) {
 }
 
 std::vector<RadiusRange> whole_range() {
-  return std::vector<RadiusRange>(kRays, {kLeastRadius_px, kMostRadius_px});
+  return std::vector<RadiusRange>(kRays, {kMinRadius_px, kMaxRadius_px});
 }
 
 // Radii that a contour allows around its centroid: those of the former contour along each ray,
@@ -275,13 +275,13 @@ TracedContour search_twice(const Eigen::MatrixXf& image, Search search) {
 }
 
 Status accept(const TracedContour& traced) {
-  if (traced.significance >= kLeastSignificance && traced.confidence >= kLeastConfidence) return {};
+  if (traced.significance >= kMinSignificance && traced.confidence >= kMinConfidence) return {};
   return fail(
       ErrorCode::kEmptySet,
       fmt::format("no boundary found on frame {}: significance {:.2f} (at least {}), confidence "
                   "{:.2f} (at least {})",
-                  traced.contour.frame, traced.significance, kLeastSignificance, traced.confidence,
-                  kLeastConfidence));
+                  traced.contour.frame, traced.significance, kMinSignificance, traced.confidence,
+                  kMinConfidence));
 }
 
 Status check_seed(const tracking::Recording& recording, const Seed& seed) {

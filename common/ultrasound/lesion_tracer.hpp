@@ -67,8 +67,8 @@ std::vector<int> best_closed_path(const Eigen::MatrixXf& gain,
 
 // The best path through noise alone reaches 5.4 in 180 images of fine speckle
 // (lesion_tracer_test.cpp).
-inline constexpr double kLeastSignificance = 8.0;
-inline constexpr double kLeastConfidence = 0.7;
+inline constexpr double kMinSignificance = 8.0;
+inline constexpr double kMinConfidence = 0.7;
 
 struct TracedContour {
   Contour contour;  // closed, one point per ray

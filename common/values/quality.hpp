@@ -40,7 +40,7 @@ enum class QualityFlag : std::uint32_t {
   kContactNotCertified = 1u << 5,  // decrement or violation of contact above its bound
   kIterationLimit = 1u << 6,       // the stop rule did not hold
   kInvertedElements = 1u << 16,    // elements with det F <= 0
-  kVolumeLost = 1u << 17,          // a nodal volume ratio is below kLeastVolumeRatio
+  kVolumeLost = 1u << 17,          // a nodal volume ratio is below kMinVolumeRatio
   kBeyondSkull = 1u << 18,         // a node moves, or a slave penetrates, farther than a skull lets
   kNotFinite = 1u << 19,           // a number of the estimate is not finite
 };
@@ -58,13 +58,13 @@ std::string_view sentence(QualityFlag flag);   // the same for people, in words 
 inline constexpr double kUnexplainedMisfit = 1.5;
 // Contact is certified up to these: a thousandth of the loads' posterior standard deviation, and a
 // hundredth of the 1 mm gap, from which on a slave counts as penetrating.
-inline constexpr double kMostContactDecrement = 1e-3;
-inline constexpr double kMostContactViolation_mm = 0.01;
+inline constexpr double kMaxContactDecrement = 1e-3;
+inline constexpr double kMaxContactViolation_mm = 0.01;
 // Twice the volume of fluid that can leave tissue, a fifth extracellular and about a twentieth
 // blood. (Shrinking by 18 % along every direction, which damages tissue, leaves 0.55.)
-inline constexpr double kLeastVolumeRatio = 0.5;
+inline constexpr double kMinVolumeRatio = 0.5;
 // More than twice the largest mean shift of a published surgery (21.3 mm).
-inline constexpr double kMostMotion_mm = 50.0;
+inline constexpr double kMaxMotion_mm = 50.0;
 // Three voxels of a head MRI: no error of the skull's surface explains a slave deeper in it.
 inline constexpr double kDeepestInSkull_mm = 3.0;
 

@@ -14,7 +14,7 @@ namespace {
 using wire::PublishedUpdate;
 
 // Above this share of the choice, changes with their node numbers save little over all of it.
-constexpr double kMostOfTheChoice = 0.9;
+constexpr double kMaxOfTheChoice = 0.9;
 
 Bytes frame(const std::string& payload) { return framed(wire::MessageType::kUpdate, 0, payload); }
 
@@ -74,7 +74,7 @@ Parcel make_parcel(const Bytes& whole, const PublishedUpdate& update, const Sele
                 now->xyz_mm.begin() + static_cast<std::ptrdiff_t>(3 * i));
     if (!now->sd_mm.empty()) now->sd_mm[i] = base->sd_mm[i];
   }
-  const auto most = kMostOfTheChoice * static_cast<double>(selection.nodes.size());
+  const auto most = kMaxOfTheChoice * static_cast<double>(selection.nodes.size());
   if (static_cast<double>(changes.nodes.size()) > most) {
     return {complete(whole, update, selection), all_of(update, selection)};
   }

@@ -10,7 +10,7 @@
 namespace brainshift::server {
 namespace {
 
-constexpr long kMostConnections = 1024;
+constexpr long kMaxConnections = 1024;
 // Above what an update allocates (an encoded field of 18 thousand nodes has 0.6 MiB), so that none
 // costs page faults.
 constexpr int kOwnPages = 4 << 20;
@@ -32,7 +32,7 @@ long raise_file_limit() {
 
 int connections_within(long file_limit) {
   return static_cast<int>(
-      std::clamp((file_limit - kReservedFiles) / kFilesPerConnection, 1L, kMostConnections));
+      std::clamp((file_limit - kReservedFiles) / kFilesPerConnection, 1L, kMaxConnections));
 }
 
 void return_large_blocks() {

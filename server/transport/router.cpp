@@ -24,7 +24,7 @@ constexpr int kRequestsPerTurn = 64;
 constexpr std::chrono::milliseconds kRetryInterval{20};
 // How often the handler is told that the loop turns.
 constexpr std::chrono::milliseconds kTurnInterval{100};
-constexpr std::size_t kMostParts = ZmtpStream::Bounds{}.parts;
+constexpr std::size_t kMaxParts = ZmtpStream::Bounds{}.parts;
 
 Bytes error_frame(std::uint64_t request_id, const Error& error) {
   return framed(wire::MessageType::kErrorReply, request_id, wire::encode(error));
@@ -307,7 +307,7 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
         self.forget_closed();  // before the peer is looked up, see ConnectionMonitor
         self.answer(*incoming);
         // With CURVE the guard cannot count the parts before.
-        if (incoming->parts > kMostParts) self.guard->close(incoming->connection_fd);
+        if (incoming->parts > kMaxParts) self.guard->close(incoming->connection_fd);
       }
       for (const Outgoing& message : outbox.take()) self.deliver(message);
       if (self.peers.anything_owed()) self.pay_owed();

@@ -23,7 +23,7 @@ constexpr std::array kMotions = {"joint-tangential", "joint-mixed", "joint-diste
 client::Scenario mannitol(std::uint64_t seed) {
   client::Scenario scenario = client::vary(*client::find_scenario("joint-sag"), seed);
   Random random(seed);
-  scenario.volume = {-kLeastShrinkage * (1.0 + random.uniform()), seed % 2 == 0};
+  scenario.volume = {-kMinShrinkage * (1.0 + random.uniform()), seed % 2 == 0};
   return scenario;
 }
 

@@ -17,10 +17,10 @@ namespace brainshift::ablations {
 
 // Consistency, each ingredient and all of them; then joint-tangential, joint-mixed,
 // joint-distension, resection and retraction of the twin, "mannitol" (joint-sag in a brain or
-// hemisphere that shrinks by kLeastShrinkage to twice that) and "outliers" (joint-sag with gross
+// hemisphere that shrinks by kMinShrinkage to twice that) and "outliers" (joint-sag with gross
 // errors in kOutliers of boundary points and landmarks). Another code's truth belongs to another
 // mesh.
-inline constexpr double kLeastShrinkage = 0.02;
+inline constexpr double kMinShrinkage = 0.02;
 inline constexpr double kOutliers = 0.2;
 const std::vector<std::string>& truth_names();
 

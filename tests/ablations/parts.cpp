@@ -11,7 +11,7 @@ namespace {
 using evidence::Anew;
 using Change = std::function<void(CaseConfig&)>;
 
-constexpr double kLeastLength_mm = 1.0;  // the key's least value
+constexpr double kMinLength_mm = 1.0;  // the key's least value
 // Of parts that are off: their values before decision 0030.
 constexpr double kDensity_n_m3 = 1000.0, kDirectionSd_deg = 10.0;
 constexpr double kWeightSd = 1.0, kStressSd_pa = 300.0;
@@ -49,7 +49,7 @@ std::vector<Part> prior_parts() {
          [](CaseConfig& c) { c.prior.coarse_density_sd_n_m3 = 0.0; }),
       of("uncorrelated", {"prior.medium_length_mm", "prior.coarse_length_mm"},
          [](CaseConfig& c) {
-           c.prior.medium_length_mm = c.prior.coarse_length_mm = kLeastLength_mm;
+           c.prior.medium_length_mm = c.prior.coarse_length_mm = kMinLength_mm;
          }),
       of("low-rank", {"condensed.max_rank"},
          [](CaseConfig& c) { c.condensed.max_rank = kLowRank; }),

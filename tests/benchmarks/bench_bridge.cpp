@@ -57,9 +57,9 @@ using server::Bytes;
 
 constexpr int kUpdates = 200;
 constexpr int kWarmUp = 10;
-constexpr double kMostAdded = 0.5;  // of t_solve
+constexpr double kMaxAdded = 0.5;  // of t_solve
 // A run that grows by this much, first tenth to last, grows.
-constexpr double kMostGrowth_mib = 8.0;
+constexpr double kMaxGrowth_mib = 8.0;
 
 double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -282,10 +282,10 @@ bool steady_run(const std::shared_ptr<const BrainModel>& model, const std::vecto
     std::fflush(stdout);
   }
   const double growth_mib = rss.back() - rss.front();
-  const bool ok = growth_mib <= kMostGrowth_mib && p50.back() <= 1.5 * p50.front() + 2.0;
+  const bool ok = growth_mib <= kMaxGrowth_mib && p50.back() <= 1.5 * p50.front() + 2.0;
   std::printf(
       "%s  %.1f minutes at 10 Hz: memory %+.1f MiB (at most %+.0f), lag p50 %.2f to %.2f ms\n",
-      ok ? "ok  " : "FAIL", minutes, growth_mib, kMostGrowth_mib, p50.front(), p50.back());
+      ok ? "ok  " : "FAIL", minutes, growth_mib, kMaxGrowth_mib, p50.front(), p50.back());
   return ok;
 }
 
@@ -315,10 +315,10 @@ bool run(const std::string& case_file, double minutes) {
   bool ok = true;
   for (const double share : {50.0, 95.0}) {
     const double lag = percentile(bridge, share) / t_solve_ms;
-    const bool holds = lag <= kMostAdded;
+    const bool holds = lag <= kMaxAdded;
     ok = ok && holds;
     std::printf("%s  lag of the IMAGE after publishing, p%.0f: %.3f t_solve (at most %.1f)\n",
-                holds ? "ok  " : "FAIL", share, lag, kMostAdded);
+                holds ? "ok  " : "FAIL", share, lag, kMaxAdded);
   }
   if (minutes > 0.0) ok = steady_run(model, frames, minutes) && ok;
   return ok;

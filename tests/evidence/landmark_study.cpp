@@ -34,7 +34,7 @@ Status check_pairs(const Points& before, const Points& during) {
   return {};
 }
 
-constexpr Eigen::Index kLeastPairs = 5;
+constexpr Eigen::Index kMinPairs = 5;
 
 struct Pairs {
   Points before, during;  // 3 x n, mm
@@ -140,7 +140,7 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
                                                    const io::NamedPairs& pairs, double sd_mm) {
   const Pairs all{io::columns_of(pairs.first), io::columns_of(pairs.second)};
   const Eigen::Index count = all.before.cols();
-  if (count < kLeastPairs) {
+  if (count < kMinPairs) {
     return fail(ErrorCode::kInvalidArgument, "landmarks: " + std::to_string(count) +
                                                  " pairs; at least 5 are needed to leave one out");
   }

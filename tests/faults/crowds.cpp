@@ -24,8 +24,8 @@ using test_support::ZmtpPeer;
 
 constexpr int kHeld = 400;       // raw connections at a time
 constexpr double kIdle_s = 5.0;  // over which processor time is taken
-constexpr double kMostIdle_s = 0.25;
-constexpr double kMostWait_s = 2.0;
+constexpr double kMaxIdle_s = 0.25;
+constexpr double kMaxWait_s = 2.0;
 
 double idle_cpu_s(const DaemonProcess& daemon) {
   const double before = daemon.cpu_s();
@@ -67,10 +67,9 @@ void raw_connections(const Settings& settings, Tally& tally) {
   held.clear();
   tally.shown("raw connections", settings.count);
   tally.shown("of them refused by the kernel", refused);
-  tally.at_most("raw connections: slowest answer to a client s", slowest_s, kMostWait_s);
+  tally.at_most("raw connections: slowest answer to a client s", slowest_s, kMaxWait_s);
   tally.equals("raw connections: descriptors left behind", leaked(daemon, before), 0);
-  tally.cost_at_most("raw connections: processor time of 5 idle s", idle_cpu_s(daemon),
-                     kMostIdle_s);
+  tally.cost_at_most("raw connections: processor time of 5 idle s", idle_cpu_s(daemon), kMaxIdle_s);
 }
 
 // As many as the daemon serves clients. Each says one byte that is no message, and stays.
@@ -87,8 +86,8 @@ void bad_peers(const Settings& settings, Tally& tally) {
   }
   tally.shown("bad peers that stay", kPeers);
   tally.at_most("bad peers: slowest answer to a client s", slowest_answer_s(daemon.endpoint()),
-                kMostWait_s);
-  tally.cost_at_most("bad peers: processor time of 5 idle s", idle_cpu_s(daemon), kMostIdle_s);
+                kMaxWait_s);
+  tally.cost_at_most("bad peers: processor time of 5 idle s", idle_cpu_s(daemon), kMaxIdle_s);
   peers.clear();
   tally.equals("bad peers: descriptors left behind", leaked(daemon, before), 0);
 }
@@ -120,11 +119,11 @@ void few_descriptors(const Settings& settings, Tally& tally) {
   tally.shown("few descriptors: limit", kLimit);
   tally.shown("few descriptors: silent peers", kConnections);
   tally.shown("few descriptors: in use then", daemon.descriptors());
-  tally.at_most("few descriptors: slowest answer to a client s", waited_s, kMostWait_s);
+  tally.at_most("few descriptors: slowest answer to a client s", waited_s, kMaxWait_s);
   tally.cost_at_most("few descriptors: processor time while crowded % of a core", busy_pct,
-                     100.0 * kMostIdle_s / kIdle_s);
+                     100.0 * kMaxIdle_s / kIdle_s);
   bool records = false;
-  if (waited_s <= kMostWait_s) {
+  if (waited_s <= kMaxWait_s) {
     // The journal opens its files when a session starts.
     Opened opened = open_session(daemon.endpoint(), feed, false);
     const auto deadline = Clock::now() + seconds(2);

@@ -61,7 +61,7 @@ struct Answer {
 };
 using Method = std::function<Answer(const RigidTransform& T_start)>;
 
-constexpr double kMostTurn_deg = 8.0;
+constexpr double kMaxTurn_deg = 8.0;
 constexpr double kFullTurnFrom_mm = 5.0;
 constexpr double kTrusted = 0.5;
 
@@ -76,7 +76,7 @@ double target_error_mm(const RigidTransform& T, const TriangleSurface& tumour) {
 // proportion less below 5 mm) and a shift, both in random directions.
 RigidTransform random_start(double error_mm, const TriangleSurface& tumour, Random& random) {
   const Vec3 centre = tumour.vertices.rowwise().mean();
-  const double turn = kMostTurn_deg * std::numbers::pi / 180.0 * random.uniform() *
+  const double turn = kMaxTurn_deg * std::numbers::pi / 180.0 * random.uniform() *
                       std::min(1.0, error_mm / kFullTurnFrom_mm);
   Vec6 xi;
   xi << turn * random.direction(), Vec3::Zero();

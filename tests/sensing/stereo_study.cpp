@@ -221,7 +221,7 @@ void chessboards() {
 // because kFloor_px holds errors of real light, which rendered pictures have not, and because a
 // vertex averages a block's pixels. Below a third, the weight 1 / sd^2 of the surface would be ten
 // times too small.
-constexpr double kLeastOverSd = 1.0 / 3.0;
+constexpr double kMinOverSd = 1.0 / 3.0;
 
 void patch_at(double depth_mm) {
   using test_support::Eye;
@@ -256,8 +256,8 @@ void patch_at(double depth_mm) {
   record({kStudy, "rms error in depth", "distance mm", "error mm", depth_mm, rms});
   record({kStudy, "Z^2 / (f b) sd", "distance mm", "error mm", depth_mm, said});
   char bound[40];
-  std::snprintf(bound, sizeof bound, "%.3f to %.3f: 1/3 to 1 of its sd", kLeastOverSd * said, said);
-  check(where + "rms error in depth mm", rms, bound, rms <= said && rms >= kLeastOverSd * said,
+  std::snprintf(bound, sizeof bound, "%.3f to %.3f: 1/3 to 1 of its sd", kMinOverSd * said, said);
+  check(where + "rms error in depth mm", rms, bound, rms <= said && rms >= kMinOverSd * said,
         source);
   check(where + "points within twice their sd %", 100.0 * inside / n, ">= 95", inside >= 0.95 * n,
         source);

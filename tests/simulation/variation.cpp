@@ -91,16 +91,16 @@ std::optional<CaseConfig> draw(const CaseConfig& config, const Head& head, Rando
   CaseConfig patient = config;
   TumourEllipsoid tumour;
   for (double& axis : tumour.semi_axes_mm) {
-    axis = between(kLeastHalfAxis_mm, kMostHalfAxis_mm, random);
+    axis = between(kMinHalfAxis_mm, kMaxHalfAxis_mm, random);
   }
-  const double depth = between(kLeastDepth_mm, kMostDepth_mm, random);
+  const double depth = between(kMinDepth_mm, kMaxDepth_mm, random);
   tumour.centre_mm = place->centre + depth * beside(-place->normal, kApproach_deg, random);
   patient.tumour = tumour;
 
   Craniotomy& opening = patient.craniotomy;
   opening.centre_mm = place->centre;
-  opening.long_axis_mm = between(kLeastLongAxis_mm, kMostLongAxis_mm, random);
-  opening.short_axis_mm = between(kLeastShortAxis_mm, kMostShortAxis_mm, random);
+  opening.long_axis_mm = between(kMinLongAxis_mm, kMaxLongAxis_mm, random);
+  opening.short_axis_mm = between(kMinShortAxis_mm, kMaxShortAxis_mm, random);
   opening.long_axis_direction = place->normal.cross(random.direction()).normalized();
 
   patient.gravity_direction = beside(-place->normal, kUppermost_deg, random);
@@ -128,7 +128,7 @@ Scenario vary(const Scenario& scenario, std::uint64_t seed) {
   varied.stiffness_sd = kStiffnessSd;
   varied.stiffness_length_mm = kStiffnessLength_mm;
 
-  const double strength = between(kLeastSwelling, kMostSwelling, random);
+  const double strength = between(kMinSwelling, kMaxSwelling, random);
   const Vec3 towards = random.direction();
   const Vec3 offset = kSwellingOffset_mm * std::cbrt(random.uniform()) * towards;
   if (scenario.swelling.volume_strain != 0.0) {
@@ -138,11 +138,11 @@ Scenario vary(const Scenario& scenario, std::uint64_t seed) {
   const double shrinkage = scenario.largest_shrinkage * random.uniform();
   const bool one_hemisphere = random.uniform() < 0.5;
   if (shrinkage > 0.0) varied.volume = {-shrinkage, one_hemisphere};
-  const double fraction = between(kLeastResected, kMostResected, random);
+  const double fraction = between(kMinResected, kMaxResected, random);
   if (varied.resection) varied.resection->volume_fraction = fraction;
 
-  const double press = between(kLeastPress, kMostPress, random);
-  const double angle_deg = kMostAside_deg * random.uniform();
+  const double press = between(kMinPress, kMaxPress, random);
+  const double angle_deg = kMaxAside_deg * random.uniform();
   const Vec3 aside = random.direction();
   const Vec3 outwards = random.direction();
   const Vec3 middle = kSpatulaOffset_mm * std::cbrt(random.uniform()) * outwards;

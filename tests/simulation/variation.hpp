@@ -10,16 +10,16 @@
 //                     pose is read by eye. The scenario's own tilt stays.
 //   stiffness         ln G with standard deviation kStiffnessSd over kStiffnessLength_mm: grey and
 //                     white matter differ by some 30 %, and gyri are about that wide
-//   swelling          strength times kLeastSwelling to kMostSwelling: oedema that is resolving to
+//   swelling          strength times kMinSwelling to kMaxSwelling: oedema that is resolving to
 //                     somewhat more than the scenario's; its sign stays. Its centre moves by up to
 //                     kSwellingOffset_mm, uniform in a ball: oedema lies beside the tumour as often
 //                     as beneath it.
 //   shrinkage         where the scenario allows it (Scenario::largest_shrinkage): a volume strain
 //                     from 0 to that, of the whole brain or of the tumour's half with equal
 //                     probability
-//   retraction        pressure times kLeastPress to kMostPress; it draws aside in any direction at
-//                     an angle up to kMostAside_deg; its middle moves by up to kSpatulaOffset_mm
-//   resection         fraction of the tumour's volume from kLeastResected to kMostResected: the
+//   retraction        pressure times kMinPress to kMaxPress; it draws aside in any direction at
+//                     an angle up to kMaxAside_deg; its middle moves by up to kSpatulaOffset_mm
+//   resection         fraction of the tumour's volume from kMinResected to kMaxResected: the
 //                     superficial part goes first, and what is left at the ground is being decided
 //
 // Noise, the points that are measured and the pattern of the stiffness come from the seed of
@@ -40,11 +40,11 @@ namespace brainshift::client {
 inline constexpr double kFluidLevel_mm = 15.0;
 inline constexpr double kGravityTurn_deg = 6.0;
 inline constexpr double kStiffnessSd = 0.3, kStiffnessLength_mm = 20.0;
-inline constexpr double kLeastSwelling = 0.5, kMostSwelling = 1.3;
+inline constexpr double kMinSwelling = 0.5, kMaxSwelling = 1.3;
 inline constexpr double kSwellingOffset_mm = 15.0;
-inline constexpr double kLeastPress = 0.5, kMostPress = 1.3;
-inline constexpr double kMostAside_deg = 60.0, kSpatulaOffset_mm = 8.0;
-inline constexpr double kLeastResected = 0.6, kMostResected = 0.8;
+inline constexpr double kMinPress = 0.5, kMaxPress = 1.3;
+inline constexpr double kMaxAside_deg = 60.0, kSpatulaOffset_mm = 8.0;
+inline constexpr double kMinResected = 0.6, kMaxResected = 0.8;
 
 // The same seed gives the same variation. It promises no contact-free brain, whatever the scenario
 // promised.
@@ -65,8 +65,8 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
 //              kFreeWay_mm (no fissure, no sulcus), and kFromMidline_mm or more from the sagittal
 //              plane through the middle of the brain (the sinus lies there). Axes as below; the
 //              long axis in any direction.
-//   tumour     an ellipsoid with half axes from kLeastHalfAxis_mm to kMostHalfAxis_mm, whose
-//              centre lies kLeastDepth_mm to kMostDepth_mm along an approach up to kApproach_deg
+//   tumour     an ellipsoid with half axes from kMinHalfAxis_mm to kMaxHalfAxis_mm, whose
+//              centre lies kMinDepth_mm to kMaxDepth_mm along an approach up to kApproach_deg
 //              beside the surface's normal. All of its surface lies kMargin_mm or more inside the
 //              brain: more than elements of 8 mm cut off a head (0.5 mm) and than sulci that the
 //              mesh closes.
@@ -81,12 +81,12 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
 inline constexpr double kSkullBase = 0.4;
 inline constexpr double kFreeWay_mm = 20.0;
 inline constexpr double kFromMidline_mm = 12.0;
-inline constexpr double kLeastHalfAxis_mm = 8.0, kMostHalfAxis_mm = 20.0;
-inline constexpr double kLeastDepth_mm = 10.0, kMostDepth_mm = 35.0;
+inline constexpr double kMinHalfAxis_mm = 8.0, kMaxHalfAxis_mm = 20.0;
+inline constexpr double kMinDepth_mm = 10.0, kMaxDepth_mm = 35.0;
 inline constexpr double kApproach_deg = 20.0;
 inline constexpr double kMargin_mm = 3.0;
-inline constexpr double kLeastLongAxis_mm = 40.0, kMostLongAxis_mm = 60.0;
-inline constexpr double kLeastShortAxis_mm = 24.0, kMostShortAxis_mm = 40.0;
+inline constexpr double kMinLongAxis_mm = 40.0, kMaxLongAxis_mm = 60.0;
+inline constexpr double kMinShortAxis_mm = 24.0, kMaxShortAxis_mm = 40.0;
 inline constexpr double kUppermost_deg = 45.0;
 inline constexpr double kHeadDown_deg = 15.0;
 

@@ -11,7 +11,7 @@
 namespace brainshift::stability {
 namespace {
 
-constexpr int kMostSets = 400;
+constexpr int kMaxSets = 400;
 
 std::vector<int> members(const contact::ActiveSet& set) {
   std::vector<int> result;
@@ -194,7 +194,7 @@ std::optional<contact::ActiveSet> ReferencePosterior::find_set(
   contact::ActiveSet set(static_cast<std::size_t>(slaves), 0);
   std::set<contact::ActiveSet> visited;
   bool cycled = false;
-  for (int k = 0; k < kMostSets; ++k) {
+  for (int k = 0; k < kMaxSets; ++k) {
     const auto model = model_of(set);
     if (!model) return std::nullopt;
     const Eigen::LLT<MatrixR> factor(innovation(*model, psi));

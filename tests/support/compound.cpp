@@ -9,13 +9,13 @@
 namespace brainshift::test_support {
 namespace {
 
-constexpr double kMostVoxels = 1 << 30;
+constexpr double kMaxVoxels = 1 << 30;
 
 Status check_grid(const VolumeGrid& grid) {
   double voxels = 1.0;
   for (const int size : grid.dims) voxels *= std::max(size, 0);
   const bool positive = grid.spacing_mm.allFinite() && grid.spacing_mm.minCoeff() > 0.0;
-  if (voxels >= 1.0 && voxels <= kMostVoxels && positive) return {};
+  if (voxels >= 1.0 && voxels <= kMaxVoxels && positive) return {};
   return fail(ErrorCode::kInvalidArgument,
               fmt::format("volume of {} x {} x {} voxels with spacing {} {} {} mm: must have 1 to "
                           "2^30 voxels and a positive spacing",
@@ -122,7 +122,7 @@ Result<VolumeGrid> enclosing_grid(const tracking::Recording& recording, const Im
   grid.spacing_mm = spacing_mm;
   for (int axis = 0; axis < 3; ++axis) {
     const double steps = std::ceil(box.sizes()[axis] / spacing_mm[axis]);
-    const bool fits = steps >= 0.0 && steps < kMostVoxels;
+    const bool fits = steps >= 0.0 && steps < kMaxVoxels;
     grid.dims[static_cast<std::size_t>(axis)] = fits ? std::max(1, static_cast<int>(steps)) : 0;
   }
   if (Status ok = check_grid(grid); !ok) return tl::unexpected(ok.error());

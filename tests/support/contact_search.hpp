@@ -25,10 +25,10 @@ struct ContactSolution {
   double backward_error = 0.0;  // the largest of all solves
 };
 
-inline constexpr int kMostContactIterations = 40;
+inline constexpr int kMaxContactIterations = 40;
 
 // stiffness: K (lower), with its factor, dofs and contact; load: 3 x n, N.
-// Errors as StiffnessFactor and fem::checked_solve. At kMostContactIterations there is no error:
+// Errors as StiffnessFactor and fem::checked_solve. At kMaxContactIterations there is no error:
 // the result holds the last iterate, and `converged` is false.
 inline Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix& stiffness,
                                                   const fem::StiffnessFactor& factor,
@@ -38,7 +38,7 @@ inline Result<ContactSolution> solve_with_contact(const linalg::SymmetricMatrix&
   ContactSolution solution;
   solution.active.assign(static_cast<std::size_t>(contact.num_slaves()), 0);
   fem::StiffnessFactor penalised = factor.clone_analysis();
-  while (solution.iterations < kMostContactIterations && !solution.converged) {
+  while (solution.iterations < kMaxContactIterations && !solution.converged) {
     VecX unknowns;
     Result<linalg::SolveQuality> quality;
     if (contact::count(solution.active) == 0) {

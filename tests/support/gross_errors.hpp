@@ -8,8 +8,8 @@
 
 namespace brainshift::test_support {
 
-inline constexpr double kLeastGrossError_mm = 5.0;
-inline constexpr double kMostOfPoints_mm = 20.0, kMostOfDisplacements_mm = 10.0;
+inline constexpr double kMinGrossError_mm = 5.0;
+inline constexpr double kMaxOfPoints_mm = 20.0, kMaxOfDisplacements_mm = 10.0;
 
 // `fraction` of the boundary points or landmark pairs are off; other observations stay as they are.
 Observation with_gross_errors(Observation observation, double fraction, Random& random);

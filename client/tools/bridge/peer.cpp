@@ -17,12 +17,12 @@ std::string greeting() {
   return bytes;
 }
 
-// Reads what has come, kMostReadAtOnce at most. A message that is well framed and cannot be
+// Reads what has come, kMaxReadAtOnce at most. A message that is well framed and cannot be
 // understood is left out.
 Status read_messages(Socket& socket, igtl::StreamReader& reader, const Peer::Sink& sink,
                      const std::function<void(std::uint16_t version)>& see_version) {
   std::array<char, 64 * 1024> buffer;
-  for (std::size_t sum = 0; sum < Peer::kMostReadAtOnce;) {
+  for (std::size_t sum = 0; sum < Peer::kMaxReadAtOnce;) {
     const auto count = socket.read(buffer.data(), buffer.size());
     if (!count) return tl::unexpected(count.error());
     if (*count == 0) return {};

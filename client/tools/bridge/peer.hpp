@@ -35,7 +35,7 @@ class Peer {
   // Answers to requests that may wait; a peer that asks for more without reading is cut off.
   static constexpr std::size_t kMaxReplies = 16;
   // Taken with one look at the socket, so that no peer keeps the others waiting.
-  static constexpr std::size_t kMostReadAtOnce = 4u << 20;
+  static constexpr std::size_t kMaxReadAtOnce = 4u << 20;
 
   Peer(Socket socket, igtl::StreamLimits limits);
 

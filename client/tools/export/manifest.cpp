@@ -46,7 +46,7 @@ Json ratio_json(const VecX& ratios) {
   const auto count = [&](double bound) { return (ratios.array() <= bound).count(); };
   return {{"min", ratios.size() > 0 ? Json(ratios.minCoeff()) : Json()},
           {"max", ratios.size() > 0 ? Json(ratios.maxCoeff()) : Json()},
-          {"below_half", count(kLeastVolumeRatio)},
+          {"below_half", count(kMinVolumeRatio)},
           {"folded", count(0.0)},
           {"elements", ratios.size()}};
 }

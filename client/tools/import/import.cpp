@@ -26,7 +26,7 @@ constexpr double kFarthest_mm = 100.0;
 // Trackers stand metres away from what they track: a link that stays
 // nearer than this is suspicious.
 constexpr double kNearTracker_mm = 10.0;
-constexpr double kMostSd_mm = 20.0;
+constexpr double kMaxSd_mm = 20.0;
 
 Status check_import(const ImportOptions& options) {
   const auto one_of = [](bool first, bool second, const char* names) -> Status {
@@ -49,7 +49,7 @@ Status check_import(const ImportOptions& options) {
                 "--registration and --fiducials");
   }
   if (ok) ok = check_one_case(options.case_file, options.model);
-  if (ok) ok = range("--sd-mm", options.sd_mm, 0.01, kMostSd_mm);
+  if (ok) ok = range("--sd-mm", options.sd_mm, 0.01, kMaxSd_mm);
   if (ok) ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0);
   if (ok) ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
   if (ok) ok = range("--sweeps", options.sweep_gap_s, 0.0, 86400.0);

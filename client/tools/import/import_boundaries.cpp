@@ -12,34 +12,33 @@ namespace brainshift::client {
 namespace {
 
 // Ultrasound pixels are 0.02 to 0.5 mm wide.
-constexpr double kLeastPixel_mm = 0.005;
-constexpr double kMostPixel_mm = 2.0;
+constexpr double kMinPixel_mm = 0.005;
+constexpr double kMaxPixel_mm = 2.0;
 // A lesion's boundary; a head is 250 mm long.
-constexpr double kLeastExtent_mm = 1.0;
-constexpr double kMostExtent_mm = 300.0;
+constexpr double kMinExtent_mm = 1.0;
+constexpr double kMaxExtent_mm = 300.0;
 
 Status check_pixel(const AffineTransform& T, int frame) {
   for (int axis = 0; axis < 2; ++axis) {
     const double width_mm = T.linear().col(axis).norm();
-    if (width_mm >= kLeastPixel_mm && width_mm <= kMostPixel_mm) continue;
+    if (width_mm >= kMinPixel_mm && width_mm <= kMaxPixel_mm) continue;
     return fail(
         ErrorCode::kInvalidArgument,
         fmt::format("a pixel of frame {} is {:.3g} mm {}: must be {} to {} mm; is a transform "
                     "in metres or the calibration missing?",
-                    frame, width_mm, axis == 0 ? "wide" : "high", kLeastPixel_mm, kMostPixel_mm));
+                    frame, width_mm, axis == 0 ? "wide" : "high", kMinPixel_mm, kMaxPixel_mm));
   }
   return {};
 }
 
 Status check_extent(const SweepBoundary& sweep) {
   const Vec3 size = sweep.points.rowwise().maxCoeff() - sweep.points.rowwise().minCoeff();
-  if (size.norm() >= kLeastExtent_mm && size.norm() <= kMostExtent_mm) return {};
+  if (size.norm() >= kMinExtent_mm && size.norm() <= kMaxExtent_mm) return {};
   return fail(
       ErrorCode::kInvalidArgument,
       fmt::format("the boundary of frames {} to {} spans {:.3g} mm: must be {} to {} mm; are "
                   "tracked transforms or contours in another unit?",
-                  sweep.first_frame, sweep.last_frame, size.norm(), kLeastExtent_mm,
-                  kMostExtent_mm));
+                  sweep.first_frame, sweep.last_frame, size.norm(), kMinExtent_mm, kMaxExtent_mm));
 }
 
 std::string summary(const std::vector<tracking::Dropped>& dropped) {

@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLeastPairs = 3;  // as the daemon needs
-constexpr double kLeastSd_mm = 0.01, kMostLandmarkSd_mm = 20.0;
+constexpr std::size_t kMinPairs = 3;  // as the daemon needs
+constexpr double kMinSd_mm = 0.01, kMaxLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
   if (options.landmarks.empty()) {
@@ -27,10 +27,10 @@ Status check_landmark_import(const LandmarkOptions& options) {
   }
   if (options.out.empty()) return fail(ErrorCode::kInvalidArgument, "--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
-  if (!(options.sd_mm >= kLeastSd_mm && options.sd_mm <= kMostLandmarkSd_mm)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("--sd-mm {}: must be {} to {}", options.sd_mm, kLeastSd_mm,
-                            kMostLandmarkSd_mm));
+  if (!(options.sd_mm >= kMinSd_mm && options.sd_mm <= kMaxLandmarkSd_mm)) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("--sd-mm {}: must be {} to {}", options.sd_mm, kMinSd_mm, kMaxLandmarkSd_mm));
   }
   return check_new(options.out);
 }
@@ -129,10 +129,10 @@ Result<LandmarkReport> import_landmarks(const LandmarkOptions& options, const Pr
   };
   LandmarkReport report;
   report.left_out = pairs->left_out;
-  if (pairs->names.size() < kLeastPairs) {
+  if (pairs->names.size() < kMinPairs) {
     return failed(
-        {ErrorCode::kInvalidArgument, fmt::format("{} landmark pairs: at least {} are needed",
-                                                  pairs->names.size(), kLeastPairs)});
+        {ErrorCode::kInvalidArgument,
+         fmt::format("{} landmark pairs: at least {} are needed", pairs->names.size(), kMinPairs)});
   }
   if (Status ok = measure_motion(*pairs, report); !ok) return failed(ok.error());
   split_off_rigid_part(*pairs, report);

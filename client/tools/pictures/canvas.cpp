@@ -259,11 +259,11 @@ std::string log_tick_label(double value) {
 
 void draw_gravity_arrow(cv::Mat& image, cv::Point2d along) {
   constexpr double kHalf_px = 44.0;
-  constexpr double kLeastSeen = 0.1;
+  constexpr double kMinSeen = 0.1;
   const TextStyle style = on_picture(18.0);
   const cv::Point2d centre(86.0, 100.0);
   draw_text(image, {static_cast<int>(centre.x), 34}, "gravity", style);
-  if (cv::norm(along) < kLeastSeen) {
+  if (cv::norm(along) < kMinSeen) {
     draw_text(image, {static_cast<int>(centre.x), 66}, "along view", style);
     return;
   }

@@ -87,7 +87,7 @@ void add_contact_rows(Table& table) {
 }
 
 // At most this many hypotheses of a run are shown; the report holds all.
-constexpr std::size_t kMostHypotheses = 3;
+constexpr std::size_t kMaxHypotheses = 3;
 
 std::string badge(const std::string& verdict) {
   const char* sign = "?";
@@ -177,7 +177,7 @@ std::string hypothesis_text(const WeightedStrengths& hypothesis) {
 
 std::string hypotheses_text(const RunReport& run) {
   std::string text;
-  for (std::size_t i = 0; i < std::min(kMostHypotheses, run.hypotheses.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kMaxHypotheses, run.hypotheses.size()); ++i) {
     text += (i == 0 ? "" : "<br>") + hypothesis_text(run.hypotheses[i]);
   }
   return text.empty() ? kNothing : text;

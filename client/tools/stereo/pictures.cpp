@@ -47,18 +47,18 @@ constexpr int kPanelWidth = 900, kMargin = 60, kTop = 110, kBottom = 80, kBarRoo
 // The scale leaves out this fraction at either end, so that a few strays do not flatten the rest.
 constexpr double kTail = 0.01;
 // A colour bar needs some width even where everything is equally far.
-constexpr double kLeastSpan = 1.0;
+constexpr double kMinSpan = 1.0;
 
 ColourScale scale_of(const stereo::PixelMap<float>& disparity) {
   std::vector<float> values;
   for (const float d : disparity.pixels)
     if (!std::isnan(d)) values.push_back(d);
-  if (values.empty()) return {0.0, kLeastSpan};
+  if (values.empty()) return {0.0, kMinSpan};
   std::sort(values.begin(), values.end());
   const auto tail = static_cast<std::size_t>(kTail * static_cast<double>(values.size()));
   const auto low = static_cast<double>(values[tail]);
   const auto high = static_cast<double>(values[values.size() - 1 - tail]);
-  return {low, std::max(high, low + kLeastSpan)};
+  return {low, std::max(high, low + kMinSpan)};
 }
 
 cv::Mat grey_panel(const stereo::GrayImage& picture) {

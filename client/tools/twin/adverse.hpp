@@ -5,7 +5,7 @@
 // from the estimate's own mesh, element, gap and material.
 //
 //   mesh          another mesh of the same head, with quadratic elements (other_mesh.hpp)
-//   gap           between brain and skull, from kLeastGap_mm to kMostGap_mm, uniform there, varying
+//   gap           between brain and skull, from kMinGap_mm to kMaxGap_mm, uniform there, varying
 //                 over kGapLength_mm (truth.hpp); the estimate believes the case's
 //   penalty       of contact, kPenaltyFactor times the case's, or that part of it
 //   stiffness     of tumour, grey and white matter and ventricles, and within them at several
@@ -58,7 +58,7 @@ struct IngredientInfo {
 };
 const std::vector<IngredientInfo>& all_ingredients();
 
-inline constexpr double kLeastGap_mm = 0.5, kMostGap_mm = 4.0, kGapLength_mm = 30.0;
+inline constexpr double kMinGap_mm = 0.5, kMaxGap_mm = 4.0, kGapLength_mm = 30.0;
 inline constexpr double kPenaltyFactor = 10.0;
 inline constexpr double kLevel_mm = 10.0;
 inline constexpr double kGravity_deg = 10.0;

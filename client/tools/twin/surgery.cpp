@@ -172,7 +172,7 @@ Status solve_moment(const TruthBrain& brain, TruthSource& solver, const Scenario
                     const Points& load, Moment& moment) {
   constexpr int kSteps = 20;
   constexpr double kClose = 0.005;  // relative
-  constexpr double kLeastSlope = 0.25, kMostSlope = 1.5;
+  constexpr double kMinSlope = 0.25, kMaxSlope = 1.5;
   double slope = 1.0, last_scale = 0.0, last_moved = 0.0;
   for (int step = 0; step < kSteps; ++step) {
     auto truth = solver.solve(moment.load_scale * load);
@@ -187,7 +187,7 @@ Status solve_moment(const TruthBrain& brain, TruthSource& solver, const Scenario
     if (!std::isfinite(ratio)) break;
     if (step > 0) {
       slope = std::log(moved / last_moved) / std::log(moment.load_scale / last_scale);
-      slope = std::clamp(slope, kLeastSlope, kMostSlope);
+      slope = std::clamp(slope, kMinSlope, kMaxSlope);
     }
     last_scale = moment.load_scale;
     last_moved = moved;

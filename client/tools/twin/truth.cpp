@@ -59,7 +59,7 @@ void set_gaps(std::uint64_t seed, const Points& nodes, std::vector<contact::Cont
   const GaussianField field(kGapLength_mm, seed);
   for (contact::ContactPair& pair : pairs) {
     const double part = normal_cdf(field.at(nodes.col(pair.slave)));
-    pair.initial_penetration_mm = -(kLeastGap_mm + (kMostGap_mm - kLeastGap_mm) * part);
+    pair.initial_penetration_mm = -(kMinGap_mm + (kMaxGap_mm - kMinGap_mm) * part);
   }
 }
 

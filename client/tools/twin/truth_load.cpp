@@ -131,7 +131,7 @@ Status check_gravity(const TruthBrain& brain, const Scenario& scenario) {
   if (scenario.gravity_tilt_deg != 0.0) {
     const double turned = angle_deg(tilted_gravity(brain.model, scenario.gravity_tilt_deg),
                                     brain.model.gravity_direction);
-    if (turned < kLeastTilt_deg) {
+    if (turned < kMinTilt_deg) {
       return fail(ErrorCode::kInvalidArgument,
                   fmt::format("scenario {} does nothing on this case: gravity lies along the axis "
                               "from the tumour to the craniotomy, so that {:g} degrees about it "

@@ -30,7 +30,7 @@ Points displacement_of_tumour(const TruthBrain& brain, const Points& u);
 // say that it does no harm.
 //
 // Gravity below this angle beside its known direction counts as unturned.
-inline constexpr double kLeastTilt_deg = 1.0;
+inline constexpr double kMinTilt_deg = 1.0;
 
 // Before a surgery. kInvalidArgument: a tilt about an axis that gravity lies along; a fluid level
 // or a direction of gravity that changes no weight, because no tissue lies between the planes or

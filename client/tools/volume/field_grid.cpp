@@ -9,9 +9,9 @@
 namespace brainshift::client {
 namespace {
 
-constexpr double kMostMargin_mm = 1000.0;
-constexpr double kLeastSpacing_mm = 0.1;
-constexpr double kMostSpacing_mm = 100.0;
+constexpr double kMaxMargin_mm = 1000.0;
+constexpr double kMinSpacing_mm = 0.1;
+constexpr double kMaxSpacing_mm = 100.0;
 // A box that is a whole number of voxels wide is not one voxel wider for its rounding errors.
 constexpr double kRounding = 1e-9;
 
@@ -50,8 +50,8 @@ Status validate(const FieldGrid& grid) {
 Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spacing_mm) {
   if (points.cols() == 0) return fail(ErrorCode::kEmptySet, "grid: there is no point to hold");
   if (!points.allFinite()) return fail(ErrorCode::kNotFinite, "grid: a point is not finite");
-  Status ok = check_range("grid margin in mm", margin_mm, 0.0, kMostMargin_mm);
-  if (ok) ok = check_range("grid spacing in mm", spacing_mm, kLeastSpacing_mm, kMostSpacing_mm);
+  Status ok = check_range("grid margin in mm", margin_mm, 0.0, kMaxMargin_mm);
+  if (ok) ok = check_range("grid spacing in mm", spacing_mm, kMinSpacing_mm, kMaxSpacing_mm);
   if (!ok) return tl::unexpected(ok.error());
   const Vec3 low = points.rowwise().minCoeff().array() - margin_mm;
   const Vec3 high = points.rowwise().maxCoeff().array() + margin_mm;

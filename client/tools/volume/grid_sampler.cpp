@@ -12,7 +12,7 @@
 namespace brainshift::client {
 namespace {
 
-constexpr double kMostFade_mm = 1000.0;
+constexpr double kMaxFade_mm = 1000.0;
 
 // 0 in the rim, 1 from fade_mm inwards. With fade_mm 0 every voxel inside the rim has 1.
 double fade_factor(double rim_distance_mm, double fade_mm) {
@@ -66,10 +66,10 @@ Result<GridSampler> GridSampler::build(const geometry::TetLocator& mesh, const F
                                        const SamplerOptions& options) {
   if (auto ok = validate(grid); !ok) return tl::unexpected(ok.error());
   if (auto ok = validate(options.taper); !ok) return tl::unexpected(ok.error());
-  if (!(options.fade_mm >= 0.0 && options.fade_mm <= kMostFade_mm)) {
+  if (!(options.fade_mm >= 0.0 && options.fade_mm <= kMaxFade_mm)) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("fade before the rim = {} mm: must be in [0, {}]", options.fade_mm,
-                            kMostFade_mm));
+                            kMaxFade_mm));
   }
   if (mesh.tets().cols() == 0) return fail(ErrorCode::kEmptySet, "mesh: it has no tetrahedron");
   GridSampler sampler;

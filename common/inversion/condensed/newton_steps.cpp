@@ -11,14 +11,14 @@ constexpr int kMaxIterations = 20000;
 constexpr double kTolerance = 1e-6;
 
 // Of |s| |y|.
-constexpr double kLeastCurvature = 1e-8;
+constexpr double kMinCurvature = 1e-8;
 
 }  // namespace
 
-NewtonBundle::NewtonBundle(Eigen::Index size) : steps_(size, kMost), step_(size) {}
+NewtonBundle::NewtonBundle(Eigen::Index size) : steps_(size, kMax), step_(size) {}
 
 void NewtonBundle::add(const VecX& newton_step, double gap) {
-  if (count_ == kMost) {  // the piece that counts least makes room
+  if (count_ == kMax) {  // the piece that counts least makes room
     int least = 0;
     for (int i = 1; i < count_; ++i) {
       if (weights_[i] < weights_[least] ||
@@ -98,7 +98,7 @@ QuasiNewton::QuasiNewton(Eigen::Index size)
 // M + (1 + y M y / s y) s s^T / s y - (M y s^T + s y^T M) / s y
 bool QuasiNewton::learn(const VecX& step, const VecX& change_of_gradient) {
   const double curvature = step.dot(change_of_gradient);
-  if (!(curvature > kLeastCurvature * step.norm() * change_of_gradient.norm())) return false;
+  if (!(curvature > kMinCurvature * step.norm() * change_of_gradient.norm())) return false;
   apply(change_of_gradient, product_);
   const double scale = (1.0 + change_of_gradient.dot(product_) / curvature) / curvature;
   const Eigen::Index size = step.size();

@@ -21,7 +21,7 @@ namespace brainshift::inversion {
 
 class NewtonBundle {
  public:
-  static constexpr int kMost = 24;
+  static constexpr int kMax = 24;
 
   // size: of a step.
   explicit NewtonBundle(Eigen::Index size);
@@ -45,9 +45,9 @@ class NewtonBundle {
   void add(const VecX& newton_step, double gap);
 
   int count_ = 0;
-  Eigen::MatrixXd steps_;                         // size x kMost
-  Eigen::Matrix<double, kMost, kMost> products_;  // s_i . s_j
-  Eigen::Matrix<double, kMost, 1> gaps_, weights_, slopes_;
+  Eigen::MatrixXd steps_;                       // size x kMax
+  Eigen::Matrix<double, kMax, kMax> products_;  // s_i . s_j
+  Eigen::Matrix<double, kMax, 1> gaps_, weights_, slopes_;
   VecX step_;
   double fall_ = 0.0;
 };

@@ -28,8 +28,8 @@ Status check_spread(const Points& positions) {
 
 // Neighbours that would have to tear apart. All pairs are compared, of a subset beyond 2000 data.
 Status check_agreement(const SparseData& data) {
-  constexpr int kMostCompared = 2000;
-  const int step = 1 + (data.size() - 1) / kMostCompared;
+  constexpr int kMaxCompared = 2000;
+  const int step = 1 + (data.size() - 1) / kMaxCompared;
   for (int i = 0; i < data.size(); i += step) {
     if (data.along_direction(i)) continue;
     for (int j = i + step; j < data.size(); j += step) {

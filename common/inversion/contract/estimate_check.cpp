@@ -121,13 +121,13 @@ void judge_algorithm(const Estimate& estimate, Judge& judge) {
   if (estimate.status == EstimateStatus::kDeadline) judge.set(QualityFlag::kDeadline);
   if (estimate.status == EstimateStatus::kIterationLimit) judge.set(QualityFlag::kIterationLimit);
   const ContactSummary& contact = estimate.contact;
-  if (contact.decrement > kMostContactDecrement ||
-      contact.max_violation_mm > kMostContactViolation_mm) {
+  if (contact.decrement > kMaxContactDecrement ||
+      contact.max_violation_mm > kMaxContactViolation_mm) {
     judge.set(QualityFlag::kContactNotCertified,
               "decrement %.2g, at most %g; violation %.2g mm, "
               "at most %g mm",
-              contact.decrement, kMostContactDecrement, contact.max_violation_mm,
-              kMostContactViolation_mm);
+              contact.decrement, kMaxContactDecrement, contact.max_violation_mm,
+              kMaxContactViolation_mm);
   }
 }
 
@@ -156,17 +156,17 @@ void judge_field(const Estimate& estimate, Judge& judge) {
   if (estimate.inverted_elements > 0) {
     judge.set(QualityFlag::kInvertedElements, "%d, smallest volume ratio %.2g",
               estimate.inverted_elements, estimate.min_volume_ratio);
-  } else if (estimate.min_nodal_volume_ratio < kLeastVolumeRatio) {
+  } else if (estimate.min_nodal_volume_ratio < kMinVolumeRatio) {
     judge.set(QualityFlag::kVolumeLost, "smallest volume ratio about a node %.2g, at least %g",
-              estimate.min_nodal_volume_ratio, kLeastVolumeRatio);
+              estimate.min_nodal_volume_ratio, kMinVolumeRatio);
   }
   const Points& u = estimate.displacement;
   const double motion_mm = u.cols() > 0 ? std::sqrt(u.colwise().squaredNorm().maxCoeff()) : 0.0;
   const double depth_mm = estimate.contact.max_penetration_mm;
-  if (motion_mm > kMostMotion_mm || depth_mm > kDeepestInSkull_mm) {
+  if (motion_mm > kMaxMotion_mm || depth_mm > kDeepestInSkull_mm) {
     judge.set(QualityFlag::kBeyondSkull,
               "motion %.3g mm, at most %g mm; %.2g mm deep in the skull, at most %g mm", motion_mm,
-              kMostMotion_mm, depth_mm, kDeepestInSkull_mm);
+              kMaxMotion_mm, depth_mm, kDeepestInSkull_mm);
   }
 }
 

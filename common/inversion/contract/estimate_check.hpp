@@ -76,7 +76,7 @@ Status check_estimate(const TetMesh& mesh, const Material& material, Estimate& e
 // "not computed". A number that is infinite, or NaN elsewhere, sets kNotFinite. Motion beyond the
 // skull is measured in two ways:
 //
-//   motion   max_i |u_i| over all nodes                       above kMostMotion_mm
+//   motion   max_i |u_i| over all nodes                       above kMaxMotion_mm
 //   depth    contact.max_penetration_mm, over the slaves      above kDeepestInSkull_mm
 //
 // An element that is inverted sets kInvertedElements and not kVolumeLost. min_nodal_volume_ratio

@@ -37,7 +37,7 @@ constexpr double kSlaveWeight = 0.1;
 constexpr int kVarianceNodes = 128;
 // A control node with less weight in the interpolation at a node has no say there. At a control
 // node its own weight is all but 1.
-constexpr float kLeastControlWeight = 1e-4F;
+constexpr float kMinControlWeight = 1e-4F;
 constexpr std::uint64_t kSeed = 20091115;  // any fixed number
 
 // Omega: normally distributed near the data and, weaker, along the slaves' normals. 0 at all other
@@ -271,7 +271,7 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
   result.truncated_variance_mm2.setZero(control.cols(), kRemainders);
   for (Eigen::Index i = 0; i < control.cols(); ++i) {
     for (int k = 0; k < 4; ++k) {
-      if (to_control.weights(k, i) < kLeastControlWeight) continue;
+      if (to_control.weights(k, i) < kMinControlWeight) continue;
       const auto neighbour = left_out.row(to_control.neighbours(k, i));
       result.truncated_variance_mm2.row(i) =
           result.truncated_variance_mm2.row(i).cwiseMax(neighbour);
@@ -294,14 +294,14 @@ double largest_motion_sd_mm(const MatrixXf& modes) {
 
 // Against a prior in other units, or with every part switched off.
 Status check_motion(const MatrixXf& modes) {
-  constexpr double kMost_mm = 10.0 * kMostMotion_mm;
+  constexpr double kMax_mm = 10.0 * kMaxMotion_mm;
   const double sd_mm = largest_motion_sd_mm(modes);
-  if (sd_mm > 0.0 && sd_mm <= kMost_mm) return {};
+  if (sd_mm > 0.0 && sd_mm <= kMax_mm) return {};
   char text[160];
   std::snprintf(text, sizeof text,
                 "prior: it allows a node to move by %.3g mm (standard deviation); above 0 and at "
                 "most %g mm, ten times what a skull allows",
-                sd_mm, kMost_mm);
+                sd_mm, kMax_mm);
   return fail(ErrorCode::kInvalidArgument, text);
 }
 

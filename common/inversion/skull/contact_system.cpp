@@ -187,7 +187,7 @@ Status ContactSystem::take(const contact::ActiveSet& set) {
   if (set == set_) return {};
   set_ = set;
   list_active(set, active_);
-  by_released_ = size() > kMost * operators_.num_slaves();
+  by_released_ = size() > kMax * operators_.num_slaves();
   if (by_released_ ? released_.take(set) : pressing_.take(set)) return {};
   const std::string slaves = std::to_string(size());
   set_.clear();

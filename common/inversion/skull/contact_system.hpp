@@ -83,7 +83,7 @@ class ReleasedSlaves {
 class ContactSystem {
  public:
   // From this part of all slaves on, a set is solved for by those that it releases.
-  static constexpr double kMost = 0.6;
+  static constexpr double kMax = 0.6;
 
   // Keeps references to operators and team. beta: penalty, N/mm.
   ContactSystem(const CondensedOperators& operators, ModeWindow window, double beta,

@@ -31,12 +31,12 @@ PrincipalFactor::PrincipalFactor(const double* matrix, int size, double shift, T
       row_in_base_(static_cast<std::size_t>(size), -1),
       row_in_set_(static_cast<std::size_t>(size), -1),
       factor_(new double[static_cast<std::size_t>(size) * static_cast<std::size_t>(size)]),
-      cache_(new double[static_cast<std::size_t>(size) * kMostChanges]),
-      columns_(new double[static_cast<std::size_t>(size) * kMostChanges]),
-      schur_(kMostChanges, kMostChanges) {
+      cache_(new double[static_cast<std::size_t>(size) * kMaxChanges]),
+      columns_(new double[static_cast<std::size_t>(size) * kMaxChanges]),
+      schur_(kMaxChanges, kMaxChanges) {
   const auto all = static_cast<std::size_t>(size);
   for (std::vector<int>* each : {&active_, &base_, &changed_}) each->reserve(all);
-  cached_.reserve(kMostChanges);
+  cached_.reserve(kMaxChanges);
   set_.reserve(all);
 }
 
@@ -109,7 +109,7 @@ bool PrincipalFactor::gather_columns() {
   const std::size_t before = cached_.size();
   for (const int member : changed_) {
     if (std::find(cached_.begin(), cached_.end(), member) != cached_.end()) continue;
-    if (cached_.size() == kMostChanges) return false;
+    if (cached_.size() == kMaxChanges) return false;
     double* made = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * total_;
     const int own_row = row_in_base_[static_cast<std::size_t>(member)];
     if (own_row < 0) {

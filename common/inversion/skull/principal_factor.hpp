@@ -38,7 +38,7 @@ inline void gather(const double* from, const std::vector<int>& set, double* out)
 
 class PrincipalFactor {
  public:
-  static constexpr int kMostChanges = 128;  // columns of V
+  static constexpr int kMaxChanges = 128;  // columns of V
 
   // matrix: M, column-major, both triangles; kept as a pointer and read by take() alone. Keeps a
   // reference to the team that shares the work.
@@ -57,7 +57,7 @@ class PrincipalFactor {
   // threads may solve at once, each with a work of its own.
   void solve(linalg::blas::Out<double> b, linalg::blas::Out<double> work) const;
   Eigen::Index work_rows() const { return base_size() + changes(); }
-  static Eigen::Index most_work_rows(int size) { return size + kMostChanges; }
+  static Eigen::Index most_work_rows(int size) { return size + kMaxChanges; }
 
  private:
   using Column = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;

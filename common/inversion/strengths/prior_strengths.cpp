@@ -12,11 +12,11 @@ namespace blas = linalg::blas;
 
 constexpr int kMaxSteps = 60;
 // Of ln p, which is known to about 1e-7.
-constexpr double kLeastGain = 1e-6;
+constexpr double kMinGain = 1e-6;
 // A hypothesis of less weight than this changes nothing that anyone sees; of the others, so many
 // are kept.
-constexpr double kLeastWeight = 0.01;
-constexpr std::size_t kMostHypotheses = 20;
+constexpr double kMinWeight = 0.01;
+constexpr std::size_t kMaxHypotheses = 20;
 // Makes the covariance of absent parts, which is zero, positive definite.
 constexpr double kJitter = 1e-12;
 
@@ -71,8 +71,8 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
   for (std::size_t part = 0; part < count_.size(); ++part) {
     part_of_mode_.insert(part_of_mode_.end(), static_cast<std::size_t>(count_[part]), part);
   }
-  hypotheses_.reserve(kMostHypotheses);
-  done_.reserve(kMostHypotheses);
+  hypotheses_.reserve(kMaxHypotheses);
+  done_.reserve(kMaxHypotheses);
   candidates_.reserve((1 + kPriorParts) * kPriorParts * kStrengths.size());
   reset();
 }
@@ -141,7 +141,7 @@ bool PriorStrengths::ascend(PriorScaleValues& scales, Projection& projection,
       best_part = part;
       best_strength = static_cast<std::size_t>(best - log_p[part].begin());
     }
-    if (gain <= kLeastGain) return true;
+    if (gain <= kMinGain) return true;
     scales[best_part] = kStrengths[best_strength];
   }
   return true;
@@ -238,7 +238,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
   });
   hypotheses_.assign(1, {best, 1.0});
   for (const Hypothesis& each : candidates_) {
-    if (hypotheses_.size() >= kMostHypotheses) break;
+    if (hypotheses_.size() >= kMaxHypotheses) break;
     // The same pair of changes may come in either order.
     const bool known =
         std::any_of(hypotheses_.begin(), hypotheses_.end(),
@@ -251,7 +251,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
     return total;
   };
   const double all = sum();
-  while (hypotheses_.size() > 1 && hypotheses_.back().weight < kLeastWeight * all) {
+  while (hypotheses_.size() > 1 && hypotheses_.back().weight < kMinWeight * all) {
     hypotheses_.pop_back();
   }
   const double kept = sum();
@@ -259,7 +259,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
 }
 
 bool PriorStrengths::climb() {
-  for (int step = 0; step < kMaxSteps && gain() > kLeastGain; ++step) {
+  for (int step = 0; step < kMaxSteps && gain() > kMinGain; ++step) {
     PriorScaleValues next = candidates_.front().scales;
     if (!ascend(next, projections_.front(), works_.front()) || !weigh(next)) return false;
   }

@@ -9,7 +9,7 @@
 namespace brainshift::io {
 namespace {
 
-constexpr double kMostCosine = 1e-4;
+constexpr double kMaxCosine = 1e-4;
 constexpr std::size_t kLongestNote = 56;
 
 Status check_values(const VoxelGrid& grid, const std::vector<float>& values,
@@ -60,7 +60,7 @@ Status validate(const VoxelGrid& grid) {
   for (int a = 0; a < 3; ++a) {
     for (int b = a + 1; b < 3; ++b) {
       const double cosine = std::abs(directions.col(a).dot(directions.col(b)));
-      if (cosine <= kMostCosine) continue;
+      if (cosine <= kMaxCosine) continue;
       return invalid(
           fmt::format("affine of the grid: voxel axes {} and {} are {:.3g} degrees off a right "
                       "angle: ITK's "

@@ -69,7 +69,7 @@ struct Free {
 constexpr double kLargestExpansion = 1040.0;
 constexpr std::size_t kNifti1Bytes = 348;
 constexpr std::size_t kNifti2Bytes = 540;
-constexpr int kMostVoxelsAlong = 32767;
+constexpr int kMaxVoxelsAlong = 32767;
 
 // Byte offsets of nifti1.h and nifti2.h.
 struct Layout {
@@ -150,9 +150,9 @@ std::string check_dimensions(const PackedHeader& header) {
     if (dimensions < 3 || dimensions > 7 || header.dim[axis] < 1) {
       return fmt::format("is not a 3-D image ({} dimensions)", dimensions);
     }
-    if (header.dim[axis] > kMostVoxelsAlong) {
+    if (header.dim[axis] > kMaxVoxelsAlong) {
       return fmt::format("dimension {} has {} voxels: must be at most {}", axis, header.dim[axis],
-                         kMostVoxelsAlong);
+                         kMaxVoxelsAlong);
     }
   }
   for (std::size_t axis = 4; axis <= static_cast<std::size_t>(dimensions); ++axis) {
@@ -172,13 +172,12 @@ std::string check_datatype(const PackedHeader& header) {
 
 std::string check_offset(const PackedHeader& header) {
   // libnifti keeps it as an int.
-  constexpr double kMost = std::numeric_limits<int>::max();
+  constexpr double kMax = std::numeric_limits<int>::max();
   const double least = header.single_file ? static_cast<double>(header.bytes) : 0.0;
   const double offset = header.vox_offset;
   const bool whole = offset == std::floor(offset);  // false for NaN
-  if (offset == 0.0 || (whole && offset >= least && offset <= kMost)) return {};
-  return fmt::format("vox_offset is {}: must be a whole number, {} to {:.0f}", offset, least,
-                     kMost);
+  if (offset == 0.0 || (whole && offset >= least && offset <= kMax)) return {};
+  return fmt::format("vox_offset is {}: must be a whole number, {} to {:.0f}", offset, least, kMax);
 }
 
 // Bytes that a regular file can hold at most once unpacked: its size, or for a .gz file what

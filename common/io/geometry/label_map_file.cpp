@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kMostLabelsAlong = 32767;  // as NIfTI's
-constexpr int kMostSegments = 10000;
+constexpr std::int64_t kMaxLabelsAlong = 32767;  // as NIfTI's
+constexpr int kMaxSegments = 10000;
 
 struct Segment {
   std::string name;
@@ -161,9 +161,9 @@ Result<Axes> read_space(const NrrdHeader& header, VoxelImage& image) {
 Status read_dims(const NrrdHeader& header, const Axes& axes, VoxelImage& image) {
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t size = header.sizes[axes.space[i]];
-    if (size < 1 || size > kMostLabelsAlong) {
+    if (size < 1 || size > kMaxLabelsAlong) {
       return unreadable(fmt::format("sizes = {}: must be 1 to {} voxels along each axis",
-                                    header.field("sizes"), kMostLabelsAlong));
+                                    header.field("sizes"), kMaxLabelsAlong));
     }
     image.dims[i] = static_cast<int>(size);
   }
@@ -185,7 +185,7 @@ Result<int> whole_number(const NrrdHeader& header, const std::string& key, int o
 // Segments are numbered from 0 without gaps; a file without segments is a plain label map.
 Result<std::vector<Segment>> read_segments(const NrrdHeader& header, const Axes& axes) {
   std::vector<Segment> segments;
-  for (int i = 0; i < kMostSegments; ++i) {
+  for (int i = 0; i < kMaxSegments; ++i) {
     const std::string prefix = fmt::format("Segment{}_", i);
     const auto first = header.fields.lower_bound(prefix);
     if (first == header.fields.end() || !first->first.starts_with(prefix)) break;

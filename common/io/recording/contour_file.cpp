@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kMostFrames = 1'000'000;
+constexpr int kMaxFrames = 1'000'000;
 
 struct Row {
   int line = 0;
@@ -31,7 +31,7 @@ bool parse_row(std::string_view text, Row& row) {
       !parse_number(cells[1], row.at_px.x()) || !parse_number(cells[2], row.at_px.y())) {
     return false;
   }
-  if (frame < 0.0 || frame > kMostFrames || frame != std::floor(frame)) return false;
+  if (frame < 0.0 || frame > kMaxFrames || frame != std::floor(frame)) return false;
   row.frame = static_cast<int>(frame);
   return true;
 }
@@ -87,7 +87,7 @@ std::string read_entry(const json& entry, ultrasound::Contour& contour) {
       return "key " + key + " is unknown";
   }
   const auto frame = entry.find("frame");
-  if (frame == entry.end() || !frame->is_number_unsigned() || *frame > kMostFrames) {
+  if (frame == entry.end() || !frame->is_number_unsigned() || *frame > kMaxFrames) {
     return "frame must be a whole number from 0";
   }
   contour.frame = frame->get<int>();

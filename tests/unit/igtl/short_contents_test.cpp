@@ -29,10 +29,10 @@ TEST(ShortContents, DecodeReturnsWhatWasEncoded) {
     const auto decoded = value_or_fail(decode_text(content_of(text)));
     EXPECT_EQ(decoded, text);
   }
-  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kMin = std::numeric_limits<std::int64_t>::min();
   for (const StatusReport& report :
        {StatusReport{}, test_example::status_report(),
-        StatusReport{65535, kLeast, std::string(20, 'e'), std::string(65535, 't')}}) {
+        StatusReport{65535, kMin, std::string(20, 'e'), std::string(65535, 't')}}) {
     const auto decoded = value_or_fail(decode_status_report(content_of(report)));
     EXPECT_EQ(decoded, report);
   }

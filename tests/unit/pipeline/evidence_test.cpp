@@ -85,7 +85,7 @@ struct FakeInversion {
     first = seen = data;
     const bool spoilt = std::any_of(data.sources.begin(), data.sources.end(),
                                     [this](const DataSource& s) { return s.name == spoiler; });
-    const double sunk_mm = spoilt ? 2.0 * kMostMotion_mm : motion_mm;
+    const double sunk_mm = spoilt ? 2.0 * kMaxMotion_mm : motion_mm;
     if (options.moving != nullptr) nodes = options.moving->nodes;
     estimate.displacement = Points(Vec3(0, 0, -sunk_mm).replicate(1, patient()->mesh.num_nodes()));
     if (options.moving != nullptr) {
@@ -168,7 +168,7 @@ TEST_F(Sources, AnObservationWithoutAnEstimateIsForgotten) {
 }
 
 TEST_F(Sources, AnObservationWithAnUnusableEstimateIsTriedBesideTheNext) {
-  inversion_.motion_mm = 2.0 * kMostMotion_mm;
+  inversion_.motion_mm = 2.0 * kMaxMotion_mm;
   const auto unusable = run(landmarks_at(1, "pointer", 0));
   ASSERT_TRUE(unusable) << "it is reported, with its reasons";
   EXPECT_EQ(unusable->estimate.quality.quality, Quality::kUnusable);

@@ -92,7 +92,7 @@ TEST(NewtonBundle, MeetsTheConditionOfTheMinimum) {
   Random random(3);
   NewtonBundle bundle(40);
   std::vector<VecX> steps;
-  for (int i = 0; i < NewtonBundle::kMost; ++i) {
+  for (int i = 0; i < NewtonBundle::kMax; ++i) {
     VecX s = VecX::Constant(40, 0.4);
     for (double& value : s) value += random.normal();
     steps.push_back(s);
@@ -108,13 +108,13 @@ TEST(NewtonBundle, AFullOneKeepsWhatCounts) {
   Random random(4);
   NewtonBundle bundle(5);
   double before = 1e9;
-  for (int i = 0; i < 3 * NewtonBundle::kMost; ++i) {
+  for (int i = 0; i < 3 * NewtonBundle::kMax; ++i) {
     VecX s = VecX::Constant(5, 2.0);
     for (double& value : s) value += random.normal();
     bundle.add_here(s);
     bundle.solve();
     EXPECT_LE(bundle.fall(), before * (1.0 + 1e-5)) << i;
-    EXPECT_LE(bundle.count(), NewtonBundle::kMost);
+    EXPECT_LE(bundle.count(), NewtonBundle::kMax);
     before = bundle.fall();
   }
 }

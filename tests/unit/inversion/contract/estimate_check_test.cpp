@@ -144,11 +144,11 @@ Estimate sound() {
   estimate.sd_mm = VecX::Constant(4, 0.3);
   estimate.contact_force_n = VecX::Constant(2, 0.01);
   estimate.contact.max_penetration_mm = kDeepestInSkull_mm;
-  estimate.contact.decrement = kMostContactDecrement;
-  estimate.contact.max_violation_mm = kMostContactViolation_mm;
+  estimate.contact.decrement = kMaxContactDecrement;
+  estimate.contact.max_violation_mm = kMaxContactViolation_mm;
   estimate.misfit_ratio = kUnexplainedMisfit;
   estimate.min_volume_ratio = 0.1;  // of a flat element
-  estimate.min_nodal_volume_ratio = kLeastVolumeRatio;
+  estimate.min_nodal_volume_ratio = kMinVolumeRatio;
   estimate.sources.resize(2);
   estimate.hypotheses.resize(2);
   return estimate;
@@ -196,11 +196,11 @@ std::vector<Fault> faults() {
       {QualityFlag::kDataOutsideRegion, "(7)", [](Estimate& e) { e.data_outside_region = 7; }},
       {QualityFlag::kDeadline, "time", [](Estimate& e) { e.status = EstimateStatus::kDeadline; }},
       {QualityFlag::kContactNotCertified, "decrement 0.001",
-       [=](Estimate& e) { e.contact.decrement = above(kMostContactDecrement); }},
+       [=](Estimate& e) { e.contact.decrement = above(kMaxContactDecrement); }},
       {QualityFlag::kContactNotCertified, "violation 0.01 mm",
        [=](Estimate& e) {
          e.contact.decrement = kNan;
-         e.contact.max_violation_mm = above(kMostContactViolation_mm);
+         e.contact.max_violation_mm = above(kMaxContactViolation_mm);
        }},
       {QualityFlag::kIterationLimit, "limit",
        [](Estimate& e) { e.status = EstimateStatus::kIterationLimit; }},
@@ -210,7 +210,7 @@ std::vector<Fault> faults() {
          e.min_volume_ratio = -0.25;
        }},
       {QualityFlag::kVolumeLost, "at least 0.5",
-       [](Estimate& e) { e.min_nodal_volume_ratio = std::nextafter(kLeastVolumeRatio, 0.0); }},
+       [](Estimate& e) { e.min_nodal_volume_ratio = std::nextafter(kMinVolumeRatio, 0.0); }},
       {QualityFlag::kBeyondSkull, "motion 50.2 mm, at most 50 mm",
        [](Estimate& e) { e.displacement.col(3) = Vec3(0.0, -50.2, 0.0); }},
       {QualityFlag::kBeyondSkull, "3.5 mm deep in the skull, at most 3 mm",

@@ -112,7 +112,7 @@ TEST_F(Condensed, RegionHasTheRowsOfTheCompactColumns) {
   for (int j = 0; j < columns; ++j) {
     const double step = static_cast<double>(ops->responses.parts().steps[j]);
     EXPECT_LT((unpacked.col(j) - ops->region_responses.col(j).cast<double>()).cwiseAbs().maxCoeff(),
-              kMostErrorSteps * step + kFloat * unpacked.col(j).cwiseAbs().maxCoeff())
+              kMaxErrorSteps * step + kFloat * unpacked.col(j).cwiseAbs().maxCoeff())
         << j;
   }
 }
@@ -144,7 +144,7 @@ TEST_F(Condensed, ModesReproduceThePriorCovarianceWhereDataComeFrom) {
 TEST_F(Condensed, APriorWithFarTooMuchMotionOrNoneIsRefusedWithTheFigure) {
   const double usual_mm = largest_motion_sd_mm(*operators(Boundary::kContact));
   EXPECT_GT(usual_mm, 0.5);
-  EXPECT_LT(usual_mm, kMostMotion_mm);
+  EXPECT_LT(usual_mm, kMaxMotion_mm);
   const auto refused = [](const CaseConfig& with) {
     const auto model = value_or_fail(PreparedModel::prepare(patient(), with, Boundary::kContact));
     return refusal_of(condense(model), ErrorCode::kInvalidArgument);

@@ -169,7 +169,7 @@ TEST(ContactSystem, AnswersForFewSlavesAsForMost) {
       for (int step = 0; step < 5; ++step) {
         ASSERT_TRUE(system.take(set));
         expect_answers(brain, system, set, window);
-        (system.size() > ContactSystem::kMost * kSlaves ? most : fewer) += 1;
+        (system.size() > ContactSystem::kMax * kSlaves ? most : fewer) += 1;
         for (int i = 0; i <= step; ++i) {
           char& one = set[static_cast<std::size_t>(random.uniform() * kSlaves)];
           one = one ? 0 : 1;
@@ -210,7 +210,7 @@ TEST(ContactSystem, AnIndefiniteComplianceIsRejectedAndLeavesNoSet) {
     refusal_of(system.take(set), ErrorCode::kSingularMatrix);
     EXPECT_EQ(system.size(), 0);
     std::fill(set.begin(), set.begin() + 30, char{0});
-    if (share > ContactSystem::kMost) continue;
+    if (share > ContactSystem::kMax) continue;
     ASSERT_TRUE(system.take(set));
   }
 }

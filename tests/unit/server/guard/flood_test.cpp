@@ -27,7 +27,7 @@ constexpr bool kMemoryTells = false;  // sanitizers keep what was freed
 #else
 constexpr bool kMemoryTells = true;
 #endif
-constexpr double kMostMib = 64.0;
+constexpr double kMaxMib = 64.0;
 
 double resident_mib() {
   std::ifstream statm("/proc/self/statm");
@@ -50,7 +50,7 @@ class Flood : public TransportTest {
   void bounded_since(double idle_mib, const char* what) {
     const double grown = resident_mib() - idle_mib;
     std::printf("%s: %.1f MiB above idle\n", what, grown);
-    EXPECT_TRUE(!kMemoryTells || grown < kMostMib) << what;
+    EXPECT_TRUE(!kMemoryTells || grown < kMaxMib) << what;
   }
 };
 

@@ -174,7 +174,7 @@ TEST_F(TransportTest, AnUnusableUpdateIsToldToAllAndReplacesNoUsableOne) {
   sender.observe(landmarks(1));
   for (RawPeer* peer : {&sender, &watcher}) EXPECT_TRUE(next_update(*peer).update.usable());
   for (std::uint64_t sequence = 2; sequence <= 7; ++sequence) {
-    sender.observe(landmarks(sequence, "pointer", kMostMotion_mm + 1.0));
+    sender.observe(landmarks(sequence, "pointer", kMaxMotion_mm + 1.0));
     for (RawPeer* peer : {&sender, &watcher}) {
       const auto message = next_update(*peer);
       EXPECT_EQ(message.update.observation_sequence, sequence);

@@ -298,7 +298,7 @@ TEST_F(RunningSession, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAns
 
 TEST_F(RunningSession, AnUnusableFieldIsUsedUpAndTheOneBeforeItStays) {
   answer(landmarks(1));
-  EXPECT_FALSE(answer(landmarks(2, "pointer", kMostMotion_mm + 1.0)).update.usable());
+  EXPECT_FALSE(answer(landmarks(2, "pointer", kMaxMotion_mm + 1.0)).update.usable());
   const SessionState now = state().shared;
   EXPECT_EQ(now.phase, SessionPhase::kDegraded);
   EXPECT_THAT(now.reason, HasSubstr("motion 51 mm"));

@@ -157,8 +157,8 @@ TEST(Gap, LiesBetweenItsBoundsAndVaries) {
     least = std::min(least, -pair.initial_penetration_mm);
     most = std::max(most, -pair.initial_penetration_mm);
   }
-  EXPECT_GE(least, kLeastGap_mm);
-  EXPECT_LE(most, kMostGap_mm);
+  EXPECT_GE(least, kMinGap_mm);
+  EXPECT_LE(most, kMaxGap_mm);
   EXPECT_GT(most - least, 0.5);
 }
 
