@@ -40,7 +40,7 @@ const std::map<std::string, Topic> kTopics = {
      {run_cost, "latency with journal and keys and without, COUNT updates each", 2000, 20, 0, 0}},
 };
 
-int run(const std::string& name, const Topic& topic, Settings settings, bool brief) {
+int run_topic(const std::string& name, const Topic& topic, Settings settings, bool brief) {
   if (settings.count == 0) settings.count = brief ? topic.brief_count : topic.count;
   if (settings.seconds == 0.0) settings.seconds = brief ? topic.brief_seconds : topic.seconds;
   std::filesystem::create_directories(settings.work);
@@ -91,5 +91,5 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string name = app.get_subcommands().front()->get_name();
-  return run(name, kTopics.at(name), settings, brief);
+  return run_topic(name, kTopics.at(name), settings, brief);
 }
