@@ -5,6 +5,8 @@
 //   symmetric:  A = V diag(values) V^T     values ascending, V orthonormal (Golub and Van Loan,
 //                                          Matrix Computations, 4th ed., section 8.3)
 //   singular:   A = U diag(values) V^T     values descending (Jacobi, section 8.6)
+//
+// Nothing fails: entries that are not finite give results that are not.
 #pragma once
 
 #include "common/core/types.hpp"

@@ -144,7 +144,7 @@ TcpProxy::~TcpProxy() {
 
 void TcpProxy::stall(bool stalled) {
   stalled_ = stalled;
-  while (passes_ == stalled) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  passes_.wait(stalled);
 }
 
 void TcpProxy::accept_one() {
@@ -164,6 +164,7 @@ void TcpProxy::run(const std::stop_token& stop) {
     std::vector<pollfd> watched = {{listener_, POLLIN, 0}};
     const bool passes = !stalled_;
     passes_ = passes;
+    passes_.notify_all();
     for (const auto& pair : pairs_) {
       if (!passes) break;
       watched.push_back({pair->client, POLLIN, 0});
