@@ -71,9 +71,8 @@ Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& mat
   const std::set<int> labels(mesh.labels.begin(), mesh.labels.end());
   for (const auto& [label, tissue] : material.regions) {
     if (labels.count(label) == 0) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "material.regions." + std::to_string(label) +
-                      ": the mesh has no such label (there: " + listed(labels) + ")");
+      return invalid("material.regions." + std::to_string(label) +
+                     ": the mesh has no such label (there: " + listed(labels) + ")");
     }
     const auto index = static_cast<int>(map.materials.size());
     map.materials.push_back(with_stiffness(material, tissue));

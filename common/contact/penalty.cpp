@@ -72,9 +72,8 @@ Result<MasterSurface> MasterSurface::build(const TriangleSurface& skull) {
   for (int t = 0; t < skull.num_triangles(); ++t) {
     const auto corners = skull.triangles.col(t);
     if (corners.minCoeff() < 0 || corners.maxCoeff() >= skull.num_vertices())
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("skull: triangle {} names a vertex outside 0..{}", t,
-                              skull.num_vertices() - 1));
+      return invalid(fmt::format("skull: triangle {} names a vertex outside 0..{}", t,
+                                 skull.num_vertices() - 1));
     const Vec3 a = skull.vertices.col(corners[0]);
     const Vec3 b = skull.vertices.col(corners[1]);
     const Vec3 c = skull.vertices.col(corners[2]);
@@ -182,8 +181,7 @@ Result<std::vector<ContactPair>> search_contact(const Points& nodes,
   pairs.reserve(slaves.size());
   for (const NodeIndex slave : slaves) {
     if (slave < 0 || slave >= nodes.cols())
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("slaves: node {} is outside 0..{}", slave, nodes.cols() - 1));
+      return invalid(fmt::format("slaves: node {} is outside 0..{}", slave, nodes.cols() - 1));
     const Vec3 s = nodes.col(slave);
     if (!s.allFinite())
       return fail(ErrorCode::kNotFinite, fmt::format("slaves: node {} is not finite", slave));

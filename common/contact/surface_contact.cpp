@@ -32,8 +32,7 @@ Pairs with_sphere(const Points& points, const RigidSphere& sphere) {
     const Vec3 out = points.col(i) - sphere.centre;
     const double distance = out.norm();
     if (!(distance > 1e-6 * sphere.radius)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "a point of the surface lies in the centre of the rigid sphere");
+      return invalid("a point of the surface lies in the centre of the rigid sphere");
     }
     const Vec3 normal = out / distance;
     pairs.push_back({i, sphere.centre + sphere.radius * normal, normal, sphere.radius - distance});

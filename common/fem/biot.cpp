@@ -11,9 +11,9 @@
 namespace brainshift::fem {
 namespace {
 
-tl::unexpected<Error> invalid(const std::string& what, double value,
-                              const std::string& constraint) {
-  return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {:g}: {}", what, value, constraint));
+tl::unexpected<Error> invalid_value(const std::string& what, double value,
+                                    const std::string& constraint) {
+  return invalid(fmt::format("{} = {:g}: {}", what, value, constraint));
 }
 
 Status check_material(const PoroMaterial& material, std::size_t index) {
@@ -21,20 +21,20 @@ Status check_material(const PoroMaterial& material, std::size_t index) {
   const Elasticity& elastic = material.elastic;
   // Written so that NaN fails.
   if (!(elastic.shear > 0.0 && std::isfinite(elastic.shear))) {
-    return invalid(name + "shear modulus", elastic.shear, "must be positive and finite");
+    return invalid_value(name + "shear modulus", elastic.shear, "must be positive and finite");
   }
   const double bulk = elastic.lambda + 2.0 / 3.0 * elastic.shear;
   if (!(bulk > 0.0 && std::isfinite(bulk))) {
-    return invalid(name + "drained bulk modulus", bulk, "must be positive and finite");
+    return invalid_value(name + "drained bulk modulus", bulk, "must be positive and finite");
   }
   if (!(material.biot_coefficient >= 0.0 && material.biot_coefficient <= 1.0)) {
-    return invalid(name + "Biot coefficient", material.biot_coefficient, "must be 0 to 1");
+    return invalid_value(name + "Biot coefficient", material.biot_coefficient, "must be 0 to 1");
   }
   if (!(material.storage >= 0.0 && std::isfinite(material.storage))) {
-    return invalid(name + "storage", material.storage, "must be zero or positive");
+    return invalid_value(name + "storage", material.storage, "must be zero or positive");
   }
   if (!(material.permeability >= 0.0 && std::isfinite(material.permeability))) {
-    return invalid(name + "permeability", material.permeability, "must be zero or positive");
+    return invalid_value(name + "permeability", material.permeability, "must be zero or positive");
   }
   return {};
 }
@@ -45,22 +45,23 @@ Status check_domain(const TetMesh& mesh, const MaterialMap& materials, const Dof
     if (auto ok = check_material(materials.materials[m], m); !ok) return ok;
   }
   if (materials.of_tet.size() != static_cast<std::size_t>(mesh.num_tets())) {
-    return invalid("materials for tetrahedra", static_cast<double>(materials.of_tet.size()),
-                   "the mesh has " + std::to_string(mesh.num_tets()));
+    return invalid_value("materials for tetrahedra", static_cast<double>(materials.of_tet.size()),
+                         "the mesh has " + std::to_string(mesh.num_tets()));
   }
   const int count = static_cast<int>(materials.materials.size());
   for (const int material : materials.of_tet) {
     if (material < 0 || material >= count) {
-      return invalid("material index", material, "there are " + std::to_string(count));
+      return invalid_value("material index", material, "there are " + std::to_string(count));
     }
   }
   if (dofs.num_nodes() != mesh.num_nodes()) {
-    return invalid("nodes with displacements", dofs.num_nodes(),
-                   "the mesh has " + std::to_string(mesh.num_nodes()));
+    return invalid_value("nodes with displacements", dofs.num_nodes(),
+                         "the mesh has " + std::to_string(mesh.num_nodes()));
   }
   for (const NodeIndex node : drained) {
     if (node < 0 || node >= mesh.num_nodes()) {
-      return invalid("drained node", node, "the mesh has " + std::to_string(mesh.num_nodes()));
+      return invalid_value("drained node", node,
+                           "the mesh has " + std::to_string(mesh.num_nodes()));
     }
   }
   return {};
@@ -69,8 +70,8 @@ Status check_domain(const TetMesh& mesh, const MaterialMap& materials, const Dof
 Status check_array(const char* what, Eigen::Index columns, int nodes, bool may_be_empty,
                    bool finite) {
   if (columns != nodes && !(may_be_empty && columns == 0)) {
-    return invalid(what, static_cast<double>(columns),
-                   "nodes given, the mesh has " + std::to_string(nodes));
+    return invalid_value(what, static_cast<double>(columns),
+                         "nodes given, the mesh has " + std::to_string(nodes));
   }
   if (!finite) {
     return fail(ErrorCode::kNotFinite, std::string(what) + " holds a value that is not finite");
@@ -138,7 +139,7 @@ Result<BiotStepper::Kept*> BiotStepper::factor_for(double dt_s) {
 
 Status BiotStepper::check(const BiotState& state, const BiotLoad& load, double dt_s) const {
   if (!(dt_s > 0.0 && std::isfinite(dt_s))) {
-    return invalid("time step in seconds", dt_s, "must be positive and finite");
+    return invalid_value("time step in seconds", dt_s, "must be positive and finite");
   }
   const int n = mesh_.num_nodes();
   const auto checks = {

@@ -16,7 +16,7 @@ Result<SamplingMatrix> sampling_matrix(const geometry::TetLocator& locator, int 
       std::ostringstream text;
       text << "point " << i << " at (" << points.col(i).transpose() << ") mm lies "
            << location.distance_mm << " mm outside the brain (limit " << tolerance_mm << " mm)";
-      return fail(ErrorCode::kInvalidArgument, text.str());
+      return invalid(text.str());
     }
     for (int k = 0; k < 4; ++k) {
       if (location.weights[k] != 0.0)

@@ -132,16 +132,14 @@ Status Builder::set_materials() {
       const auto found = std::find_if(spec_.materials.begin(), spec_.materials.end(),
                                       [&m = material](const auto& spec) { return spec.name == m; });
       if (found == spec_.materials.end()) {
-        return fail(ErrorCode::kInvalidArgument,
-                    fmt::format("regions.{} = {}: no such material (there: {})", region, material,
-                                listed(known)));
+        return invalid(fmt::format("regions.{} = {}: no such material (there: {})", region,
+                                   material, listed(known)));
       }
       const auto index = static_cast<int>(found - spec_.materials.begin());
       const std::optional<int> wanted = all ? std::nullopt : label_of(region);
       if (!all && !wanted) {
-        return fail(ErrorCode::kInvalidArgument,
-                    fmt::format("regions.{}: the mesh has no such region (there: {})", region,
-                                region_names()));
+        return invalid(fmt::format("regions.{}: the mesh has no such region (there: {})", region,
+                                   region_names()));
       }
       for (std::size_t t = 0; t < of_tet.size(); ++t) {
         if (of_tet[t] < 0 && (all || label(t) == *wanted)) of_tet[t] = index;
@@ -155,8 +153,7 @@ Status Builder::set_materials() {
     for (const auto& [text, number] : file_.volume_names) {
       if (number == bare) name = text;
     }
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("regions: region {} of the mesh has no material", name));
+    return invalid(fmt::format("regions: region {} of the mesh has no material", name));
   }
   problem_.body_force.resize(3, tets);
   for (int t = 0; t < tets; ++t) {
@@ -206,8 +203,8 @@ Status Builder::set_mesh_groups() {
 Status Builder::set_selected_groups() {
   for (const GroupSpec& spec : spec_.groups) {
     if (problem_.groups.count(spec.name) > 0) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("groups.{}: the mesh has a group of this name already", spec.name));
+      return invalid(
+          fmt::format("groups.{}: the mesh has a group of this name already", spec.name));
     }
     const auto selected = [&](NodeIndex node) {
       const Vec3 x = file_.mesh.nodes.col(node);

@@ -25,17 +25,17 @@ double youngs_modulus(const fem::Elasticity& e) { return 2.0 * e.shear * (1.0 + 
 
 Status check_materials(const ForwardProblem& problem) {
   if (static_cast<int>(problem.materials.of_tet.size()) != problem.mesh.num_tets()) {
-    return fail(ErrorCode::kInvalidArgument, "regions: must give each tetrahedron a material");
+    return invalid("regions: must give each tetrahedron a material");
   }
   for (const fem::PoroMaterial& material : problem.materials.materials) {
     const fem::Elasticity& e = material.elastic;
     const double nu = poisson_ratio(e);
     // Rounding of nu on its way through lambda.
     if (e.shear > 0.0 && nu > -1.0 && nu <= kMaxPoissonRatio + 1e-9) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("materials: shear modulus {} N/mm^2, Poisson's ratio {}: must be > 0 "
-                            "and between -1 and {}",
-                            e.shear, nu, kMaxPoissonRatio));
+    return invalid(
+        fmt::format("materials: shear modulus {} N/mm^2, Poisson's ratio {}: must be > 0 "
+                    "and between -1 and {}",
+                    e.shear, nu, kMaxPoissonRatio));
   }
   return {};
 }
@@ -46,9 +46,8 @@ Status check_group(const ForwardProblem& problem, const std::string& key, const 
   if (found == problem.groups.end()) {
     std::string known;
     for (const auto& [other, group] : problem.groups) known += (known.empty() ? "" : ", ") + other;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}.on = {}: no such group (there {})", key, name,
-                            known.empty() ? "is none" : "are " + known));
+    return invalid(fmt::format("{}.on = {}: no such group (there {})", key, name,
+                               known.empty() ? "is none" : "are " + known));
   }
   const FaceGroup& group = found->second;
   if (group.vertices.empty() || (needs_faces && group.faces.cols() == 0)) {
@@ -74,8 +73,7 @@ Result<std::vector<ProbeValue>> probe(const ForwardSolution& solution, const Poi
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const geometry::TetLocation at = locator.locate(points.col(i));
     if (!(at.distance_mm <= tolerance_mm)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
+      return invalid(fmt::format("point {} lies {:.3g} mm outside the mesh", i, at.distance_mm));
     }
     ProbeValue value;
     // The locator's weights belong to its own order of the vertices.
@@ -123,9 +121,8 @@ Status validate(const ForwardProblem& problem) {
   for (const Condition& condition : problem.conditions) {
     const bool pore_pressure = std::holds_alternative<PorePressure>(condition.what);
     if (pore_pressure && problem.steps_s.empty()) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "conditions." + condition.name +
-                      ".pore_pressure_pa: only problems with a section time have a pore pressure");
+      return invalid("conditions." + condition.name +
+                     ".pore_pressure_pa: only problems with a section time have a pore pressure");
     }
     const bool needs_faces = !pore_pressure &&
                              !std::holds_alternative<Displacement>(condition.what) &&
@@ -137,18 +134,15 @@ Status validate(const ForwardProblem& problem) {
     }
   }
   if (!problem.steps_s.empty() && !problem.contacts.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "contact." + problem.contacts.front().name +
-                    ": contact is not solved together with a section time");
+    return invalid("contact." + problem.contacts.front().name +
+                   ": contact is not solved together with a section time");
   }
   if (!problem.steps_s.empty() && problem.element != fem::Element::kP1) {
-    return fail(ErrorCode::kInvalidArgument,
-                "mesh.element = p2: problems with a section time are solved on p1");
+    return invalid("mesh.element = p2: problems with a section time are solved on p1");
   }
   for (const double step_s : problem.steps_s) {
     if (step_s > 0.0 && std::isfinite(step_s)) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("time.steps_s: {} s: must be finite and > 0", step_s));
+    return invalid(fmt::format("time.steps_s: {} s: must be finite and > 0", step_s));
   }
   for (const Contact& contact : problem.contacts) {
     if (Status ok = check_group(problem, "contact." + contact.name, contact.group, true); !ok) {

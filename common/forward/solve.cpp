@@ -98,8 +98,7 @@ class ConditionAdder {
     for (const NodeIndex node : group_->vertices) {
       const auto [held, fresh] = pore_pressure_.emplace(node, pressure.value);
       if (fresh || held->second == pressure.value) continue;
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: node {} has another pore pressure already", name_, node));
+      return invalid(fmt::format("{}: node {} has another pore pressure already", name_, node));
     }
     return {};
   }

@@ -137,9 +137,8 @@ Result<ClosestPointIndex> ClosestPointIndex::build(const TriangleSurface& surfac
   for (int t = 0; t < surface.num_triangles(); ++t)
     if (surface.triangles.col(t).minCoeff() < 0 ||
         surface.triangles.col(t).maxCoeff() >= surface.num_vertices())
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("surface: triangle {} names a vertex outside 0..{}", t,
-                              surface.num_vertices() - 1));
+      return invalid(fmt::format("surface: triangle {} names a vertex outside 0..{}", t,
+                                 surface.num_vertices() - 1));
   auto impl = std::make_unique<Impl>();
   impl->surface = surface;
   impl->find_faces();

@@ -311,19 +311,16 @@ DistanceGrid empty_grid(const TriangleSurface& surface, const DistanceGridOption
 Result<DistanceGrid> signed_distance_grid(const ClosestPointIndex& surface,
                                           const DistanceGridOptions& options) {
   if (!(std::isfinite(options.spacing_mm) && options.spacing_mm > 0.0))
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("distance grid: spacing_mm = {}: must be > 0", options.spacing_mm));
+    return invalid(fmt::format("distance grid: spacing_mm = {}: must be > 0", options.spacing_mm));
   if (!(std::isfinite(options.margin_mm) && options.margin_mm >= 0.0))
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("distance grid: margin_mm = {}: must be >= 0", options.margin_mm));
+    return invalid(fmt::format("distance grid: margin_mm = {}: must be >= 0", options.margin_mm));
   if (!(options.max_nodes >= 8.0 && options.max_nodes <= 1e9))
     return fail(
         ErrorCode::kInvalidArgument,
         fmt::format("distance grid: max_nodes = {}: must be in [8, 1e9]", options.max_nodes));
   if (!is_closed(surface.surface()))
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("distance grid: the surface of {} triangles is not closed",
-                            surface.surface().num_triangles()));
+    return invalid(fmt::format("distance grid: the surface of {} triangles is not closed",
+                               surface.surface().num_triangles()));
   DistanceGrid grid = empty_grid(surface.surface(), options);
   return GridBuilder(surface, std::move(grid), options.threads).build();
 }

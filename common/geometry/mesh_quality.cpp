@@ -68,12 +68,11 @@ Status check_indices(const TetMesh& mesh) {
   for (int t = 0; t < mesh.num_tets(); ++t)
     for (int a = 0; a < 4; ++a)
       if (mesh.tets(a, t) < 0 || mesh.tets(a, t) >= mesh.num_nodes())
-        return fail(ErrorCode::kInvalidArgument,
-                    fmt::format("mesh tetrahedron {}: node index {} must be between 0 and {}", t,
-                                mesh.tets(a, t), mesh.num_nodes() - 1));
+        return invalid(fmt::format("mesh tetrahedron {}: node index {} must be between 0 and {}", t,
+                                   mesh.tets(a, t), mesh.num_nodes() - 1));
   if (!mesh.labels.empty() && mesh.labels.size() != static_cast<std::size_t>(mesh.num_tets()))
-    return fail(ErrorCode::kInvalidArgument, fmt::format("mesh labels: {} labels for {} tetrahedra",
-                                                         mesh.labels.size(), mesh.num_tets()));
+    return invalid(fmt::format("mesh labels: {} labels for {} tetrahedra", mesh.labels.size(),
+                               mesh.num_tets()));
   return {};
 }
 

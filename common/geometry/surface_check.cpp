@@ -164,10 +164,10 @@ Status check_extent(double extent_mm, const CorticalSite& site) {
   } else if (fits(0.001)) {
     unit = "; micrometres?";
   }
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("the surface spans {:.3g} mm: must be {:.3g} to {:.3g} mm for a "
-                          "craniotomy of {:.3g} mm{}",
-                          extent_mm, least, most, site.size_mm, unit));
+  return invalid(
+      fmt::format("the surface spans {:.3g} mm: must be {:.3g} to {:.3g} mm for a "
+                  "craniotomy of {:.3g} mm{}",
+                  extent_mm, least, most, site.size_mm, unit));
 }
 
 // Turns the triangles outwards, and notes it in `checked`.
@@ -181,10 +181,10 @@ Status orient(CheckedSurface& checked, const CorticalSite& site) {
   }
   const double cosine = area > 0.0 ? along / area : 0.0;
   if (std::abs(cosine) < kMinCosine) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
-                            "mean cosine {:.2f}, must be at least {:g} either way",
-                            cosine, kMinCosine));
+    return invalid(
+        fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
+                    "mean cosine {:.2f}, must be at least {:g} either way",
+                    cosine, kMinCosine));
   }
   if (cosine > 0.0) return {};
   surface.triangles.row(1).swap(surface.triangles.row(2));
@@ -254,10 +254,10 @@ Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const Cor
   if (Status ok = check_extent(checked.extent_mm, site); !ok) return tl::unexpected(ok.error());
   checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
   if (checked.distance_mm > kFarthest_mm) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's "
-                            "centre: must be within {:g} mm; is its pose right?",
-                            checked.distance_mm, kFarthest_mm));
+    return invalid(
+        fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's "
+                    "centre: must be within {:g} mm; is its pose right?",
+                    checked.distance_mm, kFarthest_mm));
   }
   if (checked.surface.num_triangles() == 0) return checked;
   const auto rims = surface_rims(checked.surface);

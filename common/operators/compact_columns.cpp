@@ -101,9 +101,8 @@ void sum_block_anywhere(const CompactColumns::BlockArrays& block,
 template <typename List>
 Status check_size(const char* name, const List& list, std::ptrdiff_t size) {
   if (static_cast<std::ptrdiff_t>(list.size()) == size) return {};
-  return fail(ErrorCode::kInvalidArgument, std::string(name) + " has " +
-                                               std::to_string(list.size()) + " numbers: must be " +
-                                               std::to_string(size));
+  return invalid(std::string(name) + " has " + std::to_string(list.size()) + " numbers: must be " +
+                 std::to_string(size));
 }
 
 Status check_finite(const char* name, const CompactParts::List<float>& list) {
@@ -133,7 +132,7 @@ Result<CompactColumns> CompactColumns::from_parts(CompactParts parts) {
     if (auto status = check_finite(name, *list); !status) return tl::unexpected(status.error());
   }
   if (given.steps.size() > 0 && !(given.steps.minCoeff() > 0.0F)) {
-    return fail(ErrorCode::kInvalidArgument, "steps holds a number that is not above 0");
+    return invalid("steps holds a number that is not above 0");
   }
   if (auto status = made.check_sizes(); !status) return tl::unexpected(status.error());
   if (auto status = made.check_order(); !status) return tl::unexpected(status.error());
@@ -154,10 +153,9 @@ Status CompactColumns::check_sizes() {
     if (next.node > num_nodes()) break;  // reported below
     if (block[0] < 1 || block[0] > kBlockNodes || block.minCoeff() < 0 ||
         block.tail<2>().maxCoeff() > most || block.tail<2>().sum() > most) {
-      return fail(ErrorCode::kInvalidArgument, "blocks: block " + std::to_string(b) + " has " +
-                                                   std::to_string(block[0]) + " nodes and " +
-                                                   std::to_string(block[1]) + " + " +
-                                                   std::to_string(block[2]) + " directions");
+      return invalid("blocks: block " + std::to_string(b) + " has " + std::to_string(block[0]) +
+                     " nodes and " + std::to_string(block[1]) + " + " + std::to_string(block[2]) +
+                     " directions");
     }
     next.rows = 3 * block[0];
     next.wide = block[1];
@@ -188,11 +186,10 @@ Status CompactColumns::check_lengths(Eigen::Index block, Offsets& next) {
   Start start;
   for (int j = 0; j < columns; ++j, own += 3) {
     if (own[0] < 0 || own[1] < 0 || own[2] < 0 || own[0] + own[1] + own[2] > most) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "lengths: column " + std::to_string(j) + " of block " + std::to_string(block) +
-                      " has " + std::to_string(own[0]) + " + " + std::to_string(own[1]) + " + " +
-                      std::to_string(own[2]) + " eights of coefficients, the block " +
-                      std::to_string(next.rank) + " directions");
+      return invalid("lengths: column " + std::to_string(j) + " of block " + std::to_string(block) +
+                     " has " + std::to_string(own[0]) + " + " + std::to_string(own[1]) + " + " +
+                     std::to_string(own[2]) + " eights of coefficients, the block " +
+                     std::to_string(next.rank) + " directions");
     }
     starts_.push_back(start);
     start.longs += static_cast<std::uint32_t>(kTogether * own[0]);
@@ -212,7 +209,7 @@ Status CompactColumns::check_order() {
     const std::span<const NodeIndex> own = nodes(b);
     for (std::size_t i = 0; i < own.size(); ++i) {
       if (own[i] < 0 || own[i] >= n || place(own[i]).block >= 0) {
-        return fail(ErrorCode::kInvalidArgument, "order does not name every node once");
+        return invalid("order does not name every node once");
       }
       places_[static_cast<std::size_t>(own[i])] = {b, static_cast<int>(i)};
     }

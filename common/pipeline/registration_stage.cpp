@@ -193,9 +193,8 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
 Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const CaseConfig& config,
                                              Method method) {
   if (pairs.undeformed.cols() != pairs.deformed.cols()) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("landmark_pairs: {} undeformed but {} deformed points",
-                            pairs.undeformed.cols(), pairs.deformed.cols()));
+    return invalid(fmt::format("landmark_pairs: {} undeformed but {} deformed points",
+                               pairs.undeformed.cols(), pairs.deformed.cols()));
   }
   if (pairs.undeformed.cols() < 3) {
     return fail(
@@ -232,10 +231,8 @@ Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) 
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config, Method method) {
-  Result<RegisteredObservation> registered =
-      fail(ErrorCode::kInvalidArgument,
-           fmt::format("observation {}: a patient_pose is not assimilated in this version",
-                       observation.sequence));
+  Result<RegisteredObservation> registered = invalid(fmt::format(
+      "observation {}: a patient_pose is not assimilated in this version", observation.sequence));
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
     registered = from_boundary(*boundary, targets, config, method);
   } else if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {

@@ -30,7 +30,7 @@ std::string at_most_mm(double error_mm) {
 }
 
 tl::unexpected<Error> refused(const char* part, const char* value, const std::string& reason) {
-  return fail(ErrorCode::kInvalidArgument, fmt::format("scene.{} = {}: {}", part, value, reason));
+  return invalid(fmt::format("scene.{} = {}: {}", part, value, reason));
 }
 
 bool has_gravity_modes(const PriorConfig& prior) {

@@ -36,14 +36,9 @@ Vec3 principal_spread(const Points& points) {
   return symmetric_eigenvalues(Mat3(centred * centred.transpose()));
 }
 
-tl::unexpected<Error> refuse_fiducials(std::string text) {
-  return fail(ErrorCode::kInvalidArgument, std::move(text));
-}
-
 Status check_set(const char* name, const Points& points) {
   if (points.cols() < 3)
-    return refuse_fiducials(
-        fmt::format("fiducials: {} {}: at least 3 needed", points.cols(), name));
+    return invalid(fmt::format("fiducials: {} {}: at least 3 needed", points.cols(), name));
   for (Eigen::Index i = 0; i < points.cols(); ++i)
     if (!points.col(i).allFinite())
       return fail(ErrorCode::kNotFinite,
@@ -52,12 +47,11 @@ Status check_set(const char* name, const Points& points) {
   for (Eigen::Index i = 0; i < points.cols(); ++i)
     for (Eigen::Index j = 0; j < i; ++j)
       if (!((points.col(i) - points.col(j)).norm() > kSamePlace * extent))
-        return refuse_fiducials(
+        return invalid(
             fmt::format("fiducials: {} ones {} and {} are at the same place", name, j, i));
   const Vec3 spread = principal_spread(points);
   if (!(spread[1] > kThinnestArrangement * kThinnestArrangement * spread[2]))
-    return refuse_fiducials(
-        fmt::format("fiducials: all {} {} ones lie on one line", points.cols(), name));
+    return invalid(fmt::format("fiducials: all {} {} ones lie on one line", points.cols(), name));
   return {};
 }
 
@@ -71,9 +65,8 @@ Status check_extents(double measured_mm, double image_mm) {
                       : near(0.001) ? ": image in metres?"
                       : near(0.1)   ? ": image in centimetres?"
                                     : ": not the same arrangement";
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("fiducials: the measured ones span {:.3g} and the image's {:.3g} mm{}",
-                          measured_mm, image_mm, guess));
+  return invalid(fmt::format("fiducials: the measured ones span {:.3g} and the image's {:.3g} mm{}",
+                             measured_mm, image_mm, guess));
 }
 
 RigidTransform least_squares(const Points& measured, const Points& image) {
@@ -160,16 +153,14 @@ class Matcher {
 
 Status check_match(const Points& measured, const Points& image, const MatchOptions& options) {
   if (!(std::isfinite(options.tolerance_mm) && options.tolerance_mm > 0.0))
-    return refuse_fiducials(
-        fmt::format("fiducials: tolerance_mm = {}: must be > 0", options.tolerance_mm));
+    return invalid(fmt::format("fiducials: tolerance_mm = {}: must be > 0", options.tolerance_mm));
   if (!(options.ambiguity_factor >= 1.0))
-    return refuse_fiducials(
+    return invalid(
         fmt::format("fiducials: ambiguity_factor = {}: must be >= 1", options.ambiguity_factor));
   if (!(options.ambiguity_mm >= 0.0))
-    return refuse_fiducials(
-        fmt::format("fiducials: ambiguity_mm = {}: must be >= 0", options.ambiguity_mm));
+    return invalid(fmt::format("fiducials: ambiguity_mm = {}: must be >= 0", options.ambiguity_mm));
   if (measured.cols() > 10 || image.cols() > 16 || measured.cols() > image.cols())
-    return refuse_fiducials(
+    return invalid(
         fmt::format("fiducials: {} measured and {} in the image: at most 10 and 16, and no more "
                     "measured than in the image",
                     measured.cols(), image.cols()));

@@ -84,21 +84,19 @@ namespace {
 
 constexpr Eigen::Index kMinSamples = 500;  // some thirty in each of half the bins
 
-Status refuse(std::string text) { return fail(ErrorCode::kInvalidArgument, std::move(text)); }
-
 Status check_registrar(const ImageRegistrationOptions& options) {
-  if (options.levels.empty()) return refuse("image registration: levels: none given");
+  if (options.levels.empty()) return invalid("image registration: levels: none given");
   for (const ImageLevel& level : options.levels)
     if (!(level.smoothing_mm >= 0.0 && level.smoothing_mm <= 20.0) || level.samples < kMinSamples)
-      return refuse(
+      return invalid(
           fmt::format("image registration: level of smoothing_mm = {:g} and samples = {}: must be "
                       "0 to 20 and at least {}",
                       level.smoothing_mm, level.samples, kMinSamples));
   if (options.bins < 8 || options.bins > 256)
-    return refuse(fmt::format("image registration: bins = {}: must be 8 to 256", options.bins));
+    return invalid(fmt::format("image registration: bins = {}: must be 8 to 256", options.bins));
   if (!(options.low_quantile >= 0.0 && options.low_quantile < options.high_quantile &&
         options.high_quantile <= 1.0))
-    return refuse(
+    return invalid(
         fmt::format("image registration: quantiles {:g} and {:g}: must be 0 <= low < "
                     "high <= 1",
                     options.low_quantile, options.high_quantile));
@@ -113,8 +111,8 @@ Status check_registrar(const ImageRegistrationOptions& options) {
                              Bound{"min_overlap", options.min_overlap, 0.05, 1.0},
                              Bound{"same_pose_mm", options.same_pose_mm, 1e-3, 50.0}})
     if (!(bound.value >= bound.low && bound.value <= bound.high))
-      return refuse(fmt::format("image registration: {} = {:g}: must be {:g} to {:g}", bound.name,
-                                bound.value, bound.low, bound.high));
+      return invalid(fmt::format("image registration: {} = {:g}: must be {:g} to {:g}", bound.name,
+                                 bound.value, bound.low, bound.high));
   return {};
 }
 
@@ -122,17 +120,17 @@ Status check_registrar(const ImageRegistrationOptions& options) {
 Status check_image(const char* what, const VoxelImage& image) {
   for (int length : image.dims)
     if (length < 2)
-      return refuse(
+      return invalid(
           fmt::format("image registration: {} of {} x {} x {} voxels: at least 2 needed "
                       "along each axis",
                       what, image.dims[0], image.dims[1], image.dims[2]));
   if (image.values.size() != image.num_voxels())
-    return refuse(fmt::format("image registration: {} holds {} values for {} voxels", what,
-                              image.values.size(), image.num_voxels()));
+    return invalid(fmt::format("image registration: {} holds {} values for {} voxels", what,
+                               image.values.size(), image.num_voxels()));
   const double volume = image.T_ras_voxel.linear().determinant();
   if (!image.T_ras_voxel.matrix().allFinite() || !(std::abs(volume) > 1e-9))
-    return refuse(fmt::format("image registration: {} with voxels of {:g} mm3: no usable affine",
-                              what, volume));
+    return invalid(fmt::format("image registration: {} with voxels of {:g} mm3: no usable affine",
+                               what, volume));
   for (std::size_t i = 0; i < image.values.size(); ++i)
     if (!std::isfinite(image.values[i]))
       return fail(ErrorCode::kNotFinite,
@@ -143,10 +141,10 @@ Status check_image(const char* what, const VoxelImage& image) {
 Status check_samples(const IntensitySamples& samples) {
   const Eigen::Index count = samples.positions.cols();
   if (samples.intensities.size() != count)
-    return refuse(fmt::format("image registration: {} positions and {} intensities", count,
-                              samples.intensities.size()));
+    return invalid(fmt::format("image registration: {} positions and {} intensities", count,
+                               samples.intensities.size()));
   if (count < kMinSamples)
-    return refuse(
+    return invalid(
         fmt::format("image registration: {} samples: at least {} needed", count, kMinSamples));
   for (Eigen::Index i = 0; i < count; ++i)
     if (!samples.positions.col(i).allFinite() || !std::isfinite(samples.intensities[i]))
@@ -193,12 +191,10 @@ Result<Task> make_task(const IntensitySamples& samples, const ImageRegistrationO
                            options.bins)};
   task.radius_mm = std::sqrt((samples.positions.colwise() - task.centre).squaredNorm() /
                              static_cast<double>(samples.positions.cols()));
-  if (!(task.radius_mm > 0.0))
-    return fail(ErrorCode::kInvalidArgument, "image registration: all samples at one place");
+  if (!(task.radius_mm > 0.0)) return invalid("image registration: all samples at one place");
   if (!(task.sample_scale.high > task.sample_scale.low))
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("image registration: the samples' intensities are all {:g}",
-                            task.sample_scale.low));
+    return invalid(fmt::format("image registration: the samples' intensities are all {:g}",
+                               task.sample_scale.low));
   return task;
 }
 
@@ -229,8 +225,7 @@ class Level {
         quantile_scale(Eigen::Map<const VecX>(seen.data(), static_cast<Eigen::Index>(seen.size())),
                        task.options.low_quantile, task.options.high_quantile, task.options.bins);
     if (!(scale.high > scale.low))
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
+      return invalid(fmt::format("image registration: the MRI is {:g} at all samples", scale.low));
     return Level(task,
                  ImageSimilarity(image, region, scale, task.samples, task.sample_scale, stride));
   }

@@ -136,11 +136,11 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
   if (static_cast<int>(over.size()) < options.fewest) {
     const Vec3 centre = vertices.rowwise().mean();
     const double away = measured.cols() > 0 ? (measured.rowwise().mean() - centre).norm() : 0.0;
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: {} of {} points lie over the {} within {} mm, at least {} are "
-                            "needed; their mean lies {:.1f} mm from its centre",
-                            options.measured, over.size(), measured.cols(), options.surface,
-                            kFarthestPoint_mm, options.fewest, away));
+    return invalid(
+        fmt::format("{}: {} of {} points lie over the {} within {} mm, at least {} are "
+                    "needed; their mean lies {:.1f} mm from its centre",
+                    options.measured, over.size(), measured.cols(), options.surface,
+                    kFarthestPoint_mm, options.fewest, away));
   }
   std::vector<int> guiding =
       Random(kSubsetSeed).choose(options.points, static_cast<int>(over.size()));

@@ -60,9 +60,7 @@ Result<io::ModelFile> load_head(const Arguments& arguments) {
 Result<Observation> first_observation(const Arguments& arguments, const io::ModelFile& head) {
   if (arguments.surgery.empty()) {
     const auto* scenario = client::find_scenario(arguments.scenario);
-    if (scenario == nullptr) {
-      return fail(ErrorCode::kInvalidArgument, "--scenario " + arguments.scenario + ": unknown");
-    }
+    if (scenario == nullptr) return invalid("--scenario " + arguments.scenario + ": unknown");
     auto played = client::play_scenario(head.model, head.config, *scenario, arguments.seed);
     if (!played) return tl::unexpected(played.error());
     return played->observations.front();
@@ -71,18 +69,16 @@ Result<Observation> first_observation(const Arguments& arguments, const io::Mode
   if (!file) return tl::unexpected(file.error());
   const auto records = file->records(io::RecordKind::kObservation);
   if (!records) return tl::unexpected(records.error());
-  if (records->empty()) {
-    return fail(ErrorCode::kInvalidArgument, arguments.surgery + ": holds no observation");
-  }
+  if (records->empty()) return invalid(arguments.surgery + ": holds no observation");
   return wire::decode_observation(records->front().payload);
 }
 
 Result<SparseData> sparse_data(const Observation& observation, const CaseConfig& config) {
   const auto* pairs = std::get_if<LandmarkPairs>(&observation.body);
   if (pairs == nullptr) {
-    return fail(ErrorCode::kInvalidArgument,
-                "the surgery's first observation holds no landmark pairs; choose a scenario with "
-                "displacements, such as paper");
+    return invalid(
+        "the surgery's first observation holds no landmark pairs; choose a scenario with "
+        "displacements, such as paper");
   }
   return SparseData{pairs->undeformed, pairs->deformed - pairs->undeformed,
                     VecX::Constant(pairs->undeformed.cols(), config.inversion.sigma_mm)};

@@ -41,8 +41,8 @@ std::uint64_t peak_rss_bytes() {
 Status scale_edges(CaseConfig& config, const MeshWish& wish) {
   auto* mesh = std::get_if<MeshGeneration>(&config.mesh);
   if (mesh == nullptr) {
-    return fail(ErrorCode::kInvalidArgument,
-                config.file.string() + ": mesh.file: a ready mesh cannot be made in other sizes");
+    return invalid(config.file.string() +
+                   ": mesh.file: a ready mesh cannot be made in other sizes");
   }
   const double scale = std::cbrt(kReferenceThousandNodes / wish.thousand_nodes);
   mesh->edge_mm *= scale;

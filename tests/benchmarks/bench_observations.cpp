@@ -62,8 +62,8 @@ client::Scenario observed_often(const client::Scenario& scenario, int each) {
 Status run(const Arguments& arguments) {
   const client::Scenario* scenario = client::find_scenario(arguments.scenario);
   if (scenario == nullptr) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--scenario " + arguments.scenario + ": unknown; see brainshift simulate --list");
+    return invalid("--scenario " + arguments.scenario +
+                   ": unknown; see brainshift simulate --list");
   }
   const auto patient = patient::read_patient(arguments.case_file);
   if (!patient) return tl::unexpected(patient.error());

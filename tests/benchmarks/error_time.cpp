@@ -115,8 +115,7 @@ Result<Trial> make_trial(const Head& head, const client::Scenario& scenario, int
     if (!surgery) return tl::unexpected(surgery.error());
     const auto* pairs = std::get_if<LandmarkPairs>(&surgery->observations.front().body);
     if (pairs == nullptr) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "scenario " + scenario.name + ": measures no displacements; choose another");
+      return invalid("scenario " + scenario.name + ": measures no displacements; choose another");
     }
     trial.surgeries.push_back(
         {std::move(surgery->truths.front()), sparse_data(*pairs, head.config)});

@@ -142,9 +142,7 @@ Status write_swelling(const VecX& volume_strain, const fs::path& folder) {
 
 Status write_deck(const client::TruthBrain& brain, const contact::PenaltyContact& contact,
                   const DeckLoad& load, const fs::path& folder) {
-  if (brain.elsewhere) {
-    return fail(ErrorCode::kInvalidArgument, "CalculiX deck: of the case's own mesh alone");
-  }
+  if (brain.elsewhere) return invalid("CalculiX deck: of the case's own mesh alone");
   const auto tissue = contact::tissue_map(brain.model, brain.config.material);
   if (!tissue) return tl::unexpected(tissue.error());
   for (const Status& ok :
@@ -176,9 +174,8 @@ Result<Points> read_printed_displacements(const fs::path& dat, int nodes) {
     if (!inside || !(words >> node)) continue;
     Vec3 value;
     if (!(words >> value[0] >> value[1] >> value[2]) || node < 1 || node > nodes) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{}:{}: no displacement of one of {} nodes", dat.string(),
-                              line_number, nodes));
+      return invalid(fmt::format("{}:{}: no displacement of one of {} nodes", dat.string(),
+                                 line_number, nodes));
     }
     u.col(node - 1) = value;
     seen[static_cast<std::size_t>(node - 1)] = 1;
@@ -186,8 +183,7 @@ Result<Points> read_printed_displacements(const fs::path& dat, int nodes) {
   if (!inside) return fail(ErrorCode::kNotFound, dat.string() + ": it has no displacements");
   const auto missing = std::count(seen.begin(), seen.end(), char{0});
   if (missing > 0) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: {} of {} nodes are missing", dat.string(), missing, nodes));
+    return invalid(fmt::format("{}: {} of {} nodes are missing", dat.string(), missing, nodes));
   }
   return u;
 }
@@ -214,10 +210,7 @@ Result<Points> read_points(const fs::path& file) {
     for (std::size_t k = 0; fine && k < 3; ++k) {
       fine = io::parse_number(cells[k], values.emplace_back());
     }
-    if (!fine) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{}:{}: not three numbers", file.string(), line_number));
-    }
+    if (!fine) return invalid(fmt::format("{}:{}: not three numbers", file.string(), line_number));
   }
   return Points(
       Eigen::Map<const Points>(values.data(), 3, static_cast<Eigen::Index>(values.size() / 3)));
@@ -227,16 +220,15 @@ Result<Points> read_calculix_truth(const fs::path& folder, int patient, const Po
   const auto own = read_points(folder / "nodes.csv");
   if (!own) return own;
   if (own->cols() != nodes.cols() || (*own - nodes).colwise().norm().maxCoeff() > kSameNode_mm) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("calculix: the fields are of a mesh with {} nodes; this one has {} or "
-                            "others",
-                            own->cols(), nodes.cols()));
+    return invalid(
+        fmt::format("calculix: the fields are of a mesh with {} nodes; this one has {} or "
+                    "others",
+                    own->cols(), nodes.cols()));
   }
   auto u = read_points(folder / fmt::format("patient-{}.csv", patient));
   if (u && u->cols() != nodes.cols()) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("calculix: patient-{}.csv has {} rows for {} nodes", patient, u->cols(),
-                            nodes.cols()));
+    return invalid(fmt::format("calculix: patient-{}.csv has {} rows for {} nodes", patient,
+                               u->cols(), nodes.cols()));
   }
   return u;
 }

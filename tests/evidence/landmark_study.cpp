@@ -24,12 +24,11 @@ Eigen::MatrixXd affine_columns(const Points& places) {
 
 Status check_pairs(const Points& before, const Points& during) {
   if (before.cols() != during.cols() || before.cols() < 4) {
-    return fail(ErrorCode::kInvalidArgument, "landmarks: " + std::to_string(before.cols()) +
-                                                 " before and " + std::to_string(during.cols()) +
-                                                 " during surgery; at least 4 pairs are needed");
+    return invalid("landmarks: " + std::to_string(before.cols()) + " before and " +
+                   std::to_string(during.cols()) + " during surgery; at least 4 pairs are needed");
   }
   if (Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(affine_columns(before)).rank() < 4) {
-    return fail(ErrorCode::kInvalidArgument, "landmarks: all lie in one plane");
+    return invalid("landmarks: all lie in one plane");
   }
   return {};
 }
@@ -120,7 +119,7 @@ Result<PointMap> thin_plate_map(const Points& before, const Points& during) {
     for (Eigen::Index j = 0; j < n; ++j) {
       system(i, j) = (before.col(i) - before.col(j)).norm();
       if (i != j && system(i, j) == 0.0) {
-        return fail(ErrorCode::kInvalidArgument, "landmarks: two lie at one place before surgery");
+        return invalid("landmarks: two lie at one place before surgery");
       }
     }
   }
@@ -141,8 +140,8 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
   const Pairs all{io::columns_of(pairs.first), io::columns_of(pairs.second)};
   const Eigen::Index count = all.before.cols();
   if (count < kMinPairs) {
-    return fail(ErrorCode::kInvalidArgument, "landmarks: " + std::to_string(count) +
-                                                 " pairs; at least 5 are needed to leave one out");
+    return invalid("landmarks: " + std::to_string(count) +
+                   " pairs; at least 5 are needed to leave one out");
   }
   auto predictor = Predictor::build(head, sd_mm);
   if (!predictor) return tl::unexpected(predictor.error());

@@ -139,9 +139,8 @@ Result<PriorScaleValues> parse_strengths(const std::vector<std::string>& texts) 
     const double value = std::strtod(number.c_str(), &end);
     const bool read = !number.empty() && *end == '\0' && std::isfinite(value) && value >= 0.0;
     if (part == kPriorParts || !read || !named.insert(part).second) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "strength " + text +
-                      ": must be PART=NUMBER, at least 0, once for each part of the prior");
+      return invalid("strength " + text +
+                     ": must be PART=NUMBER, at least 0, once for each part of the prior");
     }
     strengths[static_cast<std::size_t>(part)] = value;
   }

@@ -26,10 +26,9 @@ Result<SessionInfo> start(client::Client& client, const std::string& endpoint,
   if (!status) return tl::unexpected(status.error());
   const io::SurgeryMeta& meta = recording.meta;
   if (status->case_id != meta.case_id || status->model_id != meta.model_id) {
-    return fail(ErrorCode::kInvalidArgument,
-                facts.surgery + ": of case \"" + meta.case_id + "\" and model \"" + meta.model_id +
-                    "\", but the daemon at " + endpoint + " serves \"" + status->case_id +
-                    "\" and \"" + status->model_id + "\"");
+    return invalid(facts.surgery + ": of case \"" + meta.case_id + "\" and model \"" +
+                   meta.model_id + "\", but the daemon at " + endpoint + " serves \"" +
+                   status->case_id + "\" and \"" + status->model_id + "\"");
   }
   auto info = client.start_session({.case_id = meta.case_id, .recorded_clock = true});
   if (!info) return info;

@@ -221,8 +221,7 @@ Result<CondensedInverter> CondensedInverter::build(
     const CondensedOptions& options) {
   if (operators->num_nodes() != operators->control_neighbours.cols() ||
       operators->responses.num_columns() != operators->num_modes() + operators->num_slaves()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "condensed operators: the arrays do not belong to one mesh");
+    return invalid("condensed operators: the arrays do not belong to one mesh");
   }
   linalg::use_single_threaded_blas();
   auto impl = std::make_unique<Impl>(std::move(operators), std::move(locator), config, options);

@@ -53,7 +53,7 @@ Status SampledOperators::refuse(const SparseData& data, int datum, const std::st
   std::ostringstream text;
   text << "sparse data: point " << datum << " at (" << data.positions.col(datum).transpose()
        << ") mm lies " << where;
-  return fail(ErrorCode::kInvalidArgument, text.str());
+  return invalid(text.str());
 }
 
 Status SampledOperators::locate(const SparseData& data) {
