@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/iterative_system.hpp"
 
-#include <sstream>
+#include <fmt/format.h>
 
 namespace brainshift::contact {
 namespace {
@@ -29,9 +29,9 @@ Status IterativeSystem::refresh() {
   forward().contact().add_stiffness(matrix_, forward().dofs(), active());
   solver_.compute(matrix_);
   if (solver_.info() != Eigen::Success) {
-    return fail(ErrorCode::kSingularMatrix, "stiffness matrix with " +
-                                                std::to_string(count(active())) +
-                                                " active slaves has no incomplete factor");
+    return fail(ErrorCode::kSingularMatrix,
+                fmt::format("stiffness matrix with {} active slaves has no incomplete factor",
+                            count(active())));
   }
   return {};
 }
@@ -78,10 +78,10 @@ Status IterativeSystem::solve(const Points& f, Points& u) const {
   }
   iterations_ += iterations;
   if (!(residual.norm() <= kDrift * limit)) {
-    std::ostringstream text;
-    text << "iterative solver: relative residual " << residual.norm() / scale << " after "
-         << iterations << " iterations is above " << kDrift * options_.tolerance;
-    return fail(ErrorCode::kNotConverged, text.str());
+    return fail(ErrorCode::kNotConverged,
+                fmt::format("iterative solver: relative residual {:g} after {} iterations is above "
+                            "{:g}",
+                            residual.norm() / scale, iterations, kDrift * options_.tolerance));
   }
   dofs.expand(q, u);
   return {};

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/penalised_system.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <sstream>
 #include <string>
 
 #include "common/fem/stiffness_factor.hpp"
@@ -173,10 +174,11 @@ Status WoodburySystem::solve_with(const Points& f, const VecX& gaps, Points& u) 
     const double eta = left.cwiseAbs().maxCoeff();
     if (eta <= linalg::kRefuseAbove * scale) return {};
     if (refinements == linalg::kMaxRefinements) {
-      std::ostringstream text;
-      text << "low-rank correction for " << set_.size() << " active slaves: relative imbalance "
-           << eta / scale << " is above " << linalg::kRefuseAbove;
-      return fail(ErrorCode::kSingularMatrix, text.str());
+      return fail(
+          ErrorCode::kSingularMatrix,
+          fmt::format("low-rank correction for {} active slaves: relative imbalance {:g} is "
+                      "above {:g}",
+                      set_.size(), eta / scale, linalg::kRefuseAbove));
     }
     Points residual = Points::Zero(3, f.cols());
     for (std::size_t i = 0; i < set_.size(); ++i) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/linalg/checked_solve.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "common/core/random.hpp"
 
@@ -23,10 +24,10 @@ double max_abs(const VecX& v) {
 Error solve_refusal(const VecX& b, const VecX& x, const SolveQuality& quality) {
   if (!b.allFinite()) return {ErrorCode::kNotFinite, "solve: the right-hand side is not finite"};
   if (!x.allFinite()) return {ErrorCode::kNotFinite, "solve: the solution is not finite"};
-  std::ostringstream text;
-  text << "solve: backward error " << quality.backward_error << " after " << quality.refinements
-       << " refinements is above " << kRefuseAbove << "; the factor does not belong to the matrix";
-  return {ErrorCode::kSingularMatrix, text.str()};
+  return {ErrorCode::kSingularMatrix,
+          fmt::format("solve: backward error {:g} after {} refinements is above {:g}; the factor "
+                      "does not belong to the matrix",
+                      quality.backward_error, quality.refinements, kRefuseAbove)};
 }
 
 double backward_error(const SymmetricMatrix& lower, double norm, const VecX& b, const VecX& x,

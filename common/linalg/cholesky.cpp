@@ -2,13 +2,13 @@
 #include "common/linalg/cholesky.hpp"
 
 #include <cholmod.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <mutex>
 #include <span>
-#include <sstream>
 
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas.hpp"
@@ -140,10 +140,10 @@ Status check_symmetric(const SymmetricMatrix& lower) {
   for (long j = 0; j < lower.outerSize(); ++j) {
     const long first = lower.outerIndexPtr()[j];
     if (first == lower.outerIndexPtr()[j + 1] || lower.innerIndexPtr()[first] == j) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                "stiffness matrix: column " + std::to_string(j) + " starts at row " +
-                    std::to_string(lower.innerIndexPtr()[first]) +
-                    "; a symmetric matrix is given by its lower triangle, diagonal included");
+    return invalid(
+        fmt::format("stiffness matrix: column {} starts at row {}; a symmetric matrix is given by "
+                    "its lower triangle, diagonal included",
+                    j, lower.innerIndexPtr()[first]));
   }
   return {};
 }
@@ -275,17 +275,16 @@ Status SparseCholesky::refactorise(const SymmetricMatrix& lower) {
   }
   impl_->rcond = cholmod_l_rcond(impl_->factor, &impl_->common);
   if (!(impl_->rcond >= kMinRcond)) {
-    std::ostringstream text;
-    text << "stiffness matrix: reciprocal condition " << impl_->rcond << " is below " << kMinRcond
-         << advice;
-    return fail(ErrorCode::kFloatingBody, text.str());
+    return fail(ErrorCode::kFloatingBody,
+                fmt::format("stiffness matrix: reciprocal condition {:g} is below {:g}{}",
+                            impl_->rcond, kMinRcond, advice));
   }
   const double share = least_pivot_share(*impl_->factor, lower);
   if (!(share >= kMinPivotShare)) {
-    std::ostringstream text;
-    text << "stiffness matrix: elimination leaves " << share << " of a diagonal entry, below "
-         << kMinPivotShare << advice;
-    return fail(ErrorCode::kFloatingBody, text.str());
+    return fail(ErrorCode::kFloatingBody,
+                fmt::format("stiffness matrix: elimination leaves {:g} of a diagonal entry, below "
+                            "{:g}{}",
+                            share, kMinPivotShare, advice));
   }
   return {};
 }

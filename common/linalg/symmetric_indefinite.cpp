@@ -3,13 +3,13 @@
 
 #include <cholmod.h>
 #include <dmumps_c.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -69,12 +69,6 @@ std::vector<int> nested_dissection(const SymmetricMatrix& lower) {
     position[static_cast<std::size_t>(order[k])] = static_cast<int>(k) + 1;
   }
   return position;
-}
-
-std::string text_of(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
 }
 
 }  // namespace
@@ -252,10 +246,11 @@ Status SymmetricIndefinite::Impl::refine(const VecX& b, VecX& x, SolveCheck& che
     return fail(ErrorCode::kNotFinite, "consolidation solve: the solution is not finite");
   }
   if (check.backward_error > kMaxBackwardError) {
-    return fail(ErrorCode::kNotConverged,
-                "consolidation solve: backward error " + text_of(check.backward_error) + " after " +
-                    std::to_string(check.refinements) + " refinements is above " +
-                    text_of(kMaxBackwardError));
+    return fail(
+        ErrorCode::kNotConverged,
+        fmt::format("consolidation solve: backward error {:g} after {} refinements is above "
+                    "{:g}",
+                    check.backward_error, check.refinements, kMaxBackwardError));
   }
   return {};
 }
@@ -313,9 +308,9 @@ Status SymmetricIndefinite::refactorise(const SymmetricMatrix& lower) {
   impl.rcond = impl.estimate_rcond();
   impl.factor_s = watch.seconds();
   if (!(impl.rcond >= kMinRcond)) {
-    return fail(ErrorCode::kFloatingBody, "consolidation matrix: reciprocal condition " +
-                                              text_of(impl.rcond) + " is below " +
-                                              text_of(kMinRcond) + advice);
+    return fail(ErrorCode::kFloatingBody,
+                fmt::format("consolidation matrix: reciprocal condition {:g} is below {:g}{}",
+                            impl.rcond, kMinRcond, advice));
   }
   return {};
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/contract/data_check.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
-#include <sstream>
-#include <string>
 
 #include "common/core/small_matrices.hpp"
 
@@ -21,9 +21,9 @@ Status check_spread(const Points& positions) {
   const Vec3 variances = symmetric_eigen(scatter).values;  // ascending
   const double limit = kCollinearRatio * kCollinearRatio * variances[2];
   if (variances[1] > limit && variances[0] > limit) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "sparse data: the " + std::to_string(positions.cols()) + " positions lie " +
-                  (variances[1] > limit ? "in one plane" : "on one line or in one point"));
+  return invalid(
+      fmt::format("sparse data: the {} positions lie {}", positions.cols(),
+                  variances[1] > limit ? "in one plane" : "on one line or in one point"));
 }
 
 // Neighbours that would have to tear apart. All pairs are compared, of a subset beyond 2000 data.
@@ -38,10 +38,10 @@ Status check_agreement(const SparseData& data) {
       const double differ = (data.displacements.col(i) - data.displacements.col(j)).norm();
       const double noise = kContradictionSds * (data.sd_mm[i] + data.sd_mm[j]);
       if (!(differ > kContradiction_mm + kContradictionStretch * apart + noise)) continue;
-      std::ostringstream text;
-      text << "sparse data: points " << i << " and " << j << " contradict each other: " << apart
-           << " mm apart, their displacements differ by " << differ << " mm";
-      return fail(ErrorCode::kInvalidArgument, text.str());
+      return invalid(
+          fmt::format("sparse data: points {} and {} contradict each other: {:g} mm apart, their "
+                      "displacements differ by {:g} mm",
+                      i, j, apart, differ));
     }
   }
   return {};
@@ -50,17 +50,15 @@ Status check_agreement(const SparseData& data) {
 Status check_directions(const SparseData& data) {
   if (data.directions.cols() == 0) return {};
   if (data.directions.cols() != data.size()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "sparse data: " + std::to_string(data.directions.cols()) + " directions for " +
-                    std::to_string(data.size()) + " data");
+    return invalid(
+        fmt::format("sparse data: {} directions for {} data", data.directions.cols(), data.size()));
   }
   for (int i = 0; i < data.size(); ++i) {
     const double length = data.directions.col(i).norm();
     if (length == 0.0 || std::abs(length - 1.0) <= kUnitTolerance) continue;
-    std::ostringstream text;
-    text << "sparse data: direction " << i << " has length " << length << ": must be 0 or 1";
-    return fail(std::isfinite(length) ? ErrorCode::kInvalidArgument : ErrorCode::kNotFinite,
-                text.str());
+    return fail(
+        std::isfinite(length) ? ErrorCode::kInvalidArgument : ErrorCode::kNotFinite,
+        fmt::format("sparse data: direction {} has length {:g}: must be 0 or 1", i, length));
   }
   return {};
 }
@@ -70,15 +68,13 @@ Status check_sources(const SparseData& data) {
   int next = 0;
   for (const DataSource& source : data.sources) {
     if (source.first != next || source.count < 0) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "sparse data: source \"" + source.name + "\" begins at datum " +
-                      std::to_string(source.first) + ", must begin at " + std::to_string(next));
+      return invalid(fmt::format("sparse data: source \"{}\" begins at datum {}, must begin at {}",
+                                 source.name, source.first, next));
     }
     next += source.count;
   }
   if (data.sources.empty() || next == data.size()) return {};
-  return fail(ErrorCode::kInvalidArgument, "sparse data: the sources hold " + std::to_string(next) +
-                                               " of " + std::to_string(data.size()) + " data");
+  return invalid(fmt::format("sparse data: the sources hold {} of {} data", next, data.size()));
 }
 
 }  // namespace
@@ -86,9 +82,9 @@ Status check_sources(const SparseData& data) {
 Status check_whole(const SparseData& data) {
   for (int i = 0; i < data.size(); ++i) {
     if (!data.along_direction(i)) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                "sparse data: datum " + std::to_string(i) +
-                    " is a distance along a direction: only method condensed takes it");
+    return invalid(fmt::format(
+        "sparse data: datum {} is a distance along a direction: only method condensed takes it",
+        i));
   }
   return {};
 }
@@ -96,40 +92,35 @@ Status check_whole(const SparseData& data) {
 Status check_data(const SparseData& data) {
   const int m = data.size();
   if (data.displacements.cols() != m || data.sd_mm.size() != m) {
-    std::ostringstream text;
-    text << "sparse data: " << m << " positions, " << data.displacements.cols()
-         << " displacements and " << data.sd_mm.size()
-         << " standard deviations must be equal counts";
-    return fail(ErrorCode::kInvalidArgument, text.str());
+    return invalid(fmt::format(
+        "sparse data: {} positions, {} displacements and {} standard deviations must be "
+        "equal counts",
+        m, data.displacements.cols(), data.sd_mm.size()));
   }
   const Eigen::MatrixXd& common = data.common_error;
   if (common.rows() > 0 &&
       (common.rows() != 3 * m || common.cols() > SparseData::kMaxCommonErrors)) {
-    std::ostringstream text;
-    text << "sparse data: common_error is " << common.rows() << " x " << common.cols()
-         << ": must have 3 rows for each of " << m << " data and at most "
-         << SparseData::kMaxCommonErrors << " columns";
-    return fail(ErrorCode::kInvalidArgument, text.str());
+    return invalid(fmt::format(
+        "sparse data: common_error is {} x {}: must have 3 rows for each of {} data and "
+        "at most {} columns",
+        common.rows(), common.cols(), m, SparseData::kMaxCommonErrors));
   }
   if (!common.allFinite()) {
     return fail(ErrorCode::kNotFinite,
                 "sparse data: common_error holds a value that is not finite");
   }
-  if (m < 3) {
-    return fail(ErrorCode::kInvalidArgument,
-                "sparse data: " + std::to_string(m) + " points, at least 3 are needed");
-  }
+  if (m < 3) return invalid(fmt::format("sparse data: {} points, at least 3 are needed", m));
   for (int i = 0; i < m; ++i) {
     if (!data.positions.col(i).allFinite() || !data.displacements.col(i).allFinite() ||
         !std::isfinite(data.sd_mm[i])) {
-      return fail(ErrorCode::kNotFinite,
-                  "sparse data: point " + std::to_string(i) +
-                      " has a position, displacement or sd that is not finite");
+      return fail(
+          ErrorCode::kNotFinite,
+          fmt::format("sparse data: point {} has a position, displacement or sd that is not "
+                      "finite",
+                      i));
     }
     if (!(data.sd_mm[i] > 0.0)) {
-      std::ostringstream text;
-      text << "sparse data: sd_mm[" << i << "] = " << data.sd_mm[i] << ": must be > 0";
-      return fail(ErrorCode::kInvalidArgument, text.str());
+      return invalid(fmt::format("sparse data: sd_mm[{}] = {:g}: must be > 0", i, data.sd_mm[i]));
     }
   }
   if (auto status = check_directions(data); !status) return status;

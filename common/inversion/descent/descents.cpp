@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/descent/descents.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,17 +68,17 @@ class DescentLog {
     estimate_.status = EstimateStatus::kIterating;
     if (options_.on_iterate) options_.on_iterate(estimate_);
 
-    std::ostringstream reason;
+    estimate_.reason.clear();
     if (settled(misfit)) {
       estimate_.status = EstimateStatus::kConverged;
-      reason << "misfit changed by less than " << config_.relative_misfit_change
-             << " of its initial value at iteration " << k;
+      estimate_.reason =
+          fmt::format("misfit changed by less than {:g} of its initial value at iteration {}",
+                      config_.relative_misfit_change, k);
     } else if (k >= config_.max_iterations) {
       estimate_.status = EstimateStatus::kIterationLimit;
-      reason << "iteration limit " << config_.max_iterations
-             << " reached before the misfit settled";
+      estimate_.reason = fmt::format("iteration limit {} reached before the misfit settled",
+                                     config_.max_iterations);
     }
-    estimate_.reason = reason.str();
     previous_misfit_ = misfit;
     return estimate_.status != EstimateStatus::kIterating;
   }

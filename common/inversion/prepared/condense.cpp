@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/condense.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <span>
-#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -154,12 +154,11 @@ Status check_memory(const PreparedModel& model, std::uint64_t bytes) {
   const double limit_gib = model.config().condensed.memory_limit_gib;
   const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
   if (needed_gib <= limit_gib) return {};
-  std::ostringstream text;
-  text.precision(3);
-  text << "condensed.memory_limit_gib = " << limit_gib << ": the preparation needs " << needed_gib
-       << " GiB (" << model.forward().contact().num_slaves() << " slaves, "
-       << model.model().mesh.num_nodes() << " nodes); raise the limit or coarsen the mesh";
-  return fail(ErrorCode::kInvalidArgument, text.str());
+  return invalid(fmt::format(
+      "condensed.memory_limit_gib = {:.3g}: the preparation needs {:.3g} GiB ({} slaves, "
+      "{} nodes); raise the limit or coarsen the mesh",
+      limit_gib, needed_gib, model.forward().contact().num_slaves(),
+      model.model().mesh.num_nodes()));
 }
 
 // Steps 1 and 2: U.
@@ -297,12 +296,10 @@ Status check_motion(const MatrixXf& modes) {
   constexpr double kMax_mm = 10.0 * kMaxMotion_mm;
   const double sd_mm = largest_motion_sd_mm(modes);
   if (sd_mm > 0.0 && sd_mm <= kMax_mm) return {};
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "prior: it allows a node to move by %.3g mm (standard deviation); above 0 and at "
-                "most %g mm, ten times what a skull allows",
-                sd_mm, kMax_mm);
-  return fail(ErrorCode::kInvalidArgument, text);
+  return invalid(fmt::format(
+      "prior: it allows a node to move by {:.3g} mm (standard deviation); above 0 and at "
+      "most {:g} mm, ten times what a skull allows",
+      sd_mm, kMax_mm));
 }
 
 // Keeps the rows of the data region as a group is read: columns [first, first + count) of
