@@ -216,8 +216,7 @@ Status DisplacementConstraints::add(NodeIndex node, const Vec3& direction, doubl
   const double length = rest.norm();
   if (length < kParallel) {
     if (std::abs(spanned_value - value) <= kSameValue * (1.0 + std::abs(value))) return {};
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("{} prescribes {} mm at node {}, but {} prescribes {} mm there", source, value,
                     node, sources_[static_cast<std::size_t>(known.back().source)], spanned_value));
   }

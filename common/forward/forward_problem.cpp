@@ -56,8 +56,7 @@ Status check_group(const ForwardProblem& problem, const std::string& key, const 
                             group.vertices.empty() ? "node" : "face of the boundary"));
   }
   if (needs_faces && group.inner.cols() > 0) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("{}.on = {}: {} of the group's faces lie inside the body, where there is "
                     "no outward side",
                     key, name, group.inner.cols()));

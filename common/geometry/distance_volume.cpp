@@ -315,8 +315,7 @@ Result<DistanceGrid> signed_distance_grid(const ClosestPointIndex& surface,
   if (!(std::isfinite(options.margin_mm) && options.margin_mm >= 0.0))
     return invalid(fmt::format("distance grid: margin_mm = {}: must be >= 0", options.margin_mm));
   if (!(options.max_nodes >= 8.0 && options.max_nodes <= 1e9))
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("distance grid: max_nodes = {}: must be in [8, 1e9]", options.max_nodes));
   if (!is_closed(surface.surface()))
     return invalid(fmt::format("distance grid: the surface of {} triangles is not closed",

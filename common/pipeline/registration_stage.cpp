@@ -197,8 +197,7 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const C
                                pairs.undeformed.cols(), pairs.deformed.cols()));
   }
   if (pairs.undeformed.cols() < 3) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("landmark_pairs: {} pairs, at least 3 are needed", pairs.undeformed.cols()));
   }
   RegisteredObservation registered;
@@ -239,8 +238,7 @@ Result<RegisteredObservation> register_observation(const Observation& observatio
     registered = from_landmarks(*pairs, config, method);
   } else if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
     if (config.scene.surface == Carry::kOff) {
-      return fail(
-          ErrorCode::kInvalidArgument,
+      return invalid(
           fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
                       observation.sequence));
     }

@@ -172,8 +172,7 @@ Status check_match(const Points& measured, const Points& image, const MatchOptio
 
 Result<FiducialRegistration> register_fiducials(const Points& measured, const Points& image) {
   if (measured.cols() != image.cols())
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("fiducials: {} measured but {} in the image", measured.cols(), image.cols()));
   if (Status good = check_set("measured", measured); !good) return tl::unexpected(good.error());
   if (Status good = check_set("image", image); !good) return tl::unexpected(good.error());
@@ -203,12 +202,10 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
             measured.cols(), image.cols(), options.tolerance_mm));
   const double best = matcher.best()->fre_mm, second = matcher.second_fre_mm();
   if (second < options.ambiguity_factor * best || second < best + options.ambiguity_mm)
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format(
-            "fiducials: two correspondences fit nearly alike (residuals {:.2f} and {:.2f} mm rms): "
-            "give their order",
-            best, second));
+    return invalid(fmt::format(
+        "fiducials: two correspondences fit nearly alike (residuals {:.2f} and {:.2f} mm rms): "
+        "give their order",
+        best, second));
   return *matcher.best();
 }
 

@@ -208,15 +208,9 @@ void Journal::begin_file(const Opening& opening) {
 }
 
 void Journal::write(Group group) {
-  if (!sink_) {
-    lose(group.ranges());
-    return;
-  }
+  if (!sink_) return lose(group.ranges());
   const Status status = commit(group);
-  if (status) {
-    tell_recorded();
-    return;
-  }
+  if (status) return tell_recorded();
   const Status in_place = writing([&] { return sink_->check(); });
   unwritten_ = std::move(group);
   end_file(in_place ? status.error() : in_place.error(), !in_place);

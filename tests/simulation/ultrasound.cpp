@@ -30,12 +30,10 @@ double mix(double a, double b, double t) { return a + (b - a) * t; }
 
 Status check_grids(const VoxelImage& mri, const VoxelImage& brain) {
   if (mri.dims == brain.dims && mri.T_ras_voxel.isApprox(brain.T_ras_voxel, 1e-4)) return {};
-  return fail(
-      ErrorCode::kInvalidArgument,
-      fmt::format("simulated ultrasound: MRI of {} x {} x {} and brain mask of {} x {} x {} "
-                  "voxels: must be the same ones",
-                  mri.dims[0], mri.dims[1], mri.dims[2], brain.dims[0], brain.dims[1],
-                  brain.dims[2]));
+  return invalid(fmt::format(
+      "simulated ultrasound: MRI of {} x {} x {} and brain mask of {} x {} x {} "
+      "voxels: must be the same ones",
+      mri.dims[0], mri.dims[1], mri.dims[2], brain.dims[0], brain.dims[1], brain.dims[2]));
 }
 
 // What all maps are made from.

@@ -205,10 +205,7 @@ void ContactSystem::forget() {
 
 void ContactSystem::solve(const VecX& z, const VecX& free_penetration, Eigen::Ref<VecX> forces,
                           VecX& penetration) {
-  if (by_released_) {
-    released_.solve(z, forces, penetration);
-    return;
-  }
+  if (by_released_) return released_.solve(z, forces, penetration);
   gather(free_penetration.data(), active_, forces.data());
   pressing_.solve(forces, work_.topLeftCorner(pressing_.work_rows(), 1));
   penetration = free_penetration;
@@ -220,10 +217,7 @@ void ContactSystem::solve(const VecX& z, const VecX& free_penetration, Eigen::Re
 }
 
 void ContactSystem::respond(Eigen::Ref<Eigen::MatrixXd> out) {
-  if (by_released_) {
-    released_.respond(out);
-    return;
-  }
+  if (by_released_) return released_.respond(out);
   const Eigen::Index r = window_.count;
   team_.split(r + 1, [&](long begin, long end) {
     for (Eigen::Index j = begin; j < end; ++j) {
@@ -237,10 +231,7 @@ void ContactSystem::respond(Eigen::Ref<Eigen::MatrixXd> out) {
 }
 
 void ContactSystem::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
-  if (by_released_) {
-    released_.add_adjoint(felt, out);
-    return;
-  }
+  if (by_released_) return released_.add_adjoint(felt, out);
   adjoint_ = felt;
   pressing_.solve(adjoint_, work_.topLeftCorner(pressing_.work_rows(), 1));
   for (int j = 0; j < size(); ++j) {
@@ -251,10 +242,7 @@ void ContactSystem::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
 }
 
 void ContactSystem::solve(blas::Out<double> b) {
-  if (by_released_) {
-    released_.solve(b);
-    return;
-  }
+  if (by_released_) return released_.solve(b);
   Eigen::MatrixXd work(pressing_.work_rows(), b.cols());
   pressing_.solve(b, work);
 }
