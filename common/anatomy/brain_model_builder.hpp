@@ -27,12 +27,8 @@ BrainSurface brain_surface_of(const TetMesh& mesh);
 
 // Disjoint; together all boundary nodes. Depth of a point x is x . gravity_direction (mm).
 struct NodeSets {
-  std::vector<NodeIndex> craniotomy;
-  std::vector<NodeIndex> brainstem;
-  std::vector<NodeIndex> slaves;
-  std::vector<NodeIndex> fixed;
-  double fluid_plane_depth_mm = 0.0;
-  double slave_plane_depth_mm = 0.0;
+  std::vector<NodeIndex> craniotomy, brainstem, slaves, fixed;
+  double fluid_plane_depth_mm = 0.0, slave_plane_depth_mm = 0.0;
 };
 
 // craniotomy  nodes inside the ellipse with the given full axes, in the tangent plane at the

@@ -78,8 +78,7 @@ int WoodburySystem::columns() const {
 Status WoodburySystem::solve_columns(const std::vector<int>& slaves) {
   const auto& pairs = forward().contact().pairs();
   const fem::DofMap& dofs = forward().dofs();
-  Eigen::MatrixXd rhs;
-  Eigen::MatrixXd x;
+  Eigen::MatrixXd rhs, x;
   for (std::size_t begin = 0; begin < slaves.size(); begin += kBlock) {
     const auto width = static_cast<Eigen::Index>(std::min(kBlock, slaves.size() - begin));
     rhs.setZero(width, dofs.num_unknowns());

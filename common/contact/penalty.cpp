@@ -57,8 +57,7 @@ class MasterSurface {
   Vec3 vertex(int v) const { return skull_->vertices.col(v); }
 
   const TriangleSurface* skull_ = nullptr;
-  Points face_normals_;
-  Points vertex_normals_;
+  Points face_normals_, vertex_normals_;
   std::map<Edge, Vec3> edge_normals_;
   std::vector<std::vector<int>> triangles_at_;
 };

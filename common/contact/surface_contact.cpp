@@ -259,8 +259,7 @@ class Problem {
   const fem::ConstrainedDofs& constrained_;
   const SurfaceContact& contact_;
   const Points& load_;
-  VecX b_;
-  VecX lift_penetration_;
+  VecX b_, lift_penetration_;
   std::vector<double> point_stiffness_;
   std::optional<linalg::SparseCholesky> factor_;
 };

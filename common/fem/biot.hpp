@@ -53,8 +53,7 @@ struct BiotDiagnostics {
   bool factorised = false;                               // the step size was new
   int stabilised_tets = 0;                               // elements below their bound
   double smallest_bound_s = 0.0, largest_bound_s = 0.0;  // h^2 / (6 c_v) over the elements
-  double rcond = 0.0;
-  double backward_error = 0.0;
+  double rcond = 0.0, backward_error = 0.0;
   int refinements = 0;
 };
 

@@ -17,9 +17,7 @@ double negative_volume_fraction(const Eigen::Vector4d& values) {
   if (v[0] >= 0.0) return 0.0;
   if (v[3] <= 0.0) return 1.0;
   // One corner negative: the cut-off corner is similar to the tetrahedron along its three edges.
-  if (v[1] >= 0.0) {
-    return v[0] / (v[0] - v[1]) * (v[0] / (v[0] - v[2])) * (v[0] / (v[0] - v[3]));
-  }
+  if (v[1] >= 0.0) return v[0] / (v[0] - v[1]) * (v[0] / (v[0] - v[2])) * (v[0] / (v[0] - v[3]));
   // One corner positive: the complement, from the other side.
   if (v[2] <= 0.0) {
     return 1.0 - v[3] / (v[3] - v[0]) * (v[3] / (v[3] - v[1])) * (v[3] / (v[3] - v[2]));

@@ -18,9 +18,7 @@ std::vector<std::vector<int>> lower_adjacency(const Eigen::Ref<const Eigen::Matr
   for (Eigen::Index e = 0; e < elements.cols(); ++e) {
     for (int a = 0; a < elements.rows(); ++a) {
       for (int b = 0; b < elements.rows(); ++b) {
-        if (elements(b, e) >= elements(a, e)) {
-          neighbours[elements(a, e)].push_back(elements(b, e));
-        }
+        if (elements(b, e) >= elements(a, e)) neighbours[elements(a, e)].push_back(elements(b, e));
       }
     }
   }

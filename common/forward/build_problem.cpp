@@ -173,8 +173,7 @@ Status Builder::set_mesh_groups() {
   for (Eigen::Index f = 0; f < boundary().cols(); ++f) {
     outward.emplace(sorted(boundary().col(f)), boundary().col(f));
   }
-  std::map<int, std::vector<Eigen::Vector3i>> of_label;
-  std::map<int, std::vector<Eigen::Vector3i>> inner;
+  std::map<int, std::vector<Eigen::Vector3i>> of_label, inner;
   for (Eigen::Index f = 0; f < file_.triangles.cols(); ++f) {
     const int label = file_.triangle_labels[static_cast<std::size_t>(f)];
     const auto found = outward.find(sorted(file_.triangles.col(f)));

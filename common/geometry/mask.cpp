@@ -16,8 +16,7 @@ using Binary = std::vector<std::uint8_t>;
 
 // Voxels begin <= i < end of one row, all of them in the labelled set.
 struct Run {
-  int begin = 0;
-  int end = 0;
+  int begin = 0, end = 0;
 };
 
 // 6-connected components of the voxels that equal `value`, as runs in row order with one root
@@ -75,8 +74,7 @@ class RunComponents {
   }
 
   void join_rows(std::size_t row_a, std::size_t row_b) {
-    std::size_t a = row_begin_[row_a];
-    std::size_t b = row_begin_[row_b];
+    std::size_t a = row_begin_[row_a], b = row_begin_[row_b];
     while (a < row_begin_[row_a + 1] && b < row_begin_[row_b + 1]) {
       if (std::max(runs_[a].begin, runs_[b].begin) < std::min(runs_[a].end, runs_[b].end))
         join(a, b);
@@ -96,8 +94,7 @@ class RunComponents {
 
   std::array<int, 3> dims_;
   std::vector<Run> runs_;
-  std::vector<std::size_t> row_begin_;
-  std::vector<std::size_t> parent_;
+  std::vector<std::size_t> row_begin_, parent_;
 };
 
 void paint(Binary& voxels, const std::array<int, 3>& dims, std::size_t row, const Run& run,
@@ -130,8 +127,7 @@ void fill_cavities(Binary& voxels, const std::array<int, 3>& dims) {
   const auto width = static_cast<std::size_t>(dims[1]);
   const auto depth = static_cast<std::size_t>(dims[2]);
   components.for_each([&](std::size_t row, std::size_t r) {
-    const std::size_t j = row % width;
-    const std::size_t k = row / width;
+    const std::size_t j = row % width, k = row / width;
     const Run& run = components.run(r);
     if (j == 0 || j + 1 == width || k == 0 || k + 1 == depth || run.begin == 0 ||
         run.end == dims[0])

@@ -34,8 +34,7 @@ struct TetLocator::Impl {
   Box box;
   double cell_mm = 1.0;
   Cell dims = Cell::Ones();
-  std::vector<int> first;
-  std::vector<int> members;
+  std::vector<int> first, members;
 
   std::vector<int> tet_of_boundary_triangle;
   std::optional<ClosestPointIndex> boundary;

@@ -200,9 +200,7 @@ struct SparseCholesky::Impl {
   cholmod_factor* factor = nullptr;
   mutable Workspace::Impl workspace;  // for solves without a workspace of their own
   std::uint64_t nonzeros = 0;
-  double rcond = 0.0;
-  double analyse_s = 0.0;
-  double factor_s = 0.0;
+  double rcond = 0.0, analyse_s = 0.0, factor_s = 0.0;
 
   Impl() {
     cholmod_l_start(&common);
@@ -229,9 +227,7 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
   if (lower.rows() == 0) {
     return fail(ErrorCode::kEmptySet, "stiffness matrix: no unknown is left to solve for");
   }
-  if (auto symmetric = check_symmetric(lower); !symmetric) {
-    return tl::unexpected(symmetric.error());
-  }
+  if (auto symmetric = check_symmetric(lower); !symmetric) return tl::unexpected(symmetric.error());
   if (auto finite = check_finite(lower); !finite) return tl::unexpected(finite.error());
   use_single_threaded_blas();
   SparseCholesky cholesky(std::make_unique<Impl>());

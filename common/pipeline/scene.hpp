@@ -24,9 +24,7 @@ namespace brainshift::pipeline {
 struct ScenePlan {
   bool pressure = false;
   bool contact = true;  // searched for; an update without any leaves it out by itself
-  bool uncertainty = true;
-  bool gravity_modes = true;
-  bool far_field = true;
+  bool uncertainty = true, gravity_modes = true, far_field = true;
 };
 
 // kInvalidArgument for a part that is forced on but not available (scene.pressure with method pcg;

@@ -67,8 +67,7 @@ struct IcpOptions {
   double welsch_scale_mm = 3.0;  // s: residual at which a point's weight falls to exp(-1/2)
   double rotation_sd_deg = 3.0;  // of the prior; <= 0 switches it off
   bool rotation = true;          // false: translation only
-  double translation_tolerance_mm = 1e-4;
-  double rotation_tolerance_deg = 1e-4;
+  double translation_tolerance_mm = 1e-4, rotation_tolerance_deg = 1e-4;
   // An axis is reported unobservable when its Hessian eigenvalue (data only, rotation scaled by
   // the point cloud's rms radius) is below this fraction of the largest. At 1e-2 the axis is known
   // ten times worse than the best one. Measured for the least visible rotation: 4.6e-4 for the

@@ -60,8 +60,7 @@ struct PoseAscentOptions {
 struct PoseAscent {
   RigidTransform T = RigidTransform::Identity();
   double value = 0.0;
-  int iterations = 0;
-  int evaluations = 0;
+  int iterations = 0, evaluations = 0;
   bool valid = false;      // the function is defined at the first pose
   bool converged = false;  // a step was below the tolerance, or no step went up
 };

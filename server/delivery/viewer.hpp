@@ -45,8 +45,7 @@ class Viewer {
   Subscription subscription_;
   bool begun_ = false;
   std::uint64_t sent_ = 0;  // updates in this subscription
-  Bytes usable_;
-  Bytes failure_;
+  Bytes usable_, failure_;
   SelectionPtr selection_;
   Held held_;
 };

@@ -22,8 +22,7 @@ struct Lane {
   static constexpr std::size_t kBytes = 16u << 10;
 
   std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(kBytes);
-  std::size_t begin = 0;
-  std::size_t end = 0;
+  std::size_t begin = 0, end = 0;
   bool empty() const { return begin == end; }
 };
 
@@ -53,8 +52,7 @@ struct Connection {
   // Something cannot go on at once.
   bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
 
-  int peer = -1;
-  int inner = -1;
+  int peer = -1, inner = -1;
   std::string name;  // of the inner socket
   Lane up, down;     // to libzmq, to the peer
   ZmtpStream stream;

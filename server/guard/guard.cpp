@@ -275,8 +275,7 @@ struct Guard::Impl {
   Listener listener;
   const std::string inner;
   GuardOptions options;
-  int epoll = -1;
-  int wake = -1;
+  int epoll = -1, wake = -1;
   std::atomic<bool> stopping{false};
   bool listening = true;
   std::map<int, Connection*> by_fd;                                // both descriptors

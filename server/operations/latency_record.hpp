@@ -48,8 +48,7 @@ class LatencyRecord {
   std::array<std::uint64_t, kBounds_ms.size() + 1> coarse_{};
   std::array<double, kRecent> last_{};  // a ring; the next one goes to count_ % kRecent
   std::uint64_t count_ = 0;
-  double sum_ms_ = 0.0;
-  double max_ms_ = 0.0;
+  double sum_ms_ = 0.0, max_ms_ = 0.0;
 };
 
 // To tell late answers by (AnswerTime::usual_ms). It is the median over all of them, not over the

@@ -97,8 +97,7 @@ class Gate {
         : observations(limits.observations_per_s, limits.observations_per_s, now),
           session_starts(limits.session_starts_per_min / 60.0, limits.session_starts_per_min, now) {
     }
-    TokenBucket observations;
-    TokenBucket session_starts;
+    TokenBucket observations, session_starts;
   };
 
   tl::unexpected<Error> refuse(std::uint64_t& counter, ErrorCode code, const std::string& sentence);

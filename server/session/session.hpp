@@ -78,8 +78,7 @@ struct Job {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   Observation observation;  // its time is the daemon's
-  TimePoint arrived;
-  TimePoint begun;
+  TimePoint arrived, begun;
   SessionKey session;
   SessionRequest request;
   std::uint64_t number = 0;  // of the update

@@ -55,8 +55,7 @@ class SourceClock {
 
  private:
   double max_age_s_;
-  std::optional<std::int64_t> offset_ns_;
-  std::optional<std::int64_t> refused_offset_ns_;
+  std::optional<std::int64_t> offset_ns_, refused_offset_ns_;
   std::int64_t last_acquired_ns_ = 0;
 };
 

@@ -258,8 +258,7 @@ struct Router::Impl {
   Parcels parcels;
   // What a late subscriber of `session` gets: the last usable field, and the newest failure since.
   std::uint64_t session = 0;
-  Bytes last_final;
-  Bytes failure_since;
+  Bytes last_final, failure_since;
   RequestHandler* handler = nullptr;                     // of run()
   std::chrono::steady_clock::time_point last_turn = {};  // that the handler was told of
   std::optional<Guard> guard;                            // the last: peers go before the socket

@@ -37,8 +37,7 @@ struct Arguments {
   double memory_limit_gib = 22.0;
   double method_budget_s = 200.0;
   std::filesystem::path out = "out/bench";
-  bool quick = false;
-  bool all = false;
+  bool quick = false, all = false;
 };
 
 // The paper's method by Woodbury's formula gives the same estimates as the paper's own, in a third
@@ -156,9 +155,7 @@ Status run(Arguments arguments) {
   std::sort(arguments.ranks.begin(), arguments.ranks.end());
   std::error_code error;
   std::filesystem::create_directories(arguments.out, error);
-  if (error) {
-    return fail(ErrorCode::kWriteFailed, arguments.out.string() + ": " + error.message());
-  }
+  if (error) return fail(ErrorCode::kWriteFailed, arguments.out.string() + ": " + error.message());
   const auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
   std::vector<MeshWish> wishes;

@@ -112,9 +112,7 @@ Result<Points> direct_posterior(const PreparedModel& model, const SparseData& da
   MatrixXd a = MatrixXd::Zero(rows, 3 * nodes), v, forces(rows, 3 * nodes);
   for (int i = 0; i < data.size(); ++i) {
     for (fem::SamplingMatrix::InnerIterator it(*weights, i); it; ++it) {
-      for (int axis = 0; axis < 3; ++axis) {
-        a(3 * i + axis, 3 * it.col() + axis) = it.value();
-      }
+      for (int axis = 0; axis < 3; ++axis) a(3 * i + axis, 3 * it.col() + axis) = it.value();
     }
   }
   if (auto status = fem::BlockSolver(k_p, factor, forward.dofs()).solve(a, v); !status) {

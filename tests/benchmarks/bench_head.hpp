@@ -30,8 +30,7 @@ struct Head {
   std::shared_ptr<const inversion::PreparedModel> prepared;
   std::shared_ptr<const CondensedOperators> operators;
   std::shared_ptr<const geometry::TetLocator> locator;
-  double mesh_s = 0.0;
-  double condense_s = 0.0;
+  double mesh_s = 0.0, condense_s = 0.0;
   std::uint64_t peak_rss_bytes = 0;  // of this process, from the mesh to the condensed operators
 };
 

@@ -56,8 +56,7 @@ struct Row {
   int rank = 0;  // 0: not applicable
   const char* start = "cold";
   int repetition = 1;
-  double time_ms = 0.0;
-  double t_solve_ms = 0.0;
+  double time_ms = 0.0, t_solve_ms = 0.0;
   std::string status;
 };
 

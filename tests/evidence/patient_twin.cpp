@@ -114,9 +114,7 @@ Result<client::SimulatedSurgery> PatientTwin::play_calculix(const PlayedBrain& p
 Result<PlayedSurgery> PatientTwin::finish(Result<client::SimulatedSurgery> surgery) const {
   PlayedSurgery played;
   if (!surgery) {
-    if (surgery.error().code != ErrorCode::kInvalidArgument) {
-      return tl::unexpected(surgery.error());
-    }
+    if (surgery.error().code != ErrorCode::kInvalidArgument) return tl::unexpected(surgery.error());
     played.reason = surgery.error().message;
     return played;
   }

@@ -79,8 +79,7 @@ bool is_prefix(const Records& found, const Records& all) {
 }
 
 struct Counts {
-  int crashes = 0;
-  int taken_for_good = 0;
+  int crashes = 0, taken_for_good = 0;
   int harmless = 0;  // accepted, with every record as it was written
   int several_lines = 0;
   double kept_pct = 0.0;  // of the records, mean over the cuts

@@ -95,8 +95,7 @@ class TcpProxy {
 
  private:
   struct Pair {
-    int client = -1;
-    int daemon = -1;
+    int client = -1, daemon = -1;
     DelayedLane up, down;
 
     ~Pair() {

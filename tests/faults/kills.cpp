@@ -108,8 +108,7 @@ std::map<std::string, std::set<std::uint64_t>> held_by(const std::vector<fs::pat
 }
 
 struct Lost {
-  int claimed = 0;
-  int lost = 0;
+  int claimed = 0, lost = 0;
 };
 Lost compare(const Claims& claims, const Feed& feed, const std::vector<fs::path>& journals) {
   auto held = held_by(journals);

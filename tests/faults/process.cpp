@@ -21,8 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Pipe {
-  int read_end = -1;
-  int write_end = -1;
+  int read_end = -1, write_end = -1;
 };
 
 Pipe make_pipe() {

@@ -43,9 +43,7 @@ class Seeds {
   void copy_all(const std::string& target, const fs::path& folder,
                 const std::string& extension) const {
     for (const auto& entry : fs::directory_iterator(fs::path(BRAINSHIFT_SOURCE_DIR) / folder)) {
-      if (entry.path().extension() == extension) {
-        copy(target, folder / entry.path().filename());
-      }
+      if (entry.path().extension() == extension) copy(target, folder / entry.path().filename());
     }
   }
 

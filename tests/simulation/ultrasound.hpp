@@ -24,8 +24,7 @@
 namespace brainshift::client {
 
 struct TissueEcho {
-  VoxelImage scatter;
-  VoxelImage impedance;
+  VoxelImage scatter, impedance;
   VoxelImage brain;  // 0 to 1, smoothed mask
 };
 
@@ -39,8 +38,7 @@ Result<TissueEcho> tissue_echo(const VoxelImage& mri, const VoxelImage& brain,
 // Intensities and the noise's standard deviation are relative to white matter.
 struct TumourAppearance {
   double rim = 1.4, core = 0.6;
-  double rim_mm = 4.0;
-  double noise = 0.03;
+  double rim_mm = 4.0, noise = 0.03;
   std::uint64_t seed = 1;
 };
 // The MRI with the tumour drawn into it. Arguments and errors as above.
@@ -88,9 +86,7 @@ struct UltrasoundProbe {
   int beams = 161;
   double sample_mm = 0.25;  // along a beam
   // The point spread: along the beam, across it, and out of the image plane.
-  double range_sd_mm = 0.35;
-  double lateral_sd_deg = 0.6;
-  double slice_sd_mm = 1.0;
+  double range_sd_mm = 0.35, lateral_sd_deg = 0.6, slice_sd_mm = 1.0;
   double attenuation_db_mm = 0.1;  // that remains after the gain by depth
   double dynamic_range_db = 60.0;
   // The echo that is drawn white, in the units of scatter

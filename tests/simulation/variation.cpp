@@ -90,9 +90,7 @@ std::optional<CaseConfig> draw(const CaseConfig& config, const Head& head, Rando
   if (!place) return std::nullopt;
   CaseConfig patient = config;
   TumourEllipsoid tumour;
-  for (double& axis : tumour.semi_axes_mm) {
-    axis = between(kMinHalfAxis_mm, kMaxHalfAxis_mm, random);
-  }
+  for (double& axis : tumour.semi_axes_mm) axis = between(kMinHalfAxis_mm, kMaxHalfAxis_mm, random);
   const double depth = between(kMinDepth_mm, kMaxDepth_mm, random);
   tumour.centre_mm = place->centre + depth * beside(-place->normal, kApproach_deg, random);
   patient.tumour = tumour;

@@ -19,9 +19,7 @@ constexpr double kMove_mm = 5.0;
 // The product's side: mesh check, factor, checked solve.
 Result<Points> answer(const LinearBody& body, const linalg::SymmetricMatrix& matrix,
                       const Points& load, Point& point) {
-  if (auto status = geometry::check_mesh(body.mesh); !status) {
-    return tl::unexpected(status.error());
-  }
+  if (auto status = geometry::check_mesh(body.mesh); !status) return tl::unexpected(status.error());
   const auto factor = linalg::SparseCholesky::factorise(matrix);
   if (!factor) return tl::unexpected(factor.error());
   point.rcond = factor->rcond();

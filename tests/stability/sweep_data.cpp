@@ -36,9 +36,7 @@ void correlation_length(const Options& options) {
       continue;
     }
     const auto data = sagging_data(*problem, {});
-    for (const Method method : kMethods) {
-      invert_and_record(*problem, *data, method, point, options);
-    }
+    for (const Method method : kMethods) invert_and_record(*problem, *data, method, point, options);
   }
 }
 

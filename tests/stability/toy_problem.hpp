@@ -38,8 +38,7 @@ Points sagging_load(const ToyProblem& problem, double largest_mm);
 
 struct DataOptions {
   double largest_mm = 8.0;  // of the sagging truth without contact; negative: it rises
-  double noise_mm = 0.1;
-  double sd_mm = 0.2;
+  double noise_mm = 0.1, sd_mm = 0.2;
   int count = 40;  // nodes of the data region
   std::uint64_t seed = 4;
 };

@@ -107,8 +107,7 @@ Vec3 body_force(const Vec3& x) {
 }
 
 struct Errors {
-  double l2 = 0.0;
-  double gradient = 0.0;
+  double l2 = 0.0, gradient = 0.0;
 };
 
 Errors errors_of(const DisplacementSpace& space, const Points& u) {

@@ -49,9 +49,7 @@ namespace brainshift::inversion {
 struct CondensedOptions {
   // Parts that a scene may leave out (common/pipeline/scene.hpp decides); omission_errors()
   // estimates the price.
-  bool contact = true;
-  bool uncertainty = true;
-  bool gravity_modes = true;
+  bool contact = true, uncertainty = true, gravity_modes = true;
   // Nodes that are rebuilt, sorted; the others are interpolated (FarField). Empty: every node.
   std::vector<NodeIndex> region_of_interest;
   int rank = 0;     // use only so many modes; 0: all

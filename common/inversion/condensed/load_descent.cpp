@@ -214,9 +214,7 @@ Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
   if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   if (contact_.set() != reduction_.set()) {
     if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
-    if (auto status = minimise(strengths); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto status = minimise(strengths); !status) return tl::unexpected(status.error());
   }
   return outcome;
 }

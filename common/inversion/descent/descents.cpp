@@ -137,9 +137,7 @@ class Direction {
   }
 
  private:
-  Points dw_;
-  Points s_;
-  Points sigma_r_;
+  Points dw_, s_, sigma_r_;
   double norm2_ = 0.0;  // r . Sigma r
 };
 
@@ -154,10 +152,7 @@ Result<Estimate> steepest_descent(const PreparedModel& model, const SparseData& 
 
   Points w = Points::Zero(3, model.model().mesh.num_nodes());
   Points b = w;
-  Points u;
-  Points lambda;
-  Points dw;
-  Points z;
+  Points u, lambda, dw, z;
   while (true) {
     if (auto s = log.check_stop(); !s) return tl::unexpected(s.error());
     if (auto s = system.solve_with_gaps(b, u); !s) return tl::unexpected(s.error());
@@ -191,10 +186,7 @@ Result<Estimate> conjugate_gradients(const PreparedModel& model, const SparseDat
 
   Points w = Points::Zero(3, model.model().mesh.num_nodes());
   Points b = w;
-  Points u;
-  Points lambda;
-  Points r;
-  Points z;
+  Points u, lambda, r, z;
   Direction direction;
   if (auto s = system.solve_with_gaps(b, u); !s) return tl::unexpected(s.error());
   while (true) {

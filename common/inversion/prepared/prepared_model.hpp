@@ -24,9 +24,7 @@
 namespace brainshift::inversion {
 
 struct PrepareTimings {
-  double assemble_s = 0.0;
-  double analyse_s = 0.0;
-  double factor_s = 0.0;
+  double assemble_s = 0.0, analyse_s = 0.0, factor_s = 0.0;
   double prior_s = 0.0;  // beside the factorisation; 0 for a prior that was given
   double total_s = 0.0;
   std::uint64_t factor_nonzeros = 0;  // of L

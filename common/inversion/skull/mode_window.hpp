@@ -6,8 +6,7 @@
 namespace brainshift::inversion {
 
 struct ModeWindow {
-  int first = 0;
-  int count = 0;
+  int first = 0, count = 0;
 };
 
 }  // namespace brainshift::inversion

@@ -139,9 +139,7 @@ TEST(Parcels, AreMadeOnceForEqualChoicesAndABoundedNumberInATurn) {
   const Bytes whole = frame_of(usable(1, 6));
   const auto shared = selection({}, {1, 4});
   const Bytes first = made(parcels, whole, shared).bytes;
-  for (int viewer = 0; viewer < 100; ++viewer) {
-    EXPECT_EQ(made(parcels, whole, shared).bytes, first);
-  }
+  for (int viewer = 0; viewer < 100; ++viewer) EXPECT_EQ(made(parcels, whole, shared).bytes, first);
   EXPECT_FALSE(parcels.spent());
   for (int other = 1; other < Parcels::kMakesPerTurn; ++other) {
     EXPECT_TRUE(parcels.make(whole, selection({}, {other % 6}), {}));

@@ -31,8 +31,7 @@ constexpr double kMaxMib = 64.0;
 
 double resident_mib() {
   std::ifstream statm("/proc/self/statm");
-  long all = 0;
-  long resident = 0;
+  long all = 0, resident = 0;
   statm >> all >> resident;
   return static_cast<double>(resident * sysconf(_SC_PAGESIZE)) / (1 << 20);
 }

@@ -44,8 +44,7 @@ class FakeStorage {
   class Sink;
   std::mutex mutex_;
   std::vector<File> files_;
-  int opens_ = 0;
-  int appends_ = 0;
+  int opens_ = 0, appends_ = 0;
 };
 
 class FakeStorage::Sink final : public RecordSink {
@@ -129,8 +128,7 @@ class Witness {
   std::mutex mutex_;
   std::condition_variable changed_;
   Recorded last_;
-  std::vector<std::string> errors_;
-  std::vector<std::string> resumed_;
+  std::vector<std::string> errors_, resumed_;
 };
 
 inline io::SurgeryRecord record(std::uint64_t sequence,

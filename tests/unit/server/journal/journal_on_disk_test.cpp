@@ -51,8 +51,7 @@ class JournalOnDisk : public testing::Test {
   }
 
   const test_support::TemporaryFolder folder;
-  const fs::path path = folder / "a.surgery";
-  const fs::path next = folder / "a-2.surgery";
+  const fs::path path = folder / "a.surgery", next = folder / "a-2.surgery";
   Witness witness;
 };
 

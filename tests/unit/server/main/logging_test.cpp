@@ -82,9 +82,7 @@ TEST(Log, AStalledReaderCostsLinesAndNoWaitingAndEachLostLineIsCounted) {
   for (int i = 0; i < kLogged; ++i) spdlog::info("event {}", i);  // a waiting log never gets past
 
   const auto lines = reader.lines_to("event " + std::to_string(kLogged - 1) + "\n");
-  int written = 0;
-  int lost = 0;
-  int last = -1;
+  int written = 0, lost = 0, last = -1;
   for (const std::string& line : lines) {
     const auto notice = line.find(" lines of the log were lost");
     if (notice == std::string::npos) {

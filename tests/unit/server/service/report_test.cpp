@@ -100,9 +100,7 @@ TEST_F(ReportTest, TellsWhatTheDoorTurnedAway) {
   for (int i = 0; i < 2; ++i) {
     peer.start(SessionRequest{kCase});
   }
-  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
-    peer.hand_in(landmarks(sequence));
-  }
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) peer.hand_in(landmarks(sequence));
   const wire::DoorFigures door = report_of(peer).door;
   EXPECT_EQ(door.accepted, 1u);
   EXPECT_EQ(door.refused_starts, 2u);
@@ -331,9 +329,7 @@ TEST_F(RandomRun, ReplacedAndSkippedAreCounted) {
   start_session(peer);
   peer.hand_in(landmarks(1));
   entered.get_future().wait();
-  for (const std::uint64_t sequence : {2u, 3u}) {
-    peer.hand_in(landmarks(sequence));
-  }
+  for (const std::uint64_t sequence : {2u, 3u}) peer.hand_in(landmarks(sequence));
   EXPECT_EQ(report_of(peer).sources.at(0).waiting, 2u) << "one at work, one in its box";
   start_session(peer);
   const SourceCounts counts = report_when(peer, nothing_waits).sources.at(0);
