@@ -10,7 +10,6 @@
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "common/geometry/closest_point.hpp"

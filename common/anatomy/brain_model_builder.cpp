@@ -6,9 +6,7 @@
 
 #include <algorithm>
 #include <limits>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/geometry/closest_point.hpp"

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/contact/forward_model.hpp"
 
-#include <algorithm>
 #include <set>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
 #include "common/fem/space_elasticity.hpp"
-#include "common/fem/stiffness_factor.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 

@@ -18,8 +18,6 @@
 // Each tissue has its own stiffness (tissue_map).
 #pragma once
 
-#include <vector>
-
 #include "common/configuration/case_config.hpp"
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"

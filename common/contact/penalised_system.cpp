@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <string>
 
-#include "common/fem/stiffness_factor.hpp"
-
 namespace brainshift::contact {
 
 PenalisedSystem::PenalisedSystem(const ForwardModel& forward)

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 #include "common/core/units.hpp"
-#include "common/fem/elasticity.hpp"
 #include "common/fem/space_elasticity.hpp"
 
 namespace brainshift::fem {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <vector>
 
 #include "common/core/units.hpp"
 

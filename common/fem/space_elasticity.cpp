@@ -7,8 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "common/fem/elasticity.hpp"
-
 namespace brainshift::fem {
 namespace {
 

@@ -2,7 +2,6 @@
 #include "common/fem/stiffness_factor.hpp"
 
 #include <limits>
-#include <utility>
 
 namespace brainshift::fem {
 namespace {

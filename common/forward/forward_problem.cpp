@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "common/core/small_matrices.hpp"
 #include "common/geometry/mesh_quality.hpp"

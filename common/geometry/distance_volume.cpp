@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "common/core/thread_team.hpp"
-#include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::geometry {

@@ -18,7 +18,6 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 #include <vector>

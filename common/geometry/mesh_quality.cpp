@@ -6,11 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <numeric>
-#include <utility>
-#include <vector>
 
 namespace brainshift::geometry {
 namespace {

@@ -8,7 +8,6 @@
 #include <map>
 #include <utility>
 
-#include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
 
 namespace brainshift::geometry {

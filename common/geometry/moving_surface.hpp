@@ -13,7 +13,6 @@
 // closest_point.hpp builds it, would take milliseconds.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "common/core/error.hpp"

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "common/core/random.hpp"
 

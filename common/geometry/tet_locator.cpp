@@ -2,7 +2,6 @@
 #include "common/geometry/tet_locator.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/inverter.hpp"
 
-#include <memory>
 #include <utility>
 
 #include "common/contact/iterative_system.hpp"

@@ -8,7 +8,6 @@
 #include <cassert>
 #include <cmath>
 #include <mutex>
-#include <span>
 
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas.hpp"

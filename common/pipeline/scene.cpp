@@ -11,7 +11,6 @@
 #include "common/fem/biot_matrix.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/registration/icp.hpp"
 
 namespace brainshift::pipeline {
 namespace {

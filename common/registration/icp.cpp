@@ -9,8 +9,6 @@
 #include <numbers>
 #include <utility>
 
-#include "common/registration/pose_information.hpp"
-
 namespace brainshift::registration {
 namespace {
 

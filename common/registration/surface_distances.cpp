@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "common/core/random.hpp"
-#include "common/core/statistics.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/registration/alignment_data.hpp"

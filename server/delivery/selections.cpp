@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <string>
 #include <unordered_map>
 #include <utility>
 

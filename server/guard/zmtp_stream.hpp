@@ -13,7 +13,6 @@
 // cost is bounded by who counts what was delivered (guard.hpp).
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>

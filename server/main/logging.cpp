@@ -11,7 +11,6 @@
 
 #include <cerrno>
 #include <future>
-#include <string>
 #include <string_view>
 #include <thread>
 #include <utility>

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <span>
-#include <vector>
 
 #include "common/core/statistics.hpp"
 

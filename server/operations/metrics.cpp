@@ -13,7 +13,6 @@
 #include <exception>
 #include <limits>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <utility>
 

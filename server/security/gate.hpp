@@ -19,7 +19,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "common/core/error.hpp"
 #include "common/io/config/role.hpp"

@@ -9,7 +9,6 @@
 // with the daemon's, and with viewers that only take the bytes.
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>

@@ -3,7 +3,6 @@
 // repetitions, which tests/studies/bench.py turns into figures, tables and checks.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <limits>

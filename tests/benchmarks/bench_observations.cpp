@@ -7,8 +7,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "client/tools/twin/simulate.hpp"
 #include "client/tools/twin/surgery.hpp"

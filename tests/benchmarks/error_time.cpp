@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <cstdio>
 #include <limits>
-#include <memory>
 #include <mutex>
 #include <stop_token>
 #include <thread>

@@ -6,7 +6,6 @@
 #include "common/core/stopwatch.hpp"
 #include "tests/benchmarks/bench_head.hpp"
 #include "tests/evidence/estimate_session.hpp"
-#include "tests/evidence/patient_twin.hpp"
 
 namespace brainshift::evidence {
 namespace {

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "tests/surgeries/surgery_rows.hpp"
-
 namespace brainshift::evidence {
 namespace {
 

@@ -3,9 +3,6 @@
 
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <cmath>
-#include <memory>
-#include <string>
 #include <utility>
 
 #include "common/inversion/inverter.hpp"

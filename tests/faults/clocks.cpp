@@ -3,7 +3,6 @@
 // jumps. Nothing old is taken as new, and what is right is used as if nothing had been.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>

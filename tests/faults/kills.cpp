@@ -4,7 +4,6 @@
 // `brainshift replay --resume` goes on to the same final field.
 #include <algorithm>
 #include <csignal>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <random>

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
-#include <string>
 #include <vector>
 
 #include "tests/faults/daemon_process.hpp"

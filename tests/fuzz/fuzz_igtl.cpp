@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // OpenIGTLink messages. The bytes are a stream as a connection brings it, whole and in pieces;
 // and a header with a body whose checksum is not looked at: behind it a fuzzer would never come.
-#include <algorithm>
 #include <string>
 
 #include "common/igtl/crc64.hpp"

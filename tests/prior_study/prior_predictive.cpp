@@ -8,7 +8,6 @@
 //                    contact set (settled 0); min_volume_ratio is that of "total" alone
 //   truncation.csv   place,left_out_sd_mm: what the modes leave out (prior_draws.hpp)
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>

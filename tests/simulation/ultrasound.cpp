@@ -9,7 +9,6 @@
 #include <numbers>
 #include <utility>
 
-#include "common/core/random.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/mask.hpp"

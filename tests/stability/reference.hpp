@@ -9,7 +9,6 @@
 
 #include <Eigen/Cholesky>
 #include <array>
-#include <memory>
 #include <vector>
 
 #include "common/contact/penalty.hpp"

@@ -4,7 +4,6 @@
 //
 // Linear tetrahedra lock above 0.48, whatever the solver: there an estimate must warn. (quadratic
 // ones: sweep_elements.cpp)
-#include <cmath>
 
 #include "common/linalg/checked_solve.hpp"
 #include "tests/stability/linear_body.hpp"

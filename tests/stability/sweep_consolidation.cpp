@@ -8,8 +8,6 @@
 //         normal  it is turned by 0.2 rad
 //         scale   the shear modulus is 1 % too large
 #include <Eigen/LU>
-#include <cmath>
-#include <limits>
 
 #include "common/core/units.hpp"
 #include "common/fem/biot.hpp"

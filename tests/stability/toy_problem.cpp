@@ -10,7 +10,6 @@
 #include "common/fem/body_loads.hpp"
 #include "common/fem/deformation.hpp"
 #include "common/inversion/inverter.hpp"
-#include "common/inversion/prepared/prepared_model.hpp"
 #include "tests/stability/linear_body.hpp"
 #include "tests/stability/reference_descent.hpp"
 #include "tests/support/contact_search.hpp"

@@ -14,7 +14,6 @@
 #include "common/pipeline/pipeline.hpp"
 #include "tests/simulation/variation.hpp"
 #include "tests/surgeries/played_brain.hpp"
-#include "tests/surgeries/surgery_rows.hpp"
 
 namespace brainshift::surgeries {
 namespace {

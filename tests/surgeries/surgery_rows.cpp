@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <limits>
 #include <span>
-#include <vector>
 
 #include "client/tools/replay/score.hpp"
 #include "common/core/statistics.hpp"

@@ -2,7 +2,6 @@
 // Patch test and rigid motion (Irons & Razzaque 1972): a linear displacement on the boundary of a
 // distorted mesh is found inside, with its constant stress, by P1 and P2; a quadratic one by P2.
 // A rigid motion costs no force.
-#include <cmath>
 
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/study_record.hpp"

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
-#include <vector>
 
 #include "common/core/stopwatch.hpp"
 #include "common/core/thread_team.hpp"

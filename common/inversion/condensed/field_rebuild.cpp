@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "common/linalg/blas.hpp"
 #include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/linalg/blas.hpp"
 #include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {

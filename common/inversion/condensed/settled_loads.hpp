@@ -11,7 +11,6 @@
 // one more descent to the end, and the outcome is kIterationLimit.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <vector>
 

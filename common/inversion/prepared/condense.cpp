@@ -13,8 +13,6 @@
 
 #include "common/core/random.hpp"
 #include "common/geometry/node_choice.hpp"
-#include "common/inversion/prepared/contact_columns.hpp"
-#include "common/inversion/prepared/prepared_model.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/operators/encode_columns.hpp"
 #include "common/values/quality.hpp"

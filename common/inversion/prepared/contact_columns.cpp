@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/contact_columns.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <memory>
 #include <mutex>
 #include <utility>
 

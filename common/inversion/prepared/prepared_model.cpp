@@ -9,7 +9,6 @@
 #include "common/core/stopwatch.hpp"
 #include "common/core/units.hpp"
 #include "common/geometry/closest_point.hpp"
-#include "common/geometry/tet_locator.hpp"
 #include "common/linalg/openblas.hpp"
 
 namespace brainshift::inversion {

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <string>
 
-#include "common/linalg/blas.hpp"
-
 namespace brainshift::inversion {
 namespace {
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "common/linalg/blas.hpp"
-
 namespace brainshift::inversion {
 namespace {
 

@@ -2,8 +2,6 @@
 #include "common/inversion/strengths/prior_strengths.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 namespace brainshift::inversion {
 namespace {

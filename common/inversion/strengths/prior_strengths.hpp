@@ -28,7 +28,6 @@
 // columns are needed than ever before.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <vector>
 

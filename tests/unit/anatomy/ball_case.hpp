@@ -2,8 +2,6 @@
 // A case made in memory: a ball for a brain, opened at its right side, standing on its left.
 #pragma once
 
-#include <vector>
-
 #include "common/configuration/case_inputs.hpp"
 #include "tests/unit/geometry/ball_mask.hpp"
 

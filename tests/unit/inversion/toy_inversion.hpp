@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <utility>
 
 #include "common/core/random.hpp"
 #include "common/fem/body_loads.hpp"

@@ -6,7 +6,6 @@
 
 #include <functional>
 #include <limits>
-#include <vector>
 
 namespace brainshift {
 namespace {

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <string>
 
 #include "common/core/random.hpp"

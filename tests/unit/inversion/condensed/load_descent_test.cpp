@@ -3,8 +3,6 @@
 
 #include <Eigen/Cholesky>
 
-#include <cmath>
-
 #include "common/core/random.hpp"
 #include "common/inversion/condensed/load_descent.hpp"
 #include "common/inversion/condensed/newton_steps.hpp"

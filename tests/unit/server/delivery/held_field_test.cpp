@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <deque>
 #include <map>
-#include <optional>
 #include <vector>
 
 #include "client/lib/received_updates.hpp"

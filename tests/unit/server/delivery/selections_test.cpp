@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 
 #include "common/core/random.hpp"
 #include "tests/support/results.hpp"

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
-#include <string>
 
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"

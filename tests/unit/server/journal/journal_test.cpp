@@ -4,12 +4,10 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
-#include <fstream>
 #include <future>
 #include <limits>
 #include <stdexcept>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "server/journal/record_sink.hpp"

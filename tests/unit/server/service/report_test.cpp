@@ -2,7 +2,6 @@
 // What the daemon says of itself, against what its clients have seen.
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <future>
 #include <limits>
 #include <map>

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
-#include <array>
 #include <string>
 #include <vector>
 
