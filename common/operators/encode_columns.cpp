@@ -179,9 +179,7 @@ class Encoder {
   // nodes: those that stand at `place` and behind it in the order of all blocks.
   Result<Block> encode(std::span<const NodeIndex> nodes, Index place) const {
     MatrixXd rows(3 * static_cast<Index>(nodes.size()), steps_.size());
-    if (auto status = read_in_steps(nodes, place, rows); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto ok = read_in_steps(nodes, place, rows); !ok) return tl::unexpected(ok.error());
     MatrixXd w = MatrixXd::Zero(rows.rows(), rows.rows()), decoded(rows.rows(), rows.cols());
     linalg::blas::subtract_outer(rows, w);
     w = (-w).eval();
@@ -318,9 +316,7 @@ Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
   linalg::use_single_threaded_blas();
   CompactParts parts;
   for (const ColumnGroup& group : groups) {
-    if (auto status = append_steps(group, parts.steps); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto ok = append_steps(group, parts.steps); !ok) return tl::unexpected(ok.error());
   }
   parts.order = nodes.order;
   parts.blocks.setZero(3, nodes.size());

@@ -35,9 +35,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   patient::PrepareOptions options;
   options.checkpoint = arguments.out.string() + ".partial";
   for (const std::filesystem::path& path : {arguments.out, options.checkpoint}) {
-    if (auto status = io::check_output_file("--out", path); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto ok = io::check_output_file("--out", path); !ok) return tl::unexpected(ok.error());
   }
   const auto config = io::read_case_config(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
@@ -57,9 +55,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto written = io::write_model(arguments.out, prepared->file); !written) {
     return tl::unexpected(written.error());
   }
-  if (auto removed = prepared->checkpoint->remove(); !removed) {
-    return tl::unexpected(removed.error());
-  }
+  if (auto ok = prepared->checkpoint->remove(); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
   return Outcome{std::move(*prepared), std::filesystem::file_size(arguments.out, ignored),
                  whole.seconds()};

@@ -87,12 +87,8 @@ Result<std::int64_t> recorded_time(const Observation& observation) {
 Result<std::int64_t> SourceClock::to_daemon(const Observation& observation,
                                             std::int64_t arrived_ns) {
   const std::int64_t acquired_ns = observation.acquired_ns;
-  if (auto status = check_stamp("acquired_ns", acquired_ns); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (auto status = check_stamp("sent_ns", observation.sent_ns); !status) {
-    return tl::unexpected(status.error());
-  }
+  if (auto ok = check_stamp("acquired_ns", acquired_ns); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_stamp("sent_ns", observation.sent_ns); !ok) return tl::unexpected(ok.error());
   const std::int64_t sent_ns = observation.sent_ns != 0 ? observation.sent_ns : acquired_ns;
   if (acquired_ns > sent_ns) {
     return refuse(observation, fmt::format("acquired {:.3g} s after it was sent",

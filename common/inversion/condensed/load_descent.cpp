@@ -239,9 +239,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       length = longest = reach_.along(step_, penetration_, most);
     }
     change_ = length * direction_;
-    if (auto status = attempt(sampled, strengths, change_); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
     const bool fell = after_ <= value_ - kSufficient * length * fall;
     if (fell) {
       penetration_ = contact_.penetration();
@@ -301,9 +299,7 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
     decrement_ = std::sqrt(2.0 * std::max(0.0, bundle_.fall()));
     if (decrement_ <= kDecrement) return EstimateStatus::kConverged;
     change_ = length * bundle_.step();
-    if (auto status = attempt(sampled, strengths, change_); !status) {
-      return tl::unexpected(status.error());
-    }
+    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
     if (after_ <= value_ - kSufficientOfBundle * length * bundle_.fall()) {
       accept_trial();
       bundle_.move(change_, value_ - after_);

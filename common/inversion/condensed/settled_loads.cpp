@@ -93,9 +93,7 @@ Status SettledLoads::begin(const DescentLimits& limits, EstimateStatus& outcome)
 
 Result<bool> SettledLoads::go_round(const InversionOptions& asked, const DescentLimits& limits,
                                     Round& round) {
-  if (auto status = descent_.average(sampled_, strengths_); !status) {
-    return tl::unexpected(status.error());
-  }
+  if (auto ok = descent_.average(sampled_, strengths_); !ok) return tl::unexpected(ok.error());
   if (round.outcome != EstimateStatus::kConverged) return true;
   if (round.depth == Depth::kLast) {
     round.outcome = EstimateStatus::kIterationLimit;
