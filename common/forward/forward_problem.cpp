@@ -31,10 +31,9 @@ Status check_materials(const ForwardProblem& problem) {
     const double nu = poisson_ratio(e);
     // Rounding of nu on its way through lambda.
     if (e.shear > 0.0 && nu > -1.0 && nu <= kMaxPoissonRatio + 1e-9) continue;
-    return invalid(
-        fmt::format("materials: shear modulus {} N/mm^2, Poisson's ratio {}: must be > 0 "
-                    "and between -1 and {}",
-                    e.shear, nu, kMaxPoissonRatio));
+    return invalid(fmt::format(
+        "materials: shear modulus {} N/mm^2, Poisson's ratio {}: must be > 0 and between -1 and {}",
+        e.shear, nu, kMaxPoissonRatio));
   }
   return {};
 }
@@ -55,10 +54,9 @@ Status check_group(const ForwardProblem& problem, const std::string& key, const 
                             group.vertices.empty() ? "node" : "face of the boundary"));
   }
   if (needs_faces && group.inner.cols() > 0) {
-    return invalid(
-        fmt::format("{}.on = {}: {} of the group's faces lie inside the body, where there is "
-                    "no outward side",
-                    key, name, group.inner.cols()));
+    return invalid(fmt::format(
+        "{}.on = {}: {} of the group's faces lie inside the body, where there is no outward side",
+        key, name, group.inner.cols()));
   }
   return {};
 }

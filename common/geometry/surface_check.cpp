@@ -163,10 +163,9 @@ Status check_extent(double extent_mm, const CorticalSite& site) {
   } else if (fits(0.001)) {
     unit = "; micrometres?";
   }
-  return invalid(
-      fmt::format("the surface spans {:.3g} mm: must be {:.3g} to {:.3g} mm for a "
-                  "craniotomy of {:.3g} mm{}",
-                  extent_mm, least, most, site.size_mm, unit));
+  return invalid(fmt::format(
+      "the surface spans {:.3g} mm: must be {:.3g} to {:.3g} mm for a craniotomy of {:.3g} mm{}",
+      extent_mm, least, most, site.size_mm, unit));
 }
 
 // Turns the triangles outwards, and notes it in `checked`.
@@ -181,8 +180,8 @@ Status orient(CheckedSurface& checked, const CorticalSite& site) {
   const double cosine = area > 0.0 ? along / area : 0.0;
   if (std::abs(cosine) < kMinCosine) {
     return invalid(
-        fmt::format("the surface's normals look neither out of the craniotomy nor into it: "
-                    "mean cosine {:.2f}, must be at least {:g} either way",
+        fmt::format("the surface's normals look neither out of the craniotomy nor into it: mean "
+                    "cosine {:.2f}, must be at least {:g} either way",
                     cosine, kMinCosine));
   }
   if (cosine > 0.0) return {};
@@ -254,8 +253,8 @@ Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const Cor
   checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
   if (checked.distance_mm > kFarthest_mm) {
     return invalid(
-        fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's "
-                    "centre: must be within {:g} mm; is its pose right?",
+        fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's centre: must "
+                    "be within {:g} mm; is its pose right?",
                     checked.distance_mm, kFarthest_mm));
   }
   if (checked.surface.num_triangles() == 0) return checked;

@@ -248,8 +248,7 @@ Status SymmetricIndefinite::Impl::refine(const VecX& b, VecX& x, SolveCheck& che
   if (check.backward_error > kMaxBackwardError) {
     return fail(
         ErrorCode::kNotConverged,
-        fmt::format("consolidation solve: backward error {:g} after {} refinements is above "
-                    "{:g}",
+        fmt::format("consolidation solve: backward error {:g} after {} refinements is above {:g}",
                     check.backward_error, check.refinements, kMaxBackwardError));
   }
   return {};
@@ -289,8 +288,7 @@ Status SymmetricIndefinite::refactorise(const SymmetricMatrix& lower) {
   }
   const std::string advice =
       "; the body is not held (too few fixed nodes), fluid is enclosed that nothing can take up, "
-      "or an "
-      "element is degenerate";
+      "or an element is degenerate";
   if (status == -10) {
     return fail(ErrorCode::kFloatingBody, "consolidation matrix: a pivot vanished" + advice);
   }

@@ -96,11 +96,10 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
     if (icp->weights[i] >= kMinWelschWeight) inliers.push_back(i);
   }
   if (inliers.size() < 3) {
-    return fail(
-        ErrorCode::kNotConverged,
-        fmt::format("alignment: {} of {} points lie on the surface after it, at least 3 are "
-                    "needed; residual {:.1f} mm",
-                    inliers.size(), points.cols(), icp->rms_mm));
+    return fail(ErrorCode::kNotConverged,
+                fmt::format("alignment: {} of {} points lie on the surface after it, at least 3 "
+                            "are needed; residual {:.1f} mm",
+                            inliers.size(), points.cols(), icp->rms_mm));
   }
   Alignment alignment;
   alignment.outliers = static_cast<int>(points.cols()) - static_cast<int>(inliers.size());

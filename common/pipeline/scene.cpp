@@ -158,12 +158,11 @@ Omission pressure_omission(const TetMesh& mesh, const CaseConfig& config) {
   return {
       "pressure",
       fmt::format("drained limit: pore pressure relaxes in about {:.3g} s (R^2/c_v)", relaxation_s),
-      fmt::format(
-          "at most {:.2g} % of the displacement by a load {:.3g} s old, 1 % after {:.3g} s; "
-          "one implicit step (scene.pressure = on) differs by at most {:.2g} %",
-          100.0 * undrained_fraction(step_s, relaxation_s), step_s,
-          drained_after_s(0.01, relaxation_s),
-          100.0 * implicit_step_fraction(step_s, relaxation_s))};
+      fmt::format("at most {:.2g} % of the displacement by a load {:.3g} s old, 1 % after {:.3g} "
+                  "s; one implicit step (scene.pressure = on) differs by at most {:.2g} %",
+                  100.0 * undrained_fraction(step_s, relaxation_s), step_s,
+                  drained_after_s(0.01, relaxation_s),
+                  100.0 * implicit_step_fraction(step_s, relaxation_s))};
 }
 
 std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig& config,
@@ -182,10 +181,10 @@ std::vector<Omission> model_omissions(const BrainModel& model, const CaseConfig&
     omissions.push_back({"uncertainty", "scene.uncertainty = off", unaffected});
   }
   if (boundary == Boundary::kFixed) {
-    omissions.push_back(
-        {"contact", "fixed boundary: the brain surface cannot leave or approach the skull",
-         "about 1.8 mm at the craniotomy: in the paper's five cases 3.4 mm of error "
-         "remain there on average, 1.6 mm with contact"});
+    omissions.push_back({"contact",
+                         "fixed boundary: the brain surface cannot leave or approach the skull",
+                         "about 1.8 mm at the craniotomy: in the paper's five cases 3.4 mm of "
+                         "error remain there on average, 1.6 mm with contact"});
   }
   for (Omission& part : prior_omissions(config.prior)) omissions.push_back(std::move(part));
   return omissions;

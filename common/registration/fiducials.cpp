@@ -194,18 +194,16 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
   Matcher matcher(measured, image, options.tolerance_mm);
   matcher.search();
   if (!matcher.best())
-    return fail(
-        ErrorCode::kNotConverged,
-        fmt::format(
-            "fiducials: no correspondence of {} measured to {} in the image keeps all distances "
-            "within {} mm",
-            measured.cols(), image.cols(), options.tolerance_mm));
+    return fail(ErrorCode::kNotConverged,
+                fmt::format("fiducials: no correspondence of {} measured to {} in the image keeps "
+                            "all distances within {} mm",
+                            measured.cols(), image.cols(), options.tolerance_mm));
   const double best = matcher.best()->fre_mm, second = matcher.second_fre_mm();
   if (second < options.ambiguity_factor * best || second < best + options.ambiguity_mm)
-    return invalid(fmt::format(
-        "fiducials: two correspondences fit nearly alike (residuals {:.2f} and {:.2f} mm rms): "
-        "give their order",
-        best, second));
+    return invalid(
+        fmt::format("fiducials: two correspondences fit nearly alike (residuals {:.2f} and {:.2f} "
+                    "mm rms): give their order",
+                    best, second));
   return *matcher.best();
 }
 

@@ -95,8 +95,7 @@ Status check_registrar(const ImageRegistrationOptions& options) {
   if (!(options.low_quantile >= 0.0 && options.low_quantile < options.high_quantile &&
         options.high_quantile <= 1.0))
     return invalid(
-        fmt::format("image registration: quantiles {:g} and {:g}: must be 0 <= low < "
-                    "high <= 1",
+        fmt::format("image registration: quantiles {:g} and {:g}: must be 0 <= low < high <= 1",
                     options.low_quantile, options.high_quantile));
   struct Bound {
     const char* name;
@@ -118,10 +117,9 @@ Status check_registrar(const ImageRegistrationOptions& options) {
 Status check_image(const char* what, const VoxelImage& image) {
   for (int length : image.dims)
     if (length < 2)
-      return invalid(
-          fmt::format("image registration: {} of {} x {} x {} voxels: at least 2 needed "
-                      "along each axis",
-                      what, image.dims[0], image.dims[1], image.dims[2]));
+      return invalid(fmt::format(
+          "image registration: {} of {} x {} x {} voxels: at least 2 needed along each axis", what,
+          image.dims[0], image.dims[1], image.dims[2]));
   if (image.values.size() != image.num_voxels())
     return invalid(fmt::format("image registration: {} holds {} values for {} voxels", what,
                                image.values.size(), image.num_voxels()));
@@ -313,12 +311,11 @@ double keep_best(const Task& task, std::vector<Path>& paths) {
 
 Status check_end(const Task& task, const ImageRegistration& result) {
   if (task.reach(result.T_ras_ras) < kEdge) return {};
-  return fail(
-      ErrorCode::kNotConverged,
-      fmt::format("image registration: the best pose, {:.1f} mm and {:.1f} deg away, lies at "
-                  "the edge of the search ({:g} mm, {:g} deg)",
-                  result.shift_mm, result.rotation_deg, task.options.max_translation_mm,
-                  task.options.max_rotation_deg));
+  return fail(ErrorCode::kNotConverged,
+              fmt::format("image registration: the best pose, {:.1f} mm and {:.1f} deg away, lies "
+                          "at the edge of the search ({:g} mm, {:g} deg)",
+                          result.shift_mm, result.rotation_deg, task.options.max_translation_mm,
+                          task.options.max_rotation_deg));
 }
 
 }  // namespace

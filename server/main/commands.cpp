@@ -55,10 +55,8 @@ Result<std::string> endpoint_to_ask(const std::string& endpoint) {
   static constexpr std::string_view kTcp = "tcp://";
   if (!endpoint.starts_with(kTcp)) return endpoint;
   if (endpoint.ends_with(":*")) {
-    return invalid(
-        fmt::format("{}: the system chooses this port; give --endpoint as the daemon "
-                    "prints it",
-                    endpoint));
+    return invalid(fmt::format(
+        "{}: the system chooses this port; give --endpoint as the daemon prints it", endpoint));
   }
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kAllInterfaces = {
       {{"0.0.0.0:", "127.0.0.1:"}, {"*:", "127.0.0.1:"}, {"[::]:", "[::1]:"}}};

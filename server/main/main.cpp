@@ -37,8 +37,7 @@ int parse_and_run(int argc, char** argv) {
       "model under both boundaries, and writes the model file.\n"
       "Examples:\n"
       "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
-      "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq "
-      ".prepare.contact.factor_s");
+      "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq .prepare.contact.factor_s");
 
   ServeArguments serve;
   auto* serve_command = app.add_subcommand("serve", "Answer clients until SIGINT or SIGTERM");

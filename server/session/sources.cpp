@@ -40,8 +40,8 @@ Status check_observation(const Observation& observation, std::string_view case_i
     }
     if (given.boot_id != running.boot_id) {
       return invalid(
-          fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, "
-                      "or this is another one ({:x})",
+          fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, or this "
+                      "is another one ({:x})",
                       given.boot_id, running.boot_id));
     }
     if (given.model_id != running.model_id) {
@@ -61,8 +61,8 @@ Status check_observation(const Observation& observation, std::string_view case_i
   }
   if (std::holds_alternative<PatientPose>(observation.body)) {
     return invalid(
-        "observation.patient_pose: a change of pose is not assimilated in this version; "
-        "start a session on a model prepared for the new pose");
+        "observation.patient_pose: a change of pose is not assimilated in this version; start a "
+        "session on a model prepared for the new pose");
   }
   return {};
 }
@@ -142,8 +142,7 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
   }
   if (observation.sequence <= last_sequence) {
     return invalid(
-        fmt::format("observation.sequence = {}: must be above {}, the last one accepted "
-                    "from {}",
+        fmt::format("observation.sequence = {}: must be above {}, the last one accepted from {}",
                     observation.sequence, last_sequence, in_quotes(observation.source)));
   }
   const auto daemon_ns = recorded_clock_ ? recorded_time(observation)

@@ -221,8 +221,7 @@ Result<Points> read_calculix_truth(const fs::path& folder, int patient, const Po
   if (!own) return own;
   if (own->cols() != nodes.cols() || (*own - nodes).colwise().norm().maxCoeff() > kSameNode_mm) {
     return invalid(
-        fmt::format("calculix: the fields are of a mesh with {} nodes; this one has {} or "
-                    "others",
+        fmt::format("calculix: the fields are of a mesh with {} nodes; this one has {} or others",
                     own->cols(), nodes.cols()));
   }
   auto u = read_points(folder / fmt::format("patient-{}.csv", patient));

@@ -19,18 +19,17 @@ void set_reason(EstimateStatus outcome, double deadline_ms, Estimate& estimate) 
       std::snprintf(text, sizeof text, "loads and contact settled in %d steps", contact.iterations);
       break;
     case EstimateStatus::kDeadline:
-      std::snprintf(
-          text, sizeof text,
-          "deadline of %g ms reached after %d steps; best iterate returned, %.2g standard "
-          "deviations from its minimum",
-          deadline_ms, contact.iterations, contact.decrement);
+      std::snprintf(text, sizeof text,
+                    "deadline of %g ms reached after %d steps; best iterate returned, %.2g "
+                    "standard deviations from its minimum",
+                    deadline_ms, contact.iterations, contact.decrement);
       break;
     default:
       if (contact.decrement <= kDecrement) {
-        std::snprintf(text, sizeof text,
-                      "weights or places of the data did not settle; loads and contact did, in %d "
-                      "steps",
-                      contact.iterations);
+        std::snprintf(
+            text, sizeof text,
+            "weights or places of the data did not settle; loads and contact did, in %d steps",
+            contact.iterations);
         break;
       }
       std::snprintf(text, sizeof text,
@@ -65,8 +64,7 @@ void append_sources(Estimate& estimate) {
     if (!source.consistent) {
       std::snprintf(
           text, sizeof text,
-          "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of "
-          "freedom",
+          "; \"%.64s\" contradicts the other sources: chi-square %.0f for %.0f degrees of freedom",
           source.source.c_str(), source.chi_square, source.degrees_of_freedom);
       estimate.reason.append(text);
     }

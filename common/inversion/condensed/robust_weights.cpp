@@ -112,11 +112,10 @@ void append_contradiction(const Contradiction& found, const SparseData& data, st
   if (found.pairs == 0) return;
   const Vec3 at = data.positions.col(found.first);
   char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "; data %d and %d at one place, (%.1f %.1f %.1f) mm, contradict each other by %.1f mm "
-      "(%.0f sd)",
-      found.first, found.second, at[0], at[1], at[2], found.differ_mm, found.sds);
+  std::snprintf(text, sizeof text,
+                "; data %d and %d at one place, (%.1f %.1f %.1f) mm, contradict each other by %.1f "
+                "mm (%.0f sd)",
+                found.first, found.second, at[0], at[1], at[2], found.differ_mm, found.sds);
   reason.append(text);
   if (found.pairs == 1) return;
   std::snprintf(text, sizeof text, ", the worst of %d such pairs", found.pairs);

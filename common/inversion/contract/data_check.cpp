@@ -92,18 +92,18 @@ Status check_whole(const SparseData& data) {
 Status check_data(const SparseData& data) {
   const int m = data.size();
   if (data.displacements.cols() != m || data.sd_mm.size() != m) {
-    return invalid(fmt::format(
-        "sparse data: {} positions, {} displacements and {} standard deviations must be "
-        "equal counts",
-        m, data.displacements.cols(), data.sd_mm.size()));
+    return invalid(
+        fmt::format("sparse data: {} positions, {} displacements and {} standard deviations must "
+                    "be equal counts",
+                    m, data.displacements.cols(), data.sd_mm.size()));
   }
   const Eigen::MatrixXd& common = data.common_error;
   if (common.rows() > 0 &&
       (common.rows() != 3 * m || common.cols() > SparseData::kMaxCommonErrors)) {
-    return invalid(fmt::format(
-        "sparse data: common_error is {} x {}: must have 3 rows for each of {} data and "
-        "at most {} columns",
-        common.rows(), common.cols(), m, SparseData::kMaxCommonErrors));
+    return invalid(
+        fmt::format("sparse data: common_error is {} x {}: must have 3 rows for each of {} data "
+                    "and at most {} columns",
+                    common.rows(), common.cols(), m, SparseData::kMaxCommonErrors));
   }
   if (!common.allFinite()) {
     return fail(ErrorCode::kNotFinite,
@@ -115,8 +115,7 @@ Status check_data(const SparseData& data) {
         !std::isfinite(data.sd_mm[i])) {
       return fail(
           ErrorCode::kNotFinite,
-          fmt::format("sparse data: point {} has a position, displacement or sd that is not "
-                      "finite",
+          fmt::format("sparse data: point {} has a position, displacement or sd that is not finite",
                       i));
     }
     if (!(data.sd_mm[i] > 0.0)) {

@@ -26,11 +26,11 @@ Status check_equilibrium(const CondensedOperators& operators, const std::vector<
   }
   if (worst <= kEquilibriumTolerance_mm + kEquilibriumRelative * largest) return {};
   char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "inversion: contact is not in equilibrium: node %d penetrates %g mm in the field, %g mm "
-      "by its contact force",
-      operators.slaves[static_cast<std::size_t>(worst_slave)], there, penetration[worst_slave]);
+  std::snprintf(text, sizeof text,
+                "inversion: contact is not in equilibrium: node %d penetrates %g mm in the field, "
+                "%g mm by its contact force",
+                operators.slaves[static_cast<std::size_t>(worst_slave)], there,
+                penetration[worst_slave]);
   return fail(ErrorCode::kNotConverged, text);
 }
 
@@ -124,10 +124,8 @@ void judge_algorithm(const Estimate& estimate, Judge& judge) {
   if (contact.decrement > kMaxContactDecrement ||
       contact.max_violation_mm > kMaxContactViolation_mm) {
     judge.set(QualityFlag::kContactNotCertified,
-              "decrement %.2g, at most %g; violation %.2g mm, "
-              "at most %g mm",
-              contact.decrement, kMaxContactDecrement, contact.max_violation_mm,
-              kMaxContactViolation_mm);
+              "decrement %.2g, at most %g; violation %.2g mm, at most %g mm", contact.decrement,
+              kMaxContactDecrement, contact.max_violation_mm, kMaxContactViolation_mm);
   }
 }
 

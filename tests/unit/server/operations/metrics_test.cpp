@@ -250,10 +250,9 @@ TEST(MetricsExporter, OtherPathsAndGarbageAreNoReport) {
   const std::string answer =
       exchange(exporter.port(), "GET /etc/passwd HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404"));
-  EXPECT_THAT(exchange(exporter.port(),
-                       "DELETE /metrics HTTP/1.1\r\nHost: x\r\nConnection: "
-                       "close\r\n\r\n"),
-              StartsWith("HTTP/1.1 405"));
+  EXPECT_THAT(
+      exchange(exporter.port(), "DELETE /metrics HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"),
+      StartsWith("HTTP/1.1 405"));
   exchange(exporter.port(), std::string(5000, '\xff') + "\r\n\r\n");
   EXPECT_EQ(asked, 0);
   EXPECT_THAT(scrape(exporter.port()), StartsWith("HTTP/1.1 200"));
