@@ -101,10 +101,6 @@ Vec3 MovedSurface::interpolated(const SurfacePlace& place, const Points& values)
          place.weights[2] * values.col(corners[2]);
 }
 
-Vec3 MovedSurface::point(const SurfacePlace& place) const {
-  return interpolated(place, moved_.vertices);
-}
-
 Vec3 MovedSurface::point_at_rest(const SurfacePlace& place) const {
   return interpolated(place, surface_.at_rest_.surface().vertices);
 }

@@ -54,8 +54,7 @@ class MovedSurface {
 
   // Precondition: the query is finite.
   SurfacePlace closest(const Vec3& query) const;
-  // The place moved, and at rest, mm.
-  Vec3 point(const SurfacePlace& place) const;
+  // The place at rest, mm.
   Vec3 point_at_rest(const SurfacePlace& place) const;
   // Unit outward normal, interpolated between those of the corners (area-weighted means of their
   // triangles). It changes continuously along the surface; the normal of a triangle does not, and
