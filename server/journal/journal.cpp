@@ -38,13 +38,6 @@ std::string sequences(const SequenceRange& range) {
 
 }  // namespace
 
-bool Recorded::holds(const std::string& source, std::uint64_t sequence) const {
-  const auto written = held.observations.find(source);
-  if (written == held.observations.end() || sequence > written->second.last) return false;
-  const auto lost = missing.observations.find(source);
-  return lost == missing.observations.end() || sequence > lost->second.last;
-}
-
 RecordRanges Journal::Group::ranges() const {
   RecordRanges ranges;
   for (std::size_t i = 0; i < records.size(); ++i) {

@@ -9,7 +9,7 @@
 // append() only queues. The thread writes what came within `commit_interval` in one transaction
 // with one sync. What recorded() then says is on the disk stays there through a crash and a power
 // cut. An observation thus has two acknowledgements: *accepted* when it is queued, *recorded* when
-// Recorded::holds() says so.
+// recorded() says that it is held.
 //
 // A failure (a file that cannot be made, a full disk, a failing sync, a file that was deleted or
 // replaced, storage so slow that the queue is full) ends the file. status() and recorded() say why
@@ -72,9 +72,6 @@ struct Recorded {
   std::uint64_t records = 0;     // on the disk, in all files of the session
   RecordRanges held;             // what was committed and synced
   RecordRanges missing;          // what no file holds and none will
-
-  // Whether an accepted observation is on the disk. After a loss, those before it count as lost.
-  bool holds(const std::string& source, std::uint64_t sequence) const;
 };
 
 class Journal {

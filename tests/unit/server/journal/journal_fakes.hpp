@@ -80,6 +80,14 @@ inline OpenSink FakeStorage::opener() {
   };
 }
 
+// Whether an accepted observation is on the disk. After a loss, those before it count as lost.
+inline bool holds(const Recorded& recorded, const std::string& source, std::uint64_t sequence) {
+  const auto written = recorded.held.observations.find(source);
+  if (written == recorded.held.observations.end() || sequence > written->second.last) return false;
+  const auto lost = recorded.missing.observations.find(source);
+  return lost == recorded.missing.observations.end() || sequence > lost->second.last;
+}
+
 // What the journal told; may be asked while it runs.
 class Witness {
  public:

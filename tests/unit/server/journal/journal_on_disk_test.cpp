@@ -47,7 +47,7 @@ class JournalOnDisk : public testing::Test {
     return options;
   }
   bool sees_recorded(std::uint64_t sequence) {
-    return witness.sees([=](const Recorded& r) { return r.holds("ius", sequence); });
+    return witness.sees([=](const Recorded& r) { return holds(r, "ius", sequence); });
   }
 
   const test_support::TemporaryFolder folder;
@@ -67,7 +67,7 @@ TEST_F(JournalOnDisk, ADeletedFileIsReportedWithinASecondAndRecordingGoesOnInANe
   EXPECT_THAT(witness.errors(),
               ElementsAre(path.string() + ": was deleted or replaced while it was recorded"));
   ASSERT_TRUE(witness.sees_resumption());
-  EXPECT_FALSE(journal.recorded().holds("ius", 1)) << "it went with its file";
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 1)) << "it went with its file";
   journal.append(record(2), "ius");
   ASSERT_TRUE(sees_recorded(2));
   journal.stop();
@@ -185,7 +185,7 @@ TEST_F(JournalOnDisk, NothingIsRecordedWhileSyncsFailAndRecordingGoesOnAfterward
   ASSERT_TRUE(witness.sees_errors(1));
   EXPECT_THAT(witness.errors().front(), HasSubstr(path.string() + ": cannot write record"));
   EXPECT_FALSE(journal.status().has_value());
-  EXPECT_FALSE(journal.recorded().holds("ius", 2));
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 2));
   FailingSync::failing = false;
   ASSERT_TRUE(witness.sees_resumption());
   journal.append(record(3), "ius");
@@ -206,7 +206,7 @@ void journal_on_a_full_disk(const fs::path& path) {
   Journal journal(options);
   journal.begin(path, io::SurgeryMeta{"c"});
   journal.append(record(1), "ius");
-  if (!witness.sees([](const Recorded& r) { return r.holds("ius", 1); })) std::exit(1);
+  if (!witness.sees([](const Recorded& r) { return holds(r, "ius", 1); })) std::exit(1);
   const rlimit limit{128 * 1024, 128 * 1024};
   setrlimit(RLIMIT_FSIZE, &limit);
   journal.append({io::RecordKind::kUpdate, 2, 0, std::string(1 << 20, 'a')});

@@ -39,7 +39,7 @@ class JournalTest : public testing::Test {
   void records(std::uint64_t sequence, Journal& journal) {
     journal.append(record(sequence), "ius");
     ASSERT_TRUE(
-        witness.sees([=](const Recorded& recorded) { return recorded.holds("ius", sequence); }));
+        witness.sees([=](const Recorded& recorded) { return holds(recorded, "ius", sequence); }));
   }
   // Whether the journal comes to count an observation as lost. Nothing tells of it.
   static bool loses(const std::string& source, std::uint64_t sequence, const Journal& journal) {
@@ -133,17 +133,17 @@ TEST_F(JournalTest, WhatIsRecordedIsOnTheDiskAndNothingElse) {
   journal.append(record(50), "camera");  // never waits for the disk
   journal.append(record(9, io::RecordKind::kUpdate));
   EXPECT_TRUE(journal.recorded().recording);
-  EXPECT_FALSE(journal.recorded().holds("ius", 3)) << "accepted, not recorded";
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 3)) << "accepted, not recorded";
   go.set_value();
   ASSERT_TRUE(witness.sees([](const Recorded& r) { return r.records == 3; }));
   const Recorded recorded = journal.recorded();
   EXPECT_EQ(recorded.session_id, 7u);
   EXPECT_EQ(recorded.file, "x.surgery");
   EXPECT_TRUE(recorded.reason.empty());
-  EXPECT_TRUE(recorded.holds("ius", 3));
-  EXPECT_FALSE(recorded.holds("ius", 4));
-  EXPECT_TRUE(recorded.holds("camera", 50));
-  EXPECT_FALSE(recorded.holds("pointer", 1));
+  EXPECT_TRUE(holds(recorded, "ius", 3));
+  EXPECT_FALSE(holds(recorded, "ius", 4));
+  EXPECT_TRUE(holds(recorded, "camera", 50));
+  EXPECT_FALSE(holds(recorded, "pointer", 1));
   EXPECT_EQ(recorded.held.updates.last, 9u);
   EXPECT_TRUE(recorded.missing.empty());
 }
@@ -153,7 +153,7 @@ TEST_F(JournalTest, ANewSessionStartsItsOwnCount) {
   records(3, journal);
   journal.begin("y.surgery", {}, 2);
   EXPECT_EQ(journal.recorded().session_id, 2u);
-  EXPECT_FALSE(journal.recorded().holds("ius", 3));
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 3));
   journal.stop();
   EXPECT_TRUE(storage.files()[0].closed);
 }
@@ -210,8 +210,8 @@ TEST_F(JournalTest, RecordingGoesOnWhenStorageReturnsAndTheGapIsStated) {
             "x: disk full; not recorded: observations 4 of camera (1), observations 2 to 3 of ius "
             "(2), updates 5 (1)");
   const Recorded recorded = journal.recorded();
-  EXPECT_FALSE(recorded.holds("ius", 3));
-  EXPECT_FALSE(recorded.holds("camera", 4));
+  EXPECT_FALSE(holds(recorded, "ius", 3));
+  EXPECT_FALSE(holds(recorded, "camera", 4));
   EXPECT_EQ(recorded.missing.updates.last, 5u);
   EXPECT_THAT(witness.errors(), ElementsAre("x: disk full"));
 }
@@ -238,7 +238,7 @@ TEST_F(JournalTest, AFileThatIsGoneIsNoticedWithoutAnyRecordAndWhatItHeldIsLost)
   records(1, journal);
   gone = true;
   ASSERT_TRUE(witness.sees_resumption());
-  EXPECT_FALSE(journal.recorded().holds("ius", 1));
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 1));
   records(2, journal);
   journal.stop();
   EXPECT_EQ(storage.files()[1].meta.gap, "x: was deleted; not recorded: observations 1 of ius (1)");
@@ -328,8 +328,8 @@ TEST_F(JournalTest, StorageThatStallsLosesRecordsInsteadOfFillingMemory) {
   EXPECT_THAT(files[0].groups, ElementsAre(ElementsAre(1, 2, 3)));
   EXPECT_THAT(files[1].groups, ElementsAre(ElementsAre(5)));
   EXPECT_THAT(files[1].meta.gap, HasSubstr("observations 4 of ius (1)"));
-  EXPECT_FALSE(journal.recorded().holds("ius", 4));
-  EXPECT_TRUE(journal.recorded().holds("ius", 5));
+  EXPECT_FALSE(holds(journal.recorded(), "ius", 4));
+  EXPECT_TRUE(holds(journal.recorded(), "ius", 5));
 }
 
 TEST_F(JournalTest, BytesInTheQueueAreBoundedToo) {
