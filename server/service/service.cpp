@@ -94,16 +94,13 @@ void Service::stop() {
 // ---------- requests ----------
 
 std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame& frame) {
+  const auto empty = [&](const char* name) { return wire::decode_empty(frame.payload, name); };
   switch (frame.type) {
     case MessageType::kStatusRequest:
-      if (auto empty = wire::decode_empty(frame.payload, "StatusRequest"); !empty) {
-        return error_reply(empty.error());
-      }
+      if (auto ok = empty("StatusRequest"); !ok) return error_reply(ok.error());
       return Reply{MessageType::kStatusReply, wire::encode(status())};
     case MessageType::kReportRequest:
-      if (auto empty = wire::decode_empty(frame.payload, "ReportRequest"); !empty) {
-        return error_reply(empty.error());
-      }
+      if (auto ok = empty("ReportRequest"); !ok) return error_reply(ok.error());
       return Reply{MessageType::kReportReply, wire::encode(report())};
     case MessageType::kSubscribeRequest: return subscribe(frame);
     case MessageType::kStartSessionRequest: {
@@ -117,9 +114,7 @@ std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame&
       return std::nullopt;
     }
     case MessageType::kModelRequest:
-      if (auto empty = wire::decode_empty(frame.payload, "ModelRequest"); !empty) {
-        return error_reply(empty.error());
-      }
+      if (auto ok = empty("ModelRequest"); !ok) return error_reply(ok.error());
       if (!options_.model) return model_not_ready();
       if (encoded_model_.empty()) encoded_model_ = wire::encode(*options_.model);
       return Reply{MessageType::kModelReply, encoded_model_};
