@@ -262,9 +262,8 @@ Status SurgeryFile::append(std::span<const SurgeryRecord> records) {
   if (Status status = impl_->check_writable("record"); !status) return status;
   for (const SurgeryRecord& record : records) {
     if (fits(record.sequence)) continue;
-    return file_error(
-        ErrorCode::kInvalidArgument, impl_->database.path(),
-        "record of sequence " + std::to_string(record.sequence) + ": must be below 2^63");
+    return file_error(ErrorCode::kInvalidArgument, impl_->database.path(),
+                      fmt::format("record of sequence {}: must be below 2^63", record.sequence));
   }
   SqliteDatabase& database = impl_->database;
   if (!database.execute("BEGIN IMMEDIATE")) return database.write_failure("record");
