@@ -4,7 +4,7 @@
 #include "brainshift/v1/brainshift.pb.h"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/convert_choice.hpp"
+#include "common/wire/convert_parts.hpp"
 #include "common/wire/names.hpp"
 #include "common/wire/payload_scan.hpp"
 #include "common/wire/text.hpp"
