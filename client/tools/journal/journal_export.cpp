@@ -14,7 +14,6 @@
 #include "common/io/model/field_series_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "client/lib/client.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {
