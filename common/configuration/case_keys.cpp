@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/configuration/case_keys.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -59,7 +60,16 @@ std::vector<KeyDocument> case_key_documents() {
   return documenter.documents();
 }
 
-// What follows the table, of case_config.hpp.
+// What case_config.hpp declares.
+
+double largest_poisson_ratio(const Material& material) {
+  double largest = material.poisson_ratio;
+  if (material.tumour) largest = std::max(largest, material.tumour->poisson_ratio);
+  for (const auto& [label, tissue] : material.regions) {
+    largest = std::max(largest, tissue.poisson_ratio);
+  }
+  return largest;
+}
 
 Status validate(const CaseConfig& config) {
   KeyChecker checker;

@@ -13,6 +13,12 @@
 
 namespace brainshift {
 
+// Points one after the other as columns, 3 x n.
+inline Points columns_of(const std::vector<Vec3>& points) {
+  const double* const first = points.empty() ? nullptr : points.front().data();
+  return Eigen::Map<const Points>(first, 3, static_cast<Eigen::Index>(points.size()));
+}
+
 // Linear tetrahedra. nodes: 3 x n, mm RAS. tets: 4 x m node indices; positively oriented, i.e.
 // det[x1-x0, x2-x0, x3-x0] > 0. labels: m region labels (0 = brain) or empty.
 struct TetMesh {

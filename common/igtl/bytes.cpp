@@ -33,6 +33,12 @@ Status check_padded(std::string_view field, std::string_view text, std::size_t w
   return {};
 }
 
+tl::unexpected<Error> wrong_size(std::string_view content, std::string_view which,
+                                 std::size_t size) {
+  return malformed(std::to_string(content.size()) + " bytes, must be " + std::string(which) +
+                   std::to_string(size));
+}
+
 tl::unexpected<Error> does_not_fit(std::string_view what, std::uint64_t bytes, std::size_t left) {
   return malformed(std::string(what) + " of " + std::to_string(bytes) + " bytes, " +
                    std::to_string(left) + " are left");

@@ -73,6 +73,9 @@ Status check_padded(std::string_view field, std::string_view text, std::size_t w
 inline tl::unexpected<Error> malformed(std::string message) {
   return fail(ErrorCode::kProtocol, std::move(message));
 }
+// kProtocol: "N bytes, must be WHICH SIZE" of a content; `which` is "", "at least " and the like.
+tl::unexpected<Error> wrong_size(std::string_view content, std::string_view which,
+                                 std::size_t size);
 // kProtocol: "WHAT of N bytes, LEFT are left".
 tl::unexpected<Error> does_not_fit(std::string_view what, std::uint64_t bytes, std::size_t left);
 

@@ -208,10 +208,8 @@ void append_content(const ImageView& image, std::string& out) {
 }
 
 Result<Image> decode_image(std::string_view content) {
-  if (content.size() < kImageHeaderBytes) {
-    return malformed(std::to_string(content.size()) + " bytes, must be at least " +
-                     std::to_string(kImageHeaderBytes));
-  }
+  if (content.size() < kImageHeaderBytes)
+    return wrong_size(content, "at least ", kImageHeaderBytes);
   ByteReader reader(content);
   if (const auto version = reader.number<std::uint16_t>(); version != kImageVersion) {
     return malformed("version " + std::to_string(version) + ", must be 1");

@@ -16,17 +16,11 @@ Error of_type(std::string_view type, Error error) {
 template <typename T>
 Status encode_one(const Envelope& envelope, const T& content, std::string& out) {
   out.clear();
-  const Status valid = validate(content);
-  if (!valid) return tl::unexpected<Error>(of_type(T::kType, valid.error()));
   Header header{envelope.version, std::string(T::kType), envelope.device, envelope.timestamp, 0, 0};
-  if (const Status status = validate(header); !status) {
-    return tl::unexpected<Error>(of_type(T::kType, status.error()));
-  }
-  if (envelope.version != 1) {
-    if (const Status status = validate(envelope.metadata); !status) {
-      return tl::unexpected<Error>(of_type(T::kType, status.error()));
-    }
-  }
+  const Status valid = validate(content).and_then([&] { return validate(header); }).and_then([&] {
+    return envelope.version == 1 ? Status() : validate(envelope.metadata);
+  });
+  if (!valid) return tl::unexpected<Error>(of_type(T::kType, valid.error()));
   const BodyFrame frame =
       encode_body_frame(envelope.version, envelope.message_id, envelope.metadata);
   out.append(kHeaderBytes, '\0').append(frame.before);
@@ -39,11 +33,10 @@ Status encode_one(const Envelope& envelope, const T& content, std::string& out) 
   return {};
 }
 
-// Result<T> of one decoder as a Result<Content>.
-template <typename T>
-Result<Content> as_content(Result<T> decoded) {
-  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
-  return Content(std::move(*decoded));
+// What one decoder makes of a content.
+template <auto kDecode>
+Result<Content> decoded_by(std::string_view content) {
+  return kDecode(content).map([](auto&& one) { return Content(std::move(one)); });
 }
 
 template <typename T>
@@ -53,15 +46,15 @@ Result<Content> without_content(std::string_view) {
 
 using Decoder = Result<Content> (*)(std::string_view);
 constexpr std::pair<std::string_view, Decoder> kDecoders[] = {
-    {Image::kType, [](std::string_view c) { return as_content(decode_image(c)); }},
-    {Transform::kType, [](std::string_view c) { return as_content(decode_transform(c)); }},
-    {TrackingData::kType, [](std::string_view c) { return as_content(decode_tracking_data(c)); }},
-    {PolyData::kType, [](std::string_view c) { return as_content(decode_poly_data(c)); }},
-    {PointList::kType, [](std::string_view c) { return as_content(decode_point_list(c)); }},
-    {Text::kType, [](std::string_view c) { return as_content(decode_text(c)); }},
-    {StatusReport::kType, [](std::string_view c) { return as_content(decode_status_report(c)); }},
+    {Image::kType, decoded_by<decode_image>},
+    {Transform::kType, decoded_by<decode_transform>},
+    {TrackingData::kType, decoded_by<decode_tracking_data>},
+    {PolyData::kType, decoded_by<decode_poly_data>},
+    {PointList::kType, decoded_by<decode_point_list>},
+    {Text::kType, decoded_by<decode_text>},
+    {StatusReport::kType, decoded_by<decode_status_report>},
     {StatusRequest::kType, without_content<StatusRequest>},
-    {Capability::kType, [](std::string_view c) { return as_content(decode_capability(c)); }},
+    {Capability::kType, decoded_by<decode_capability>},
     {CapabilityRequest::kType, without_content<CapabilityRequest>},
 };
 static_assert(std::size(kDecoders) == std::variant_size_v<Content>);

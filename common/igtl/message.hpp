@@ -15,10 +15,8 @@
 #include "common/igtl/header.hpp"
 #include "common/igtl/image.hpp"
 #include "common/igtl/metadata.hpp"
-#include "common/igtl/point_list.hpp"
 #include "common/igtl/poly_data.hpp"
 #include "common/igtl/short_contents.hpp"
-#include "common/igtl/tracking.hpp"
 
 namespace brainshift::igtl {
 

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift::igtl {
@@ -84,5 +85,15 @@ void append_content(const PolyData& data, std::string& out);
 // kProtocol: sizes that do not fit the content, or what validate() refuses. Every size is compared
 // with what is left of the content before memory is taken for it.
 Result<PolyData> decode_poly_data(std::string_view content);
+
+// ---- triangle surfaces as POLYDATA, and back: points in mm RAS, in single precision ----
+
+// One polygon for each triangle, in the same order; no attribute.
+PolyData from_surface(const TriangleSurface& surface);
+
+// Polygons as fans round their first point, triangle strips with alternating orientation. Vertices
+// and lines are left out, and triangles that name a point twice, which strips use as joints.
+// kEmptySet: no triangle. Precondition: validate(data).
+Result<TriangleSurface> to_surface(const PolyData& data);
 
 }  // namespace brainshift::igtl

@@ -93,15 +93,8 @@ Grid grid_of(const PixelMap<float>& disparity, const PixelMap<float>& sd_px,
   return grid;
 }
 
-Points as_points(const std::vector<Vec3>& points) {
-  Points matrix(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i)
-    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
-  return matrix;
-}
-
 void drop_outliers(Grid& grid, ReconstructedSurface& result) {
-  const std::vector<bool> outlier = distance_outliers(as_points(grid.points), kOutlierSds);
+  const std::vector<bool> outlier = distance_outliers(columns_of(grid.points), kOutlierSds);
   for (int& vertex : grid.vertex) {
     if (vertex < 0 || !outlier[static_cast<std::size_t>(vertex)]) continue;
     vertex = -1;

@@ -14,7 +14,7 @@
 
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
-#include "common/tracking/transform_name.hpp"
+#include "common/tracking/transform_graph.hpp"
 
 namespace brainshift::tracking {
 

@@ -25,6 +25,7 @@
 
 #include "common/core/error.hpp"
 #include "common/values/brain_model.hpp"
+#include "common/values/decision.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
 #include "common/values/session.hpp"
@@ -43,6 +44,7 @@ std::string encode(const SessionInfo& info);
 std::string encode(const BrainModel& model);
 std::string encode(const Observation& observation);
 std::string encode(const ObservationReceipt& receipt);
+std::string encode(const Decision& decision);
 std::string encode(const UpdateMessage& message);
 // The same in two steps, for an update that is to carry the time of its own encoding: the payload
 // without timings and answer_time, and these behind it. The result decodes like that of encode();
@@ -61,6 +63,7 @@ Result<SessionInfo> decode_session_info(std::string_view payload);
 Result<BrainModel> decode_model(std::string_view payload);
 Result<Observation> decode_observation(std::string_view payload);
 Result<ObservationReceipt> decode_observation_receipt(std::string_view payload);
+Result<Decision> decode_decision(std::string_view payload);
 Result<UpdateMessage> decode_update(std::string_view payload);
 Result<Subscription> decode_subscription(std::string_view payload);
 Result<SessionState> decode_session_state(std::string_view payload);

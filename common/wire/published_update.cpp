@@ -4,7 +4,7 @@
 #include <cassert>
 
 #include "brainshift/v1/brainshift.pb.h"
-#include "common/wire/convert_choice.hpp"
+#include "common/wire/convert_parts.hpp"
 #include "common/wire/payload_scan.hpp"
 
 namespace brainshift::wire {

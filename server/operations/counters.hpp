@@ -20,8 +20,8 @@
 #include <string_view>
 #include <vector>
 
+#include "common/values/decision.hpp"
 #include "common/values/estimate.hpp"
-#include "common/wire/decision.hpp"
 #include "common/wire/report.hpp"
 #include "server/operations/latency_record.hpp"
 

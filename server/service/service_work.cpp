@@ -7,7 +7,7 @@
 
 #include "common/core/guarded.hpp"
 #include "common/core/utc_time.hpp"
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 #include "server/service/service.hpp"
 
 namespace brainshift::server {

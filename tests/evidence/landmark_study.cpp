@@ -134,7 +134,7 @@ Result<PointMap> thin_plate_map(const Points& before, const Points& during) {
 
 Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
                                                    const io::NamedPairs& pairs, double sd_mm) {
-  const Pairs all{io::columns_of(pairs.first), io::columns_of(pairs.second)};
+  const Pairs all{columns_of(pairs.first), columns_of(pairs.second)};
   const Eigen::Index count = all.before.cols();
   if (count < kMinPairs) {
     return invalid("landmarks: " + std::to_string(count) +

@@ -5,8 +5,8 @@
 
 #include "common/igtl/crc64.hpp"
 #include "common/igtl/message.hpp"
+#include "common/igtl/poly_data.hpp"
 #include "common/igtl/stream_reader.hpp"
-#include "common/igtl/surface.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace brainshift::fuzz {

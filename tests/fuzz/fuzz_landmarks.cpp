@@ -10,7 +10,7 @@ namespace {
 
 void require_finite(const std::vector<Vec3>& points, std::size_t count) {
   require(points.size() == count, "every name has a point");
-  require(io::columns_of(points).allFinite(), "every point lies somewhere");
+  require(columns_of(points).allFinite(), "every point lies somewhere");
 }
 
 }  // namespace

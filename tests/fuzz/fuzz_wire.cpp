@@ -2,7 +2,6 @@
 // Frames, and every message that a daemon or a client decodes. The bytes are a frame, and a
 // payload too: behind the frame's checksum a fuzzer would never come.
 #include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 #include "common/wire/frame.hpp"
 #include "common/wire/published_update.hpp"
 #include "common/wire/report.hpp"

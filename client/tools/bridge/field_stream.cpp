@@ -7,7 +7,7 @@
 
 #include "common/geometry/node_choice.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/igtl/surface.hpp"
+#include "common/igtl/poly_data.hpp"
 
 namespace brainshift::client {
 namespace {

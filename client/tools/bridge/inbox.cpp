@@ -8,7 +8,7 @@
 #include "client/tools/import/import_boundaries.hpp"
 #include "client/tools/import/import_case.hpp"
 #include "common/core/rigid_motion.hpp"
-#include "common/igtl/surface.hpp"
+#include "common/igtl/poly_data.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/tracking/transform_graph.hpp"

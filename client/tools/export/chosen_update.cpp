@@ -80,16 +80,15 @@ Result<ChosenUpdate> choose_update(const io::SurgeryFile& file, const fs::path& 
   const UpdateMessage& message = found->chosen->message;
   const std::string name = fmt::format("update {}", message.update.sequence);
   if (message.error || message.update.estimate.displacement.cols() == 0) {
-    return io::file_error(
-        ErrorCode::kInvalidArgument, path,
-        fmt::format("{} carries no field: {}", name,
-                    message.error ? message.error->message : objection(message.update)));
+    return io::invalid_file(
+        path, fmt::format("{} carries no field: {}", name,
+                          message.error ? message.error->message : objection(message.update)));
   }
   if (!message.update.usable() && !choice.allow_unusable) {
-    return io::file_error(ErrorCode::kInvalidArgument, path,
-                          fmt::format("{} is {}. --allow-unusable exports it all the same, and "
-                                      "every file says so",
-                                      name, objection(message.update)));
+    return io::invalid_file(path,
+                            fmt::format("{} is {}. --allow-unusable exports it all the same, and "
+                                        "every file says so",
+                                        name, objection(message.update)));
   }
   const auto columns = message.update.estimate.displacement.cols();
   if (columns != nodes) {

@@ -88,8 +88,7 @@ class PendingFolder {
     const bool made = !failed && fs::create_directory(pending.place_, failed);
     if (made) return pending;
     const fs::path place = std::exchange(pending.place_, fs::path());  // somebody else's
-    return io::file_error(ErrorCode::kWriteFailed, place,
-                          failed ? failed.message() : "exists already");
+    return io::write_failed(place, failed ? failed.message() : "exists already");
   }
   PendingFolder(PendingFolder&& other) noexcept
       : folder_(std::move(other.folder_)), place_(std::exchange(other.place_, fs::path())) {}
@@ -102,7 +101,7 @@ class PendingFolder {
   Status commit() {
     std::error_code failed;
     fs::rename(place_, folder_, failed);
-    if (failed) return io::file_error(ErrorCode::kWriteFailed, folder_, failed.message());
+    if (failed) return io::write_failed(folder_, failed.message());
     place_.clear();
     return {};
   }

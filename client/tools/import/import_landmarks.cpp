@@ -62,7 +62,7 @@ Status measure_motion(const io::NamedPairs& pairs, LandmarkReport& report) {
 }
 
 void split_off_rigid_part(const io::NamedPairs& pairs, LandmarkReport& report) {
-  const Points before = io::columns_of(pairs.first), during = io::columns_of(pairs.second);
+  const Points before = columns_of(pairs.first), during = columns_of(pairs.second);
   const auto fit = registration::register_fiducials(before, during);
   if (!fit) {
     report.no_rigid = fit.error().message;
@@ -104,8 +104,7 @@ Observation observation_of(const io::NamedPairs& pairs, const std::string& case_
   observation.case_id = case_id;
   observation.source = "landmarks";
   observation.sequence = 1;
-  observation.body =
-      LandmarkPairs{io::columns_of(pairs.first), io::columns_of(pairs.second), sd_mm};
+  observation.body = LandmarkPairs{columns_of(pairs.first), columns_of(pairs.second), sd_mm};
   return observation;
 }
 

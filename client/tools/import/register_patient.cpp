@@ -146,12 +146,12 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
     if (!pairs) return failed(pairs.error());
     report.names = pairs->names;
     report.left_out = pairs->left_out;
-    auto fit = registration::register_fiducials(io::columns_of(pairs->first),
-                                                io::columns_of(pairs->second));
+    auto fit =
+        registration::register_fiducials(columns_of(pairs->first), columns_of(pairs->second));
     if (!fit) return failed(fit.error());
     return Fit{std::move(*fit), false};
   }
-  const Points measured = io::columns_of(touched.points), image = io::columns_of(ras.points);
+  const Points measured = columns_of(touched.points), image = columns_of(ras.points);
   if (options.pairing == Pairing::kShape) {
     auto fit = registration::match_fiducials(measured, image);
     if (!fit) return failed(fit.error());

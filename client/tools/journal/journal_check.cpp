@@ -7,7 +7,6 @@
 
 #include "common/io/files/file_access.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 
 namespace brainshift::client {
 namespace {

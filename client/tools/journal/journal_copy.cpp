@@ -26,12 +26,12 @@ class NewSurgery {
   static Result<NewSurgery> create(const fs::path& out, const io::SurgeryMeta& meta) {
     std::error_code ignored;
     if (fs::exists(fs::symlink_status(out, ignored))) {
-      return io::file_error(ErrorCode::kWriteFailed, out, "exists already");
+      return io::write_failed(out, "exists already");
     }
     fs::path temporary = out;
     temporary.replace_filename(fmt::format(".{}.tmp-{}", out.filename().string(), ::getpid()));
     auto file = io::SurgeryFile::create(temporary, meta);
-    if (!file) return io::file_error(ErrorCode::kWriteFailed, out, file.error().message);
+    if (!file) return io::write_failed(out, file.error().message);
     return NewSurgery(out, temporary, std::move(*file));
   }
   NewSurgery(NewSurgery&& other) noexcept
@@ -57,7 +57,7 @@ class NewSurgery {
     if (Status ok = file_.close(); !ok) return ok;
     std::error_code failed;
     if (!fs::exists(out_, failed)) fs::rename(temporary_, out_, failed);
-    if (failed) return io::file_error(ErrorCode::kWriteFailed, out_, failed.message());
+    if (failed) return io::write_failed(out_, failed.message());
     temporary_.clear();
     return {};
   }

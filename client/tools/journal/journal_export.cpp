@@ -14,7 +14,6 @@
 #include "common/io/model/field_series_file.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -129,10 +128,9 @@ Result<BrainModel> recorded_model(const io::SurgeryFile& file, const fs::path& p
   auto model = io::read_model(model_file, {});
   if (!model) return tl::unexpected(model.error());
   if (model->model.model_id != file.meta().model_id) {
-    return io::file_error(
-        ErrorCode::kInvalidArgument, path,
-        fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
-                    model_file.string(), model->model.model_id));
+    return io::invalid_file(
+        path, fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"", file.meta().model_id,
+                          model_file.string(), model->model.model_id));
   }
   return std::move(model->model);
 }
@@ -184,7 +182,7 @@ Result<int> write_field_series(const io::SurgeryFile& file, const fs::path& path
                                const BrainModel& model, const fs::path& folder) {
   std::error_code failed;
   fs::create_directories(folder, failed);
-  if (failed) return io::file_error(ErrorCode::kWriteFailed, folder, failed.message());
+  if (failed) return io::write_failed(folder, failed.message());
   std::string list;
   auto fields = visit_fields(file, path, model, [&](const Update& update, double time_s) -> Status {
     const std::string name = fmt::format("{}-{:06}.vtu", path.stem().string(), update.sequence);

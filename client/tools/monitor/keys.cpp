@@ -22,8 +22,7 @@ Result<std::string> check_pair(const fs::path& file) {
   const auto pair = io::read_secret_key(file);
   if (!pair) return tl::unexpected(pair.error());
   if (public_key_of(pair->secret_key) != pair->public_key) {
-    return io::file_error(ErrorCode::kInvalidArgument, file,
-                          "the public key does not belong to the secret one");
+    return io::invalid_file(file, "the public key does not belong to the secret one");
   }
   return fmt::format("{}: secret key of {}", file.string(), pair->name);
 }

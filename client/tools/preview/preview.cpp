@@ -202,7 +202,7 @@ Result<PreviewSummary> write_preview(const fs::path& case_file, const fs::path& 
   if (!view) return tl::unexpected(view.error());
   std::error_code failed;
   fs::create_directories(out, failed);
-  if (failed) return io::file_error(ErrorCode::kWriteFailed, out, failed.message());
+  if (failed) return io::write_failed(out, failed.message());
   PreviewSummary summary{facts(*view), doubts(*view), view->problems, {}};
   std::vector<std::pair<std::string, cv::Mat>> pictures;
   if (view->tumour.num_vertices() > 0) {

@@ -80,9 +80,9 @@ Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
   const auto point = read_resume_point(options.resume);
   if (!point) return tl::unexpected(point.error());
   if (point->meta.model_id != meta.model_id) {
-    return io::file_error(ErrorCode::kInvalidArgument, options.resume,
-                          "meta.model_id is \"" + point->meta.model_id + "\", that of " +
-                              options.surgery.string() + " is \"" + meta.model_id + "\"");
+    return io::invalid_file(options.resume, "meta.model_id is \"" + point->meta.model_id +
+                                                "\", that of " + options.surgery.string() +
+                                                " is \"" + meta.model_id + "\"");
   }
   if (point->broken) notes.push_back(point->broken->message);
   notes.push_back(options.resume.string() + ": " + describe(*point));
@@ -121,9 +121,9 @@ Result<DaemonStatus> check_daemon(Client& client, const Surgery& surgery,
   }
   const auto differs = [&](const char* key, const std::string& recorded,
                            const std::string& served) {
-    return io::file_error(ErrorCode::kInvalidArgument, options.surgery,
-                          fmt::format("meta.{} is \"{}\", but the daemon at {} serves \"{}\"", key,
-                                      recorded, options.endpoint, served));
+    return io::invalid_file(
+        options.surgery, fmt::format("meta.{} is \"{}\", but the daemon at {} serves \"{}\"", key,
+                                     recorded, options.endpoint, served));
   };
   if (status->case_id != surgery.meta.case_id)
     return differs("case_id", surgery.meta.case_id, status->case_id);

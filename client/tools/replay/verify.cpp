@@ -14,7 +14,7 @@
 
 #include "client/lib/client.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -280,8 +280,8 @@ Status check_served(const io::SurgeryMeta& meta, const DaemonStatus& status,
     return fail(ErrorCode::kModelNotReady, options.endpoint + ": the daemon has no model loaded");
   }
   if (status.case_id == meta.case_id && status.model_id == meta.model_id) return {};
-  return io::file_error(
-      ErrorCode::kInvalidArgument, options.journal,
+  return io::invalid_file(
+      options.journal,
       fmt::format("is of case \"{}\" and model \"{}\", but the daemon at {} serves \"{}\" and "
                   "\"{}\"",
                   meta.case_id, meta.model_id, options.endpoint, status.case_id, status.model_id));

@@ -96,8 +96,8 @@ Status check_same(const io::SurgeryFile& surgery, const fs::path& path, const Br
   for (const auto& [key, theirs, ours] : {std::tuple("case_id", meta.case_id, model.case_id),
                                           std::tuple("model_id", meta.model_id, model.model_id)}) {
     if (theirs == ours) continue;
-    return io::file_error(ErrorCode::kInvalidArgument, path,
-                          fmt::format("{} is \"{}\": the model's is \"{}\"", key, theirs, ours));
+    return io::invalid_file(path,
+                            fmt::format("{} is \"{}\": the model's is \"{}\"", key, theirs, ours));
   }
   return {};
 }
@@ -133,8 +133,8 @@ Result<std::int64_t> acquired_ns(const ObserveJob& job, const Place& place) {
   if (!job.time_s) return place.last_ns ? *place.last_ns + kDefaultStepNs : 0;
   const auto wanted = static_cast<std::int64_t>(std::llround(*job.time_s * kNanosecondsPerSecond));
   if (!place.last_ns || wanted > *place.last_ns) return wanted;
-  return io::file_error(
-      ErrorCode::kInvalidArgument, job.out,
+  return io::invalid_file(
+      job.out,
       fmt::format("--time-s {:g}: must be above {:g}, the time of its last observation",
                   *job.time_s, static_cast<double>(*place.last_ns) / kNanosecondsPerSecond));
 }
@@ -143,8 +143,8 @@ Result<geometry::CheckedSurface> checked_surface(const ObserveJob& job, const Br
   auto surface = io::read_surface_or_points(job.surface);
   if (!surface) return tl::unexpected(surface.error());
   if (surface->num_vertices() > wire::kMaxPoints || surface->num_triangles() > wire::kMaxPoints) {
-    return io::file_error(
-        ErrorCode::kInvalidArgument, job.surface,
+    return io::invalid_file(
+        job.surface,
         fmt::format("has {} points and {} triangles: at most {} of each", surface->num_vertices(),
                     surface->num_triangles(), wire::kMaxPoints));
   }

@@ -149,7 +149,7 @@ Status write_disparity_picture(const std::filesystem::path& path,
                         100.0 * measured.map.valid_fraction));
   std::vector<std::uint8_t> png;
   if (!cv::imencode(".png", sheet, png))
-    return io::file_error(ErrorCode::kWriteFailed, path, "the picture cannot be encoded");
+    return io::write_failed(path, "the picture cannot be encoded");
   return io::write_file(path, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 

@@ -48,11 +48,10 @@ Result<std::string> read_guarded(const fs::path& path, mode_t forbidden,
     return unreadable(path, std::generic_category().message(errno));
   }
   if ((status.st_mode & forbidden) != 0) {
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      fmt::format("mode {}: {}", mode_text(status.st_mode), complaint));
+    return invalid_file(path, fmt::format("mode {}: {}", mode_text(status.st_mode), complaint));
   }
   if (static_cast<std::uintmax_t>(status.st_size) > kMaxFileBytes) {
-    return file_error(ErrorCode::kInvalidArgument, path, "is too large for a file of keys");
+    return invalid_file(path, "is too large for a file of keys");
   }
   return read_file(path);
 }
@@ -80,8 +79,7 @@ Result<std::map<std::string, std::string>> key_fields(const fs::path& path,
   }
   for (const char* needed : {"name", "public"}) {
     if (fields.count(needed) == 0) {
-      return file_error(ErrorCode::kInvalidArgument, path,
-                        fmt::format("has no line `{}:`: is it a key file?", needed));
+      return invalid_file(path, fmt::format("has no line `{}:`: is it a key file?", needed));
     }
   }
   return fields;
@@ -90,10 +88,9 @@ Result<std::map<std::string, std::string>> key_fields(const fs::path& path,
 Status write_new(const fs::path& path, const std::string& text, mode_t mode) {
   const auto refuse = [&](int error) {
     if (error == EEXIST) {
-      return file_error(ErrorCode::kInvalidArgument, path,
-                        "exists already, and keys are never overwritten");
+      return invalid_file(path, "exists already, and keys are never overwritten");
     }
-    return file_error(ErrorCode::kWriteFailed, path, std::generic_category().message(error));
+    return write_failed(path, std::generic_category().message(error));
   };
   Descriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
   if (file.get() < 0) return refuse(errno);
@@ -231,8 +228,7 @@ Result<KeyPair> read_secret_key(const fs::path& path) {
   });
   if (!fields) return tl::unexpected(fields.error());
   if (fields->count("secret") == 0) {
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      "holds no secret key: it is the public half");
+    return invalid_file(path, "holds no secret key: it is the public half");
   }
   const auto guarded = read_guarded(
       path, kBesideOwner, "other accounts may use the secret key: chmod 600 it, or make a new one");
@@ -251,8 +247,7 @@ Result<std::vector<AllowedKey>> read_allow_list(const fs::path& path) {
   if (!text) return tl::unexpected(text.error());
   auto keys = parse_allow_list(path, *text);
   if (keys && keys->empty()) {
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      "allows no key: add one with `brainshift keys add`");
+    return invalid_file(path, "allows no key: add one with `brainshift keys add`");
   }
   return keys;
 }
@@ -272,9 +267,7 @@ Status add_allowed_key(const fs::path& path, const AllowedKey& key) {
   const auto keys = parse_allow_list(path, *text);
   if (!keys) return tl::unexpected(keys.error());
   for (const AllowedKey& earlier : *keys) {
-    if (const auto why = conflict(earlier, key); !why.empty()) {
-      return file_error(ErrorCode::kInvalidArgument, path, why);
-    }
+    if (const auto why = conflict(earlier, key); !why.empty()) return invalid_file(path, why);
   }
   std::string extended = *text;
   if (!extended.empty() && extended.back() != '\n') extended += '\n';

@@ -46,11 +46,11 @@ class GzipOutput {
       std::ofstream head(pending->temporary_path(), std::ios::binary);
       head.write(plain.data(), static_cast<std::streamsize>(plain.size()));
       head.close();
-      if (!head) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
+      if (!head) return write_failed(path, "cannot be written");
     }
     gzFile_s* stream =
         gzopen(pending->temporary_path().c_str(), compressed ? kAppendCompressed : kAppendPlain);
-    if (stream == nullptr) return file_error(ErrorCode::kWriteFailed, path, "cannot be written");
+    if (stream == nullptr) return write_failed(path, "cannot be written");
     gzbuffer(stream, 1u << 18);
     return GzipOutput(path, std::move(*pending), stream);
   }
@@ -85,9 +85,8 @@ class GzipOutput {
   GzipOutput(fs::path path, PendingFile pending, gzFile_s* stream)
       : path_(std::move(path)), pending_(std::move(pending)), stream_(stream) {}
   Status failed(int error) const {
-    return file_error(ErrorCode::kWriteFailed, path_,
-                      std::string("cannot be written: ") +
-                          (error != 0 ? std::strerror(error) : "the compressor failed"));
+    return write_failed(path_, std::string("cannot be written: ") +
+                                   (error != 0 ? std::strerror(error) : "the compressor failed"));
   }
 
   fs::path path_;

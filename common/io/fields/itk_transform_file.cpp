@@ -99,7 +99,7 @@ Status write_itk_transform(const std::filesystem::path& path, const Displacement
     check_hdf5(H5Fflush(file.get(), H5F_SCOPE_GLOBAL), "buffers");
     if (!file.close()) throw Hdf5Problem{"buffers"};
   } catch (const Hdf5Problem& problem) {
-    return file_error(ErrorCode::kWriteFailed, path, "cannot write " + problem.message);
+    return write_failed(path, "cannot write " + problem.message);
   }
   return pending->commit();
 }

@@ -23,8 +23,7 @@ std::string system_message(int error) {
 }
 
 tl::unexpected<Error> write_error(const fs::path& path, const std::string& action, int error) {
-  return file_error(ErrorCode::kWriteFailed, path,
-                    "cannot " + action + ": " + system_message(error));
+  return write_failed(path, "cannot " + action + ": " + system_message(error));
 }
 
 Status sync_path(const fs::path& path, int flags) {
@@ -106,10 +105,10 @@ Result<PendingFile> PendingFile::create(const fs::path& path) {
   name += std::to_string(counter++);
   std::error_code ignored;
   if (path.filename().empty() || fs::is_directory(path, ignored)) {
-    return file_error(ErrorCode::kWriteFailed, path, "is not a file name");
+    return write_failed(path, "is not a file name");
   }
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
-    return file_error(ErrorCode::kWriteFailed, path, "exists and is not a regular file");
+    return write_failed(path, "exists and is not a regular file");
   }
   const fs::path temporary = folder_of(path) / name;
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
@@ -119,12 +118,12 @@ Result<PendingFile> PendingFile::create(const fs::path& path) {
 
 Status PendingFile::commit() {
   if (Status synced = sync_path(temporary_, O_RDWR); !synced) {
-    return file_error(ErrorCode::kWriteFailed, path_, synced.error().message);
+    return write_failed(path_, synced.error().message);
   }
   if (::rename(temporary_.c_str(), path_.c_str()) != 0) return write_error(path_, "rename", errno);
   temporary_.clear();
   if (Status synced = sync_path(folder_of(path_), O_RDONLY | O_DIRECTORY); !synced) {
-    return file_error(ErrorCode::kWriteFailed, path_, synced.error().message);
+    return write_failed(path_, synced.error().message);
   }
   return {};
 }

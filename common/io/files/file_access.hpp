@@ -52,6 +52,14 @@ inline tl::unexpected<Error> file_error(const std::filesystem::path& path, const
   return file_error(error.code, path, error.message);
 }
 
+inline tl::unexpected<Error> invalid_file(const std::filesystem::path& path,
+                                          const std::string& message) {
+  return file_error(ErrorCode::kInvalidArgument, path, message);
+}
+inline tl::unexpected<Error> write_failed(const std::filesystem::path& path,
+                                          const std::string& message) {
+  return file_error(ErrorCode::kWriteFailed, path, message);
+}
 // What is wrong with a file's content, for parsers that do not know the file's name.
 inline tl::unexpected<Error> unreadable(std::string message) {
   return fail(ErrorCode::kUnreadable, std::move(message));

@@ -293,8 +293,7 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
 Result<VoxelImage> read_label_map(const fs::path& path, const LabelChoice& choice) {
   if (path.extension() != ".nrrd") {
     if (choice.segment.empty()) return read_nifti(path);
-    return file_error(ErrorCode::kInvalidArgument, path,
-                      "names no segments: only a .seg.nrrd file does");
+    return invalid_file(path, "names no segments: only a .seg.nrrd file does");
   }
   return parse_file(path, [&](const std::string& content) { return parse_nrrd(content, choice); });
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Surfaces and point clouds out of .stl, .ply, .obj and plain text; mesh_formats.hpp says what of
 // each format is read.
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -51,7 +53,7 @@ TriangleSurface read_stl_binary(const std::string& content, std::size_t triangle
       const float z = load_number<float>(at + 8, false);
       // NaN would break the order of the merging map.
       if (!(std::isfinite(x) && std::isfinite(y) && std::isfinite(z))) {
-        refuse_format("triangle " + std::to_string(t) + " has a coordinate that is not finite");
+        refuse_format(fmt::format("triangle {} has a coordinate that is not finite", t));
       }
       builder.add_corner(x, y, z);
     }
@@ -85,15 +87,15 @@ TriangleSurface read_stl_ascii(std::string_view text) {
   for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
     if (word == "endsolid") ended = true;
     if (word == "endloop" && builder.corners() != 3 * ++loops) {
-      refuse_format("facet " + std::to_string(loops - 1) + " does not have three vertices");
+      refuse_format(fmt::format("facet {} does not have three vertices", loops - 1));
     }
     if (word != "vertex") continue;
     double p[3];
     for (double& coordinate : p) {
       const std::string_view number = next_word(text);
       if (!parse_real(number, coordinate)) {
-        refuse_format("vertex coordinate '" + std::string(number) + "' of facet " +
-                      std::to_string(loops) + " is not a finite number");
+        refuse_format(fmt::format("vertex coordinate '{}' of facet {} is not a finite number",
+                                  number, loops));
       }
     }
     builder.add_corner(p[0], p[1], p[2]);
@@ -248,8 +250,7 @@ TriangleSurface read_ply(std::string_view rest) {
       }
       if (element.name == "face") {
         if (indices.size() != 3) {
-          refuse_format("face " + std::to_string(i) + " has " + std::to_string(indices.size()) +
-                        " vertices: must have 3");
+          refuse_format(fmt::format("face {} has {} vertices: must have 3", i, indices.size()));
         }
         surface.triangles.col(i) << indices[0], indices[1], indices[2];
       }
@@ -299,7 +300,7 @@ TriangleSurface read_obj(const std::string& content) {
         ++count;
       }
       if (count != 3) {
-        refuse_format(place + "face has " + std::to_string(count) + " vertices: must have 3");
+        refuse_format(fmt::format("{}face has {} vertices: must have 3", place, count));
       }
     }
   }
@@ -355,8 +356,7 @@ std::vector<std::vector<double>> number_rows(const std::string& text) {
     rows.emplace_back();
     const std::string_view wrong = take_numbers(line, rows.back());
     if (wrong.empty()) continue;
-    refuse_format("line " + std::to_string(number) + ": \"" + std::string(wrong) +
-                  "\" is no number");
+    refuse_format(fmt::format("line {}: \"{}\" is no number", number, wrong));
   }
   return rows;
 }
@@ -367,8 +367,7 @@ TriangleSurface read_xyz(const std::string& content) {
   surface.vertices.resize(3, static_cast<Eigen::Index>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].size() < 3) {
-      refuse_format("point " + std::to_string(i) + " has " + std::to_string(rows[i].size()) +
-                    " coordinates: must have 3");
+      refuse_format(fmt::format("point {} has {} coordinates: must have 3", i, rows[i].size()));
     }
     surface.vertices.col(static_cast<Eigen::Index>(i)) << rows[i][0], rows[i][1], rows[i][2];
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .vtu and .vtp files: VtkXmlFile gives arrays by name, whatever their encoding is; the functions
 // behind it say what they mean.
+#include <fmt/format.h>
+
 #include <bit>
 #include <charconv>
 #include <cstdint>
@@ -183,8 +185,8 @@ class VtkXmlFile {
     const std::size_t size = array.is_real() ? array.reals.size() : array.integers.size();
     if (tuples >= 0 &&
         size != static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array.components)) {
-      refuse_format(place + " has " + std::to_string(size) + " numbers: must have " +
-                    std::to_string(tuples) + " x " + std::to_string(array.components));
+      refuse_format(fmt::format("{} has {} numbers: must have {} x {}", place, size, tuples,
+                                array.components));
     }
     return array;
   }
@@ -323,9 +325,8 @@ CellList read_cells(const VtkXmlFile& file, const std::string& section, std::int
   const auto end = static_cast<std::int64_t>(cells.connectivity.size());
   for (std::size_t i = 0; i < cells.offsets.size(); ++i) {
     if (cells.size(i) >= 0 && cells.offsets[i] >= 0 && cells.offsets[i] <= end) continue;
-    refuse_format(section + " offset " + std::to_string(i) + " is " +
-                  std::to_string(cells.offsets[i]) + ": must grow and not exceed " +
-                  std::to_string(end));
+    refuse_format(fmt::format("{} offset {} is {}: must grow and not exceed {}", section, i,
+                              cells.offsets[i], end));
   }
   if (static_cast<std::int64_t>(cells.offsets.size()) != count) {
     refuse_format(section + " offsets must be integers");
@@ -343,7 +344,7 @@ std::vector<std::int64_t> read_labels(const VtkXmlFile& file, std::int64_t cells
     }
     for (const std::int64_t label : array.integers) {
       if (label < std::numeric_limits<int>::min() || label > std::numeric_limits<int>::max()) {
-        refuse_format("label " + std::to_string(label) + " is out of range");
+        refuse_format(fmt::format("label {} is out of range", label));
       }
     }
     return std::move(array.integers);
@@ -368,10 +369,8 @@ GroupedMesh read_grouped(const VtkXmlFile& file) {
     if (!tetra && (types.integers[cell] != kVtkTriangle || labels.empty())) continue;
     const int vertices = tetra ? 4 : 3;
     if (cells.size(cell) != vertices) {
-      refuse_format("cell " + std::to_string(cell) + " is a " +
-                    (tetra ? "tetrahedron" : "triangle") + " with " +
-                    std::to_string(cells.size(cell)) + " vertices: must have " +
-                    std::to_string(vertices));
+      refuse_format(fmt::format("cell {} is a {} with {} vertices: must have {}", cell,
+                                tetra ? "tetrahedron" : "triangle", cells.size(cell), vertices));
     }
     for (int k = 0; k < vertices; ++k) (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
     if (labels.empty()) continue;
@@ -420,8 +419,8 @@ Result<TriangleSurface> parse_vtp(std::string content) {
     surface.triangles.resize(3, count);
     for (std::size_t cell = 0; cell < cells.offsets.size(); ++cell) {
       if (cells.size(cell) != 3) {
-        refuse_format("polygon " + std::to_string(cell) + " has " +
-                      std::to_string(cells.size(cell)) + " vertices: must have 3");
+        refuse_format(
+            fmt::format("polygon {} has {} vertices: must have 3", cell, cells.size(cell)));
       }
       for (int k = 0; k < 3; ++k) {
         surface.triangles(k, static_cast<Eigen::Index>(cell)) = cells.vertex(cell, k);

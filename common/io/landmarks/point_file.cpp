@@ -230,14 +230,6 @@ bool NamedPoints::all_named() const {
   return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.empty(); });
 }
 
-Points columns_of(const std::vector<Vec3>& points) {
-  Points matrix(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    matrix.col(static_cast<Eigen::Index>(i)) = points[i];
-  }
-  return matrix;
-}
-
 Result<NamedPoints> read_points(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".json" && extension != ".fcsv" && extension != ".csv") {

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
-#include "common/core/types.hpp"
+#include "common/core/mesh.hpp"
 
 namespace brainshift::io {
 
@@ -34,9 +34,6 @@ struct NamedPoints {
   // Every point has a name.
   bool all_named() const;
 };
-
-// As columns, 3 x n.
-Points columns_of(const std::vector<Vec3>& points);
 
 // kNotFound; kUnreadable or kEmptySet naming the file, the line or point and what is wrong there:
 // also another type of markup, more than one list, another coordinate system or unit.

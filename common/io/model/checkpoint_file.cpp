@@ -127,9 +127,8 @@ struct CheckpointFile::Impl {
   std::uint64_t end = 0;  // of the last whole block
 
   tl::unexpected<Error> write_error(const std::string& action) const {
-    return file_error(
-        ErrorCode::kWriteFailed, path,
-        "cannot " + action + ": " + std::error_code(errno, std::generic_category()).message());
+    return write_failed(path, "cannot " + action + ": " +
+                                  std::error_code(errno, std::generic_category()).message());
   }
 
   // Header read, or written where there is none of this key; what is no whole block cut off.
@@ -184,8 +183,7 @@ struct CheckpointFile::Impl {
 
     const std::lock_guard lock(mutex);
     if (blocks.count(index) != 0) {
-      return file_error(ErrorCode::kInvalidArgument, path,
-                        "has block " + std::to_string(index) + " already");
+      return invalid_file(path, "has block " + std::to_string(index) + " already");
     }
     block.payload_at = end + sizeof block.header;
     bool good = write_at(file.get(), &block.header, sizeof block.header, end);
@@ -213,12 +211,12 @@ struct CheckpointFile::Impl {
     if (header.scalar_bytes != sizeof(Scalar) ||
         header.rows != static_cast<std::uint64_t>(out.rows()) ||
         header.columns != static_cast<std::uint64_t>(out.cols())) {
-      return file_error(ErrorCode::kInvalidArgument, path,
-                        "block " + std::to_string(index) + " is " + std::to_string(header.rows) +
-                            " x " + std::to_string(header.columns) + " numbers of " +
-                            std::to_string(header.scalar_bytes) + " bytes, asked for " +
-                            std::to_string(out.rows()) + " x " + std::to_string(out.cols()) +
-                            " of " + std::to_string(sizeof(Scalar)));
+      return invalid_file(
+          path, "block " + std::to_string(index) + " is " + std::to_string(header.rows) + " x " +
+                    std::to_string(header.columns) + " numbers of " +
+                    std::to_string(header.scalar_bytes) + " bytes, asked for " +
+                    std::to_string(out.rows()) + " x " + std::to_string(out.cols()) + " of " +
+                    std::to_string(sizeof(Scalar)));
     }
     const Pieces pieces(out);
     std::uint32_t crc = 0;
@@ -296,8 +294,7 @@ Status CheckpointFile::read_columns(int index, Eigen::Index first, Eigen::Matrix
   if (header.scalar_bytes != sizeof(float) ||
       header.rows != static_cast<std::uint64_t>(out.rows()) ||
       begin + static_cast<std::uint64_t>(out.cols()) > header.columns) {
-    return file_error(ErrorCode::kInvalidArgument, impl_->path,
-                      "block " + std::to_string(index) + " has no such columns");
+    return invalid_file(impl_->path, "block " + std::to_string(index) + " has no such columns");
   }
   if (read_at(impl_->file.get(), out.data(), sizeof(float) * static_cast<std::size_t>(out.size()),
               block->payload_at + begin * header.rows * sizeof(float))) {

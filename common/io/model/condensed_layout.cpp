@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/io/model/condensed_layout.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
@@ -240,29 +242,25 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
              "names a node that is no slave of the model");
   check.nodes("region", operators.region, n, true);
   check.nodes("control", operators.control, n, true);
-  check.that(
-      operators.num_nodes() == n, "responses",
-      "has " + std::to_string(operators.num_nodes()) + " nodes: must have " + std::to_string(n));
-  check.that(
-      r >= 0, "responses",
-      "has " + std::to_string(r + s) + " columns: fewer than the " + std::to_string(s) + " slaves");
+  check.that(operators.num_nodes() == n, "responses",
+             fmt::format("has {} nodes: must have {}", operators.num_nodes(), n));
+  check.that(r >= 0, "responses",
+             fmt::format("has {} columns: fewer than the {} slaves", r + s, s));
   check.matrix("region_responses", operators.region_responses,
                3 * static_cast<Eigen::Index>(operators.region.size()), r + s);
   int left = static_cast<int>(r);
   for (int part = 0; part < kPriorParts; ++part) {
     const int columns = operators.part_columns[static_cast<std::size_t>(part)];
     check.that(columns >= 0 && columns <= left, modes_of(part),
-               "= " + std::to_string(columns) + ": must be from 0 to the " + std::to_string(left) +
-                   " modes that the parts before it leave");
+               fmt::format("= {}: must be from 0 to the {} modes that the parts before it leave",
+                           columns, left));
     left -= std::max(0, columns);
   }
-  check.that(left == 0, "responses",
-             "has " + std::to_string(left) + " columns of no part of the prior");
+  check.that(left == 0, "responses", fmt::format("has {} columns of no part of the prior", left));
   check.matrix("compliance", operators.compliance, s, s);
   if (!check.found()) check.that(symmetric(operators.compliance), "compliance", "is not symmetric");
-  check.that(
-      operators.num_modes() == r, "slave_modes",
-      "has " + std::to_string(operators.num_modes()) + " columns: must have " + std::to_string(r));
+  check.that(operators.num_modes() == r, "slave_modes",
+             fmt::format("has {} columns: must have {}", operators.num_modes(), r));
   check.matrix("slave_modes", operators.slave_modes, s, r);
   check.matrix("slave_normals", operators.slave_normals, 3, s);
   check.matrix("initial_penetration_mm", operators.initial_penetration_mm, s, 1);

@@ -28,7 +28,7 @@ struct FieldSeriesFile::Impl {
       write(out);
       return {};
     } catch (const Hdf5Problem& problem) {
-      return file_error(ErrorCode::kWriteFailed, path, "cannot write " + problem.message);
+      return write_failed(path, "cannot write " + problem.message);
     }
   }
 
@@ -49,7 +49,7 @@ Result<FieldSeriesFile> FieldSeriesFile::create(const fs::path& path, const Brai
   try {
     impl = std::make_unique<Impl>(path, std::move(*pending));
   } catch (const Hdf5Problem& problem) {
-    return file_error(ErrorCode::kWriteFailed, path, "cannot write " + problem.message);
+    return write_failed(path, "cannot write " + problem.message);
   }
   const Status written = impl->attempt([&](Hdf5Writer& out) {
     out.attribute("/", "frame", std::string("RAS"));

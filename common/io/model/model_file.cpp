@@ -205,9 +205,7 @@ bool write_header(const fs::path& path) {
 
 // What would be refused on reading is not written.
 Status check_content(const fs::path& path, const ModelFile& file) {
-  const auto refuse = [&path](const std::string& reason) {
-    return file_error(ErrorCode::kInvalidArgument, path, reason);
-  };
+  const auto refuse = [&path](const std::string& reason) { return invalid_file(path, reason); };
   if (file.model.model_id != content_hash(file.model)) {
     return refuse("model_id '" + file.model.model_id + "' is not the hash of the model");
   }
@@ -298,8 +296,8 @@ Status write_model(const fs::path& path, const ModelFile& file) {
     write_hdf5(pending->temporary_path(), file);
     if (!write_header(pending->temporary_path())) throw Hdf5Problem{"header"};
   } catch (const Hdf5Problem& problem) {
-    return file_error(ErrorCode::kWriteFailed, path,
-                      "cannot write " + problem.message + free_space(pending->temporary_path()));
+    return write_failed(path,
+                        "cannot write " + problem.message + free_space(pending->temporary_path()));
   }
   return pending->commit();
 }

@@ -102,8 +102,7 @@ Status SqliteDatabase::fold_log() {
   const auto busy = query("PRAGMA wal_checkpoint(TRUNCATE)");
   if (!busy) return write_failure("write-ahead log back");
   if (*busy != "0" || query("PRAGMA journal_mode = DELETE") != "delete") {
-    return file_error(ErrorCode::kWriteFailed, path_,
-                      "cannot fold the write-ahead log back: the file is in use");
+    return write_failed(path_, "cannot fold the write-ahead log back: the file is in use");
   }
   log_id_.reset();  // SQLite has removed it
   return {};

@@ -123,8 +123,8 @@ struct SurgeryFile::Impl {
   Status check_writable(std::string_view what) const {
     if (database.handle() == nullptr) return database.write_failure(what);
     if (!writable) {
-      return file_error(ErrorCode::kWriteFailed, database.path(),
-                        "cannot write " + std::string(what) + ": opened for reading");
+      return write_failed(database.path(),
+                          "cannot write " + std::string(what) + ": opened for reading");
     }
     return {};
   }
@@ -195,9 +195,9 @@ Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta&
   // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty.
   const int reserved = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
   if (reserved < 0) {
-    return file_error(
-        ErrorCode::kWriteFailed, path,
-        errno == EEXIST ? "exists already" : std::string("cannot create: ") + std::strerror(errno));
+    return write_failed(path, errno == EEXIST
+                                  ? "exists already"
+                                  : std::string("cannot create: ") + std::strerror(errno));
   }
   ::close(reserved);
   auto impl = std::make_unique<Impl>(path);
@@ -235,8 +235,7 @@ Result<SurgeryFile> SurgeryFile::open_to_append(const fs::path& path) {
   // SQLite opens a file that it may not write for reading only, without a word.
   if (Status status = check_regular_file(path); !status) return tl::unexpected(status.error());
   if (::access(path.c_str(), W_OK) != 0) {
-    return file_error(ErrorCode::kWriteFailed, path,
-                      std::string("cannot be written: ") + std::strerror(errno));
+    return write_failed(path, std::string("cannot be written: ") + std::strerror(errno));
   }
   // What is no surgery is told before anything of it is touched.
   {
@@ -262,9 +261,8 @@ Status SurgeryFile::append(std::span<const SurgeryRecord> records) {
   if (Status status = impl_->check_writable("record"); !status) return status;
   for (const SurgeryRecord& record : records) {
     if (fits(record.sequence)) continue;
-    return file_error(
-        ErrorCode::kInvalidArgument, impl_->database.path(),
-        "record of sequence " + std::to_string(record.sequence) + ": must be below 2^63");
+    return invalid_file(impl_->database.path(),
+                        fmt::format("record of sequence {}: must be below 2^63", record.sequence));
   }
   SqliteDatabase& database = impl_->database;
   if (!database.execute("BEGIN IMMEDIATE")) return database.write_failure("record");
@@ -288,8 +286,7 @@ Status SurgeryFile::append(std::span<const SurgeryRecord> records) {
 Status SurgeryFile::write_truth(std::uint64_t observation_sequence, const SurgeryTruth& truth) {
   if (Status status = impl_->check_writable("truth"); !status) return status;
   if (!fits(observation_sequence)) {
-    return file_error(ErrorCode::kInvalidArgument, impl_->database.path(),
-                      "truth: sequence must be below 2^63");
+    return invalid_file(impl_->database.path(), "truth: sequence must be below 2^63");
   }
   return write_truth_rows(impl_->database, static_cast<std::int64_t>(observation_sequence), truth);
 }
@@ -300,8 +297,7 @@ Status SurgeryFile::close() {
   impl_->insert.reset();
   Status status;
   if (impl_->writable && !database.in_place()) {
-    status = file_error(ErrorCode::kWriteFailed, database.path(),
-                        "was deleted or replaced while it was written");
+    status = write_failed(database.path(), "was deleted or replaced while it was written");
   } else if (impl_->writable) {
     const Impl::Tail& tail = impl_->tail;
     status = write_closed_seal(database, {tail.records, chain_end(tail.crc, tail.records)});

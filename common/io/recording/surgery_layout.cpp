@@ -161,9 +161,8 @@ Status check_truth(const std::filesystem::path& path, const SurgeryTruth& truth)
       if (point.nodes.minCoeff() < 0 || point.nodes.maxCoeff() >= nodes) {
         const int bad =
             point.nodes.minCoeff() < 0 ? point.nodes.minCoeff() : point.nodes.maxCoeff();
-        return file_error(ErrorCode::kInvalidArgument, path,
-                          "truth point " + kind + ": node " + std::to_string(bad) +
-                              ", must be in [0, " + std::to_string(nodes) + ")");
+        return invalid_file(path, "truth point " + kind + ": node " + std::to_string(bad) +
+                                      ", must be in [0, " + std::to_string(nodes) + ")");
       }
     }
   }

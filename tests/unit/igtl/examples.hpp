@@ -22,6 +22,19 @@ std::string content_of(const T& value) {
   return content;
 }
 
+// The sentence of validate(); empty: nothing is wrong.
+template <typename T>
+std::string complaint(const T& value) {
+  const Status status = validate(value);
+  return status ? "" : status.error().message;
+}
+
+template <typename T>
+void expect_round_trip(const T& value, Result<T> (*decode)(std::string_view)) {
+  const auto decoded = value_or_fail(decode(content_of(value)));
+  EXPECT_TRUE(decoded == value);
+}
+
 template <typename T>
 void expect_refused(const Result<T>& decoded, const char* part) {
   EXPECT_THAT(refusal_of(decoded, ErrorCode::kProtocol), ::testing::HasSubstr(part));

@@ -10,6 +10,7 @@ namespace brainshift::igtl {
 namespace {
 
 using std::chrono::nanoseconds;
+using test_example::complaint;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
 
@@ -72,19 +73,15 @@ TEST(Header, WhatCannotBeAHeaderIsRefused) {
 }
 
 TEST(Header, ValidateNamesWhatIsWrong) {
-  const auto message = [](const Header& header) {
-    const Status status = validate(header);
-    return status ? "" : status.error().message;
-  };
   Header header = example();
-  EXPECT_EQ(message(header), "");
+  EXPECT_EQ(complaint(header), "");
   header.device = std::string(21, 'd');
-  EXPECT_EQ(message(header), "device name has 21 bytes, must have at most 20");
+  EXPECT_EQ(complaint(header), "device name has 21 bytes, must have at most 20");
   header.device = "a\0b"s;
-  EXPECT_EQ(message(header), "device name holds a NUL");
+  EXPECT_EQ(complaint(header), "device name holds a NUL");
   header = example();
   header.type = "THIRTEEN_BYTE";
-  EXPECT_EQ(message(header), "message type has 13 bytes, must have at most 12");
+  EXPECT_EQ(complaint(header), "message type has 13 bytes, must have at most 12");
 }
 
 TEST(Header, CrcIsComparedWithTheBodys) {

@@ -11,15 +11,12 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::complaint;
 using test_example::content_of;
+using test_example::expect_round_trip;
 using test_example::image;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
-
-std::string message_of(const Image& image) {
-  const Status status = validate(image);
-  return status ? "" : status.error().message;
-}
 
 void expect_image_refused(const std::string& content, const char* part) {
   test_example::expect_refused(decode_image(content), part);
@@ -37,9 +34,7 @@ TYPED_TEST_SUITE(ImageOf, ScalarTypes);
 
 TYPED_TEST(ImageOf, DecodeReturnsWhatWasEncoded) {
   for (const int components : {1, 3, 255}) {
-    const Image ours = image<TypeParam>(components);
-    const auto decoded = value_or_fail(decode_image(content_of(ours)));
-    EXPECT_TRUE(decoded == ours);
+    expect_round_trip(image<TypeParam>(components), decode_image);
   }
 }
 
@@ -51,8 +46,7 @@ TYPED_TEST(ImageOf, ExtremeNumbersSurvive) {
   voxels[1] = Limits::max();
   voxels[2] = Limits::min();
   if (Limits::has_infinity) voxels[3] = -Limits::infinity();
-  const auto decoded = value_or_fail(decode_image(content_of(ours)));
-  EXPECT_TRUE(decoded == ours);
+  expect_round_trip(ours, decode_image);
 }
 
 TYPED_TEST(ImageOf, BigEndianVoxelsAreTheSameNumbers) {
@@ -91,8 +85,7 @@ TEST(Image, APartOfAVolumeSurvives) {
   ours.part = {3, 1, 2};
   ours.voxels = std::vector<std::int16_t>{1, 2, 3, 4, 5, 6};
   EXPECT_FALSE(ours.is_whole());
-  const auto decoded = value_or_fail(decode_image(content_of(ours)));
-  EXPECT_TRUE(decoded == ours);
+  expect_round_trip(ours, decode_image);
 }
 
 // Along an axis of n voxels the first centre lies (n - 1) / 2 steps before the middle.
@@ -162,30 +155,26 @@ TEST(Image, EveryTruncationIsRefused) {
 }
 
 TEST(Image, ValidateNamesWhatIsWrong) {
-  Image ours = image<float>(3);
-  EXPECT_EQ(message_of(ours), "");
-  ours.components = 256;
-  EXPECT_EQ(message_of(ours), "256 components, must be 1 to 255");
-  ours = image<float>(3);
-  ours.geometry.dims[1] = 65536;
-  EXPECT_EQ(message_of(ours), "dims hold 65536, must be 1 to 65535");
-  ours = image<float>(3);
-  ours.offset[2] = -1;
-  EXPECT_THAT(message_of(ours), HasSubstr("from voxel -1 on"));
-  ours = image<float>(3);
-  ours.part[0] = 0;
-  EXPECT_THAT(message_of(ours), HasSubstr("part of 0 voxels"));
-  ours = image<float>(3);
-  ours.voxels = std::vector<float>(71);
-  EXPECT_EQ(message_of(ours), "71 numbers, must be 72");
-  ours = image<float>(3);
-  ours.geometry.steps.col(1) = -3.0F * ours.geometry.steps.col(0);
-  EXPECT_EQ(message_of(ours), "two steps are parallel, or one is zero");
-  ours.geometry.steps.col(1).setZero();
-  EXPECT_EQ(message_of(ours), "two steps are parallel, or one is zero");
-  ours = image<float>(3);
-  ours.geometry.centre[1] = std::numeric_limits<float>::infinity();
-  EXPECT_THAT(message_of(ours), HasSubstr("not finite"));
+  const auto changed = [](const auto& change) {
+    Image ours = image<float>(3);
+    change(ours);
+    return complaint(ours);
+  };
+  EXPECT_EQ(changed([](Image&) {}), "");
+  EXPECT_EQ(changed([](Image& i) { i.components = 256; }), "256 components, must be 1 to 255");
+  EXPECT_EQ(changed([](Image& i) { i.geometry.dims[1] = 65536; }),
+            "dims hold 65536, must be 1 to 65535");
+  EXPECT_THAT(changed([](Image& i) { i.offset[2] = -1; }), HasSubstr("from voxel -1 on"));
+  EXPECT_THAT(changed([](Image& i) { i.part[0] = 0; }), HasSubstr("part of 0 voxels"));
+  EXPECT_EQ(changed([](Image& i) { i.voxels = std::vector<float>(71); }), "71 numbers, must be 72");
+  for (const float factor : {-3.0F, 0.0F}) {
+    EXPECT_EQ(
+        changed([factor](Image& i) { i.geometry.steps.col(1) = factor * i.geometry.steps.col(0); }),
+        "two steps are parallel, or one is zero");
+  }
+  EXPECT_THAT(
+      changed([](Image& i) { i.geometry.centre[1] = std::numeric_limits<float>::infinity(); }),
+      HasSubstr("not finite"));
 }
 
 TEST(Image, TheStepAcrossASingleSliceMayBeZero) {
@@ -193,9 +182,9 @@ TEST(Image, TheStepAcrossASingleSliceMayBeZero) {
   slice.geometry.dims[2] = slice.part[2] = 1;
   slice.voxels = std::vector<std::uint8_t>(12);
   slice.geometry.steps.col(2).setZero();
-  EXPECT_EQ(message_of(slice), "");
+  EXPECT_EQ(complaint(slice), "");
   slice.geometry.steps.col(1).setZero();
-  EXPECT_EQ(message_of(slice), "two steps are parallel, or one is zero");
+  EXPECT_EQ(complaint(slice), "two steps are parallel, or one is zero");
 }
 
 }  // namespace

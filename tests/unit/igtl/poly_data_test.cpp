@@ -11,15 +11,12 @@
 namespace brainshift::igtl {
 namespace {
 
+using test_example::complaint;
 using test_example::content_of;
+using test_example::expect_round_trip;
 using test_example::poly_data;
 using ::testing::HasSubstr;
 using namespace std::string_literals;
-
-std::string poly_message_of(const PolyData& data) {
-  const Status status = validate(data);
-  return status ? "" : status.error().message;
-}
 
 void expect_poly_data_refused(const std::string& content, const char* part) {
   test_example::expect_refused(decode_poly_data(content), part);
@@ -41,8 +38,7 @@ TEST(PolyData, DecodeReturnsWhatWasEncoded) {
   PolyData points_only;
   points_only.points = poly_data().points;
   for (const PolyData& data : {poly_data(), points_only, PolyData{}}) {
-    const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
-    EXPECT_TRUE(decoded == data);
+    expect_round_trip(data, decode_poly_data);
   }
 }
 
@@ -52,17 +48,16 @@ TEST(PolyData, AttributesOfCellsAndColourTablesSurvive) {
       {"of cells", AttributeKind::kVector, true, Eigen::MatrixXf::Ones(3, 6)});
   data.attributes.push_back({"table", AttributeKind::kRgba, false, Eigen::MatrixXf::Ones(4, 256)});
   data.attributes.push_back({"", AttributeKind::kScalar, false, Eigen::MatrixXf::Ones(127, 4)});
-  ASSERT_EQ(poly_message_of(data), "");
-  const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
-  EXPECT_TRUE(decoded == data);
+  ASSERT_EQ(complaint(data), "");
+  expect_round_trip(data, decode_poly_data);
 }
 
 TEST(PolyData, NamesOfEveryLengthSurvive) {
   for (std::size_t size = 0; size <= 255; ++size) {
     PolyData data = poly_data();
     data.attributes[1].name = std::string(size, 'n');
-    const auto decoded = value_or_fail(decode_poly_data(content_of(data)));
-    EXPECT_TRUE(decoded == data) << size;
+    SCOPED_TRACE(size);
+    expect_round_trip(data, decode_poly_data);
   }
 }
 
@@ -125,25 +120,24 @@ TEST(PolyData, EveryTruncationIsRefused) {
 }
 
 TEST(PolyData, ValidateNamesWhatIsWrong) {
-  PolyData data = poly_data();
-  EXPECT_EQ(poly_message_of(data), "");
-  data.points(1, 2) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(poly_message_of(data), "a point is not finite");
-  data = poly_data();
-  data.attributes[0].values.resize(4, 4);
-  EXPECT_EQ(poly_message_of(data), "attribute \"displacement_mm\" has 4 components, must have 3");
-  data = poly_data();
-  data.attributes[1].values.resize(128, 4);
-  EXPECT_EQ(poly_message_of(data), "attribute \"sd_mm\" has 128 components, must have 1 to 127");
-  data = poly_data();
-  data.attributes[1].values.setOnes(1, 5);
-  EXPECT_EQ(poly_message_of(data), "attribute \"sd_mm\" has 5 tuples for 4 points");
-  data = poly_data();
-  data.attributes[1].name = std::string(256, 'n');
-  EXPECT_THAT(poly_message_of(data), HasSubstr("attribute name has 256 bytes"));
-  data = poly_data();
-  data.attributes.resize(257);
-  EXPECT_EQ(poly_message_of(data), "257 attributes, must be at most 256");
+  const auto changed = [](const auto& change) {
+    PolyData data = poly_data();
+    change(data);
+    return complaint(data);
+  };
+  EXPECT_EQ(changed([](PolyData&) {}), "");
+  EXPECT_EQ(changed([](PolyData& d) { d.points(1, 2) = std::numeric_limits<float>::quiet_NaN(); }),
+            "a point is not finite");
+  EXPECT_EQ(changed([](PolyData& d) { d.attributes[0].values.resize(4, 4); }),
+            "attribute \"displacement_mm\" has 4 components, must have 3");
+  EXPECT_EQ(changed([](PolyData& d) { d.attributes[1].values.resize(128, 4); }),
+            "attribute \"sd_mm\" has 128 components, must have 1 to 127");
+  EXPECT_EQ(changed([](PolyData& d) { d.attributes[1].values.setOnes(1, 5); }),
+            "attribute \"sd_mm\" has 5 tuples for 4 points");
+  EXPECT_THAT(changed([](PolyData& d) { d.attributes[1].name = std::string(256, 'n'); }),
+              HasSubstr("attribute name has 256 bytes"));
+  EXPECT_EQ(changed([](PolyData& d) { d.attributes.resize(257); }),
+            "257 attributes, must be at most 256");
 }
 
 TEST(PolyData, ValuesOfOtherShapesAreUnequal) {
@@ -153,6 +147,73 @@ TEST(PolyData, ValuesOfOtherShapesAreUnequal) {
   other = poly_data();
   other.points.resize(3, 5);
   EXPECT_FALSE(other == poly_data());
+}
+
+// ---- surfaces ----
+
+using Triangles = Eigen::Matrix<int, 3, Eigen::Dynamic>;
+
+PolyData square() {
+  PolyData data;
+  data.points.resize(3, 4);
+  data.points << 0.0F, 1.0F, 1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 1.0F, 0.5F, 0.5F, 0.5F, 0.5F;
+  return data;
+}
+
+Triangles triangles(std::initializer_list<int> columns) {
+  return Eigen::Map<const Triangles>(columns.begin(), 3,
+                                     static_cast<Eigen::Index>(columns.size() / 3));
+}
+
+TEST(Surface, ASurfaceComesBackFromItsPolyData) {
+  TriangleSurface surface;
+  surface.vertices = test_example::poly_data().points.cast<double>();
+  surface.triangles = triangles({0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3});
+  const PolyData data = from_surface(surface);
+  EXPECT_TRUE(validate(data));
+  EXPECT_EQ(data.polygons.count, 4u);
+  const auto back = value_or_fail(to_surface(data));
+  EXPECT_EQ(back.vertices, surface.vertices);
+  EXPECT_EQ(back.triangles, surface.triangles);
+}
+
+TEST(Surface, APolygonBecomesAFan) {
+  PolyData data = square();
+  data.polygons.add({0, 1, 2, 3});
+  const auto surface = value_or_fail(to_surface(data));
+  EXPECT_EQ(surface.triangles, triangles({0, 1, 2, 0, 2, 3}));
+}
+
+// Both triangles of the strip 0 1 3 2 of a square face the same way.
+TEST(Surface, AStripKeepsItsOrientation) {
+  PolyData data = square();
+  data.triangle_strips.add({0, 1, 3, 2});
+  const auto surface = value_or_fail(to_surface(data));
+  ASSERT_EQ(surface.num_triangles(), 2);
+  for (int t = 0; t < 2; ++t) {
+    const auto corner = [&](int i) -> Vec3 {
+      return surface.vertices.col(surface.triangles(i, t));
+    };
+    const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    EXPECT_EQ(normal, Vec3(0.0, 0.0, 1.0));
+  }
+}
+
+TEST(Surface, TrianglesThatNameAPointTwiceAreLeftOut) {
+  PolyData data = square();
+  data.triangle_strips.add({0, 1, 2, 2, 3});
+  data.polygons.add({1, 1, 2});
+  const auto surface = value_or_fail(to_surface(data));
+  EXPECT_EQ(surface.triangles, triangles({0, 1, 2}));
+}
+
+TEST(Surface, PointsAndLinesAloneAreNoSurface) {
+  PolyData data = square();
+  data.vertices.add({0});
+  data.lines.add({0, 1, 2});
+  data.polygons.add({0, 1});
+  data.polygons.add({});
+  refusal_of(to_surface(data), ErrorCode::kEmptySet);
 }
 
 }  // namespace

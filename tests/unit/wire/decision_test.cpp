@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 
 #include <gmock/gmock.h>
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "common/wire/convert.hpp"
 #include "common/wire/report.hpp"
@@ -79,39 +80,34 @@ inline void expect_same(const BrainModel& a, const BrainModel& b) {
 }
 
 inline void expect_same(const DaemonReport& a, const DaemonReport& b) { EXPECT_EQ(a, b); }
+inline void expect_same(const Subscription& a, const Subscription& b) { EXPECT_EQ(a, b); }
+inline void expect_same(const SessionState& a, const SessionState& b) { EXPECT_EQ(a, b); }
+
+// members: of a value, tied together.
+template <typename T, typename Members>
+void expect_same_members(const T& a, const T& b, const Members& members) {
+  EXPECT_EQ(members(a), members(b));
+}
 
 inline void expect_same(const DaemonStatus& a, const DaemonStatus& b) {
-  EXPECT_EQ(a.version, b.version);
-  EXPECT_EQ(a.model_ready, b.model_ready);
-  EXPECT_EQ(a.case_id, b.case_id);
-  EXPECT_EQ(a.model_id, b.model_id);
-  EXPECT_EQ(a.busy, b.busy);
-  EXPECT_EQ(a.updates, b.updates);
-  EXPECT_EQ(a.uptime_ms, b.uptime_ms);
+  expect_same_members(a, b, [](const DaemonStatus& s) {
+    return std::tie(s.version, s.model_ready, s.case_id, s.model_id, s.busy, s.updates,
+                    s.uptime_ms);
+  });
 }
 
 inline void expect_same(const SessionRequest& a, const SessionRequest& b) {
-  EXPECT_EQ(a.case_id, b.case_id);
-  EXPECT_EQ(a.method, b.method);
-  EXPECT_EQ(a.boundary, b.boundary);
-  EXPECT_EQ(a.publish_iterates, b.publish_iterates);
-  EXPECT_EQ(a.takeover, b.takeover);
-  EXPECT_EQ(a.recorded_clock, b.recorded_clock);
+  expect_same_members(a, b, [](const SessionRequest& r) {
+    return std::tie(r.case_id, r.method, r.boundary, r.publish_iterates, r.takeover,
+                    r.recorded_clock);
+  });
 }
 
-inline void expect_same(const Subscription& a, const Subscription& b) { EXPECT_EQ(a, b); }
-
-inline void expect_same(const SessionState& a, const SessionState& b) { EXPECT_EQ(a, b); }
-
 inline void expect_same(const SessionInfo& a, const SessionInfo& b) {
-  EXPECT_EQ(a.session_id, b.session_id);
-  EXPECT_EQ(a.model_id, b.model_id);
-  EXPECT_EQ(a.nodes, b.nodes);
-  EXPECT_EQ(a.tets, b.tets);
-  EXPECT_EQ(a.slaves, b.slaves);
-  EXPECT_EQ(a.prepare_s, b.prepare_s);
-  EXPECT_EQ(a.model_bytes, b.model_bytes);
-  EXPECT_EQ(a.boot_id, b.boot_id);
+  expect_same_members(a, b, [](const SessionInfo& i) {
+    return std::tie(i.session_id, i.model_id, i.nodes, i.tets, i.slaves, i.prepare_s, i.model_bytes,
+                    i.boot_id);
+  });
 }
 
 inline void expect_same(const ObservationReceipt& a, const ObservationReceipt& b) {
@@ -152,11 +148,10 @@ inline void expect_same(const Estimate& a, const Estimate& b) {
   expect_same(a.misfit_mm, b.misfit_mm);
   ASSERT_EQ(a.history.size(), b.history.size());
   for (std::size_t i = 0; i < a.history.size(); ++i) {
-    EXPECT_EQ(a.history[i].iteration, b.history[i].iteration);
     expect_same(a.history[i].misfit_mm, b.history[i].misfit_mm);
-    EXPECT_EQ(a.history[i].penetrating, b.history[i].penetrating);
-    EXPECT_EQ(a.history[i].max_penetration_mm, b.history[i].max_penetration_mm);
-    EXPECT_EQ(a.history[i].elapsed_ms, b.history[i].elapsed_ms);
+    expect_same_members(a.history[i], b.history[i], [](const IterationRecord& r) {
+      return std::tie(r.iteration, r.penetrating, r.max_penetration_mm, r.elapsed_ms);
+    });
   }
   EXPECT_EQ(a.quality.quality, b.quality.quality);
   EXPECT_EQ(a.quality.flags, b.quality.flags);
@@ -179,20 +174,14 @@ inline void expect_same(const Estimate& a, const Estimate& b) {
 
 inline void expect_same(const UpdateMessage& a, const UpdateMessage& b) {
   EXPECT_EQ(a.session_id, b.session_id);
-  EXPECT_EQ(a.update.case_id, b.update.case_id);
-  EXPECT_EQ(a.update.model_id, b.update.model_id);
-  EXPECT_EQ(a.update.sequence, b.update.sequence);
-  EXPECT_EQ(a.update.observation_sequence, b.update.observation_sequence);
-  EXPECT_EQ(a.update.method, b.update.method);
-  EXPECT_EQ(a.update.boundary, b.update.boundary);
-  EXPECT_EQ(a.update.final, b.update.final);
+  expect_same_members(a.update, b.update, [](const Update& u) {
+    return std::tie(u.case_id, u.model_id, u.sequence, u.observation_sequence, u.method, u.boundary,
+                    u.final, u.part);
+  });
   expect_same(a.update.estimate, b.update.estimate);
-  EXPECT_EQ(a.update.part, b.update.part);
-  EXPECT_EQ(a.update.timings.register_ms, b.update.timings.register_ms);
-  EXPECT_EQ(a.update.timings.invert_ms, b.update.timings.invert_ms);
-  EXPECT_EQ(a.update.timings.rebuild_ms, b.update.timings.rebuild_ms);
-  EXPECT_EQ(a.update.timings.encode_ms, b.update.timings.encode_ms);
-  EXPECT_EQ(a.update.timings.journal_ms, b.update.timings.journal_ms);
+  expect_same_members(a.update.timings, b.update.timings, [](const StageTimings& t) {
+    return std::tie(t.register_ms, t.invert_ms, t.rebuild_ms, t.encode_ms, t.journal_ms);
+  });
   EXPECT_EQ(a.update.answer_time.ms, b.update.answer_time.ms);
   EXPECT_EQ(a.update.answer_time.usual_ms, b.update.answer_time.usual_ms);
   expect_same_matrix(a.update.T_undeformed_deformed.matrix(),
@@ -201,24 +190,21 @@ inline void expect_same(const UpdateMessage& a, const UpdateMessage& b) {
   ASSERT_EQ(sources.size(), b.update.estimate.sources.size());
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const SourceSummary& other = b.update.estimate.sources[i];
-    EXPECT_EQ(sources[i].source, other.source);
-    EXPECT_EQ(sources[i].observation_sequence, other.observation_sequence);
-    EXPECT_EQ(sources[i].age_s, other.age_s);
-    EXPECT_EQ(sources[i].data, other.data);
-    EXPECT_EQ(sources[i].outliers, other.outliers);
+    expect_same_members(sources[i], other, [](const SourceSummary& s) {
+      return std::tie(s.source, s.observation_sequence, s.age_s, s.data, s.outliers, s.consistent);
+    });
     EXPECT_EQ(std::isnan(sources[i].p_value), std::isnan(other.p_value));
     if (!std::isnan(other.p_value)) {
       EXPECT_EQ(sources[i].chi_square, other.chi_square);
       EXPECT_EQ(sources[i].degrees_of_freedom, other.degrees_of_freedom);
       EXPECT_EQ(sources[i].p_value, other.p_value);
     }
-    EXPECT_EQ(sources[i].consistent, other.consistent);
   }
   ASSERT_EQ(a.update.left_out.size(), b.update.left_out.size());
   for (std::size_t i = 0; i < a.update.left_out.size(); ++i) {
-    EXPECT_EQ(a.update.left_out[i].part, b.update.left_out[i].part);
-    EXPECT_EQ(a.update.left_out[i].reason, b.update.left_out[i].reason);
-    EXPECT_EQ(a.update.left_out[i].estimated_error, b.update.left_out[i].estimated_error);
+    expect_same_members(a.update.left_out[i], b.update.left_out[i], [](const Omission& o) {
+      return std::tie(o.part, o.reason, o.estimated_error);
+    });
   }
   ASSERT_EQ(a.error.has_value(), b.error.has_value());
   if (a.error) expect_same(*a.error, *b.error);

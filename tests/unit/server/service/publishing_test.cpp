@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "common/core/stopwatch.hpp"
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 #include "server/operations/latency_record.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -8,7 +8,7 @@
 #include "client/tools/bridge/inbound_worker.hpp"
 #include "client/tools/bridge/inbox.hpp"
 #include "common/geometry/surface.hpp"
-#include "common/igtl/surface.hpp"
+#include "common/igtl/poly_data.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/virtual_sweep.hpp"

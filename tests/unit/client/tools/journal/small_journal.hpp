@@ -12,7 +12,6 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/model_id.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/decision.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/toy_patient.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "client/tools/replay/verify.hpp"
-#include "common/wire/decision.hpp"
+#include "common/wire/convert.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/client/tools/replay/scripted_daemon.hpp"
