@@ -29,8 +29,7 @@ Status check_landmarks_alone(const ImportArguments& arguments) {
         std::pair{"--registration", options.registration},
         std::pair{"--fiducials", options.fiducials}}) {
     if (path.empty()) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                std::string(name) + " is for a recording: landmarks are in RAS already");
+    return invalid(std::string(name) + " is for a recording: landmarks are in RAS already");
   }
   return {};
 }
@@ -53,7 +52,7 @@ Status run_import(const ImportArguments& arguments) {
   }
   if (!arguments.landmarks.empty()) return run_landmarks(arguments);
   if (!arguments.landmarks_moved.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--landmarks-moved needs --landmarks");
+    return invalid("--landmarks-moved needs --landmarks");
   }
   const auto report = import_recording(options, terminal_progress());
   if (!report) return tl::unexpected(report.error());

@@ -68,7 +68,7 @@ Status show_status(const StatusArguments& arguments) {
 
 Status show_top(const TopArguments& arguments) {
   if (!std::isfinite(arguments.interval_s)) {  // CLI::Range lets NaN pass
-    return fail(ErrorCode::kInvalidArgument, "--interval must be a number of seconds");
+    return invalid("--interval must be a number of seconds");
   }
   TopOptions options = arguments.options;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
@@ -102,8 +102,7 @@ Status add(const KeysArguments& arguments) {
                                arguments.name.empty() ? key->name : arguments.name,
                                key->public_key};
   if (allowed.name.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "keys add: --name is needed for a key that is no file");
+    return invalid("keys add: --name is needed for a key that is no file");
   }
   if (Status added = io::add_allowed_key(arguments.allow_list, allowed); !added) return added;
   std::printf("%s: %s may act as %s from the daemon's next start\n", arguments.allow_list.c_str(),

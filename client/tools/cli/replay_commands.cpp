@@ -53,13 +53,13 @@ Status run_replay(ReplayArguments arguments) {
     if (arguments.method == to_string(method)) options.method = method;
   }
   if (!std::isfinite(arguments.timeout_s)) {  // CLI::Range lets NaN pass
-    return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
+    return invalid("--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
   if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   if (arguments.verify) return verify(options);
   if (options.report.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--report is required (see brainshift replay --help)");
+    return invalid("--report is required (see brainshift replay --help)");
   }
   if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
   if (!options.latency_csv.empty()) {

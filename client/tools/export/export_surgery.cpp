@@ -23,10 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 using io::FieldDirection;
 
-tl::unexpected<Error> invalid(std::string message) {
-  return fail(ErrorCode::kInvalidArgument, std::move(message));
-}
-
 // "PREFIX: MESSAGE"
 tl::unexpected<Error> about(const std::string& prefix, const Error& error) {
   return fail(error.code, prefix + ": " + error.message);

@@ -103,8 +103,7 @@ Result<ExportFormats> parse_formats(const std::vector<std::string>& words) {
       std::string all;
       for (const ExportFormat format : kAllExportFormats)
         all += fmt::format("{}, ", to_string(format));
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("--formats: \"{}\" is not a format: must be {}or all", word, all));
+      return invalid(fmt::format("--formats: \"{}\" is not a format: must be {}or all", word, all));
     }
     formats.insert(*known);
   }

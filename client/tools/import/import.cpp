@@ -31,17 +31,16 @@ constexpr double kMaxSd_mm = 20.0;
 Status check_import(const ImportOptions& options) {
   const auto one_of = [](bool first, bool second, const char* names) -> Status {
     if (first != second) return {};
-    return fail(ErrorCode::kInvalidArgument, fmt::format("exactly one of {} is required, {} given",
-                                                         names, first ? "both" : "none"));
+    return invalid(
+        fmt::format("exactly one of {} is required, {} given", names, first ? "both" : "none"));
   };
   for (const auto& [name, path] :
        {std::pair{"--recording", options.recording}, std::pair{"--out", options.out}}) {
-    if (path.empty()) return fail(ErrorCode::kInvalidArgument, std::string(name) + " is required");
+    if (path.empty()) return invalid(std::string(name) + " is required");
   }
   const auto range = [](const char* name, double value, double least, double most) -> Status {
     if (value >= least && value <= most) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{} {}: must be {} to {}", name, value, least, most));
+    return invalid(fmt::format("{} {}: must be {} to {}", name, value, least, most));
   };
   Status ok = one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
   if (ok) {

@@ -41,9 +41,8 @@ io::SurgeryMeta ImportCase::meta(const std::string& scenario, const std::string&
 
 Status check_one_case(const fs::path& case_file, const fs::path& model) {
   if (case_file.empty() != model.empty()) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("exactly one of --case and --model is required, {} given",
-                          model.empty() ? "none" : "both"));
+  return invalid(fmt::format("exactly one of --case and --model is required, {} given",
+                             model.empty() ? "none" : "both"));
 }
 
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {

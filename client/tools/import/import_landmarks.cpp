@@ -23,9 +23,9 @@ constexpr double kMinSd_mm = 0.01, kMaxLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
   if (options.landmarks.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--landmarks is required");
+    return invalid("--landmarks is required");
   }
-  if (options.out.empty()) return fail(ErrorCode::kInvalidArgument, "--out is required");
+  if (options.out.empty()) return invalid("--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
   if (!(options.sd_mm >= kMinSd_mm && options.sd_mm <= kMaxLandmarkSd_mm)) {
     return fail(
@@ -46,10 +46,10 @@ Status measure_motion(const io::NamedPairs& pairs, LandmarkReport& report) {
   for (std::size_t i = 0; i < pairs.names.size(); ++i) {
     const double moved = (pairs.second[i] - pairs.first[i]).norm();
     if (moved > kLargestMotion_mm) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places "
-                              "mm RAS?",
-                              called(pairs, i), moved, kLargestMotion_mm));
+      return invalid(
+          fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places "
+                      "mm RAS?",
+                      called(pairs, i), moved, kLargestMotion_mm));
     }
     sum += moved, squares += moved * moved;
     if (moved >= report.largest_mm) report.largest_mm = moved, report.largest = called(pairs, i);

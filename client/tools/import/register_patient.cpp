@@ -20,9 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-tl::unexpected<Error> refuse(std::string text) {
-  return fail(ErrorCode::kInvalidArgument, std::move(text));
-}
+tl::unexpected<Error> refuse(std::string text) { return invalid(std::move(text)); }
 
 Status check_register(const RegisterOptions& options) {
   if (options.recording.empty() == options.fiducials.empty()) {

@@ -267,7 +267,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 
 Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
   const auto refuse = [&](const std::string& why) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("repeat = {}: {}", options.repeat, why));
+    return invalid(fmt::format("repeat = {}: {}", options.repeat, why));
   };
   if (options.repeat < 1) return refuse("must be at least 1");
   if (options.repeat == 1) return {};

@@ -61,9 +61,8 @@ TetMesh without(const TetMesh& mesh, const std::vector<char>& removed) {
 Result<ResectedBrain> resect(const BrainModel& model, const CaseConfig& config,
                              const Resection& resection) {
   if (!(resection.volume_fraction > 0.0 && resection.volume_fraction <= 1.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("resection.volume_fraction = {:g}: must be above 0 and at most 1",
-                            resection.volume_fraction));
+    return invalid(fmt::format("resection.volume_fraction = {:g}: must be above 0 and at most 1",
+                               resection.volume_fraction));
   }
   const auto tets = tumour_tets(model);
   if (!tets) return tl::unexpected(tets.error());
