@@ -151,10 +151,9 @@ void add_watch(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<WatchArguments>();
   WatchOptions& options = arguments->options;
   ChoiceText& choice = arguments->choice;
-  CLI::App* command = app.add_subcommand(
-      "watch",
-      "Tell a line per update of a running daemon: its age, what travelled, whether it "
-      "is current.");
+  CLI::App* command = app.add_subcommand("watch",
+                                         "Tell a line per update of a running daemon: its age, "
+                                         "what travelled, whether it is current.");
   add_with_default(*command, "--endpoint", options.endpoint, "where the daemon listens");
   add_key_options(*command, arguments->keys);
   add_with_default(*command, "--region", choice.region,

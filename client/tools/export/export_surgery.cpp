@@ -314,8 +314,7 @@ Result<FieldSamples> samples_of(const ExportOptions& options, const Inputs& inpu
   }
   if (samples->voxels_inside == 0) {
     return invalid(
-        fmt::format("--like: {}: no voxel lies in the brain: is it in the patient's RAS "
-                    "frame?",
+        fmt::format("--like: {}: no voxel lies in the brain: is it in the patient's RAS frame?",
                     options.like.string()));
   }
   for (std::string* note : {&samples->field.note, &samples->sd_mm.note, &samples->jacobian.note}) {

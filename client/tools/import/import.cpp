@@ -117,12 +117,11 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
     if (told.tumour_distance_mm > kFarthest_mm) {
       std::string notes;
       for (const std::string& note : report.notes) notes += "; " + note;
-      return fail(
-          ErrorCode::kInvalidArgument,
-          fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of case {}: "
-                      "must be within {:.0f} mm; is it the right registration{}",
-                      sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
-                      patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of "
+                              "case {}: must be within {:.0f} mm; is it the right registration{}",
+                              sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
+                              patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
     }
     Observation observation;
     observation.case_id = patient.model.case_id;
@@ -199,8 +198,7 @@ std::vector<std::string> report_lines(const ImportReport& report) {
   for (const ImportedSweep& sweep : report.sweeps) {
     lines.push_back(
         fmt::format("sweep {}: frames {} to {}, {} contours, {} boundary points, extent {:.1f} mm, "
-                    "{:.1f} mm from the "
-                    "tumour before surgery",
+                    "{:.1f} mm from the tumour before surgery",
                     sweep.sequence, sweep.first_frame, sweep.last_frame, sweep.contours,
                     sweep.points, sweep.extent_mm, sweep.tumour_distance_mm));
   }

@@ -47,8 +47,7 @@ Status measure_motion(const io::NamedPairs& pairs, LandmarkReport& report) {
     const double moved = (pairs.second[i] - pairs.first[i]).norm();
     if (moved > kLargestMotion_mm) {
       return invalid(
-          fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places "
-                      "mm RAS?",
+          fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places mm RAS?",
                       called(pairs, i), moved, kLargestMotion_mm));
     }
     sum += moved, squares += moved * moved;
@@ -84,11 +83,11 @@ Status check_place(const io::NamedPairs& pairs, const BrainModel& model, Landmar
       const Vec3& at = pairs.first[i];
       return fail(
           ErrorCode::kInvalidArgument,
-          fmt::format("{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside "
-                      "the brain of case {}: must be within {:.0f} mm; is it mm RAS, and of "
-                      "this patient?",
-                      called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id,
-                      kLargestOutside_mm));
+          fmt::format(
+              "{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside the brain of "
+              "case {}: must be within {:.0f} mm; is it mm RAS, and of this patient?",
+              called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id,
+              kLargestOutside_mm));
     }
     if (outside <= 0.0) continue;
     ++report.outside;
@@ -147,10 +146,9 @@ Result<LandmarkReport> import_landmarks(const LandmarkOptions& options, const Pr
 }
 
 std::vector<std::string> report_lines(const LandmarkReport& report) {
-  std::vector<std::string> lines = {
-      fmt::format("landmarks: {} pairs, moved {:.2f} mm on average ({:.2f} rms), at most {:.2f} mm "
-                  "({})",
-                  report.pairs, report.mean_mm, report.rms_mm, report.largest_mm, report.largest)};
+  std::vector<std::string> lines = {fmt::format(
+      "landmarks: {} pairs, moved {:.2f} mm on average ({:.2f} rms), at most {:.2f} mm ({})",
+      report.pairs, report.mean_mm, report.rms_mm, report.largest_mm, report.largest)};
   if (report.rigid) {
     lines.push_back(fmt::format(
         "rigid part: rotation {:.2f} degrees, translation {:.2f} mm (of the landmarks' centroid); "
@@ -165,8 +163,7 @@ std::vector<std::string> report_lines(const LandmarkReport& report) {
   }
   if (report.outside > 0) {
     lines.emplace_back(
-        fmt::format("note: {} landmarks lie outside the mesh of the brain, at most {:.1f} "
-                    "mm ({})",
+        fmt::format("note: {} landmarks lie outside the mesh of the brain, at most {:.1f} mm ({})",
                     report.outside, report.farthest_outside_mm, report.farthest_outside));
   }
   for (const std::string& name : report.left_out) {

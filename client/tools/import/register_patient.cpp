@@ -114,13 +114,11 @@ Result<io::NamedPoints> touched_points(const RegisterOptions& options, RegisterR
     for (const auto& dropped : report.dropped) {
       reasons += fmt::format("; {} ({} poses)", dropped.reason, dropped.count);
     }
-    return io::file_error(
-        ErrorCode::kEmptySet, options.recording,
-        fmt::format(
-            "the tip of the stylus never stays within {} mm for {} s; {} of {} poses have a "
-            "valid chain{}",
-            options.hold.radius_mm, options.hold.least_s, report.poses_used, report.poses,
-            reasons));
+    return io::file_error(ErrorCode::kEmptySet, options.recording,
+                          fmt::format("the tip of the stylus never stays within {} mm for {} s; {} "
+                                      "of {} poses have a valid chain{}",
+                                      options.hold.radius_mm, options.hold.least_s,
+                                      report.poses_used, report.poses, reasons));
   }
   if (Status ok = choose_holds(options, report); !ok) return tl::unexpected(ok.error());
   io::NamedPoints points;
@@ -164,8 +162,7 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
             ? std::string()
             : "; the stylus was held still " + list_of(report.held) + ": choose with --holds";
     return refuse(
-        fmt::format("{} fiducials were touched, {} holds {}: in order there must be as "
-                    "many{}",
+        fmt::format("{} fiducials were touched, {} holds {}: in order there must be as many{}",
                     measured.cols(), options.ras.string(), image.cols(), held));
   }
   auto fit = registration::register_fiducials(measured, image);

@@ -253,9 +253,8 @@ std::string source_table(const std::vector<ReportedRun>& runs) {
   if (rows.empty()) return "";
   return "<table "
          "class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>observation</th><th>age "
-         "(s)</th>"
-         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr></"
-         "thead>\n<tbody>" +
+         "(s)</th><th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></"
+         "tr></thead>\n<tbody>" +
          rows + "</tbody></table>\n";
 }
 

@@ -60,8 +60,7 @@ Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spa
     const double count = std::max(steps, 0.0) + 3.0;
     if (count > FieldGrid::kMaxVoxelsAlongAxis) {
       return invalid(
-          fmt::format("grid spacing {} mm: gives {:.0f} voxels along an axis, must be at "
-                      "most {}",
+          fmt::format("grid spacing {} mm: gives {:.0f} voxels along an axis, must be at most {}",
                       spacing_mm, count, FieldGrid::kMaxVoxelsAlongAxis));
     }
     grid.dims[static_cast<std::size_t>(axis)] = static_cast<int>(count);
@@ -82,10 +81,9 @@ Status validate(const OutsideTaper& taper) {
   const bool ok =
       taper.full_mm >= 0.0 && taper.full_mm < taper.zero_mm && taper.zero_mm <= kFarthest_mm;
   if (ok) return {};
-  return invalid(
-      fmt::format("taper outside the brain: full up to {} mm, zero from {} mm: must be 0 "
-                  "<= full < zero <= {}",
-                  taper.full_mm, taper.zero_mm, kFarthest_mm));
+  return invalid(fmt::format(
+      "taper outside the brain: full up to {} mm, zero from {} mm: must be 0 <= full < zero <= {}",
+      taper.full_mm, taper.zero_mm, kFarthest_mm));
 }
 
 }  // namespace brainshift::client
