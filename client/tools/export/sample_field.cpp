@@ -8,7 +8,6 @@
 #include <atomic>
 #include <vector>
 
-#include "client/tools/volume/field_grid.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/geometry/tet_locator.hpp"
 

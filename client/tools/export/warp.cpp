@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "common/core/thread_team.hpp"
 #include "common/geometry/surface.hpp"

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <map>
 
-#include "client/tools/import/import_boundaries.hpp"
-#include "client/tools/import/import_case.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"

@@ -8,7 +8,6 @@
 #include "common/core/utc_time.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/io/recording/surgery_file.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 

@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <tuple>
 
-#include "client/tools/import/import_case.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/landmarks/point_file.hpp"

@@ -4,16 +4,13 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/wire/convert.hpp"
 #include "common/wire/decision.hpp"
 
 namespace brainshift::client {

@@ -7,9 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "client/lib/client.hpp"
 #include "common/geometry/closest_point.hpp"

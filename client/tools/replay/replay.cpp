@@ -7,8 +7,6 @@
 #include <limits>
 #include <set>
 
-#include "client/lib/client.hpp"
-#include "client/tools/replay/play.hpp"
 #include "client/tools/replay/score.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/io/config/config_file.hpp"

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "client/tools/report/html_table.hpp"
 #include "common/io/files/binary_codec.hpp"
 

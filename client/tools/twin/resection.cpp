@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "client/tools/twin/load.hpp"
 #include "common/fem/elasticity.hpp"
