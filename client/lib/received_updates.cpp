@@ -2,7 +2,6 @@
 #include "client/lib/received_updates.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <utility>
 #include <vector>
 

@@ -34,18 +34,15 @@ struct Bridge::Impl {
 Status validate(const BridgeOptions& options) {
   const bool brings = options.inbox.wants_images() || options.inbox.wants_models();
   if (options.inbox.wants_images() && !options.from) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--contours and --seeds are for the images of a server: name it with --from");
+    return invalid("--contours and --seeds are for the images of a server: name it with --from");
   }
   if (options.from && !brings) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--from " + to_string(*options.from) +
-                    ": say what of it to use, with --contours, --seeds, --tumour-device, "
-                    "--surface-device or --landmarks-after");
+    return invalid("--from " + to_string(*options.from) +
+                   ": say what of it to use, with --contours, --seeds, --tumour-device, "
+                   "--surface-device or --landmarks-after");
   }
   if (options.from && options.from->port == 0) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--from " + to_string(*options.from) + ": the port must be 1 to 65535");
+    return invalid("--from " + to_string(*options.from) + ": the port must be 1 to 65535");
   }
   return {};
 }

@@ -112,16 +112,14 @@ FieldChoice FieldStream::smallest_choice(const BrainModel& model) const {
 Status FieldStream::take(const UpdateMessage& message) {
   const Estimate& estimate = message.update.estimate;
   if (message.update.model_id != model_id_) {
-    return fail(ErrorCode::kInvalidArgument,
-                "update of model " + message.update.model_id + ", must be of " + model_id_);
+    return invalid("update of model " + message.update.model_id + ", must be of " + model_id_);
   }
   const auto columns = estimate.displacement.cols();
   has_sd_ = rest_->with_sd && estimate.sd_mm.size() == columns;
   const auto& part = message.update.part;
   if (!part) {
     if (columns != u_.cols()) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("update of {} nodes, must be of {}", columns, u_.cols()));
+      return invalid(fmt::format("update of {} nodes, must be of {}", columns, u_.cols()));
     }
     u_ = estimate.displacement;
     if (has_sd_) sd_ = estimate.sd_mm;
@@ -129,9 +127,8 @@ Status FieldStream::take(const UpdateMessage& message) {
   }
   if (part->mesh_nodes != u_.cols() ||
       !std::includes(part->nodes.begin(), part->nodes.end(), needed_.begin(), needed_.end())) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("update of {} of {} nodes leaves out nodes that were asked for",
-                            part->nodes.size(), part->mesh_nodes));
+    return invalid(fmt::format("update of {} of {} nodes leaves out nodes that were asked for",
+                               part->nodes.size(), part->mesh_nodes));
   }
   for (Eigen::Index i = 0; i < columns; ++i) {
     const NodeIndex node = part->nodes[static_cast<std::size_t>(i)];

@@ -44,10 +44,10 @@ Result<Observation> observation_of(const Found& found, const Followed& followed,
     const Vec3 centroid = boundary->points.rowwise().mean();
     const double away_mm = (centroid - followed.tumour_centroid).norm();
     if (!(away_mm <= kFarthest_mm)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: it lies {:.0f} mm from the tumour of case {}: must be within "
-                              "{:.0f} mm; is it the right frame or registration?",
-                              found.told, away_mm, followed.case_id, kFarthest_mm));
+      return invalid(
+          fmt::format("{}: it lies {:.0f} mm from the tumour of case {}: must be within "
+                      "{:.0f} mm; is it the right frame or registration?",
+                      found.told, away_mm, followed.case_id, kFarthest_mm));
     }
   }
   Observation observation;

@@ -20,9 +20,7 @@ constexpr const char* kRas = "Ras";
 constexpr const char* kSweepSource = "ius";
 
 Status check(const InboxOptions& options) {
-  const auto refuse = [](const std::string& sentence) {
-    return fail(ErrorCode::kInvalidArgument, sentence);
-  };
+  const auto refuse = [](const std::string& sentence) { return invalid(sentence); };
   if (!options.contours.empty() && !options.seeds.empty()) {
     return refuse("--contours and --seeds: at most one of them");
   }

@@ -28,7 +28,7 @@ Result<AddressList> look_up(const Address& address, int flags) {
   const int error =
       getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &list);
   if (error != 0) {
-    return fail(ErrorCode::kInvalidArgument, to_string(address) + ": " + gai_strerror(error));
+    return invalid(to_string(address) + ": " + gai_strerror(error));
   }
   return AddressList(list, &freeaddrinfo);
 }
@@ -67,9 +67,8 @@ bool no_room_now() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == 
 
 Result<Address> parse_address(std::string_view option, std::string_view text) {
   const auto refuse = [&] {
-    return fail(ErrorCode::kInvalidArgument,
-                std::string(option) + " " + std::string(text) +
-                    ": must be ADDRESS:PORT, like 127.0.0.1:18945 or [::1]:18945");
+    return invalid(std::string(option) + " " + std::string(text) +
+                   ": must be ADDRESS:PORT, like 127.0.0.1:18945 or [::1]:18945");
   };
   const std::size_t colon = text.rfind(':');
   if (colon == std::string_view::npos) return refuse();

@@ -26,8 +26,8 @@ Status run_preview(const PreviewArguments& arguments) {
   for (const std::string& line : summary->doubts) std::printf("look again: %s\n", line.c_str());
   for (const auto& file : summary->files) std::printf("wrote %s\n", file.c_str());
   if (summary->problems.empty()) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              arguments.case_file.string() + ": cannot be prepared: " + summary->problems.front());
+  return invalid(arguments.case_file.string() +
+                 ": cannot be prepared: " + summary->problems.front());
 }
 
 struct SimulateArguments {
@@ -52,7 +52,7 @@ Status run_simulate(const SimulateArguments& arguments) {
   }
   const auto required = [](bool given, const char* option) -> Status {
     if (given) return {};
-    return fail(ErrorCode::kInvalidArgument, std::string(option) + " is required (or --list)");
+    return invalid(std::string(option) + " is required (or --list)");
   };
   if (Status ok = required(!arguments.options.case_file.empty(), "--case"); !ok) return ok;
   if (Status ok = required(!arguments.options.scenario.empty(), "--scenario"); !ok) return ok;

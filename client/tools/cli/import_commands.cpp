@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <vector>
@@ -29,8 +28,7 @@ Status check_landmarks_alone(const ImportArguments& arguments) {
         std::pair{"--registration", options.registration},
         std::pair{"--fiducials", options.fiducials}}) {
     if (path.empty()) continue;
-    return fail(ErrorCode::kInvalidArgument,
-                std::string(name) + " is for a recording: landmarks are in RAS already");
+    return invalid(std::string(name) + " is for a recording: landmarks are in RAS already");
   }
   return {};
 }
@@ -53,7 +51,7 @@ Status run_import(const ImportArguments& arguments) {
   }
   if (!arguments.landmarks.empty()) return run_landmarks(arguments);
   if (!arguments.landmarks_moved.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--landmarks-moved needs --landmarks");
+    return invalid("--landmarks-moved needs --landmarks");
   }
   const auto report = import_recording(options, terminal_progress());
   if (!report) return tl::unexpected(report.error());
@@ -86,9 +84,9 @@ void add_inputs(CLI::App& command, RegisterArguments& arguments) {
   command.add_option("--recording", options.recording,
                      "tracked stylus held still on each fiducial, as PLUS records it (.mha, .nrrd; "
                      "images are not needed)");
-  command.add_option("--device", options.device,
-                     "PLUS device set (.xml) with StylusTipToStylus; not needed when the recording "
-                     "has the tip");
+  command.add_option(
+      "--device", options.device,
+      "PLUS device set (.xml) with StylusTipToStylus; not needed when the recording has the tip");
   command.add_option("--fiducials", options.fiducials,
                      "instead of --recording: .csv of the points touched, x,y,z or name,x,y,z in "
                      "the reference frame; or pairs as `brainshift import` reads them");
@@ -101,9 +99,9 @@ void add_inputs(CLI::App& command, RegisterArguments& arguments) {
   command.add_option("--target", arguments.target, "instead of --model: a point, mm RAS")
       ->expected(3)
       ->type_name("X Y Z");
-  command.add_option("--out", options.out,
-                     "T_ras_reference as `brainshift import --registration` reads it; must not "
-                     "exist yet");
+  command.add_option(
+      "--out", options.out,
+      "T_ras_reference as `brainshift import --registration` reads it; must not exist yet");
 }
 
 }  // namespace
@@ -111,10 +109,9 @@ void add_inputs(CLI::App& command, RegisterArguments& arguments) {
 void add_import(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<ImportArguments>();
   ImportOptions* options = &arguments->options;
-  CLI::App* command = app.add_subcommand(
-      "import",
-      "Make a surgery file from a recording of tracked ultrasound, or from landmarks "
-      "(docs/import.md).");
+  CLI::App* command = app.add_subcommand("import",
+                                         "Make a surgery file from a recording of tracked "
+                                         "ultrasound, or from landmarks (docs/import.md).");
   command->add_option("--recording", options->recording,
                       "sequence of images with transforms (.mha, .nrrd)");
   command->add_option(
@@ -132,9 +129,9 @@ void add_import(CLI::App& app, Status& status) {
   command->add_option("--landmarks", arguments->landmarks,
                       "instead of --recording: landmarks before and during surgery, mm RAS (.csv, "
                       "MNI .tag), or those before (Slicer's .mrk.json or .fcsv, .csv)");
-  command->add_option("--landmarks-moved", arguments->landmarks_moved,
-                      "the landmarks during surgery where --landmarks has those before; paired by "
-                      "name");
+  command->add_option(
+      "--landmarks-moved", arguments->landmarks_moved,
+      "the landmarks during surgery where --landmarks has those before; paired by name");
   command->add_option("--case", options->case_file, "case file (YAML); its model is built again");
   command->add_option("--model", options->model, "instead of --case: prepared model (.h5)");
   command->add_option("--out", options->out, "surgery file to make; must not exist yet");
@@ -168,10 +165,9 @@ Frames are left out where the tracker lost sight; the report counts them by reas
 void add_register(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<RegisterArguments>();
   RegisterOptions& options = arguments->options;
-  CLI::App* command = app.add_subcommand(
-      "register",
-      "Make the patient registration from fiducials touched with a tracked stylus "
-      "(docs/register.md).");
+  CLI::App* command = app.add_subcommand("register",
+                                         "Make the patient registration from fiducials touched "
+                                         "with a tracked stylus (docs/register.md).");
   add_inputs(*command, *arguments);
   const std::map<std::string, Pairing> pairings = {{"auto", Pairing::kAuto},
                                                    {"name", Pairing::kName},
@@ -197,8 +193,7 @@ void add_register(CLI::App& app, Status& status) {
   command->footer(
       "Example: four fiducials placed in 3D Slicer, touched in the same order while PLUS records:\n"
       "  brainshift register --recording stylus.igs.mha --device device.xml --ras "
-      "fiducials.mrk.json "
-      "\\\n"
+      "fiducials.mrk.json \\\n"
       "    --model colin27.h5 --out T_ras_reference.txt\n"
       "  brainshift import --recording sweep.igs.mha --device device.xml --contours tumour.csv \\\n"
       "    --registration T_ras_reference.txt --model colin27.h5 --out sweep.surgery\n"

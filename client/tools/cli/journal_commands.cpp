@@ -53,12 +53,10 @@ Status run_check(const std::vector<fs::path>& files) {
 Status export_tables(const JournalArguments& arguments) {
   const bool fields_wanted = !arguments.fields_folder.empty() || !arguments.fields_file.empty();
   if (arguments.csv.empty() && !fields_wanted) {
-    return fail(ErrorCode::kInvalidArgument,
-                "journal export: give --csv, or --vtu or --hdf5 with --model");
+    return invalid("journal export: give --csv, or --vtu or --hdf5 with --model");
   }
   if (fields_wanted == arguments.model.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "journal export: --model needs --vtu or --hdf5, and they need it");
+    return invalid("journal export: --model needs --vtu or --hdf5, and they need it");
   }
   const auto file = io::SurgeryFile::open(arguments.file);
   if (!file) return tl::unexpected(file.error());
@@ -185,8 +183,7 @@ Status read_sequence(const std::string& text, UpdateChoice& choice) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--sequence: \"" + text + "\": must be the number of an update, or last");
+    return invalid("--sequence: \"" + text + "\": must be the number of an update, or last");
   }
   choice.sequence = number;
   return {};
@@ -196,8 +193,7 @@ Status read_direction(const std::string& text, ExportOptions& options) {
   if (text.empty()) return {};  // export_surgery explains both
   options.direction = io::field_direction(text);
   if (options.direction) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "--direction: \"" + text + "\": must be resampling or modeling");
+  return invalid("--direction: \"" + text + "\": must be resampling or modeling");
 }
 
 void print_export(const Manifest& manifest, const ExportOptions& options) {

@@ -68,7 +68,7 @@ Status show_status(const StatusArguments& arguments) {
 
 Status show_top(const TopArguments& arguments) {
   if (!std::isfinite(arguments.interval_s)) {  // CLI::Range lets NaN pass
-    return fail(ErrorCode::kInvalidArgument, "--interval must be a number of seconds");
+    return invalid("--interval must be a number of seconds");
   }
   TopOptions options = arguments.options;
   options.interval = std::chrono::milliseconds(std::lround(1e3 * arguments.interval_s));
@@ -102,8 +102,7 @@ Status add(const KeysArguments& arguments) {
                                arguments.name.empty() ? key->name : arguments.name,
                                key->public_key};
   if (allowed.name.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "keys add: --name is needed for a key that is no file");
+    return invalid("keys add: --name is needed for a key that is no file");
   }
   if (Status added = io::add_allowed_key(arguments.allow_list, allowed); !added) return added;
   std::printf("%s: %s may act as %s from the daemon's next start\n", arguments.allow_list.c_str(),
@@ -152,10 +151,9 @@ void add_watch(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<WatchArguments>();
   WatchOptions& options = arguments->options;
   ChoiceText& choice = arguments->choice;
-  CLI::App* command = app.add_subcommand(
-      "watch",
-      "Tell a line per update of a running daemon: its age, what travelled, whether it "
-      "is current.");
+  CLI::App* command = app.add_subcommand("watch",
+                                         "Tell a line per update of a running daemon: its age, "
+                                         "what travelled, whether it is current.");
   add_with_default(*command, "--endpoint", options.endpoint, "where the daemon listens");
   add_key_options(*command, arguments->keys);
   add_with_default(*command, "--region", choice.region,

@@ -53,13 +53,13 @@ Status run_replay(ReplayArguments arguments) {
     if (arguments.method == to_string(method)) options.method = method;
   }
   if (!std::isfinite(arguments.timeout_s)) {  // CLI::Range lets NaN pass
-    return fail(ErrorCode::kInvalidArgument, "--timeout-s must be a number of seconds");
+    return invalid("--timeout-s must be a number of seconds");
   }
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
   if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   if (arguments.verify) return verify(options);
   if (options.report.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--report is required (see brainshift replay --help)");
+    return invalid("--report is required (see brainshift replay --help)");
   }
   if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
   if (!options.latency_csv.empty()) {
@@ -82,10 +82,9 @@ void add_replay(CLI::App& app, Status& status) {
   add_required(*command, "surgery", options.surgery, "surgery file (.surgery)");
   add_with_default(*command, "--endpoint", options.endpoint, "where brainshiftd listens");
   add_key_options(*command, arguments->keys);
-  CLI::Option* report =
-      command->add_option("--report", options.report,
-                          "report.json to write; fields go beside it as .vtu; required "
-                          "without --verify");
+  CLI::Option* report = command->add_option(
+      "--report", options.report,
+      "report.json to write; fields go beside it as .vtu; required without --verify");
   CLI::Option* verify =
       command->add_flag("--verify", arguments->verify,
                         "compare the daemon's updates with those of a journal, and write nothing; "
@@ -108,16 +107,16 @@ void add_replay(CLI::App& app, Status& status) {
       ->add_option("--resume", options.resume,
                    "journal of a session that crashed: go on after what it holds")
       ->excludes(verify);
-  add_with_default(*command, "--repeat", options.repeat,
-                   "play the observations so many times in a cycle, to measure latency; needs "
-                   "--speed max")
+  add_with_default(
+      *command, "--repeat", options.repeat,
+      "play the observations so many times in a cycle, to measure latency; needs --speed max")
       ->check(CLI::Range(1, 1000000));
   command->add_flag("--takeover", options.takeover,
                     "end the session of another client that is still connected");
-  command->add_option("--latency-csv", options.latency_csv,
-                      "also write latency, stage times and contact of every update, a row each; "
-                      "with --boundary both a file per boundary, \"-contact\" and \"-fixed\" added "
-                      "to its name");
+  command->add_option(
+      "--latency-csv", options.latency_csv,
+      "also write latency, stage times and contact of every update, a row each; with --boundary "
+      "both a file per boundary, \"-contact\" and \"-fixed\" added to its name");
   add_with_default(*command, "--timeout-s", arguments->timeout_s,
                    "longest silence before an observation counts as lost, s")
       ->check(CLI::Range(0.1, 86400.0));
@@ -131,8 +130,8 @@ void add_replay(CLI::App& app, Status& status) {
       "After a crash of the daemon, on from the last observation that its journal holds:\n"
       "  brainshift replay sag.surgery --resume journal/colin27-20250131T120000Z-1.surgery "
       "--report rest.json\n"
-      "Does this daemon still answer as it did when the journal was recorded? Exit status 1 "
-      "when an update differs:\n"
+      "Does this daemon still answer as it did when the journal was recorded? Exit status 1 when "
+      "an update differs:\n"
       "  brainshift replay journal/colin27-20250131T120000Z-1.surgery --verify");
   command->callback([arguments, &status] { status = run_replay(*arguments); });
 }

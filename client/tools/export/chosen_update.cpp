@@ -61,8 +61,7 @@ tl::unexpected<Error> none_usable(const fs::path& path, const Found& found) {
 Result<ChosenUpdate> choose_update(const io::SurgeryFile& file, const fs::path& path, int nodes,
                                    const UpdateChoice& choice) {
   if (choice.allow_unusable && !choice.sequence) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--allow-unusable: needs --sequence N, the update that is meant");
+    return invalid("--allow-unusable: needs --sequence N, the update that is meant");
   }
   auto found = search(file, path, choice.sequence);
   if (!found) return tl::unexpected(found.error());

@@ -23,10 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 using io::FieldDirection;
 
-tl::unexpected<Error> invalid(std::string message) {
-  return fail(ErrorCode::kInvalidArgument, std::move(message));
-}
-
 // "PREFIX: MESSAGE"
 tl::unexpected<Error> about(const std::string& prefix, const Error& error) {
   return fail(error.code, prefix + ": " + error.message);
@@ -317,8 +313,7 @@ Result<FieldSamples> samples_of(const ExportOptions& options, const Inputs& inpu
   }
   if (samples->voxels_inside == 0) {
     return invalid(
-        fmt::format("--like: {}: no voxel lies in the brain: is it in the patient's RAS "
-                    "frame?",
+        fmt::format("--like: {}: no voxel lies in the brain: is it in the patient's RAS frame?",
                     options.like.string()));
   }
   for (std::string* note : {&samples->field.note, &samples->sd_mm.note, &samples->jacobian.note}) {

@@ -103,8 +103,7 @@ Result<ExportFormats> parse_formats(const std::vector<std::string>& words) {
       std::string all;
       for (const ExportFormat format : kAllExportFormats)
         all += fmt::format("{}, ", to_string(format));
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("--formats: \"{}\" is not a format: must be {}or all", word, all));
+      return invalid(fmt::format("--formats: \"{}\" is not a format: must be {}or all", word, all));
     }
     formats.insert(*known);
   }
@@ -121,28 +120,27 @@ std::string to_json(const Manifest& manifest) {
   const Update& update = manifest.message.update;
   Json files = Json::array();
   for (const ManifestFile& file : manifest.files) files.push_back(file_json(file, manifest));
-  const Json json = {
-      {"software", manifest.software},
-      {"surgery", manifest.surgery},
-      {"case_id", manifest.case_id},
-      {"model_id", update.model_id},
-      {"session_id", manifest.message.session_id},
-      {"sequence", update.sequence},
-      {"observation_sequence", update.observation_sequence},
-      {"time_s", manifest.time_s},
-      {"quality", quality_json(update)},
-      {"direction", to_string(manifest.direction)},
-      {"direction_means", direction_means(manifest.direction)},
-      {"grid", grid_json(manifest)},
-      {"outside_brain",
-       {{"full_mm", manifest.taper.full_mm},
-        {"zero_mm", manifest.taper.zero_mm},
-        {"means",
-         "no model says what lies there: the closest surface point's value, which falls "
-         "to zero between full_mm and zero_mm"}}},
-      {"largest_mm", manifest.largest_mm},
-      {"volume_ratio", ratio_json(manifest.volume_ratios)},
-      {"files", std::move(files)}};
+  const Json json = {{"software", manifest.software},
+                     {"surgery", manifest.surgery},
+                     {"case_id", manifest.case_id},
+                     {"model_id", update.model_id},
+                     {"session_id", manifest.message.session_id},
+                     {"sequence", update.sequence},
+                     {"observation_sequence", update.observation_sequence},
+                     {"time_s", manifest.time_s},
+                     {"quality", quality_json(update)},
+                     {"direction", to_string(manifest.direction)},
+                     {"direction_means", direction_means(manifest.direction)},
+                     {"grid", grid_json(manifest)},
+                     {"outside_brain",
+                      {{"full_mm", manifest.taper.full_mm},
+                       {"zero_mm", manifest.taper.zero_mm},
+                       {"means",
+                        "no model says what lies there: the closest surface point's value, which "
+                        "falls to zero between full_mm and zero_mm"}}},
+                     {"largest_mm", manifest.largest_mm},
+                     {"volume_ratio", ratio_json(manifest.volume_ratios)},
+                     {"files", std::move(files)}};
   // Names of files are bytes; what is not UTF-8 is replaced.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -8,7 +8,6 @@
 #include <atomic>
 #include <vector>
 
-#include "client/tools/volume/field_grid.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/geometry/tet_locator.hpp"
 
@@ -101,10 +100,10 @@ class Sampling {
 Status check_invertible(const TetMesh& mesh, const Points& u) {
   const auto folded = (volume_ratios(mesh, u).array() <= 0.0).count();
   if (folded == 0) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("the displacement turns {} of {} elements inside out: it has no inverse, "
-                          "hence no direction resampling; modeling can be had",
-                          folded, mesh.num_tets()));
+  return invalid(
+      fmt::format("the displacement turns {} of {} elements inside out: it has no inverse, "
+                  "hence no direction resampling; modeling can be had",
+                  folded, mesh.num_tets()));
 }
 
 double largest_norm(const std::vector<float>& vectors) {

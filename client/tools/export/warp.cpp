@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "common/core/thread_team.hpp"
 #include "common/geometry/surface.hpp"
@@ -63,8 +62,7 @@ DeformedSurface moved(TriangleSurface surface, const Points& u, const VecX& sd_m
 Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::DisplacementField& field) {
   if (Status ok = validate(field); !ok) return tl::unexpected(ok.error());
   if (field.direction != io::FieldDirection::kResampling) {
-    return fail(ErrorCode::kInvalidArgument,
-                "an image is warped by a field of direction resampling, not modeling");
+    return invalid("an image is warped by a field of direction resampling, not modeling");
   }
   const io::VoxelGrid& grid = field.grid;
   io::ScalarVolume warped{grid, std::vector<float>(grid.num_voxels(), 0.0F), field.note};
@@ -88,8 +86,7 @@ Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::Displacem
     if (found) any = true;
   });
   if (!any) {
-    return fail(ErrorCode::kInvalidArgument,
-                "no voxel of the grid lies in the image: are both in the patient's RAS frame?");
+    return invalid("no voxel of the grid lies in the image: are both in the patient's RAS frame?");
   }
   return warped;
 }

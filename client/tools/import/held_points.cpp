@@ -72,7 +72,7 @@ Status check(const Samples& samples, const HoldOptions& options) {
        {std::pair{"radius_mm", options.radius_mm}, std::pair{"least_s", options.least_s},
         std::pair{"gap_s", options.gap_s}}) {
     if (!(std::isfinite(value) && value > 0.0)) {
-      return fail(ErrorCode::kInvalidArgument, fmt::format("{} = {}: must be > 0", name, value));
+      return invalid(fmt::format("{} = {}: must be > 0", name, value));
     }
   }
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <map>
 
-#include "client/tools/import/import_boundaries.hpp"
-#include "client/tools/import/import_case.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/recording/contour_file.hpp"
@@ -31,17 +29,16 @@ constexpr double kMaxSd_mm = 20.0;
 Status check_import(const ImportOptions& options) {
   const auto one_of = [](bool first, bool second, const char* names) -> Status {
     if (first != second) return {};
-    return fail(ErrorCode::kInvalidArgument, fmt::format("exactly one of {} is required, {} given",
-                                                         names, first ? "both" : "none"));
+    return invalid(
+        fmt::format("exactly one of {} is required, {} given", names, first ? "both" : "none"));
   };
   for (const auto& [name, path] :
        {std::pair{"--recording", options.recording}, std::pair{"--out", options.out}}) {
-    if (path.empty()) return fail(ErrorCode::kInvalidArgument, std::string(name) + " is required");
+    if (path.empty()) return invalid(std::string(name) + " is required");
   }
   const auto range = [](const char* name, double value, double least, double most) -> Status {
     if (value >= least && value <= most) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{} {}: must be {} to {}", name, value, least, most));
+    return invalid(fmt::format("{} {}: must be {} to {}", name, value, least, most));
   };
   Status ok = one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
   if (ok) {
@@ -118,12 +115,11 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
     if (told.tumour_distance_mm > kFarthest_mm) {
       std::string notes;
       for (const std::string& note : report.notes) notes += "; " + note;
-      return fail(
-          ErrorCode::kInvalidArgument,
-          fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of case {}: "
-                      "must be within {:.0f} mm; is it the right registration{}",
-                      sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
-                      patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of "
+                              "case {}: must be within {:.0f} mm; is it the right registration{}",
+                              sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
+                              patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
     }
     Observation observation;
     observation.case_id = patient.model.case_id;
@@ -200,8 +196,7 @@ std::vector<std::string> report_lines(const ImportReport& report) {
   for (const ImportedSweep& sweep : report.sweeps) {
     lines.push_back(
         fmt::format("sweep {}: frames {} to {}, {} contours, {} boundary points, extent {:.1f} mm, "
-                    "{:.1f} mm from the "
-                    "tumour before surgery",
+                    "{:.1f} mm from the tumour before surgery",
                     sweep.sequence, sweep.first_frame, sweep.last_frame, sweep.contours,
                     sweep.points, sweep.extent_mm, sweep.tumour_distance_mm));
   }

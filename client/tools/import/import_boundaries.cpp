@@ -55,9 +55,8 @@ Status check_contours(const tracking::Recording& recording,
                       const std::vector<ultrasound::Contour>& contours) {
   for (const ultrasound::Contour& contour : contours) {
     if (contour.frame < 0 || contour.frame >= recording.num_frames()) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("contour on frame {}: the recording has frames 0 to {}",
-                              contour.frame, recording.num_frames() - 1));
+      return invalid(fmt::format("contour on frame {}: the recording has frames 0 to {}",
+                                 contour.frame, recording.num_frames() - 1));
     }
     for (Eigen::Index i = 0; i < contour.points_px.cols(); ++i) {
       const double u = contour.points_px(0, i), v = contour.points_px(1, i);
@@ -86,8 +85,7 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
                                      std::vector<ultrasound::Contour> contours,
                                      const BoundaryOptions& options) {
   if (!(options.sweep_gap_s >= 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("gap between sweeps = {} s: must be >= 0", options.sweep_gap_s));
+    return invalid(fmt::format("gap between sweeps = {} s: must be >= 0", options.sweep_gap_s));
   }
   if (Status ok = check_contours(recording, contours); !ok) return tl::unexpected(ok.error());
   auto chain = tracking::evaluate_chain(recording, constants, options.image_frame,

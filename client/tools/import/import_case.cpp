@@ -8,7 +8,6 @@
 #include "common/core/utc_time.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/io/recording/surgery_file.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
 
@@ -41,9 +40,8 @@ io::SurgeryMeta ImportCase::meta(const std::string& scenario, const std::string&
 
 Status check_one_case(const fs::path& case_file, const fs::path& model) {
   if (case_file.empty() != model.empty()) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("exactly one of --case and --model is required, {} given",
-                          model.empty() ? "none" : "both"));
+  return invalid(fmt::format("exactly one of --case and --model is required, {} given",
+                             model.empty() ? "none" : "both"));
 }
 
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {

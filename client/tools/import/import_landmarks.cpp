@@ -23,9 +23,9 @@ constexpr double kMinSd_mm = 0.01, kMaxLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
   if (options.landmarks.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "--landmarks is required");
+    return invalid("--landmarks is required");
   }
-  if (options.out.empty()) return fail(ErrorCode::kInvalidArgument, "--out is required");
+  if (options.out.empty()) return invalid("--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
   if (!(options.sd_mm >= kMinSd_mm && options.sd_mm <= kMaxLandmarkSd_mm)) {
     return fail(
@@ -46,10 +46,9 @@ Status measure_motion(const io::NamedPairs& pairs, LandmarkReport& report) {
   for (std::size_t i = 0; i < pairs.names.size(); ++i) {
     const double moved = (pairs.second[i] - pairs.first[i]).norm();
     if (moved > kLargestMotion_mm) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places "
-                              "mm RAS?",
-                              called(pairs, i), moved, kLargestMotion_mm));
+      return invalid(
+          fmt::format("{} moved {:.0f} mm: must be within {:.0f} mm; are both its places mm RAS?",
+                      called(pairs, i), moved, kLargestMotion_mm));
     }
     sum += moved, squares += moved * moved;
     if (moved >= report.largest_mm) report.largest_mm = moved, report.largest = called(pairs, i);
@@ -84,11 +83,11 @@ Status check_place(const io::NamedPairs& pairs, const BrainModel& model, Landmar
       const Vec3& at = pairs.first[i];
       return fail(
           ErrorCode::kInvalidArgument,
-          fmt::format("{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside "
-                      "the brain of case {}: must be within {:.0f} mm; is it mm RAS, and of "
-                      "this patient?",
-                      called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id,
-                      kLargestOutside_mm));
+          fmt::format(
+              "{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside the brain of "
+              "case {}: must be within {:.0f} mm; is it mm RAS, and of this patient?",
+              called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id,
+              kLargestOutside_mm));
     }
     if (outside <= 0.0) continue;
     ++report.outside;
@@ -146,10 +145,9 @@ Result<LandmarkReport> import_landmarks(const LandmarkOptions& options, const Pr
 }
 
 std::vector<std::string> report_lines(const LandmarkReport& report) {
-  std::vector<std::string> lines = {
-      fmt::format("landmarks: {} pairs, moved {:.2f} mm on average ({:.2f} rms), at most {:.2f} mm "
-                  "({})",
-                  report.pairs, report.mean_mm, report.rms_mm, report.largest_mm, report.largest)};
+  std::vector<std::string> lines = {fmt::format(
+      "landmarks: {} pairs, moved {:.2f} mm on average ({:.2f} rms), at most {:.2f} mm ({})",
+      report.pairs, report.mean_mm, report.rms_mm, report.largest_mm, report.largest)};
   if (report.rigid) {
     lines.push_back(fmt::format(
         "rigid part: rotation {:.2f} degrees, translation {:.2f} mm (of the landmarks' centroid); "
@@ -164,8 +162,7 @@ std::vector<std::string> report_lines(const LandmarkReport& report) {
   }
   if (report.outside > 0) {
     lines.emplace_back(
-        fmt::format("note: {} landmarks lie outside the mesh of the brain, at most {:.1f} "
-                    "mm ({})",
+        fmt::format("note: {} landmarks lie outside the mesh of the brain, at most {:.1f} mm ({})",
                     report.outside, report.farthest_outside_mm, report.farthest_outside));
   }
   for (const std::string& name : report.left_out) {

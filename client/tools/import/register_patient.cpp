@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <tuple>
 
-#include "client/tools/import/import_case.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
 #include "common/io/landmarks/point_file.hpp"
@@ -20,9 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-tl::unexpected<Error> refuse(std::string text) {
-  return fail(ErrorCode::kInvalidArgument, std::move(text));
-}
+tl::unexpected<Error> refuse(std::string text) { return invalid(std::move(text)); }
 
 Status check_register(const RegisterOptions& options) {
   if (options.recording.empty() == options.fiducials.empty()) {
@@ -116,13 +112,11 @@ Result<io::NamedPoints> touched_points(const RegisterOptions& options, RegisterR
     for (const auto& dropped : report.dropped) {
       reasons += fmt::format("; {} ({} poses)", dropped.reason, dropped.count);
     }
-    return io::file_error(
-        ErrorCode::kEmptySet, options.recording,
-        fmt::format(
-            "the tip of the stylus never stays within {} mm for {} s; {} of {} poses have a "
-            "valid chain{}",
-            options.hold.radius_mm, options.hold.least_s, report.poses_used, report.poses,
-            reasons));
+    return io::file_error(ErrorCode::kEmptySet, options.recording,
+                          fmt::format("the tip of the stylus never stays within {} mm for {} s; {} "
+                                      "of {} poses have a valid chain{}",
+                                      options.hold.radius_mm, options.hold.least_s,
+                                      report.poses_used, report.poses, reasons));
   }
   if (Status ok = choose_holds(options, report); !ok) return tl::unexpected(ok.error());
   io::NamedPoints points;
@@ -166,8 +160,7 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
             ? std::string()
             : "; the stylus was held still " + list_of(report.held) + ": choose with --holds";
     return refuse(
-        fmt::format("{} fiducials were touched, {} holds {}: in order there must be as "
-                    "many{}",
+        fmt::format("{} fiducials were touched, {} holds {}: in order there must be as many{}",
                     measured.cols(), options.ras.string(), image.cols(), held));
   }
   auto fit = registration::register_fiducials(measured, image);

@@ -140,8 +140,7 @@ Result<CopiedJournal> repair_journal(const fs::path& file, const fs::path& out) 
 Result<CopiedJournal> trim_journal(const fs::path& file, std::uint64_t first, std::uint64_t last,
                                    const fs::path& out) {
   if (first > last) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("first = {}: must be at most last = {}", first, last));
+    return invalid(fmt::format("first = {}: must be at most last = {}", first, last));
   }
   const auto from = io::SurgeryFile::open(file);
   if (!from) return tl::unexpected(from.error());

@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "common/io/files/file_access.hpp"

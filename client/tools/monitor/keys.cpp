@@ -78,8 +78,7 @@ CheckedKeys check_key_files(const std::vector<fs::path>& files) {
 Result<std::optional<ClientKeys>> client_keys(const fs::path& server_key, const fs::path& key) {
   if (server_key.empty() && key.empty()) return std::nullopt;
   if (server_key.empty() || key.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "--server-key and --key need each other (see brainshift keys --help)");
+    return invalid("--server-key and --key need each other (see brainshift keys --help)");
   }
   auto server = io::read_public_key(server_key);
   if (!server) return tl::unexpected(server.error());

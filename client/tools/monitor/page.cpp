@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace brainshift::client {
@@ -156,10 +155,10 @@ class Page {
     for (const wire::StageLatency& stage : now_.stages) {
       const wire::LatencyFigures& recent = stage.recent;
       const wire::LatencyFigures& all = stage.all;
-      add("", fmt::format("{:<14}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}         {:>9.2f}{:>9.2f}{:>9.2f}"
-                          "{:>9.2f}",
-                          stage.stage, recent.p50_ms, recent.p95_ms, recent.p99_ms, recent.max_ms,
-                          all.p50_ms, all.p95_ms, all.p99_ms, all.max_ms));
+      add("", fmt::format(
+                  "{:<14}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}         {:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}",
+                  stage.stage, recent.p50_ms, recent.p95_ms, recent.p99_ms, recent.max_ms,
+                  all.p50_ms, all.p95_ms, all.p99_ms, all.max_ms));
     }
   }
 
@@ -175,12 +174,11 @@ class Page {
   void add_door() {
     const wire::DoorFigures& door = now_.door;
     add("door",
-        fmt::format("{} accepted, closed for breach {}, memory {}, silence {}, room {}, "
-                    "{} held",
+        fmt::format("{} accepted, closed for breach {}, memory {}, silence {}, room {}, {} held",
                     door.accepted, door.closed_for_breach, door.closed_for_memory,
                     door.closed_for_silence, door.closed_for_room, mebibytes(door.held_bytes)));
-    add("", fmt::format("refused: unknown keys {}, beyond a role {}, connections {}, "
-                        "observations {}, session starts {}",
+    add("", fmt::format("refused: unknown keys {}, beyond a role {}, connections {}, observations "
+                        "{}, session starts {}",
                         door.unknown_keys, door.refused_role, door.refused_connections,
                         door.refused_observations, door.refused_starts));
   }

@@ -7,9 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "client/lib/client.hpp"
 #include "common/geometry/closest_point.hpp"
@@ -61,7 +59,7 @@ tl::unexpected<Error> refuse(std::string_view option, std::string_view text,
                              std::string_view must_be) {
   std::string sentence(option);
   sentence.append(" ").append(text).append(": must be ").append(must_be);
-  return fail(ErrorCode::kInvalidArgument, std::move(sentence));
+  return invalid(std::move(sentence));
 }
 
 using std::chrono::milliseconds;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "client/tools/pictures/canvas.hpp"
-
 namespace brainshift::client {
 namespace {
 

@@ -6,9 +6,6 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
-#include "client/tools/pictures/axes.hpp"
-#include "client/tools/pictures/canvas.hpp"
-
 namespace brainshift::client {
 namespace {
 

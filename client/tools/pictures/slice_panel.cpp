@@ -5,7 +5,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "client/tools/pictures/canvas.hpp"
 #include "common/core/statistics.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"

@@ -11,7 +11,6 @@
 #include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "client/tools/pictures/canvas.hpp"

@@ -8,8 +8,6 @@
 #include <functional>
 #include <limits>
 
-#include "client/tools/pictures/canvas.hpp"
-
 namespace brainshift::client {
 namespace {
 

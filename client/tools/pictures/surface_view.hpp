@@ -6,7 +6,6 @@
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <string>
 #include <vector>
 
 #include "client/tools/pictures/canvas.hpp"

@@ -7,7 +7,6 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "client/tools/pictures/canvas.hpp"
 #include "client/tools/pictures/sheet.hpp"

@@ -2,12 +2,10 @@
 #include "client/tools/replay/play.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "client/lib/client.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/recording/surgery_file.hpp"
-#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {

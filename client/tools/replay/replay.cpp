@@ -7,8 +7,6 @@
 #include <limits>
 #include <set>
 
-#include "client/lib/client.hpp"
-#include "client/tools/replay/play.hpp"
 #include "client/tools/replay/score.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/io/config/config_file.hpp"
@@ -267,7 +265,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 
 Status check_repeat(const ReplayOptions& options, const Surgery& surgery) {
   const auto refuse = [&](const std::string& why) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("repeat = {}: {}", options.repeat, why));
+    return invalid(fmt::format("repeat = {}: {}", options.repeat, why));
   };
   if (options.repeat < 1) return refuse("must be at least 1");
   if (options.repeat == 1) return {};

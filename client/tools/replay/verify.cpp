@@ -8,11 +8,9 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <optional>
 #include <string_view>
 #include <utility>
 
-#include "client/lib/client.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/wire/convert.hpp"
 

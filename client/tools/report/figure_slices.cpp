@@ -317,18 +317,16 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
   for (const auto& [plane, infix, shown_in] :
        {std::tuple{Plane::kAxial, "", " (compare Fig. 4a and e)."},
         std::tuple{Plane::kCoronal, "coronal-", " (compare Fig. 4b)."}}) {
-    figures.push_back(
-        {"shift-" + std::string(infix) + group.name + ".png",
-         "Estimated displacement (coloured arrows) and true displacement (thin white) on the MRI, "
-         "with the tumour's outline before, estimated and true; " +
-             what + shown_in,
-         shift_sheet(scene, plane)});
-    figures.push_back(
-        {"tumour-" + std::string(infix) + group.name + ".png",
-         "Close-up at the tumour: outlines of tumour and brain surface before, estimated and "
-         "true; " +
-             what + ".",
-         close_up_sheet(scene, plane)});
+    figures.push_back({"shift-" + std::string(infix) + group.name + ".png",
+                       "Estimated displacement (coloured arrows) and true displacement (thin "
+                       "white) on the MRI, with the tumour's outline before, estimated and true; " +
+                           what + shown_in,
+                       shift_sheet(scene, plane)});
+    figures.push_back({"tumour-" + std::string(infix) + group.name + ".png",
+                       "Close-up at the tumour: outlines of tumour and brain surface before, "
+                       "estimated and true; " +
+                           what + ".",
+                       close_up_sheet(scene, plane)});
   }
   if (scene.truth == nullptr) return figures;
   figures.push_back({"difference-" + group.name + ".png",

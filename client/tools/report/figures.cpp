@@ -97,9 +97,8 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
   figure.file_name = "error-time.png";
   figure.caption =
       "Error at the tumour against the time of one update, per method and boundary condition. The "
-      "paper's time "
-      "was measured on a machine of 2009. make bench draws the same for more methods, ranks and "
-      "meshes.";
+      "paper's time was measured on a machine of 2009. make bench draws the same for more methods, "
+      "ranks and meshes.";
   figure.image = draw_chart(spec);
   return figure;
 }
@@ -153,9 +152,8 @@ Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<Re
   figure.file_name = "recovery.png";
   figure.caption =
       "Deformation recovered at the tumour (cross-validation points) and at the craniotomy "
-      "(closest-point "
-      "projection distance), contact against fixed boundary. Black ticks: the paper's simulated "
-      "case.";
+      "(closest-point projection distance), contact against fixed boundary. Black ticks: the "
+      "paper's simulated case.";
   figure.image = draw_bars(spec);
   return figure;
 }

@@ -60,8 +60,7 @@ Result<RunField> load_field(const std::filesystem::path& path) {
     const bool required = values == estimated;
     if ((values == nullptr && required) || (values != nullptr && !fits(*values))) {
       return fail(ErrorCode::kUnreadable, path.string() + ": point array " + name +
-                                              " must hold 3 finite numbers "
-                                              "for each of the " +
+                                              " must hold 3 finite numbers for each of the " +
                                               std::to_string(file->mesh.num_nodes()) + " nodes");
     }
   }

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "client/tools/report/html_table.hpp"
 #include "common/io/files/binary_codec.hpp"
 
@@ -53,11 +51,9 @@ figure.slide input.p2:checked ~ .stack img.p2 { visibility: visible; }
 
 constexpr const char* kCitation =
     "S. Ji, D. W. Roberts, A. Hartov, K. D. Paulsen: <cite>Brain&ndash;skull contact boundary "
-    "conditions in an inverse "
-    "computational deformation model</cite>, Medical Image Analysis, 2009; simulated case (patient "
-    "2), section 3.1, "
-    "and section 4 for ICP. The value in brackets is not printed there but follows from its "
-    "errors.";
+    "conditions in an inverse computational deformation model</cite>, Medical Image Analysis, "
+    "2009; simulated case (patient 2), section 3.1, and section 4 for ICP. The value in brackets "
+    "is not printed there but follows from its errors.";
 
 std::string scalar_list(const RunReport& run) {
   std::string text;
@@ -126,8 +122,7 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
   html +=
       "<h1>Brain shift: what the replays showed</h1>\n"
       "<p class=\"note\">Research software for simulation, replay and laboratory use. It is no "
-      "medical device and "
-      "must not guide the treatment of patients.</p>\n";
+      "medical device and must not guide the treatment of patients.</p>\n";
   html += "<p class=\"verdict-sentence\">" + escape_html(verdict(runs)) + "</p>\n";
   html += section("Failures", failure_list(runs));
   std::string shown;
@@ -137,17 +132,15 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
       "In short",
       summary_table(runs) +
           "<p class=\"soft\">Each line is a run, the blue ones are published: " + kCitation +
-          " Errors are means, at points of the tumour that were not measured and by "
-          "closest point at the craniotomy.</p>\n");
+          " Errors are means, at points of the tumour that were not measured and by closest point "
+          "at the craniotomy.</p>\n");
   html += section("The runs", scenario_list(runs, groups));
-  html +=
-      section("Quality of the fields",
-              quality_table(runs) +
-                  "<p class=\"soft\">What the daemon says of each final update's field. "
-                  "&ldquo;Converged&rdquo; "
-                  "speaks of the algorithm only. Everything else on this page is taken from the "
-                  "last update "
-                  "that was usable. Strengths: in units of the case's standard deviations.</p>\n");
+  html += section("Quality of the fields",
+                  quality_table(runs) +
+                      "<p class=\"soft\">What the daemon says of each final update's field. "
+                      "&ldquo;Converged&rdquo; speaks of the algorithm only. Everything else on "
+                      "this page is taken from the last update that was usable. Strengths: in "
+                      "units of the case's standard deviations.</p>\n");
   html +=
       section("Errors, beside the published ones",
               error_table(runs) +
@@ -163,12 +156,11 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
   html += section("Pictures", figures);
   const std::string sources = source_table(runs);
   if (!sources.empty()) {
-    html += section(
-        "Instruments",
-        sources +
-            "<p class=\"soft\">Of each run's last update. Chi-square: how far an instrument "
-            "lies from what the others and the prior predict for it, beside its expectation; "
-            "p: probability of more by chance.</p>\n");
+    html += section("Instruments",
+                    sources +
+                        "<p class=\"soft\">Of each run's last update. Chi-square: how far an "
+                        "instrument lies from what the others and the prior predict for it, beside "
+                        "its expectation; p: probability of more by chance.</p>\n");
   }
   html += section("Left out of the model", left_out_list(runs));
   return html + "</body></html>\n";

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 
 #include "client/tools/report/html_page.hpp"
@@ -253,9 +252,8 @@ std::string source_table(const std::vector<ReportedRun>& runs) {
   if (rows.empty()) return "";
   return "<table "
          "class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>observation</th><th>age "
-         "(s)</th>"
-         "<th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></tr></"
-         "thead>\n<tbody>" +
+         "(s)</th><th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></"
+         "tr></thead>\n<tbody>" +
          rows + "</tbody></table>\n";
 }
 

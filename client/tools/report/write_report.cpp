@@ -53,10 +53,9 @@ Result<std::map<std::string, Head>> load_heads(const std::vector<ReportedRun>& r
     if (!head) return tl::unexpected(head.error());
     if (!run.report.model_id.empty() && head->model_id != run.report.model_id) {
       // Outlines and gravity of another model on these fields would look right and be wrong.
-      return fail(ErrorCode::kInvalidArgument,
-                  file + ": builds model " + head->model_id + ", but scenario \"" +
-                      run.report.scenario + "\" was recorded with model " + run.report.model_id +
-                      "; the case has changed since");
+      return invalid(file + ": builds model " + head->model_id + ", but scenario \"" +
+                     run.report.scenario + "\" was recorded with model " + run.report.model_id +
+                     "; the case has changed since");
     }
     heads.emplace(file, std::move(*head));
   }

@@ -33,8 +33,7 @@ Result<stereo::ChessBoard> parse_board(const std::string& text, double square_mm
     const auto [stop, error] = std::from_chars(cross + 1, end, board.rows);
     if (error == std::errc() && stop == end) return board;
   }
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("--board {}: must be inner corners along and across, e.g. 9x6", text));
+  return invalid(fmt::format("--board {}: must be inner corners along and across, e.g. 9x6", text));
 }
 
 // A camera looks from some 300 mm: a rotation off by 1e-4 moves the cortex by 0.03 mm.
@@ -54,15 +53,14 @@ constexpr std::size_t kMaxSource = 64;
 
 Status check(const ObserveJob& job) {
   if (!(std::isfinite(job.sd_mm) && job.sd_mm > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("--sd-mm {}: must be finite and > 0", job.sd_mm));
+    return invalid(fmt::format("--sd-mm {}: must be finite and > 0", job.sd_mm));
   }
   if (job.time_s && !(*job.time_s >= 0.0 && *job.time_s <= kMaxSeconds)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("--time-s {}: must be between 0 and {:g}", *job.time_s, kMaxSeconds));
+    return invalid(
+        fmt::format("--time-s {}: must be between 0 and {:g}", *job.time_s, kMaxSeconds));
   }
   if (job.source.empty() || job.source.size() > kMaxSource) {
-    return fail(ErrorCode::kInvalidArgument, "--source must have 1 to 64 characters");
+    return invalid("--source must have 1 to 64 characters");
   }
   return {};
 }

@@ -10,7 +10,6 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "client/tools/pictures/canvas.hpp"
 #include "common/io/files/file_access.hpp"

@@ -97,12 +97,11 @@ Result<Ingredients> ingredients_from(const std::string& list) {
     const auto ingredient = ingredient_from(part);
     if (!ingredient) return tl::unexpected(ingredient.error());
     if (!ingredients.insert(*ingredient).second) {
-      return fail(ErrorCode::kInvalidArgument, "adverse ingredient " + part + " is given twice");
+      return invalid("adverse ingredient " + part + " is given twice");
     }
   }
   if (ingredients.empty() || list.back() == ',') {
-    return fail(ErrorCode::kInvalidArgument,
-                "adverse ingredients \"" + list + "\": a name is missing");
+    return invalid("adverse ingredients \"" + list + "\": a name is missing");
   }
   return ingredients;
 }
@@ -120,13 +119,12 @@ Result<Scenario> with_ingredients(const Scenario& scenario, const Ingredients& i
                                   const Vec3& gravity, std::uint64_t seed) {
   if (ingredients.count(Ingredient::kSegmentation) > 0 &&
       scenario.measurement != Measurement::kProbeSections) {
-    return fail(ErrorCode::kInvalidArgument,
-                "adverse ingredient segmentation does nothing in scenario " + scenario.name +
-                    ": it measures displacements, not an outline");
+    return invalid("adverse ingredient segmentation does nothing in scenario " + scenario.name +
+                   ": it measures displacements, not an outline");
   }
   if (ingredients.count(Ingredient::kMesh) > 0 && scenario.resection) {
-    return fail(ErrorCode::kInvalidArgument, "adverse ingredient mesh: scenario " + scenario.name +
-                                                 " cuts tissue out, which needs the case's mesh");
+    return invalid("adverse ingredient mesh: scenario " + scenario.name +
+                   " cuts tissue out, which needs the case's mesh");
   }
   Scenario adverse = scenario;
   for (const Ingredient each : ingredients) add(each, gravity, stream(each, seed), adverse);

@@ -39,9 +39,8 @@ Result<BrainModel> mesh_anew(const CaseConfig& config, const Progress& progress)
   CaseConfig other = config;
   auto* mesh = std::get_if<MeshGeneration>(&other.mesh);
   if (mesh == nullptr) {
-    return fail(ErrorCode::kInvalidArgument,
-                "case " + config.case_id +
-                    ": mesh.file: adverse ingredient mesh needs a case whose mesh is generated");
+    return invalid("case " + config.case_id +
+                   ": mesh.file: adverse ingredient mesh needs a case whose mesh is generated");
   }
   mesh->edge_mm *= kOtherEdge;
   mesh->tumour_edge_mm *= kOtherEdge;
@@ -54,10 +53,9 @@ Result<std::shared_ptr<const OtherMesh>> make_other_mesh(const BrainModel& model
   SpacePoints nodes(locator, model.mesh.nodes);
   SpacePoints tumour(locator, model.tumour.vertices);
   if (nodes.farthest_outside_mm() > kLargestMismatch_mm) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("the other mesh leaves out a node of the case's mesh by {:.1f} mm: not "
-                            "the same head",
-                            nodes.farthest_outside_mm()));
+    return invalid(fmt::format(
+        "the other mesh leaves out a node of the case's mesh by {:.1f} mm: not the same head",
+        nodes.farthest_outside_mm()));
   }
   fem::DisplacementSpace space = fem::make_space(other.mesh, fem::Element::kP2);
   return std::make_shared<const OtherMesh>(OtherMesh{

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "client/tools/twin/load.hpp"
 #include "common/fem/elasticity.hpp"
@@ -61,9 +60,8 @@ TetMesh without(const TetMesh& mesh, const std::vector<char>& removed) {
 Result<ResectedBrain> resect(const BrainModel& model, const CaseConfig& config,
                              const Resection& resection) {
   if (!(resection.volume_fraction > 0.0 && resection.volume_fraction <= 1.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("resection.volume_fraction = {:g}: must be above 0 and at most 1",
-                            resection.volume_fraction));
+    return invalid(fmt::format("resection.volume_fraction = {:g}: must be above 0 and at most 1",
+                               resection.volume_fraction));
   }
   const auto tets = tumour_tets(model);
   if (!tets) return tl::unexpected(tets.error());

@@ -126,10 +126,9 @@ Scenario resection() {
 
 // A spatula holds the cortex aside while the fluid drains.
 Scenario retraction() {
-  Scenario scenario =
-      joint(paper(), "retraction",
-            "sag while a spatula presses on the exposed cortex and draws it aside; ultrasound, "
-            "stereo camera, vessel forks");
+  Scenario scenario = joint(paper(), "retraction",
+                            "sag while a spatula presses on the exposed cortex and draws it aside; "
+                            "ultrasound, stereo camera, vessel forks");
   scenario.fluid_levels_mm = {30.0};
   scenario.retraction = Retraction{4000.0, 12.0, 45.0};
   return scenario;

@@ -5,7 +5,6 @@
 #include "client/tools/twin/scenario.hpp"
 #include "client/tools/twin/surgery.hpp"
 #include "common/core/utc_time.hpp"
-#include "common/io/recording/surgery_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"

@@ -160,9 +160,8 @@ std::vector<Observation> observe(const TruthBrain& brain, const Scenario& scenar
 
 Status keeps_promise(const Scenario& scenario, const Truth& truth) {
   if (!scenario.contact_free || truth.active == 0) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "scenario " + scenario.name + ": " + std::to_string(truth.active) +
-                  " slaves of this case touch the skull, it promises none");
+  return invalid("scenario " + scenario.name + ": " + std::to_string(truth.active) +
+                 " slaves of this case touch the skull, it promises none");
 }
 
 // The true displacement under the load times moment.load_scale. With a displacement that the

@@ -6,8 +6,6 @@
 
 #include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/stiffness.hpp"
-#include "client/tools/twin/truth_brain.hpp"
-#include "common/contact/forward_model.hpp"
 
 namespace brainshift::client {
 namespace {

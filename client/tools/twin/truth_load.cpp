@@ -33,9 +33,8 @@ double angle_deg(const Vec3& a, const Vec3& b) {
 }
 
 Status nothing(const Scenario& scenario, const std::string& ingredient, const std::string& why) {
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("adverse ingredient {} does nothing in scenario {} on this case: {}",
-                          ingredient, scenario.name, why));
+  return invalid(fmt::format("adverse ingredient {} does nothing in scenario {} on this case: {}",
+                             ingredient, scenario.name, why));
 }
 
 // Weights of the whole brain, by the case's own mesh.
@@ -132,11 +131,10 @@ Status check_gravity(const TruthBrain& brain, const Scenario& scenario) {
     const double turned = angle_deg(tilted_gravity(brain.model, scenario.gravity_tilt_deg),
                                     brain.model.gravity_direction);
     if (turned < kMinTilt_deg) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("scenario {} does nothing on this case: gravity lies along the axis "
-                              "from the tumour to the craniotomy, so that {:g} degrees about it "
-                              "turn gravity by {:.1f}",
-                              scenario.name, scenario.gravity_tilt_deg, turned));
+      return invalid(fmt::format(
+          "scenario {} does nothing on this case: gravity lies along the axis from the tumour to "
+          "the craniotomy, so that {:g} degrees about it turn gravity by {:.1f}",
+          scenario.name, scenario.gravity_tilt_deg, turned));
     }
   }
   const Adversity& adverse = scenario.adverse;
@@ -161,10 +159,10 @@ Status check_retraction(const TruthBrain& brain, const Scenario& scenario) {
   if (!scenario.retraction) return {};
   const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
   if (!retraction_load(body, *scenario.retraction).isZero(0.0)) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("scenario {} does nothing on this case: its spatula of radius {:g} mm "
-                          "presses on no node of the opening",
-                          scenario.name, scenario.retraction->radius_mm));
+  return invalid(
+      fmt::format("scenario {} does nothing on this case: its spatula of radius {:g} mm presses on "
+                  "no node of the opening",
+                  scenario.name, scenario.retraction->radius_mm));
 }
 
 bool depends_on_contact(const Scenario& scenario) {

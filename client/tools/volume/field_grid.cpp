@@ -17,8 +17,7 @@ constexpr double kRounding = 1e-9;
 
 Status check_range(const char* name, double value, double least, double most) {
   if (value >= least && value <= most) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("{} = {}: must be in [{}, {}]", name, value, least, most));
+  return invalid(fmt::format("{} = {}: must be in [{}, {}]", name, value, least, most));
 }
 
 }  // namespace
@@ -28,8 +27,7 @@ Status validate(const FieldGrid& grid) {
     return fail(ErrorCode::kNotFinite, "grid: origin and spacing must be numbers");
   }
   if (!(grid.spacing_mm > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("grid.spacing_mm = {}: must be above 0", grid.spacing_mm));
+    return invalid(fmt::format("grid.spacing_mm = {}: must be above 0", grid.spacing_mm));
   }
   for (const int count : grid.dims) {
     if (count >= 3 && count <= FieldGrid::kMaxVoxelsAlongAxis) continue;
@@ -39,10 +37,9 @@ Status validate(const FieldGrid& grid) {
                     grid.dims[1], grid.dims[2], FieldGrid::kMaxVoxelsAlongAxis));
   }
   if (grid.num_voxels() > FieldGrid::kMaxVoxels) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("grid of {} x {} x {} voxels, {} mm apart: must have at most {} in all",
-                            grid.dims[0], grid.dims[1], grid.dims[2], grid.spacing_mm,
-                            FieldGrid::kMaxVoxels));
+    return invalid(fmt::format(
+        "grid of {} x {} x {} voxels, {} mm apart: must have at most {} in all", grid.dims[0],
+        grid.dims[1], grid.dims[2], grid.spacing_mm, FieldGrid::kMaxVoxels));
   }
   return {};
 }
@@ -62,10 +59,9 @@ Result<FieldGrid> grid_around(const Points& points, double margin_mm, double spa
     // One voxel more than steps, and the rim on both sides.
     const double count = std::max(steps, 0.0) + 3.0;
     if (count > FieldGrid::kMaxVoxelsAlongAxis) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("grid spacing {} mm: gives {:.0f} voxels along an axis, must be at "
-                              "most {}",
-                              spacing_mm, count, FieldGrid::kMaxVoxelsAlongAxis));
+      return invalid(
+          fmt::format("grid spacing {} mm: gives {:.0f} voxels along an axis, must be at most {}",
+                      spacing_mm, count, FieldGrid::kMaxVoxelsAlongAxis));
     }
     grid.dims[static_cast<std::size_t>(axis)] = static_cast<int>(count);
     grid.origin_mm[axis] = 0.5 * (low[axis] + high[axis]) - 0.5 * (count - 1.0) * spacing_mm;
@@ -85,10 +81,9 @@ Status validate(const OutsideTaper& taper) {
   const bool ok =
       taper.full_mm >= 0.0 && taper.full_mm < taper.zero_mm && taper.zero_mm <= kFarthest_mm;
   if (ok) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("taper outside the brain: full up to {} mm, zero from {} mm: must be 0 "
-                          "<= full < zero <= {}",
-                          taper.full_mm, taper.zero_mm, kFarthest_mm));
+  return invalid(fmt::format(
+      "taper outside the brain: full up to {} mm, zero from {} mm: must be 0 <= full < zero <= {}",
+      taper.full_mm, taper.zero_mm, kFarthest_mm));
 }
 
 }  // namespace brainshift::client

@@ -67,9 +67,8 @@ Result<GridSampler> GridSampler::build(const geometry::TetLocator& mesh, const F
   if (auto ok = validate(grid); !ok) return tl::unexpected(ok.error());
   if (auto ok = validate(options.taper); !ok) return tl::unexpected(ok.error());
   if (!(options.fade_mm >= 0.0 && options.fade_mm <= kMaxFade_mm)) {
-    return fail(ErrorCode::kInvalidArgument,
-                fmt::format("fade before the rim = {} mm: must be in [0, {}]", options.fade_mm,
-                            kMaxFade_mm));
+    return invalid(fmt::format("fade before the rim = {} mm: must be in [0, {}]", options.fade_mm,
+                               kMaxFade_mm));
   }
   if (mesh.tets().cols() == 0) return fail(ErrorCode::kEmptySet, "mesh: it has no tetrahedron");
   GridSampler sampler;

@@ -3,8 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
-
 #include "common/geometry/node_choice.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/toy_patient.hpp"

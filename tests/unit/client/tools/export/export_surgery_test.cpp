@@ -267,8 +267,7 @@ TEST_F(ExportSurgery, AFoldedFieldIsExportedForLookingAtOnly) {
 TEST_F(ExportSurgery, TheDirectionIsNeverImplied) {
   options.direction.reset();
   expect_refused(ErrorCode::kInvalidArgument,
-                 "--direction is missing and is never implied: "
-                 "resampling warps images");
+                 "--direction is missing and is never implied: resampling warps images");
 }
 
 TEST_F(ExportSurgery, OptionsThatContradictEachOtherAreRefused) {

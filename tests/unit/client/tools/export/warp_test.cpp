@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <limits>
 
 #include "client/tools/export/warp.hpp"

@@ -14,7 +14,6 @@
 #include <csignal>
 #include <future>
 #include <string>
-#include <thread>
 
 #include "tests/support/results.hpp"
 #include "tests/unit/client/lib/fake_daemon.hpp"

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
 #include "client/tools/pictures/canvas.hpp"

@@ -122,7 +122,7 @@ TEST(Play, WithoutAnyUsableUpdateThereIsNothingToScore) {
 TEST(Play, RefusedObservationIsRecordedAndTheRestGoesOn) {
   ScriptedDaemon daemon;
   daemon.on_submit = [](const Observation& o) -> Result<ObservationReceipt> {
-    if (o.sequence == 1) return fail(ErrorCode::kInvalidArgument, "frame lps");
+    if (o.sequence == 1) return invalid("frame lps");
     return ObservationReceipt{o.sequence, false};
   };
   daemon.script = [](const Observation& o) { return std::vector{update(o.sequence, true)}; };

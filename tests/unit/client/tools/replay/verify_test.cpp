@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
-#include <cmath>
-
 #include "client/tools/replay/verify.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/support/results.hpp"

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/other_mesh.hpp"
