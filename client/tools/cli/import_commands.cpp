@@ -50,9 +50,7 @@ Status run_import(const ImportArguments& arguments) {
     if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
   }
   if (!arguments.landmarks.empty()) return run_landmarks(arguments);
-  if (!arguments.landmarks_moved.empty()) {
-    return invalid("--landmarks-moved needs --landmarks");
-  }
+  if (!arguments.landmarks_moved.empty()) return invalid("--landmarks-moved needs --landmarks");
   const auto report = import_recording(options, terminal_progress());
   if (!report) return tl::unexpected(report.error());
   print_lines(report_lines(*report));

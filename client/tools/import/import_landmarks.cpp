@@ -22,9 +22,7 @@ constexpr std::size_t kMinPairs = 3;  // as the daemon needs
 constexpr double kMinSd_mm = 0.01, kMaxLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
-  if (options.landmarks.empty()) {
-    return invalid("--landmarks is required");
-  }
+  if (options.landmarks.empty()) return invalid("--landmarks is required");
   if (options.out.empty()) return invalid("--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
   if (!(options.sd_mm >= kMinSd_mm && options.sd_mm <= kMaxLandmarkSd_mm)) {
