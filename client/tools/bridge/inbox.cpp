@@ -20,26 +20,21 @@ constexpr const char* kRas = "Ras";
 constexpr const char* kSweepSource = "ius";
 
 Status check(const InboxOptions& options) {
-  const auto refuse = [](const std::string& sentence) { return invalid(sentence); };
   if (!options.contours.empty() && !options.seeds.empty()) {
-    return refuse("--contours and --seeds: at most one of them");
+    return invalid("--contours and --seeds: at most one of them");
   }
   if (options.wants_images() && options.registration.empty()) {
-    return refuse("--registration is required with --contours or --seeds");
+    return invalid("--registration is required with --contours or --seeds");
   }
   if (options.landmarks_before.empty() != options.landmarks_after.empty()) {
-    return refuse("--landmarks-before and --landmarks-after: both or none");
+    return invalid("--landmarks-before and --landmarks-after: both or none");
   }
-  const auto range = [&](const char* name, double value, double least, double most) -> Status {
-    if (value >= least && value <= most) return {};
-    return refuse(fmt::format("{} {}: must be {} to {}", name, value, least, most));
-  };
-  Status ok = range("--sd-mm", options.sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--surface-sd-mm", options.surface_sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--landmark-sd-mm", options.landmark_sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0);
-  if (ok) ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
-  if (ok) ok = range("--sweeps", options.sweep_gap_s, 0.1, 3600.0);
+  Status ok = check_option("--sd-mm", options.sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--surface-sd-mm", options.surface_sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--landmark-sd-mm", options.landmark_sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--latency-ms", options.latency_ms, -1000.0, 1000.0);
+  if (ok) ok = check_option("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
+  if (ok) ok = check_option("--sweeps", options.sweep_gap_s, 0.1, 3600.0);
   return ok;
 }
 

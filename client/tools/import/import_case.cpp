@@ -44,6 +44,11 @@ Status check_one_case(const fs::path& case_file, const fs::path& model) {
                              model.empty() ? "none" : "both"));
 }
 
+Status check_option(const char* name, double value, double least, double most) {
+  if (value >= least && value <= most) return {};
+  return invalid(fmt::format("{} {}: must be {} to {}", name, value, least, most));
+}
+
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {
   if (device.empty()) return std::vector<tracking::ConstantLink>{};
   return io::read_plus_config(device);
