@@ -115,11 +115,8 @@ std::string shown_line(const ShownLine& line, bool json) {
     return text_of(object);
   }
   std::string text = fmt::format("update {}", state.sequence);
-  if (std::isfinite(state.age_ms)) {
-    text += fmt::format("  age {:.2f} s", 1e-3 * state.age_ms);
-  } else {
-    text += "  age unknown";
-  }
+  text += std::isfinite(state.age_ms) ? fmt::format("  age {:.2f} s", 1e-3 * state.age_ms)
+                                      : "  age unknown";
   text += fmt::format("  {}, {}  {} x {} x {} voxels, {:g} mm, error {:.2f} mm  {:.1f} ms",
                       state.quality, to_string(state.currency), line.dims[0], line.dims[1],
                       line.dims[2], state.spacing_mm, state.grid_error_mm, line.made_ms);

@@ -165,8 +165,7 @@ Result<stereo::CalibrationResult> calibrate_files(const CalibrateJob& job,
   const auto right = expand_patterns(job.right);
   if (!right) return tl::unexpected(right.error());
   if (left->size() != right->size()) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("{} left and {} right pictures: must be as many", left->size(), right->size()));
   }
   std::vector<stereo::PicturePair> pairs;
