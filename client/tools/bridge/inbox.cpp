@@ -10,6 +10,7 @@
 #include "common/core/rigid_motion.hpp"
 #include "common/igtl/surface.hpp"
 #include "common/io/geometry/pose_file.hpp"
+#include "common/io/landmarks/point_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/tracking/transform_graph.hpp"
 
@@ -165,27 +166,22 @@ void Inbox::take_landmarks(const std::string& device, const igtl::PointList& lis
     taken.notes.push_back(device + ": " + T_ras.error().message);
     return;
   }
-  std::vector<std::pair<Vec3, Vec3>> pairs;
+  std::vector<Vec3> undeformed, deformed;
   for (const auto& point : list.points) {
     const auto before = before_.find(point.name);
     if (before == before_.end()) continue;
-    pairs.emplace_back(before->second, *T_ras * Vec3(point.position.cast<double>()));
+    undeformed.push_back(before->second);
+    deformed.emplace_back(*T_ras * Vec3(point.position.cast<double>()));
   }
-  if (pairs.empty()) {
+  if (deformed.empty()) {
     taken.notes.push_back(device + ": no point has the name of one of " +
                           options_.landmarks_before);
     return;
   }
-  LandmarkPairs landmarks{Points(3, static_cast<Eigen::Index>(pairs.size())),
-                          Points(3, static_cast<Eigen::Index>(pairs.size())),
-                          options_.landmark_sd_mm};
-  for (Eigen::Index i = 0; i < landmarks.deformed.cols(); ++i) {
-    const auto& [undeformed, deformed] = pairs[static_cast<std::size_t>(i)];
-    landmarks.undeformed.col(i) = undeformed;
-    landmarks.deformed.col(i) = deformed;
-  }
-  taken.found.push_back({device, std::move(landmarks), arrived,
-                         fmt::format("{}: {} landmark pairs", device, pairs.size())});
+  taken.found.push_back(
+      {device,
+       LandmarkPairs{io::columns_of(undeformed), io::columns_of(deformed), options_.landmark_sd_mm},
+       arrived, fmt::format("{}: {} landmark pairs", device, deformed.size())});
 }
 
 Taken Inbox::take(const igtl::Message& message, TimePoint arrived) {

@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "client/tools/journal/journal_export.hpp"
+
 namespace brainshift::client {
 namespace {
 
@@ -46,15 +48,8 @@ bool is_ascii(std::string_view text) {
 }  // namespace
 
 std::string flag_names(const Update& update) {
-  std::string names;
-  const auto add = [&](std::string_view name) {
-    if (!names.empty()) names += '+';
-    names += name;
-  };
-  for (const QualityFlag flag : kAllQualityFlags) {
-    if (update.estimate.quality.flags.has(flag)) add(to_string(flag));
-  }
-  if (update.answer_time.late()) add("late");
+  std::string names = flags_text(update.estimate.quality);
+  if (update.answer_time.late()) names += names.empty() ? "late" : "+late";
   return names;
 }
 
