@@ -115,14 +115,12 @@ Result<Target> open_target(const fs::path& path, const io::ModelFile& model) {
     if (!place) return tl::unexpected(place.error());
     return Target{std::move(*file), *place};
   }
-  io::SurgeryMeta meta;
-  meta.case_id = model.model.case_id;
-  meta.model_id = model.model.model_id;
-  meta.case_file = model.config.file.string();
-  meta.scenario = "recorded";
-  meta.created_utc = utc_now();
-  meta.software = "brainshift stereo";
-  auto file = io::SurgeryFile::create(path, meta);
+  auto file = io::SurgeryFile::create(path, {.case_id = model.model.case_id,
+                                             .model_id = model.model.model_id,
+                                             .case_file = model.config.file.string(),
+                                             .scenario = "recorded",
+                                             .created_utc = utc_now(),
+                                             .software = "brainshift stereo"});
   if (!file) return tl::unexpected(file.error());
   return Target{std::move(*file), {}};
 }
