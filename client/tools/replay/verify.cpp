@@ -239,10 +239,9 @@ Result<SessionRequest> request_of(const io::SurgeryMeta& meta, const fs::path& p
   SessionRequest request;
   request.case_id = meta.case_id;
   const auto unknown = [&](const char* key, const std::string& value) {
-    return io::unreadable(path,
-                          fmt::format("meta.{} is \"{}\": it is no journal of a session that could "
-                                      "be repeated",
-                                      key, value));
+    return io::unreadable(
+        path, fmt::format("meta.{} is \"{}\": it is no journal of a session that could be repeated",
+                          key, value));
   };
   const auto method = std::find_if(std::begin(kAllMethods), std::end(kAllMethods),
                                    [&](Method m) { return meta.method == to_string(m); });
@@ -280,9 +279,9 @@ Status check_served(const io::SurgeryMeta& meta, const DaemonStatus& status,
   if (status.case_id == meta.case_id && status.model_id == meta.model_id) return {};
   return io::file_error(
       ErrorCode::kInvalidArgument, options.journal,
-      fmt::format("is of case \"{}\" and model \"{}\", but the daemon at {} serves \"{}\" and "
-                  "\"{}\"",
-                  meta.case_id, meta.model_id, options.endpoint, status.case_id, status.model_id));
+      fmt::format(
+          "is of case \"{}\" and model \"{}\", but the daemon at {} serves \"{}\" and \"{}\"",
+          meta.case_id, meta.model_id, options.endpoint, status.case_id, status.model_id));
 }
 
 }  // namespace

@@ -90,12 +90,11 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
   paper.points.push_back({1e3 * paper::kTime_s, paper::kContactCross_mm.mean, "paper"});
   spec.series.push_back(std::move(paper));
 
-  return Figure{
-      "error-time.png",
-      "Error at the tumour against the time of one update, per method and boundary condition. The "
-      "paper's time was measured on a machine of 2009. make bench draws the same for more methods, "
-      "ranks and meshes.",
-      draw_chart(spec)};
+  return Figure{"error-time.png",
+                "Error at the tumour against the time of one update, per method and boundary "
+                "condition. The paper's time was measured on a machine of 2009. make bench draws "
+                "the same for more methods, ranks and meshes.",
+                draw_chart(spec)};
 }
 
 Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs) {
