@@ -225,7 +225,9 @@ TEST_F(ResectedSurgery, NothingOfTheCavityIsMeasuredOrScored) {
     Vec3 x = Vec3::Zero();
     for (int k = 0; k < 4; ++k) {
       x += point.weights[k] * resected_patient().mesh.nodes.col(point.nodes[k]);
-      if (point.weights[k] > 0.0) EXPECT_EQ(removed.count(point.nodes[k]), 0u);
+      if (point.weights[k] > 0.0) {
+        EXPECT_EQ(removed.count(point.nodes[k]), 0u);
+      }
     }
     for (int v = 0; v < deformed.num_vertices(); ++v) {
       if ((deformed.vertices.col(v) - x).norm() > 1e-9) continue;

@@ -149,7 +149,9 @@ TEST(Joint, EveryMomentIsSeenByThreeInstrumentsWithTheSameTruth) {
     const Observation& observation = surgery.observations[i];
     EXPECT_EQ(observation.source, sources[i % 3]);
     EXPECT_EQ(observation.sequence, i + 1);
-    if (i > 0) EXPECT_GT(observation.acquired_ns, surgery.observations[i - 1].acquired_ns);
+    if (i > 0) {
+      EXPECT_GT(observation.acquired_ns, surgery.observations[i - 1].acquired_ns);
+    }
     EXPECT_EQ(surgery.truths[i].displacement, surgery.truths[3 * (i / 3)].displacement);
   }
   EXPECT_NE(surgery.truths[0].displacement, surgery.truths[3].displacement);

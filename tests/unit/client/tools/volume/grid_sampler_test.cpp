@@ -132,7 +132,9 @@ TEST(GridSampler, OnlyTheRimIsZeroWhereAGridEndsInTheBrain) {
       for (int i = 0; i < 7; ++i) {
         const Vec3 got = vector_at(xyz, grid.index(i, j, k));
         EXPECT_EQ(got.isZero(0.0), grid.in_rim(i, j, k));
-        if (!grid.in_rim(i, j, k)) EXPECT_LT((got - Vec3(1, -2, 3)).norm(), kFloat);
+        if (!grid.in_rim(i, j, k)) {
+          EXPECT_LT((got - Vec3(1, -2, 3)).norm(), kFloat);
+        }
       }
     }
   }
