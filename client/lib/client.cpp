@@ -52,14 +52,15 @@ struct Client::Impl {
   Deadline renewed;                // when it was last renewed
   std::uint64_t losses = 0;        // of the dealer, as far as they have been dealt with
 
-  // Sends a request and waits for its reply's payload. Updates met on the way are queued.
+  // Sends a request and waits for its reply's payload: by default for as long as the options say.
+  // Updates met on the way are queued.
   Result<std::string> request(MessageType type, const std::string& payload, MessageType reply_type,
-                              milliseconds timeout) {
+                              std::optional<milliseconds> timeout = {}) {
     if (payload.size() > wire::kMaxPayloadBytes) {
       return invalid("request of " + std::to_string(payload.size()) + " bytes: must be at most " +
                      std::to_string(wire::kMaxPayloadBytes));
     }
-    const Deadline deadline = deadline_after(timeout);
+    const Deadline deadline = deadline_after(timeout.value_or(options.request_timeout));
     const std::uint64_t id = ++last_request_id;
     if (Status status = dealer->send(encode_frame(type, id, payload), deadline); !status) {
       return tl::unexpected(status.error());
@@ -69,11 +70,6 @@ struct Client::Impl {
       if (!message) return tl::unexpected(message.error());
       if (auto result = answer(*message, id, reply_type)) return *std::move(result);
     }
-  }
-
-  Result<std::string> request(MessageType type, const std::string& payload,
-                              MessageType reply_type) {
-    return request(type, payload, reply_type, options.request_timeout);
   }
 
   // The payload if `message` answers request `id`; nullopt if it is an update or a late reply.

@@ -11,15 +11,12 @@ namespace {
 
 Status encode_volume(const igtl::Envelope& envelope, const igtl::ImageGeometry& geometry,
                      int components, const std::vector<float>& voxels, std::string& out) {
+  std::vector<float> zeros;
+  if (voxels.empty()) zeros.resize(static_cast<std::size_t>(components) * geometry.num_voxels());
   igtl::ImageView view;
   view.geometry = geometry;
   view.components = components;
-  if (!voxels.empty()) {
-    view.voxels = std::span<const float>(voxels);
-    return igtl::encode(envelope, view, out);
-  }
-  const std::vector<float> zeros(static_cast<std::size_t>(components) * geometry.num_voxels());
-  view.voxels = std::span<const float>(zeros);
+  view.voxels = std::span<const float>(voxels.empty() ? zeros : voxels);
   return igtl::encode(envelope, view, out);
 }
 

@@ -63,10 +63,8 @@ Status Follower::run(const std::stop_token& stop) {
 }
 
 Status Follower::follow(const std::stop_token& stop) {
-  ClientOptions options;
-  options.keys = options_.keys;
-  options.request_timeout = kRequestTimeout;
-  auto client = Client::connect(options_.endpoint, options);
+  auto client = Client::connect(options_.endpoint,
+                                {.request_timeout = kRequestTimeout, .keys = options_.keys});
   if (!client) return tl::unexpected(client.error());
   client_ = std::move(*client);
   if (auto ok = load_model(); !ok) return ok;

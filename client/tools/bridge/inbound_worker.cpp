@@ -137,9 +137,7 @@ Status InboundWorker::submit(const Found& found, const std::stop_token& stop) {
     return fail(ErrorCode::kUnavailable, "no session runs in " + endpoint_);
   }
   if (!client_) {
-    ClientOptions options;
-    options.keys = keys_;
-    auto client = Client::connect(endpoint_, options);
+    auto client = Client::connect(endpoint_, {.keys = keys_});
     if (!client) return tl::unexpected(client.error());
     client_ = std::move(*client);
   }

@@ -10,6 +10,7 @@
 #include "common/core/rigid_motion.hpp"
 #include "common/igtl/poly_data.hpp"
 #include "common/io/geometry/pose_file.hpp"
+#include "common/io/landmarks/point_file.hpp"
 #include "common/io/recording/contour_file.hpp"
 #include "common/tracking/transform_graph.hpp"
 
@@ -20,26 +21,21 @@ constexpr const char* kRas = "Ras";
 constexpr const char* kSweepSource = "ius";
 
 Status check(const InboxOptions& options) {
-  const auto refuse = [](const std::string& sentence) { return invalid(sentence); };
   if (!options.contours.empty() && !options.seeds.empty()) {
-    return refuse("--contours and --seeds: at most one of them");
+    return invalid("--contours and --seeds: at most one of them");
   }
   if (options.wants_images() && options.registration.empty()) {
-    return refuse("--registration is required with --contours or --seeds");
+    return invalid("--registration is required with --contours or --seeds");
   }
   if (options.landmarks_before.empty() != options.landmarks_after.empty()) {
-    return refuse("--landmarks-before and --landmarks-after: both or none");
+    return invalid("--landmarks-before and --landmarks-after: both or none");
   }
-  const auto range = [&](const char* name, double value, double least, double most) -> Status {
-    if (value >= least && value <= most) return {};
-    return refuse(fmt::format("{} {}: must be {} to {}", name, value, least, most));
-  };
-  Status ok = range("--sd-mm", options.sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--surface-sd-mm", options.surface_sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--landmark-sd-mm", options.landmark_sd_mm, 0.01, 20.0);
-  if (ok) ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0);
-  if (ok) ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
-  if (ok) ok = range("--sweeps", options.sweep_gap_s, 0.1, 3600.0);
+  Status ok = check_option("--sd-mm", options.sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--surface-sd-mm", options.surface_sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--landmark-sd-mm", options.landmark_sd_mm, 0.01, 20.0);
+  if (ok) ok = check_option("--latency-ms", options.latency_ms, -1000.0, 1000.0);
+  if (ok) ok = check_option("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
+  if (ok) ok = check_option("--sweeps", options.sweep_gap_s, 0.1, 3600.0);
   return ok;
 }
 
@@ -170,27 +166,22 @@ void Inbox::take_landmarks(const std::string& device, const igtl::PointList& lis
     taken.notes.push_back(device + ": " + T_ras.error().message);
     return;
   }
-  std::vector<std::pair<Vec3, Vec3>> pairs;
+  std::vector<Vec3> undeformed, deformed;
   for (const auto& point : list.points) {
     const auto before = before_.find(point.name);
     if (before == before_.end()) continue;
-    pairs.emplace_back(before->second, *T_ras * Vec3(point.position.cast<double>()));
+    undeformed.push_back(before->second);
+    deformed.emplace_back(*T_ras * Vec3(point.position.cast<double>()));
   }
-  if (pairs.empty()) {
+  if (deformed.empty()) {
     taken.notes.push_back(device + ": no point has the name of one of " +
                           options_.landmarks_before);
     return;
   }
-  LandmarkPairs landmarks{Points(3, static_cast<Eigen::Index>(pairs.size())),
-                          Points(3, static_cast<Eigen::Index>(pairs.size())),
-                          options_.landmark_sd_mm};
-  for (Eigen::Index i = 0; i < landmarks.deformed.cols(); ++i) {
-    const auto& [undeformed, deformed] = pairs[static_cast<std::size_t>(i)];
-    landmarks.undeformed.col(i) = undeformed;
-    landmarks.deformed.col(i) = deformed;
-  }
-  taken.found.push_back({device, std::move(landmarks), arrived,
-                         fmt::format("{}: {} landmark pairs", device, pairs.size())});
+  taken.found.push_back(
+      {device,
+       LandmarkPairs{io::columns_of(undeformed), io::columns_of(deformed), options_.landmark_sd_mm},
+       arrived, fmt::format("{}: {} landmark pairs", device, deformed.size())});
 }
 
 Taken Inbox::take(const igtl::Message& message, TimePoint arrived) {

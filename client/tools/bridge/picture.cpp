@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "client/tools/journal/journal_export.hpp"
+
 namespace brainshift::client {
 namespace {
 
@@ -46,15 +48,8 @@ bool is_ascii(std::string_view text) {
 }  // namespace
 
 std::string flag_names(const Update& update) {
-  std::string names;
-  const auto add = [&](std::string_view name) {
-    if (!names.empty()) names += '+';
-    names += name;
-  };
-  for (const QualityFlag flag : kAllQualityFlags) {
-    if (update.estimate.quality.flags.has(flag)) add(to_string(flag));
-  }
-  if (update.answer_time.late()) add("late");
+  std::string names = flags_text(update.estimate.quality);
+  if (update.answer_time.late()) names += names.empty() ? "late" : "+late";
   return names;
 }
 
@@ -115,11 +110,8 @@ std::string shown_line(const ShownLine& line, bool json) {
     return text_of(object);
   }
   std::string text = fmt::format("update {}", state.sequence);
-  if (std::isfinite(state.age_ms)) {
-    text += fmt::format("  age {:.2f} s", 1e-3 * state.age_ms);
-  } else {
-    text += "  age unknown";
-  }
+  text += std::isfinite(state.age_ms) ? fmt::format("  age {:.2f} s", 1e-3 * state.age_ms)
+                                      : "  age unknown";
   text += fmt::format("  {}, {}  {} x {} x {} voxels, {:g} mm, error {:.2f} mm  {:.1f} ms",
                       state.quality, to_string(state.currency), line.dims[0], line.dims[1],
                       line.dims[2], state.spacing_mm, state.grid_error_mm, line.made_ms);

@@ -27,9 +27,7 @@ Result<AddressList> look_up(const Address& address, int flags) {
   addrinfo* list = nullptr;
   const int error =
       getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &list);
-  if (error != 0) {
-    return invalid(to_string(address) + ": " + gai_strerror(error));
-  }
+  if (error != 0) return invalid(to_string(address) + ": " + gai_strerror(error));
   return AddressList(list, &freeaddrinfo);
 }
 

@@ -33,15 +33,18 @@ Status check_landmarks_alone(const ImportArguments& arguments) {
   return {};
 }
 
+// Prints what was made, if it was.
+template <typename Report>
+Status print_report(const Result<Report>& report) {
+  return report.map([](const Report& made) { print_lines(report_lines(made)); });
+}
+
 Status run_landmarks(const ImportArguments& arguments) {
   if (Status ok = check_landmarks_alone(arguments); !ok) return ok;
   const ImportOptions& given = arguments.options;
-  const auto report = import_landmarks({arguments.landmarks, arguments.landmarks_moved,
+  return print_report(import_landmarks({arguments.landmarks, arguments.landmarks_moved,
                                         given.case_file, given.model, given.out, given.sd_mm},
-                                       terminal_progress());
-  if (!report) return tl::unexpected(report.error());
-  print_lines(report_lines(*report));
-  return {};
+                                       terminal_progress()));
 }
 
 Status run_import(const ImportArguments& arguments) {
@@ -50,13 +53,8 @@ Status run_import(const ImportArguments& arguments) {
     if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
   }
   if (!arguments.landmarks.empty()) return run_landmarks(arguments);
-  if (!arguments.landmarks_moved.empty()) {
-    return invalid("--landmarks-moved needs --landmarks");
-  }
-  const auto report = import_recording(options, terminal_progress());
-  if (!report) return tl::unexpected(report.error());
-  print_lines(report_lines(*report));
-  return {};
+  if (!arguments.landmarks_moved.empty()) return invalid("--landmarks-moved needs --landmarks");
+  return print_report(import_recording(options, terminal_progress()));
 }
 
 // What the arguments say, before they are options of register_patient.
@@ -73,10 +71,7 @@ Status run_register(const RegisterArguments& arguments) {
   if (!options.out.empty()) {  // register_patient names what is missing
     if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
   }
-  const auto report = register_patient(options, terminal_progress());
-  if (!report) return tl::unexpected(report.error());
-  print_lines(report_lines(*report));
-  return {};
+  return print_report(register_patient(options, terminal_progress()));
 }
 
 void add_inputs(CLI::App& command, RegisterArguments& arguments) {

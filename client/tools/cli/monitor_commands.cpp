@@ -101,9 +101,7 @@ Status add(const KeysArguments& arguments) {
   const io::AllowedKey allowed{*role_from(arguments.role),
                                arguments.name.empty() ? key->name : arguments.name,
                                key->public_key};
-  if (allowed.name.empty()) {
-    return invalid("keys add: --name is needed for a key that is no file");
-  }
+  if (allowed.name.empty()) return invalid("keys add: --name is needed for a key that is no file");
   if (Status added = io::add_allowed_key(arguments.allow_list, allowed); !added) return added;
   std::printf("%s: %s may act as %s from the daemon's next start\n", arguments.allow_list.c_str(),
               allowed.name.c_str(), arguments.role.c_str());

@@ -58,9 +58,7 @@ Status run_replay(ReplayArguments arguments) {
   options.timeout = std::chrono::milliseconds(static_cast<long>(1e3 * arguments.timeout_s));
   if (Status ok = read_keys(arguments.keys, options.keys); !ok) return ok;
   if (arguments.verify) return verify(options);
-  if (options.report.empty()) {
-    return invalid("--report is required (see brainshift replay --help)");
-  }
+  if (options.report.empty()) return invalid("--report is required (see brainshift replay --help)");
   if (Status ok = io::check_output_file("--report", options.report); !ok) return ok;
   if (!options.latency_csv.empty()) {
     if (Status ok = io::check_output_file("--latency-csv", options.latency_csv); !ok) return ok;

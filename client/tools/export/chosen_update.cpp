@@ -91,9 +91,8 @@ Result<ChosenUpdate> choose_update(const io::SurgeryFile& file, const fs::path& 
   }
   const auto columns = message.update.estimate.displacement.cols();
   if (columns != nodes) {
-    return io::file_error(
-        ErrorCode::kUnreadable, path,
-        fmt::format("{}: displacement of {} nodes, the model has {}", name, columns, nodes));
+    return io::unreadable(
+        path, fmt::format("{}: displacement of {} nodes, the model has {}", name, columns, nodes));
   }
   return std::move(*found->chosen);
 }

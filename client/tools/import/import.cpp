@@ -36,20 +36,16 @@ Status check_import(const ImportOptions& options) {
        {std::pair{"--recording", options.recording}, std::pair{"--out", options.out}}) {
     if (path.empty()) return invalid(std::string(name) + " is required");
   }
-  const auto range = [](const char* name, double value, double least, double most) -> Status {
-    if (value >= least && value <= most) return {};
-    return invalid(fmt::format("{} {}: must be {} to {}", name, value, least, most));
-  };
   Status ok = one_of(!options.contours.empty(), !options.seeds.empty(), "--contours and --seeds");
   if (ok) {
     ok = one_of(!options.registration.empty(), !options.fiducials.empty(),
                 "--registration and --fiducials");
   }
   if (ok) ok = check_one_case(options.case_file, options.model);
-  if (ok) ok = range("--sd-mm", options.sd_mm, 0.01, kMaxSd_mm);
-  if (ok) ok = range("--latency-ms", options.latency_ms, -1000.0, 1000.0);
-  if (ok) ok = range("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
-  if (ok) ok = range("--sweeps", options.sweep_gap_s, 0.0, 86400.0);
+  if (ok) ok = check_option("--sd-mm", options.sd_mm, 0.01, kMaxSd_mm);
+  if (ok) ok = check_option("--latency-ms", options.latency_ms, -1000.0, 1000.0);
+  if (ok) ok = check_option("--max-age-ms", options.max_age_ms, 0.0, 60000.0);
+  if (ok) ok = check_option("--sweeps", options.sweep_gap_s, 0.0, 86400.0);
   return ok ? check_new(options.out) : ok;
 }
 
@@ -115,11 +111,11 @@ Result<std::vector<Observation>> observations_of(const Boundaries& boundaries,
     if (told.tumour_distance_mm > kFarthest_mm) {
       std::string notes;
       for (const std::string& note : report.notes) notes += "; " + note;
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of "
-                              "case {}: must be within {:.0f} mm; is it the right registration{}",
-                              sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
-                              patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
+      return invalid(
+          fmt::format("the boundary of frames {} to {} lies {:.0f} mm from the tumour of "
+                      "case {}: must be within {:.0f} mm; is it the right registration{}",
+                      sweep.first_frame, sweep.last_frame, told.tumour_distance_mm,
+                      patient.model.case_id, kFarthest_mm, notes.empty() ? "?" : notes));
     }
     Observation observation;
     observation.case_id = patient.model.case_id;

@@ -22,8 +22,7 @@ Status check_pixel(const AffineTransform& T, int frame) {
   for (int axis = 0; axis < 2; ++axis) {
     const double width_mm = T.linear().col(axis).norm();
     if (width_mm >= kMinPixel_mm && width_mm <= kMaxPixel_mm) continue;
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("a pixel of frame {} is {:.3g} mm {}: must be {} to {} mm; is a transform "
                     "in metres or the calibration missing?",
                     frame, width_mm, axis == 0 ? "wide" : "high", kMinPixel_mm, kMaxPixel_mm));
@@ -34,8 +33,7 @@ Status check_pixel(const AffineTransform& T, int frame) {
 Status check_extent(const SweepBoundary& sweep) {
   const Vec3 size = sweep.points.rowwise().maxCoeff() - sweep.points.rowwise().minCoeff();
   if (size.norm() >= kMinExtent_mm && size.norm() <= kMaxExtent_mm) return {};
-  return fail(
-      ErrorCode::kInvalidArgument,
+  return invalid(
       fmt::format("the boundary of frames {} to {} spans {:.3g} mm: must be {} to {} mm; are "
                   "tracked transforms or contours in another unit?",
                   sweep.first_frame, sweep.last_frame, size.norm(), kMinExtent_mm, kMaxExtent_mm));
@@ -63,8 +61,7 @@ Status check_contours(const tracking::Recording& recording,
       if (u >= -0.5 && u <= recording.width - 0.5 && v >= -0.5 && v <= recording.height - 0.5) {
         continue;
       }
-      return fail(
-          ErrorCode::kInvalidArgument,
+      return invalid(
           fmt::format("contour on frame {}: {} {} px lies outside the image of {} x {} pixels",
                       contour.frame, u, v, recording.width, recording.height));
     }

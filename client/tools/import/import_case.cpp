@@ -28,20 +28,23 @@ constexpr double kThin = 0.2;
 Vec3 ImportCase::tumour_centroid() const { return model.tumour.vertices.rowwise().mean(); }
 
 io::SurgeryMeta ImportCase::meta(const std::string& scenario, const std::string& software) const {
-  io::SurgeryMeta meta;
-  meta.case_id = model.case_id;
-  meta.model_id = model.model_id;
-  meta.case_file = case_file.string();
-  meta.scenario = scenario;
-  meta.created_utc = utc_now();
-  meta.software = software;
-  return meta;
+  return {.case_id = model.case_id,
+          .model_id = model.model_id,
+          .case_file = case_file.string(),
+          .scenario = scenario,
+          .created_utc = utc_now(),
+          .software = software};
 }
 
 Status check_one_case(const fs::path& case_file, const fs::path& model) {
   if (case_file.empty() != model.empty()) return {};
   return invalid(fmt::format("exactly one of --case and --model is required, {} given",
                              model.empty() ? "none" : "both"));
+}
+
+Status check_option(const char* name, double value, double least, double most) {
+  if (value >= least && value <= most) return {};
+  return invalid(fmt::format("{} {}: must be {} to {}", name, value, least, most));
 }
 
 Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device) {

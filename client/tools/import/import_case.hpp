@@ -38,6 +38,9 @@ Result<ImportCase> load_import_case(const std::filesystem::path& case_file,
                                     const std::filesystem::path& model,
                                     const Progress& progress = {});
 
+// kInvalidArgument when an option's value lies outside of [least, most], or is no number.
+Status check_option(const char* name, double value, double least, double most);
+
 // The fixed transforms of a PLUS device set (.xml); none for an empty path. Errors of
 // io::read_plus_config.
 Result<std::vector<tracking::ConstantLink>> device_links(const std::filesystem::path& device);

@@ -22,17 +22,11 @@ constexpr std::size_t kMinPairs = 3;  // as the daemon needs
 constexpr double kMinSd_mm = 0.01, kMaxLandmarkSd_mm = 20.0;
 
 Status check_landmark_import(const LandmarkOptions& options) {
-  if (options.landmarks.empty()) {
-    return invalid("--landmarks is required");
-  }
+  if (options.landmarks.empty()) return invalid("--landmarks is required");
   if (options.out.empty()) return invalid("--out is required");
   if (Status ok = check_one_case(options.case_file, options.model); !ok) return ok;
-  if (!(options.sd_mm >= kMinSd_mm && options.sd_mm <= kMaxLandmarkSd_mm)) {
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format("--sd-mm {}: must be {} to {}", options.sd_mm, kMinSd_mm, kMaxLandmarkSd_mm));
-  }
-  return check_new(options.out);
+  const Status ok = check_option("--sd-mm", options.sd_mm, kMinSd_mm, kMaxLandmarkSd_mm);
+  return ok ? check_new(options.out) : ok;
 }
 
 // "landmark 3", and its name where it has one.
@@ -81,13 +75,10 @@ Status check_place(const io::NamedPairs& pairs, const BrainModel& model, Landmar
     const double outside = brain.locate(pairs.first[i]).distance_mm;
     if (outside > kLargestOutside_mm) {
       const Vec3& at = pairs.first[i];
-      return fail(
-          ErrorCode::kInvalidArgument,
-          fmt::format(
-              "{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside the brain of "
-              "case {}: must be within {:.0f} mm; is it mm RAS, and of this patient?",
-              called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id,
-              kLargestOutside_mm));
+      return invalid(fmt::format(
+          "{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside the brain of "
+          "case {}: must be within {:.0f} mm; is it mm RAS, and of this patient?",
+          called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id, kLargestOutside_mm));
     }
     if (outside <= 0.0) continue;
     ++report.outside;

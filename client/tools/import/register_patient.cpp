@@ -18,32 +18,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-tl::unexpected<Error> refuse(std::string text) { return invalid(std::move(text)); }
-
 Status check_register(const RegisterOptions& options) {
   if (options.recording.empty() == options.fiducials.empty()) {
-    return refuse(fmt::format("exactly one of --recording and --fiducials is required, {} given",
-                              options.recording.empty() ? "none" : "both"));
+    return invalid(fmt::format("exactly one of --recording and --fiducials is required, {} given",
+                               options.recording.empty() ? "none" : "both"));
   }
   if (options.ras.empty() && !options.recording.empty()) {
-    return refuse("--ras is required: where the fiducials lie in the image");
+    return invalid("--ras is required: where the fiducials lie in the image");
   }
-  if (options.out.empty()) return refuse("--out is required");
+  if (options.out.empty()) return invalid("--out is required");
   const int targets = int{!options.case_file.empty()} + int{!options.model.empty()} +
                       int{options.target.has_value()};
   if (targets != 1) {
-    return refuse(
+    return invalid(
         fmt::format("exactly one of --model, --case and --target is required, {} given", targets));
   }
-  if (options.target && !options.target->allFinite()) return refuse("--target is not finite");
+  if (options.target && !options.target->allFinite()) return invalid("--target is not finite");
   if (options.recording.empty() && !options.holds.empty()) {
-    return refuse("--holds is for a --recording");
+    return invalid("--holds is for a --recording");
   }
   for (const auto& [name, value, most] : {std::tuple{"--still-mm", options.hold.radius_mm, 100.0},
                                           std::tuple{"--still-s", options.hold.least_s, 3600.0}}) {
-    if (!(value >= 0.01 && value <= most)) {
-      return refuse(fmt::format("{} {}: must be 0.01 to {}", name, value, most));
-    }
+    if (Status ok = check_option(name, value, 0.01, most); !ok) return ok;
   }
   return check_new(options.out);
 }
@@ -89,7 +85,7 @@ Status choose_holds(const RegisterOptions& options, RegisterReport& report) {
   std::set<int> seen;
   for (const int hold : options.holds) {
     if (hold < 1 || hold > count || !seen.insert(hold).second) {
-      return refuse(fmt::format(
+      return invalid(fmt::format(
           "--holds {}: must be numbers from 1 to {}, each once: the stylus was held still {}", hold,
           count, list_of(report.held)));
     }
@@ -159,7 +155,7 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
         report.held.empty()
             ? std::string()
             : "; the stylus was held still " + list_of(report.held) + ": choose with --holds";
-    return refuse(
+    return invalid(
         fmt::format("{} fiducials were touched, {} holds {}: in order there must be as many{}",
                     measured.cols(), options.ras.string(), image.cols(), held));
   }

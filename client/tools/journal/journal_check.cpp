@@ -14,9 +14,9 @@ namespace {
 // The payload must be what its kind says; counts it.
 Status count(const io::SurgeryRecord& record, JournalCheck& check) {
   const auto undecodable = [&](const Error& error) {
-    return io::file_error(ErrorCode::kUnreadable, check.file,
-                          fmt::format("record {}: {} {}: {}", check.records + 1,
-                                      to_string(record.kind), record.sequence, error.message));
+    return io::unreadable(
+        check.file, fmt::format("record {}: {} {}: {}", check.records + 1, to_string(record.kind),
+                                record.sequence, error.message));
   };
   switch (record.kind) {
     case io::RecordKind::kObservation: {

@@ -157,7 +157,7 @@ Result<CopiedJournal> trim_journal(const fs::path& file, std::uint64_t first, st
     if (record.kind != io::RecordKind::kUpdate) return in_range(record.sequence);
     const auto message = wire::decode_update(record.payload);
     if (!message) {
-      return io::file_error(ErrorCode::kUnreadable, file,
+      return io::unreadable(file,
                             fmt::format("update {}: {}", record.sequence, message.error().message));
     }
     return in_range(message->update.observation_sequence);

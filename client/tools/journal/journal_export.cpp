@@ -80,9 +80,8 @@ class RecordClock {
 // "PATH: KIND SEQUENCE: reason".
 tl::unexpected<Error> undecodable_record(const fs::path& path, const io::SurgeryRecord& record,
                                          const Error& error) {
-  return io::file_error(
-      ErrorCode::kUnreadable, path,
-      fmt::format("{} {}: {}", to_string(record.kind), record.sequence, error.message));
+  return io::unreadable(
+      path, fmt::format("{} {}: {}", to_string(record.kind), record.sequence, error.message));
 }
 
 // Shows every usable update; gives their number. As above; kUnreadable for a field of another
@@ -96,10 +95,9 @@ Result<int> visit_fields(const io::SurgeryFile& file, const fs::path& path, cons
         if (message.error || !message.update.usable()) return {};
         const auto nodes = message.update.estimate.displacement.cols();
         if (nodes != model.mesh.num_nodes()) {
-          return io::file_error(
-              ErrorCode::kUnreadable, path,
-              fmt::format("update {}: displacement of {} nodes, the model has {}",
-                          message.update.sequence, nodes, model.mesh.num_nodes()));
+          return io::unreadable(
+              path, fmt::format("update {}: displacement of {} nodes, the model has {}",
+                                message.update.sequence, nodes, model.mesh.num_nodes()));
         }
         ++fields;
         return show(message.update, time_s);

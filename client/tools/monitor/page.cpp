@@ -315,11 +315,7 @@ std::string summary(const Reports& reports) {
                         recent.p95_ms, recent.p99_ms, recent.max_ms);
   }
   if (now.journal) {
-    if (now.journal->recording) {
-      text += ", recording";
-    } else {
-      text += ", NOT RECORDING: " + now.journal->reason;
-    }
+    text += now.journal->recording ? ", recording" : ", NOT RECORDING: " + now.journal->reason;
   }
   if (const auto trouble = complaint(now)) text += ", ATTENTION: " + *trouble;
   return text;

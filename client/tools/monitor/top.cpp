@@ -156,10 +156,8 @@ Status print_once(TopView& view, const TopOptions& options, const io::StopSignal
 }  // namespace
 
 Status top(const TopOptions& options) {
-  ClientOptions client_options;
-  client_options.keys = options.keys;
-  client_options.request_timeout = std::chrono::milliseconds(1000);
-  auto client = Client::connect(options.endpoint, client_options);
+  auto client = Client::connect(
+      options.endpoint, {.request_timeout = std::chrono::milliseconds(1000), .keys = options.keys});
   if (!client) return tl::unexpected(client.error());
   const auto signals = io::StopSignals::catch_all();
   if (!signals) return tl::unexpected(signals.error());

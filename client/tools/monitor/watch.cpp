@@ -57,9 +57,7 @@ std::optional<Region> region(std::string_view text) {
 
 tl::unexpected<Error> refuse(std::string_view option, std::string_view text,
                              std::string_view must_be) {
-  std::string sentence(option);
-  sentence.append(" ").append(text).append(": must be ").append(must_be);
-  return invalid(std::move(sentence));
+  return invalid(fmt::format("{} {}: must be {}", option, text, must_be));
 }
 
 using std::chrono::milliseconds;
@@ -229,30 +227,22 @@ WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>
 std::string watch_line(const WatchedUpdate& update, bool json) {
   if (json) return json_line(update);
   std::string line = fmt::format("update {}", update.sequence);
-  if (std::isfinite(update.status.age_s)) {
-    line += fmt::format("  age {:.2f} s", update.status.age_s);
-  } else {
-    line += "  age unknown";
-  }
+  line += std::isfinite(update.status.age_s) ? fmt::format("  age {:.2f} s", update.status.age_s)
+                                             : "  age unknown";
   if (!update.failure.empty()) {
     return line + "  no field: " + update.failure + "  " + status_text(update.status);
   }
   line += fmt::format("  {} of {} nodes ({} sent, {:.1f} kB)", update.nodes, update.mesh_nodes,
                       update.received_nodes, 1e-3 * static_cast<double>(update.received_bytes));
-  if (update.tumour_mm) {
-    line += fmt::format("  tumour {:.2f} mm", *update.tumour_mm);
-  } else {
-    line += "  no tumour node";
-  }
+  line +=
+      update.tumour_mm ? fmt::format("  tumour {:.2f} mm", *update.tumour_mm) : "  no tumour node";
   line += "  " + update.quality + ", " + status_text(update.status);
   if (update.answer_time.late()) line += "  LATE: " + sentence(update.answer_time);
   return line;
 }
 
 Status watch(const WatchOptions& options, const std::function<void(const std::string&)>& tell) {
-  ClientOptions client_options;
-  client_options.keys = options.keys;
-  auto client = Client::connect(options.endpoint, client_options);
+  auto client = Client::connect(options.endpoint, {.keys = options.keys});
   if (!client) return tl::unexpected(client.error());
   return Watcher(std::move(*client), options, tell).run();
 }

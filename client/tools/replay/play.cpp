@@ -23,6 +23,17 @@ milliseconds time_left(Clock::time_point deadline) {
   return std::max(left, milliseconds(0));
 }
 
+// Sequence number with which a recorded observation is sent in a cycle, counted from 0:
+//   recorded number + cycle (last - first + 1)
+// Numbers that increase within the recording increase over all cycles.
+std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
+                                std::size_t index, int cycle) {
+  const std::uint64_t first = recording.front().observation.sequence;
+  const std::uint64_t last = recording.back().observation.sequence;
+  return recording[index].observation.sequence +
+         static_cast<std::uint64_t>(cycle) * (last - first + 1);
+}
+
 class Player {
  public:
   Player(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
@@ -198,14 +209,6 @@ DaemonLink link_to(Client& client) {
           [&client](std::chrono::milliseconds timeout) { return client.next_update(timeout); }};
 }
 
-std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
-                                std::size_t index, int cycle) {
-  const std::uint64_t first = recording.front().observation.sequence;
-  const std::uint64_t last = recording.back().observation.sequence;
-  return recording[index].observation.sequence +
-         static_cast<std::uint64_t>(cycle) * (last - first + 1);
-}
-
 Observation for_replay(Observation recorded) {
   if (recorded.daemon_ns != 0) recorded.acquired_ns = recorded.daemon_ns;
   recorded.daemon_ns = recorded.sent_ns = 0;
@@ -227,9 +230,8 @@ Result<ResumePoint> read_resume_point(const std::filesystem::path& journal) {
     if (record.kind == io::RecordKind::kObservation) {
       const auto observation = wire::decode_observation(record.payload);
       if (!observation) {
-        return io::file_error(
-            ErrorCode::kUnreadable, journal,
-            "observation " + std::to_string(record.sequence) + ": " + observation.error().message);
+        return io::unreadable(journal, "observation " + std::to_string(record.sequence) + ": " +
+                                           observation.error().message);
       }
       point.last[observation->source] = record.sequence;
     }

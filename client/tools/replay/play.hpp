@@ -56,7 +56,7 @@ struct PlayOptions {
   Speed speed = Speed::kMax;
   std::chrono::milliseconds timeout{120000};  // longest wait for one answer
   // The recording is played this many times, at least 1; more than 1 at Speed::kMax only. Sequence
-  // numbers count up from cycle to cycle (sequence_in_cycle), else the daemon would reject them.
+  // numbers count up from cycle to cycle, else the daemon would reject them.
   int repeat = 1;
 };
 
@@ -87,12 +87,6 @@ struct PlayedSession {
   std::uint64_t last_recorded_sequence = 0;  // of the recorded observation that `last` answers
   std::vector<Iterate> iterates;             // of the observation that `last` answers
 };
-
-// Sequence number with which a recorded observation is sent in a cycle, counted from 0:
-//   recorded number + cycle (last - first + 1)
-// Numbers that increase within the recording increase over all cycles.
-std::uint64_t sequence_in_cycle(const std::vector<RecordedObservation>& recording,
-                                std::size_t index, int cycle);
 
 // Never fails as a whole: each observation carries its own error. After kUnavailable the remaining
 // observations are not sent and carry the same error.

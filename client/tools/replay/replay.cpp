@@ -29,7 +29,7 @@ struct Surgery {
 
 Status check_given(const fs::path& path, const char* key, const std::string& value) {
   if (!value.empty()) return {};
-  return io::file_error(ErrorCode::kUnreadable, path, fmt::format("meta.{} is missing", key));
+  return io::unreadable(path, fmt::format("meta.{} is missing", key));
 }
 
 Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile& file,
@@ -40,9 +40,8 @@ Result<std::vector<RecordedObservation>> read_observations(const io::SurgeryFile
   for (const io::SurgeryRecord& record : *records) {
     auto observation = wire::decode_observation(record.payload);
     if (!observation) {
-      return io::file_error(
-          ErrorCode::kUnreadable, path,
-          fmt::format("observation {}: {}", record.sequence, observation.error().message));
+      return io::unreadable(
+          path, fmt::format("observation {}: {}", record.sequence, observation.error().message));
     }
     observations.push_back({record.recorded_ns, for_replay(std::move(*observation))});
   }

@@ -277,12 +277,12 @@ Result<std::vector<RunReport>> read_reports(const std::filesystem::path& path) {
     return fail(ErrorCode::kNotFound, path.string() + ": no such file");
   }
   if (std::filesystem::is_directory(path, ignored)) {
-    return fail(ErrorCode::kUnreadable, path.string() + ": is a folder, not a report");
+    return io::unreadable(path, "is a folder, not a report");
   }
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   text << file.rdbuf();
-  if (!file) return fail(ErrorCode::kUnreadable, path.string() + ": cannot be read");
+  if (!file) return io::unreadable(path, "cannot be read");
   return from_json(text.str(), path.string());
 }
 

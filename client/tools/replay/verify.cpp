@@ -143,7 +143,7 @@ class Verifier {
   using Key = std::pair<std::string, std::uint64_t>;  // source, sequence
 
   tl::unexpected<Error> unreadable(const io::SurgeryRecord& record, const std::string& why) const {
-    return io::file_error(ErrorCode::kUnreadable, path_,
+    return io::unreadable(path_,
                           fmt::format("{} {}: {}", to_string(record.kind), record.sequence, why));
   }
 
@@ -239,10 +239,9 @@ Result<SessionRequest> request_of(const io::SurgeryMeta& meta, const fs::path& p
   SessionRequest request;
   request.case_id = meta.case_id;
   const auto unknown = [&](const char* key, const std::string& value) {
-    return io::file_error(ErrorCode::kUnreadable, path,
-                          fmt::format("meta.{} is \"{}\": it is no journal of a session that could "
-                                      "be repeated",
-                                      key, value));
+    return io::unreadable(
+        path, fmt::format("meta.{} is \"{}\": it is no journal of a session that could be repeated",
+                          key, value));
   };
   const auto method = std::find_if(std::begin(kAllMethods), std::end(kAllMethods),
                                    [&](Method m) { return meta.method == to_string(m); });

@@ -52,14 +52,11 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run) {
                                [](const TracePoint& point) { return point.penetrating > 0; });
   if (any || run.boundary == to_string(Boundary::kContact)) spec.series.push_back(penetrating);
 
-  Figure figure;
-  figure.file_name = "convergence-" + group.name + "-" + file_name_from(run.boundary) + ".png";
-  figure.caption =
-      "Misfit at the sparse data and at the cross-validation points, and number of slave nodes "
-      "penetrating the skull, per iteration; " +
-      run.scenario + ", " + run.boundary + " boundary (compare Fig. 3 of the paper).";
-  figure.image = draw_chart(spec);
-  return figure;
+  return {"convergence-" + group.name + "-" + file_name_from(run.boundary) + ".png",
+          "Misfit at the sparse data and at the cross-validation points, and number of slave nodes "
+          "penetrating the skull, per iteration; " +
+              run.scenario + ", " + run.boundary + " boundary (compare Fig. 3 of the paper).",
+          draw_chart(spec)};
 }
 
 std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
@@ -93,14 +90,11 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
   paper.points.push_back({1e3 * paper::kTime_s, paper::kContactCross_mm.mean, "paper"});
   spec.series.push_back(std::move(paper));
 
-  Figure figure;
-  figure.file_name = "error-time.png";
-  figure.caption =
-      "Error at the tumour against the time of one update, per method and boundary condition. The "
-      "paper's time was measured on a machine of 2009. make bench draws the same for more methods, "
-      "ranks and meshes.";
-  figure.image = draw_chart(spec);
-  return figure;
+  return Figure{"error-time.png",
+                "Error at the tumour against the time of one update, per method and boundary "
+                "condition. The paper's time was measured on a machine of 2009. make bench draws "
+                "the same for more methods, ranks and meshes.",
+                draw_chart(spec)};
 }
 
 Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs) {
@@ -148,14 +142,11 @@ Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<Re
   spec.y_min = lowest < 0.0 ? std::max(-100.0, 1.1 * lowest - 8.0) : 0.0;
   spec.y_max = 112.0;
 
-  Figure figure;
-  figure.file_name = "recovery.png";
-  figure.caption =
-      "Deformation recovered at the tumour (cross-validation points) and at the craniotomy "
-      "(closest-point projection distance), contact against fixed boundary. Black ticks: the "
-      "paper's simulated case.";
-  figure.image = draw_bars(spec);
-  return figure;
+  return {"recovery.png",
+          "Deformation recovered at the tumour (cross-validation points) and at the craniotomy "
+          "(closest-point projection distance), contact against fixed boundary. Black ticks: the "
+          "paper's simulated case.",
+          draw_bars(spec)};
 }
 
 }  // namespace brainshift::client

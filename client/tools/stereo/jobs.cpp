@@ -39,11 +39,6 @@ Result<stereo::ChessBoard> parse_board(const std::string& text, double square_mm
 // A camera looks from some 300 mm: a rotation off by 1e-4 moves the cortex by 0.03 mm.
 constexpr double kCameraPoseTolerance = 1e-4;
 
-// What goes wrong with a pair is told with its left picture's name.
-tl::unexpected<Error> of_pair(const ReconstructJob& job, const Error& error) {
-  return io::file_error(error.code, job.left, error.message);
-}
-
 namespace fs = std::filesystem;
 
 constexpr double kNanosecondsPerSecond = 1e9;
@@ -115,14 +110,12 @@ Result<Target> open_target(const fs::path& path, const io::ModelFile& model) {
     if (!place) return tl::unexpected(place.error());
     return Target{std::move(*file), *place};
   }
-  io::SurgeryMeta meta;
-  meta.case_id = model.model.case_id;
-  meta.model_id = model.model.model_id;
-  meta.case_file = model.config.file.string();
-  meta.scenario = "recorded";
-  meta.created_utc = utc_now();
-  meta.software = "brainshift stereo";
-  auto file = io::SurgeryFile::create(path, meta);
+  auto file = io::SurgeryFile::create(path, {.case_id = model.model.case_id,
+                                             .model_id = model.model.model_id,
+                                             .case_file = model.config.file.string(),
+                                             .scenario = "recorded",
+                                             .created_utc = utc_now(),
+                                             .software = "brainshift stereo"});
   if (!file) return tl::unexpected(file.error());
   return Target{std::move(*file), {}};
 }
@@ -149,7 +142,7 @@ Result<geometry::CheckedSurface> checked_surface(const ObserveJob& job, const Br
   const auto site = geometry::craniotomy_site(model);
   if (!site) return tl::unexpected(site.error());
   auto checked = geometry::check_cortical_surface(std::move(*surface), *site);
-  if (!checked) return io::file_error(checked.error().code, job.surface, checked.error().message);
+  if (!checked) return io::file_error(job.surface, checked.error());
   return checked;
 }
 
@@ -165,8 +158,7 @@ Result<stereo::CalibrationResult> calibrate_files(const CalibrateJob& job,
   const auto right = expand_patterns(job.right);
   if (!right) return tl::unexpected(right.error());
   if (left->size() != right->size()) {
-    return fail(
-        ErrorCode::kInvalidArgument,
+    return invalid(
         fmt::format("{} left and {} right pictures: must be as many", left->size(), right->size()));
   }
   std::vector<stereo::PicturePair> pairs;
@@ -199,10 +191,11 @@ Result<ReconstructSummary> reconstruct_files(const ReconstructJob& job, const Pr
   if (!right) return tl::unexpected(right.error());
   report(progress, "match", 0.0);
   const auto measured = stereo::measure_disparity(*left, *right, *calibration, job.range);
-  if (!measured) return of_pair(job, measured.error());
+  // What goes wrong with a pair is told with its left picture's name.
+  if (!measured) return io::file_error(job.left, measured.error());
   report(progress, "match", 1.0);
   auto made = stereo::reconstruct(measured->map, measured->geometry, *T_ras_camera, job.options);
-  if (!made) return of_pair(job, made.error());
+  if (!made) return io::file_error(job.left, made.error());
   if (Status ok = io::write_surface(
           job.out, made->surface,
           {{"sd_mm", made->sd_mm.transpose()}, {"confidence", made->confidence.transpose()}});

@@ -29,7 +29,7 @@ bool is_gzip(const std::string& bytes) {
 
 Result<std::string> gunzip(const fs::path& path) {
   const gzFile file = gzopen(path.c_str(), "rb");
-  if (file == nullptr) return io::file_error(ErrorCode::kUnreadable, path, "cannot be opened");
+  if (file == nullptr) return io::unreadable(path, "cannot be opened");
   std::string bytes;
   std::array<char, 1 << 16> buffer{};
   int count = 0;
@@ -37,8 +37,7 @@ Result<std::string> gunzip(const fs::path& path) {
     bytes.append(buffer.data(), static_cast<std::size_t>(count));
   const bool whole = count == 0;
   const bool closed = gzclose(file) == Z_OK;
-  if (!whole || !closed)
-    return io::file_error(ErrorCode::kUnreadable, path, "is a damaged gzip file");
+  if (!whole || !closed) return io::unreadable(path, "is a damaged gzip file");
   return bytes;
 }
 
@@ -95,7 +94,7 @@ Result<stereo::GrayImage> read_picture(const fs::path& path) {
   auto bytes = io::read_file(path);
   if (bytes && is_gzip(*bytes)) bytes = gunzip(path);
   if (!bytes) return tl::unexpected(bytes.error());
-  if (bytes->empty()) return io::file_error(ErrorCode::kUnreadable, path, "is empty");
+  if (bytes->empty()) return io::unreadable(path, "is empty");
   cv::Mat picture;
   try {
     const cv::Mat raw(1, static_cast<int>(bytes->size()), CV_8UC1, bytes->data());
@@ -104,7 +103,7 @@ Result<stereo::GrayImage> read_picture(const fs::path& path) {
     picture.release();
   }
   if (picture.empty() || picture.type() != CV_8UC1)
-    return io::file_error(ErrorCode::kUnreadable, path, "is no picture that can be read");
+    return io::unreadable(path, "is no picture that can be read");
   stereo::GrayImage image(picture.cols, picture.rows);
   for (int y = 0; y < picture.rows; ++y)
     for (int x = 0; x < picture.cols; ++x) image.at(x, y) = picture.at<std::uint8_t>(y, x);

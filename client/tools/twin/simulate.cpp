@@ -37,15 +37,13 @@ Status write_surgery(const SimulateOptions& options, const std::string& scenario
 io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::path& case_file,
                                const std::string& scenario, std::uint64_t seed,
                                const std::string& software) {
-  io::SurgeryMeta meta;
-  meta.case_id = model.case_id;
-  meta.model_id = model.model_id;
-  meta.case_file = std::filesystem::absolute(case_file).lexically_normal().string();
-  meta.scenario = scenario;
-  meta.seed = seed;
-  meta.created_utc = utc_now();
-  meta.software = software;
-  return meta;
+  return {.case_id = model.case_id,
+          .model_id = model.model_id,
+          .case_file = std::filesystem::absolute(case_file).lexically_normal().string(),
+          .scenario = scenario,
+          .seed = seed,
+          .created_utc = utc_now(),
+          .software = software};
 }
 
 Status simulate(const SimulateOptions& options, const Progress& progress) {

@@ -80,13 +80,6 @@ Points gravity_load(const TruthBrain& brain, const Gravity& gravity, double flui
 
 namespace {
 
-// With another mesh at its own vertices, which are the first nodes of its space.
-void add_retraction(const TruthBrain& brain, const Scenario& scenario, Points& load) {
-  if (!scenario.retraction) return;
-  const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
-  load.leftCols(body.mesh.num_nodes()) += retraction_load(body, *scenario.retraction);
-}
-
 Points volume_load(const TruthBrain& brain, const Scenario& scenario) {
   const Material& material = brain.config.material;
   const Vec3 centre = swelling_centre(brain.model, scenario.swelling);
@@ -108,7 +101,10 @@ Points volume_load(const TruthBrain& brain, const Scenario& scenario) {
 
 Points constant_load(const TruthBrain& brain, const Scenario& scenario) {
   Points load = volume_load(brain, scenario);
-  add_retraction(brain, scenario, load);
+  if (!scenario.retraction) return load;
+  // With another mesh at its own vertices, which are the first nodes of its space.
+  const BrainModel& body = brain.elsewhere ? brain.elsewhere->model : brain.model;
+  load.leftCols(body.mesh.num_nodes()) += retraction_load(body, *scenario.retraction);
   return load;
 }
 

@@ -31,10 +31,9 @@ Status validate(const FieldGrid& grid) {
   }
   for (const int count : grid.dims) {
     if (count >= 3 && count <= FieldGrid::kMaxVoxelsAlongAxis) continue;
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format("grid of {} x {} x {} voxels: must have 3 to {} along every axis", grid.dims[0],
-                    grid.dims[1], grid.dims[2], FieldGrid::kMaxVoxelsAlongAxis));
+    return invalid(fmt::format("grid of {} x {} x {} voxels: must have 3 to {} along every axis",
+                               grid.dims[0], grid.dims[1], grid.dims[2],
+                               FieldGrid::kMaxVoxelsAlongAxis));
   }
   if (grid.num_voxels() > FieldGrid::kMaxVoxels) {
     return invalid(fmt::format(

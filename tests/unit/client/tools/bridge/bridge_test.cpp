@@ -272,7 +272,4 @@ TEST(Bridge, APortThatIsTakenIsNamed) {
 }
 
 }  // namespace
-
-// The whole of it runs in tests/integration/bridge_test.cpp.
-
 }  // namespace brainshift::client

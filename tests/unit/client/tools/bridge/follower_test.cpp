@@ -191,7 +191,7 @@ TEST_F(FollowedDaemon, BlanksWhenTheDaemonFallsSilentAndShowsAgainWhenItComesBac
   EXPECT_FALSE(shown(1)->state.blank);
 }
 
-TEST_F(FollowedDaemon, BlanksAtAnUnusableFieldAndSaysWhy) {
+TEST_F(FollowedDaemon, BlanksAtAnUnusableFieldSaysWhyAndShowsTheNextUsableOne) {
   shown(1);
   change([&] {
     state.newest_update = 2;
@@ -199,19 +199,7 @@ TEST_F(FollowedDaemon, BlanksAtAnUnusableFieldAndSaysWhy) {
     state.reason = "a node lies beyond the skull";
     newest = update(2, Quality::kUnusable);
   });
-  const PicturePtr degraded = blank(Currency::kDegraded);
-  EXPECT_EQ(degraded->state.reason, "a node lies beyond the skull");
-}
-
-TEST_F(FollowedDaemon, ShowsTheNextUsableFieldAfterAnUnusableOne) {
-  shown(1);
-  change([&] {
-    state.newest_update = 2;
-    state.phase = SessionPhase::kDegraded;
-    state.reason = "a node lies beyond the skull";
-    newest = update(2, Quality::kUnusable);
-  });
-  blank(Currency::kDegraded);
+  EXPECT_EQ(blank(Currency::kDegraded)->state.reason, "a node lies beyond the skull");
   change([&] {
     pictures.clear();
     state.newest_update = state.newest_usable = 3;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Submitting to a daemon: tests/integration/test_bridge.py.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -306,7 +307,4 @@ TEST(InboundWorker, WithoutASessionItSaysSo) {
 }
 
 }  // namespace
-
-// Submitting to a daemon: tests/integration/bridge_test.cpp.
-
 }  // namespace brainshift::client

@@ -214,5 +214,4 @@ TEST(Peer, WhatIsNoOpenIgtLinkEndsIt) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

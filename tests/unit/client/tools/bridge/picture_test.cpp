@@ -296,5 +296,4 @@ TEST_F(BroadcastOfAToy, EncodesOncePerVersion) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

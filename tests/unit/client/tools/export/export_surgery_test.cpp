@@ -355,5 +355,4 @@ TEST_F(ExportSurgery, AnImageElsewhereLeavesNothingBehind) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

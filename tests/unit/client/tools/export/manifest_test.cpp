@@ -98,5 +98,4 @@ TEST(Manifest, ANameThatIsNotUtf8IsNoReasonToFail) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -259,5 +259,4 @@ TEST(SampleField, AGridFarAwayIsZeroAndSaysThatNothingIsInside) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

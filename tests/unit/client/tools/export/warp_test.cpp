@@ -126,5 +126,4 @@ TEST(DeformedSurface, WithoutAStandardDeviationThereIsNoSuchField) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

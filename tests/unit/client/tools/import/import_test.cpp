@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// A virtual sweep over an ellipsoid of known place, imported: the points must lie on its surface.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -360,7 +361,4 @@ TEST_F(Import, ReportTellsChainFramesAndPoints) {
 }
 
 }  // namespace
-
-// A virtual sweep over an ellipsoid of known place, imported: the points must lie on its surface.
-
 }  // namespace brainshift::client

@@ -34,15 +34,12 @@ TEST_F(CheckJournal, CountsWhatAGoodFileHolds) {
 }
 
 TEST_F(CheckJournal, DecisionsAreCountedByOutcome) {
-  {
-    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
-    for (std::uint64_t i = 1; i <= 5; ++i) {
-      const auto outcome = i < 4 ? Outcome::kUsed : Outcome::kSkipped;
-      ASSERT_TRUE(file.append(decision(i, outcome)));
-    }
-    ASSERT_TRUE(file.append({io::RecordKind::kDecision, 6, 0, "\xff\xff"}));
-    ASSERT_TRUE(file.close());
-  }
+  write_records({decision(1, Outcome::kUsed),
+                 decision(2, Outcome::kUsed),
+                 decision(3, Outcome::kUsed),
+                 decision(4, Outcome::kSkipped),
+                 decision(5, Outcome::kSkipped),
+                 {io::RecordKind::kDecision, 6, 0, "\xff\xff"}});
   const auto check = value_or_fail(check_journal(path));
   EXPECT_THAT(report_lines(check), Contains("  decisions    2 skipped, 3 used"));
   ASSERT_TRUE(check.broken);
@@ -61,12 +58,7 @@ TEST_F(CheckJournal, NamesTheFirstBadRecordAndCountsWhatIsInFrontOfIt) {
 }
 
 TEST_F(CheckJournal, APayloadThatNobodyCanDecodeIsBad) {
-  {
-    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
-    ASSERT_TRUE(file.append(observation(1, "ius")));
-    ASSERT_TRUE(file.append({io::RecordKind::kUpdate, 5, 0, "\xff\xff"}));
-    ASSERT_TRUE(file.close());
-  }
+  write_records({observation(1, "ius"), {io::RecordKind::kUpdate, 5, 0, "\xff\xff"}});
   const auto check = check_journal(path);
   ASSERT_TRUE(check && check->broken);
   EXPECT_THAT(check->broken->message, HasSubstr("record 2: update 5: "));
@@ -202,5 +194,4 @@ TEST_F(CopyJournal, NothingThatExistsIsReplaced) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

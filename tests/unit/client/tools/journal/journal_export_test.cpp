@@ -62,11 +62,7 @@ TEST_F(ExportJournal, TheTableHasARowPerRecord) {
 }
 
 TEST_F(ExportJournal, ADecisionIsARowWithItsOutcome) {
-  {
-    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
-    ASSERT_TRUE(file.append(decision(4, Outcome::kSuperseded)));
-    ASSERT_TRUE(file.close());
-  }
+  write_records({decision(4, Outcome::kSuperseded)});
   const std::string csv = records_csv(open(), path).value();
   const std::string row = csv.substr(csv.find('\n') + 1);
   EXPECT_THAT(row, testing::StartsWith("1,decision,4,ius,0.000000,"));
@@ -75,11 +71,7 @@ TEST_F(ExportJournal, ADecisionIsARowWithItsOutcome) {
 }
 
 TEST_F(ExportJournal, ASourceWithACommaStaysOneField) {
-  {
-    auto file = value_or_fail(io::SurgeryFile::create(path, {}));
-    ASSERT_TRUE(file.append(observation(1, "a \"b\", c")));
-    ASSERT_TRUE(file.close());
-  }
+  write_records({observation(1, "a \"b\", c")});
   EXPECT_THAT(records_csv(open(), path).value(), HasSubstr(",\"a \"\"b\"\", c\","));
 }
 
@@ -139,11 +131,7 @@ TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
 }
 
 TEST_F(ExportJournal, AFileIsNotLeftBehindHalfWritten) {
-  {
-    auto file = value_or_fail(io::SurgeryFile::create(path, {.model_id = model.model_id}));
-    ASSERT_TRUE(file.append(observation(1, "ius")));
-    ASSERT_TRUE(file.close());
-  }
+  write_records({observation(1, "ius")}, {.model_id = model.model_id});
   const auto before = std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator());
   refusal_of(write_field_file(open(), path, model, folder / "fields.h5"), ErrorCode::kEmptySet);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator()), before);

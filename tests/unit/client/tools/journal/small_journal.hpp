@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/model_id.hpp"
@@ -66,6 +67,14 @@ class SmallJournal : public testing::Test {
       ASSERT_TRUE(file->append(observation(i, i % 3 == 0 ? "camera" : "ius")));
       ASSERT_TRUE(file->append(update(i, i)));
     }
+    ASSERT_TRUE(file->close());
+  }
+  // A closed file of these records.
+  void write_records(const std::vector<io::SurgeryRecord>& records,
+                     const io::SurgeryMeta& meta = {}) const {
+    auto file = io::SurgeryFile::create(path, meta);
+    ASSERT_TRUE(file) << file.error().message;
+    ASSERT_TRUE(file->append(records));
     ASSERT_TRUE(file->close());
   }
   static void run_sql(const std::filesystem::path& file, const char* sql) {

@@ -202,5 +202,4 @@ TEST(ReportJson, TextThatIsNotUtf8StaysReadable) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -163,5 +163,4 @@ TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

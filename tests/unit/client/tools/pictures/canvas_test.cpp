@@ -201,5 +201,4 @@ TEST(Sheet, TitleSubtitleAndLegendAreWholeOnNarrowPanels) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -214,5 +214,4 @@ TEST(Bars, AReferenceIsABlackTickAtItsHeight) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

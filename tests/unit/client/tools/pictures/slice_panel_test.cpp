@@ -193,5 +193,4 @@ TEST(GravityArrow, PointsAlongAndSaysWhenItCannot) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

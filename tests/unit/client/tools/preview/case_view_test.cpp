@@ -47,47 +47,34 @@ TEST_F(CaseViewOf, FactsGiveSizesSidesAndAngles) {
 }
 
 TEST_F(CaseViewOf, DoubtsNameATumourOnTheOtherSide) {
-  BoxCase box;
-  box.tumour = "[-40, -10, 20]";
-  EXPECT_THAT(doubts(view(box)),
+  EXPECT_THAT(doubts(view({.tumour = "[-40, -10, 20]"})),
               Contains(AllOf(HasSubstr("the tumour lies on the left, the craniotomy on the right"),
                              HasSubstr("tumour.ellipsoid"))));
 }
 
 TEST_F(CaseViewOf, DoubtsNameGravityThatPullsOutOfTheOpening) {
-  BoxCase box;
-  box.gravity = "[1, 0, 0]";
-  box.brainstem = "[0, 0, -75]";
-  EXPECT_THAT(doubts(view(box)),
+  EXPECT_THAT(doubts(view({.gravity = "[1, 0, 0]", .brainstem = "[0, 0, -75]"})),
               Contains(AllOf(HasSubstr("faces down"), HasSubstr("gravity.direction"))));
 }
 
 TEST_F(CaseViewOf, DoubtsNameABrainOfAnotherUnit) {
-  BoxCase box;
-  box.side_mm = 300.0;
-  box.craniotomy = "[150, -10, 20]";
-  box.brainstem = "[0, 0, -150]";
+  const BoxCase box{.craniotomy = "[150, -10, 20]", .brainstem = "[0, 0, -150]", .side_mm = 300.0};
   EXPECT_THAT(doubts(view(box)), Contains(HasSubstr("300 mm long")));
 }
 
 TEST_F(CaseViewOf, DoubtsNameABrainstemOnTop) {
-  BoxCase box;
-  box.brainstem = "[0, 0, 75]";
-  EXPECT_THAT(doubts(view(box)), Contains(HasSubstr("brainstem.centre_mm")));
+  EXPECT_THAT(doubts(view({.brainstem = "[0, 0, 75]"})),
+              Contains(HasSubstr("brainstem.centre_mm")));
 }
 
 TEST_F(CaseViewOf, DoubtsNameATumourThatIsCutAtTheSurface) {
-  BoxCase box;
-  box.tumour = "[65, -10, 20]";  // sticks out by 2 mm
-  const CaseView seen = view(box);
+  const CaseView seen = view({.tumour = "[65, -10, 20]"});  // sticks out by 2 mm
   EXPECT_THAT(seen.problems, IsEmpty());
   EXPECT_THAT(doubts(seen), Contains(HasSubstr("outside the brain, by up to 2.0 mm")));
 }
 
 TEST_F(CaseViewOf, ATumourOutsideTheBrainIsAProblemThatIsStillSeen) {
-  BoxCase box;
-  box.tumour = "[90, -10, 20]";
-  const CaseView seen = view(box);
+  const CaseView seen = view({.tumour = "[90, -10, 20]"});
   EXPECT_THAT(seen.problems,
               ElementsAre(AllOf(HasSubstr("tumour.ellipsoid"), HasSubstr("outside the brain"))));
   EXPECT_GT(seen.tumour.num_vertices(), 0);
@@ -96,9 +83,7 @@ TEST_F(CaseViewOf, ATumourOutsideTheBrainIsAProblemThatIsStillSeen) {
 }
 
 TEST_F(CaseViewOf, AnOpeningInTheAirIsAProblemWithoutRoles) {
-  BoxCase box;
-  box.craniotomy = "[175, -10, 20]";
-  const CaseView seen = view(box);
+  const CaseView seen = view({.craniotomy = "[175, -10, 20]"});
   EXPECT_THAT(seen.problems, ElementsAre(HasSubstr("craniotomy.centre_mm")));
   EXPECT_THAT(seen.roles, IsEmpty());
   EXPECT_FALSE(opening_of(seen));

@@ -5,9 +5,9 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "client/tools/pictures/canvas.hpp"
 #include "common/io/files/file_access.hpp"
 #include "tests/support/results.hpp"
+#include "tests/unit/client/tools/pictures/pixels.hpp"
 #include "tests/unit/client/tools/preview/box_case.hpp"
 
 namespace brainshift::client {
@@ -17,41 +17,26 @@ using test_support::TemporaryFolder;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-// Share of pixels of exactly this colour.
-int count_colour(const cv::Mat& image, const cv::Scalar& colour) {
-  int count = 0;
-  for (int y = 0; y < image.rows; ++y) {
-    for (int x = 0; x < image.cols; ++x) {
-      const auto& p = image.at<cv::Vec3b>(y, x);
-      count +=
-          p == cv::Vec3b(static_cast<std::uint8_t>(colour[0]), static_cast<std::uint8_t>(colour[1]),
-                         static_cast<std::uint8_t>(colour[2]));
-    }
-  }
-  return count;
-}
-
 TEST(Preview, WritesPicturesAndTheFacts) {
   const TemporaryFolder folder;
   const auto summary = value_or_fail(write_preview(write_box_case(folder), folder / "out"));
   EXPECT_THAT(summary.files, SizeIs(4));
   for (const auto& file : summary.files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   const cv::Mat slices = cv::imread((folder / "out/slices-tumour.png").string());
-  EXPECT_GT(count_colour(slices, palette::kOrange), 1000);   // tumour
-  EXPECT_GT(count_colour(slices, palette::kSkyBlue), 1000);  // slaves
-  EXPECT_GT(count_colour(slices, palette::kPurple), 1000);   // craniotomy
+  EXPECT_GT(count_colour(slices, palette::kOrange, whole(slices)), 1000);   // tumour
+  EXPECT_GT(count_colour(slices, palette::kSkyBlue, whole(slices)), 1000);  // slaves
+  EXPECT_GT(count_colour(slices, palette::kPurple, whole(slices)), 1000);   // craniotomy
   EXPECT_THAT(io::read_file(folder / "out/preview.txt").value(), HasSubstr("case box"));
 }
 
 TEST(Preview, DrawsACaseThatCannotBePrepared) {
   const TemporaryFolder folder;
-  BoxCase box;
-  box.tumour = "[110, -10, 20]";  // 23 mm outside
-  const auto summary = value_or_fail(write_preview(write_box_case(folder, box), folder / "out"));
+  const auto outside = write_box_case(folder, {.tumour = "[110, -10, 20]"});  // by 23 mm
+  const auto summary = value_or_fail(write_preview(outside, folder / "out"));
   EXPECT_THAT(summary.problems, SizeIs(1));
   // The plane through the tumour's centre is widened until the tumour is in it.
   const cv::Mat slices = cv::imread((folder / "out/slices-tumour.png").string());
-  EXPECT_GT(count_colour(slices, palette::kOrange), 1000);
+  EXPECT_GT(count_colour(slices, palette::kOrange, whole(slices)), 1000);
   EXPECT_THAT(io::read_file(folder / "out/preview.txt").value(), HasSubstr("cannot be prepared"));
 }
 

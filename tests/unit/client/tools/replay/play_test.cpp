@@ -331,5 +331,4 @@ TEST_F(Resume, TheLastRecordedObservationOfEverySourceIsSentAgain) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -122,13 +122,14 @@ TEST(Summary, ASingleUpdateIsBothTheColdOneAndTheLatency) {
   EXPECT_DOUBLE_EQ(run.latency_ms->max, 70.0);
 }
 
-TEST(Summary, WithoutUpdatesTimesStayEmpty) {
+TEST(Summary, WithoutUpdatesThereAreNeitherTimesNorAQuality) {
   RunReport run;
   summarise(PlayedSession{}, run);
   EXPECT_EQ(run.updates, 0);
   EXPECT_FALSE(run.latency_ms);
   EXPECT_FALSE(run.cold_ms);
   EXPECT_FALSE(run.stages_ms);
+  EXPECT_FALSE(run.quality);
 }
 
 TEST(Summary, TheWorstVerdictOfARunStands) {
@@ -147,12 +148,6 @@ TEST(Summary, TheWorstVerdictOfARunStands) {
     ASSERT_TRUE(run.quality);
     EXPECT_EQ(run.quality->worst, to_string(quality));
   }
-}
-
-TEST(Summary, WithoutUpdatesThereIsNoQuality) {
-  RunReport run;
-  summarise(PlayedSession{}, run);
-  EXPECT_FALSE(run.quality);
 }
 
 TEST(SummaryLine, CountsVerdictsFlagsAndFailures) {
@@ -228,5 +223,4 @@ TEST(LatencyCsv, TellsTimesContactAndOutcome) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -76,9 +76,7 @@ TEST(RunReport, ReadsBackWhatItWrote) {
 
 TEST(RunReport, HasEveryKeyOfTheContract) {
   const json run = json::parse(to_json({full_run()}))[0];
-  for (const char* key : test_support::kReportKeys) {
-    EXPECT_TRUE(run.contains(key)) << key;
-  }
+  for (const char* key : test_support::kReportKeys) EXPECT_TRUE(run.contains(key)) << key;
   const auto keys_of = [&](const char* object, std::initializer_list<const char*> keys) {
     for (const char* key : keys) EXPECT_TRUE(run[object].contains(key)) << object << "." << key;
   };

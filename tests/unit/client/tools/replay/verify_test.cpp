@@ -230,5 +230,4 @@ TEST(CompareUpdates, TwoFailuresOfOneKindAgree) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -146,5 +146,4 @@ TEST(Groups, KeepRunsOfDifferentSeedsApart) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

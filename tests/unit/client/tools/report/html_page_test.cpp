@@ -183,12 +183,6 @@ ReportedRun condensed(const char* scenario, double recovered) {
   return run;
 }
 
-std::size_t count_of(const std::string& text, const std::string& part) {
-  std::size_t found = 0;
-  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
-  return found;
-}
-
 TEST(Verdict, NamesTheRangeAndTheLeastBesideThePaper) {
   ReportedRun worst = condensed("joint-mixed", 81.5);
   worst.report.latency_ms->p50 = 150.0;
@@ -228,14 +222,13 @@ TEST(Verdict, SaysWhatIsUnknownAndWhatIsUnusable) {
 TEST(SummaryTable, HasALinePerRunAndThePapers) {
   ReportedRun odd = condensed("<b>odd</b>", 50.0);
   const std::string html = summary_table({condensed("paper", 97.0), odd});
-  EXPECT_EQ(count_of(html, "<tr>") + count_of(html, "<tr class"), 1u + 2u + 3u);
+  EXPECT_EQ(count(html, "<tr>") + count(html, "<tr class"), 1 + 2 + 3);
   EXPECT_THAT(html, HasSubstr("&lt;b&gt;odd"));
   EXPECT_THAT(html, Not(HasSubstr("<b>odd")));
   // As many cells in every line as the heading has.
-  const std::size_t columns = count_of(html.substr(0, html.find("</thead>")), "<th>");
-  EXPECT_EQ(count_of(html, "<td>"), 5u * (columns - 1));
+  const int columns = count(html.substr(0, html.find("</thead>")), "<th>");
+  EXPECT_EQ(count(html, "<td>"), 5 * (columns - 1));
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -177,5 +177,4 @@ TEST(Retraction, PushesTheCortexIntoTheBrain) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The named scenarios on the toy patient. Their descriptions tell their size in the default head.
 #include <gmock/gmock.h>
 
 #include <set>
@@ -316,7 +317,4 @@ TEST(Surgery, TellsHowFarItIs) {
 }
 
 }  // namespace
-
-// The named scenarios on the toy patient. Their descriptions tell their size in the default head.
-
 }  // namespace brainshift::client

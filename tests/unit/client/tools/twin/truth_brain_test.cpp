@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Truths from another mesh with quadratic elements, on the toy patient.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -265,7 +266,4 @@ TEST(SpacePoints, MeetQuadraticDisplacementsExactly) {
 }
 
 }  // namespace
-
-// Truths from another mesh with quadratic elements, on the toy patient.
-
 }  // namespace brainshift::client

@@ -122,5 +122,4 @@ TEST(OutsideTaper, RefusesAnOrderThatIsNone) {
 }
 
 }  // namespace
-
 }  // namespace brainshift::client
