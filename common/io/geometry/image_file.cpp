@@ -15,6 +15,7 @@
 #include <optional>
 #include <string_view>
 
+#include "common/io/files/binary_codec.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
@@ -87,23 +88,15 @@ struct PackedHeader {
   double vox_offset = 0.0;
 };
 
-template <typename T>
-T field(std::string_view bytes, std::size_t offset, bool swapped) {
-  std::array<char, sizeof(T)> raw{};
-  bytes.copy(raw.data(), sizeof(T), offset);
-  if (swapped) std::reverse(raw.begin(), raw.end());
-  T value;
-  std::memcpy(&value, raw.data(), sizeof(T));
-  return value;
-}
-
+// Precondition: `bytes` hold the whole header.
 template <typename Dim, typename Offset>
 void fill(PackedHeader& header, std::string_view bytes, const Layout& layout, bool swapped) {
   for (std::size_t i = 0; i < header.dim.size(); ++i) {
-    header.dim[i] = field<Dim>(bytes, layout.dim + i * sizeof(Dim), swapped);
+    header.dim[i] = load_number<Dim>(bytes.data() + layout.dim + i * sizeof(Dim), swapped);
   }
-  header.datatype = field<std::int16_t>(bytes, layout.datatype, swapped);
-  header.vox_offset = static_cast<double>(field<Offset>(bytes, layout.vox_offset, swapped));
+  header.datatype = load_number<std::int16_t>(bytes.data() + layout.datatype, swapped);
+  header.vox_offset =
+      static_cast<double>(load_number<Offset>(bytes.data() + layout.vox_offset, swapped));
 }
 
 // The bytes of the largest header, or all that there are.
@@ -124,7 +117,7 @@ std::optional<PackedHeader> parse(std::string_view bytes) {
   if (bytes.size() < kNifti1Bytes) return std::nullopt;
   PackedHeader header;
   for (const bool swapped : {false, true}) {
-    const auto size = static_cast<std::size_t>(field<std::uint32_t>(bytes, 0, swapped));
+    const auto size = static_cast<std::size_t>(load_number<std::uint32_t>(bytes.data(), swapped));
     header.bytes = size;
     using namespace std::string_view_literals;
     if (size == kNifti1Bytes && (has_magic(344, "n+1\0"sv) || has_magic(344, "ni1\0"sv))) {

@@ -8,11 +8,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <vector>
 
+#include "common/io/files/binary_codec.hpp"
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/nrrd_header.hpp"
@@ -42,9 +42,7 @@ using LabelReader = double (*)(const char*);
 
 template <typename T>
 double value_at(const char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return static_cast<double>(value);
+  return static_cast<double>(load_number<T>(bytes, false));
 }
 
 struct ValueType {
@@ -212,17 +210,16 @@ Result<std::optional<Segment>> chosen_segment(const std::vector<Segment>& segmen
     chosen = segment;
     ++found;
   }
-  const auto refuse = [](const std::string& text) { return invalid(text); };
   if (segments.empty() && !name.empty()) {
-    return refuse(fmt::format("names no segments, so there is none called \"{}\"", name));
+    return invalid(fmt::format("names no segments, so there is none called \"{}\"", name));
   }
   if (name.empty() && segments.size() > 1) {
-    return refuse(fmt::format("has {} segments: name one of {}", segments.size(), names));
+    return invalid(fmt::format("has {} segments: name one of {}", segments.size(), names));
   }
   if (!name.empty() && found != 1) {
-    return refuse(fmt::format("has {} called \"{}\": its segments are {}",
-                              found == 0 ? "no segment" : fmt::format("{} segments", found), name,
-                              names));
+    return invalid(fmt::format("has {} called \"{}\": its segments are {}",
+                               found == 0 ? "no segment" : fmt::format("{} segments", found), name,
+                               names));
   }
   return chosen;
 }

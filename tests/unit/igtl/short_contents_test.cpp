@@ -127,8 +127,7 @@ TEST(Tracking, NumbersThatAreNotFiniteAreRefused) {
   for (int i = 0; i < 12; ++i) {
     Transform transform;
     transform.matrix.data()[i] = i % 2 == 0 ? kNan : std::numeric_limits<float>::infinity();
-    ASSERT_FALSE(validate(transform));
-    EXPECT_EQ(validate(transform).error().code, ErrorCode::kNotFinite);
+    refusal_of(validate(transform), ErrorCode::kNotFinite);
     expect_refused(decode_transform(content_of(transform)), "not finite");
     TrackingData data = tracking_data();
     data.tools[1].matrix = transform.matrix;

@@ -97,8 +97,8 @@ TEST(DisplacementField, AMissingValueIsNamed) {
 TEST(DisplacementField, AValueThatIsNotFiniteIsNamedByItsVoxel) {
   DisplacementField field = small_field();
   field.ras_mm[3 * field.grid.index(4, 2, 1) + 1] = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(validate(field).error().code, ErrorCode::kNotFinite);
-  EXPECT_THAT(validate(field).error().message, HasSubstr("voxel (4, 2, 1) is not finite"));
+  EXPECT_THAT(refusal_of(validate(field), ErrorCode::kNotFinite),
+              HasSubstr("voxel (4, 2, 1) is not finite"));
   ScalarVolume volume = small_volume();
   volume.values[volume.grid.index(0, 3, 2)] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(validate(volume).error().message, HasSubstr("voxel (0, 3, 2) is not finite"));

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "common/io/geometry/image_file.hpp"
+#include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/fields/small_field.hpp"
 
@@ -141,14 +142,12 @@ TEST(NiftiWriter, WhatIsInvalidIsRefusedByNameAndNothingWritten) {
   EXPECT_THAT(name.error().message, HasSubstr("f.img: must end in .nii or .nii.gz"));
   field.ras_mm[4] = std::numeric_limits<float>::quiet_NaN();
   const Status value = write_nifti(folder / "f.nii", field, VectorFrame::kRas);
-  EXPECT_EQ(value.error().code, ErrorCode::kNotFinite);
-  EXPECT_THAT(value.error().message, StartsWith((folder / "f.nii").string()));
+  EXPECT_THAT(refusal_of(value, ErrorCode::kNotFinite), StartsWith((folder / "f.nii").string()));
   ScalarVolume volume = small_volume();
   volume.grid.dims[0] = 6;
   EXPECT_FALSE(write_nifti(folder / "v.nii", volume));
   EXPECT_EQ(folder.entries(), 0u);
-  const Status place = write_nifti(folder / "no" / "v.nii.gz", small_volume());
-  EXPECT_EQ(place.error().code, ErrorCode::kWriteFailed);
+  refusal_of(write_nifti(folder / "no" / "v.nii.gz", small_volume()), ErrorCode::kWriteFailed);
 }
 
 // ---- NRRD ----
