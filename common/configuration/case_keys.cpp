@@ -53,13 +53,6 @@ std::string key_of(const CaseConfig& config, const std::filesystem::path& member
   return {};
 }
 
-std::vector<KeyDocument> case_key_documents() {
-  KeyDocumenter documenter;
-  const CaseConfig defaults;
-  visit(documenter, defaults);
-  return documenter.documents();
-}
-
 // What case_config.hpp declares.
 
 double largest_poisson_ratio(const Material& material) {

@@ -27,9 +27,6 @@ std::vector<NamedFile> named_files(const CaseConfig& config);
 // The key of one path of `config`, by its address; empty for any other path.
 std::string key_of(const CaseConfig& config, const std::filesystem::path& member);
 
-// The documentation of every key.
-std::vector<KeyDocument> case_key_documents();
-
 // ---- the table ----
 
 inline constexpr Word<bool> kScalesWords[] = {{true, "estimated"}, {false, "fixed"}};

@@ -5,8 +5,8 @@
 // A table is a function visit(a, v) for each struct v that has keys. It makes one call per key:
 //   a({name, unit, meaning, source, note}, v.member, between(0, 20));
 // The default is the member's value in a default-made struct. Visitors:
-//   KeyChecker     here, the ranges                 io::KeyReader   from YAML
-//   KeyDocumenter  here, a text for every key       io::KeyWriter   to YAML
+//   KeyChecker  here, the ranges    io::KeyReader  from YAML    io::KeyWriter  to YAML
+// Tests compare the documented files with a text for every key (tests/support/key_documenter.hpp).
 // `a` also takes groups of keys:
 //   section(key, need, body)            keys below a heading
 //   one_of(key, need, variant)          a heading with one kind out of several; each kind has a
@@ -158,53 +158,6 @@ class KeyChecker : public KeyWalker<KeyChecker> {
   void check(bool ok, const std::string& key, double value, const std::string& constraint);
   void check(const std::string& key, double value, const Limits& limits);
   std::string message_;
-};
-
-// What the documentation of a configuration file says in front of a key.
-struct KeyDocument {
-  std::string key;   // with its sections; for a kind also "tumour.ellipsoid"
-  std::string text;  // "Gap between brain and skull, mm. Default 1 (paper); range 0 to 20. NOTE"
-};
-
-// Collects the documents of all keys of a default-made value, with all kinds and optional
-// sections.
-class KeyDocumenter : public KeyWalker<KeyDocumenter> {
- public:
-  void operator()(const Key& key, double value, const Limits& limits);
-  void operator()(const Key& key, double value, const Limits& limits, const SameAs& same);
-  void operator()(const Key& key, const Vec3& value, const Limits& limits,
-                  Need need = Need::kOptional);
-  void operator()(const Key& key, const std::vector<double>& value, const Limits& limits);
-  void operator()(const Key& key, const std::string& value, Need need = Need::kOptional);
-  void operator()(const Key& key, const std::filesystem::path& value, Need need = Need::kOptional);
-  void operator()(const Key& key, const std::optional<std::filesystem::path>& value);
-  void operator()(const Key& key, const std::optional<std::string>& value);
-  template <typename T, typename W, std::size_t N>
-  void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
-    std::string list;
-    for (const Word<W>& known : words) list.append(list.empty() ? "" : ", ").append(known.word);
-    add(key, std::string("Default ") + word_of(value, words), "one of " + list);
-  }
-  template <typename... Kinds>
-  void one_of(const Key& key, Need need, const std::variant<Kinds...>&) {
-    const auto document = [this](const auto& kind) { visit_kind(*this, kind); };
-    section(key, need, [&] { (document(Kinds{}), ...); });
-  }
-  template <typename Optional, typename Section>
-  void section_if(const Key& key, Optional&, const Section& like) {
-    section(key, Need::kOptional, [&] { visit(*this, like); });
-  }
-  template <typename Map, typename Section>
-  void sections(const Key& key, Map&, const Section&) {
-    open(key);
-  }
-  void open(const Key& key) { add(key, "", ""); }
-
-  const std::vector<KeyDocument>& documents() const { return documents_; }
-
- private:
-  void add(const Key& key, const std::string& standard, const std::string& range);
-  std::vector<KeyDocument> documents_;
 };
 
 }  // namespace brainshift

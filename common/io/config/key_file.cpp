@@ -7,12 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <sstream>
 #include <system_error>
 

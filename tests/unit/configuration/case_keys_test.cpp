@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "tests/support/key_documenter.hpp"
+
 namespace brainshift {
 namespace {
 
@@ -94,7 +96,7 @@ TEST(CaseKeys, EveryMemberHasAKey) {
 
 TEST(CaseKeys, EveryKeyIsNamedOnceAndSaysWhatItMeans) {
   std::set<std::string> keys;
-  for (const KeyDocument& document : case_key_documents()) {
+  for (const KeyDocument& document : documents_of<CaseConfig>()) {
     EXPECT_TRUE(keys.insert(document.key).second) << document.key;
     EXPECT_NE(document.text.substr(0, 1), " ") << document.key << " has no meaning";
   }

@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "tests/support/key_documenter.hpp"
+
 namespace brainshift {
 
 // A table with a key of every kind.

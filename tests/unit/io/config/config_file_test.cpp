@@ -338,7 +338,7 @@ TEST(ShippedCases, DefaultCaseHasThePapersTumourVolume) {
 
 TEST(ShippedCases, DefaultCaseDocumentsEveryKeyAsTheTableDoes) {
   expect_documented(content_of(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/cases/colin27.yaml"),
-                    case_key_documents());
+                    documents_of<CaseConfig>());
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST(DaemonFile, ShippedFileHasTheDefaults) {
 
 TEST(DaemonFile, ShippedFileDocumentsEveryKeyAsTheTableDoes) {
   expect_documented(content_of(fs::path(BRAINSHIFT_SOURCE_DIR) / "config/daemon.yaml"),
-                    daemon_key_documents());
+                    documents_of<DaemonConfig>());
 }
 
 class DaemonFileKeys : public testing::Test {

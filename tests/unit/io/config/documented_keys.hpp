@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/configuration/key_table.hpp"
+#include "tests/support/key_documenter.hpp"
 
 namespace brainshift::io {
 
