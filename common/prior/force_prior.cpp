@@ -142,11 +142,6 @@ VecX ForceKernel::variance_along(const Eigen::MatrixXd& w) const {
   return each.reshaped(w.rows(), 3).rowwise().sum();
 }
 
-Eigen::MatrixXd ForceKernel::dense() const {
-  if (compact_.rows() > 0) return Eigen::MatrixXd(compact_);
-  return basis_ * basis_.transpose();
-}
-
 std::uint64_t ForceKernel::bytes() const {
   return static_cast<std::uint64_t>(compact_.nonZeros()) * (sizeof(double) + sizeof(int)) +
          static_cast<std::uint64_t>(basis_.size()) * sizeof(double);

@@ -56,8 +56,6 @@ class ForceKernel {
   // w^T Sigma w of each field: the variance of the work that the random forces do on it. w: k x 3n
   // as above; -> k numbers, mm^2 N^2. Half the cost of apply(). Thread-safe.
   VecX variance_along(const Eigen::MatrixXd& w) const;
-  // sigma_f^2 V R V, n x n, both triangles.
-  Eigen::MatrixXd dense() const;
   std::uint64_t bytes() const;
 
   static constexpr double kSupportOverLength = 4.2;

@@ -33,9 +33,6 @@ struct FieldGrid {
   Vec3 voxel_mm(int i, int j, int k) const { return origin_mm + spacing_mm * Vec3(i, j, k); }
   // Centre of the last voxel of every axis.
   Vec3 last_mm() const { return voxel_mm(dims[0] - 1, dims[1] - 1, dims[2] - 1); }
-  bool in_rim(int i, int j, int k) const {
-    return i == 0 || j == 0 || k == 0 || i == dims[0] - 1 || j == dims[1] - 1 || k == dims[2] - 1;
-  }
 };
 
 // kInvalidArgument: fewer than 3 voxels along an axis (a rim on both sides needs them) or more than

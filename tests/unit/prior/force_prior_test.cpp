@@ -46,6 +46,15 @@ Points applied(const ForceKernel& kernel, const Points& w) {
   return f;
 }
 
+// Row and column for each node, from the response to a force on one component of one node.
+Eigen::MatrixXd dense_of(const ForceKernel& kernel, const TetMesh& mesh) {
+  const int n = mesh.num_nodes();
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(n, 3 * n), forces;
+  for (int i = 0; i < n; ++i) unit(i, 3 * i) = 1.0;
+  kernel.apply(unit, forces);
+  return forces(Eigen::all, Eigen::seqN(0, n, 3));
+}
+
 TetMesh crooked_box(int cells, double size_mm) {
   TetMesh mesh = box_mesh(cells, cells, cells, Vec3(size_mm, size_mm, size_mm));
   test_support::perturb_interior(mesh, 2.0, 5);
@@ -78,7 +87,7 @@ TEST(ForceKernel, BasisOverAllNodesIsThePapersCorrelation) {
   const VecX volumes = fem::nodal_volumes(mesh);
   ASSERT_LE(mesh.num_nodes(), ForceKernel::kFewestCentres);
   const double sd = 0.3, length = 20.0;
-  const Eigen::MatrixXd dense = ForceKernel::basis(mesh.nodes, volumes, length, sd).dense();
+  const Eigen::MatrixXd dense = dense_of(ForceKernel::basis(mesh.nodes, volumes, length, sd), mesh);
   for (int i = 0; i < mesh.num_nodes(); ++i) {
     for (int j = 0; j < mesh.num_nodes(); ++j) {
       const double r = (mesh.nodes.col(i) - mesh.nodes.col(j)).norm() / length;
@@ -93,8 +102,7 @@ TEST(ForceKernel, BasisKeepsMostOfTheVariance) {
   const TetMesh mesh = box_mesh(10, 10, 10, Vec3(100, 100, 100));
   const VecX volumes = fem::nodal_volumes(mesh);
   for (const double length : {20.0, 60.0}) {
-    const VecX kept = ForceKernel::basis(mesh.nodes, volumes, length, 1.0)
-                          .dense()
+    const VecX kept = dense_of(ForceKernel::basis(mesh.nodes, volumes, length, 1.0), mesh)
                           .diagonal()
                           .cwiseQuotient(volumes.cwiseAbs2());
     EXPECT_LE(kept.maxCoeff(), 1.0 + 1e-6) << length;
@@ -126,7 +134,7 @@ TEST(ForceKernel, CompactIsPositiveDefiniteAlsoForLongCorrelation) {
   const TetMesh mesh = box_mesh(4, 4, 4, Vec3(20, 20, 20));
   for (double length : {1.0, 5.0, 8.0}) {
     const Eigen::MatrixXd dense =
-        ForceKernel::compact(mesh.nodes, fem::nodal_volumes(mesh), length, 1.0).dense();
+        dense_of(ForceKernel::compact(mesh.nodes, fem::nodal_volumes(mesh), length, 1.0), mesh);
     EXPECT_LT((dense - dense.transpose()).norm(), 1e-14 * dense.norm());
     const VecX eigenvalues = test_support::eigenvalues(dense);
     EXPECT_GT(eigenvalues[0], 0.0) << "L = " << length;
@@ -165,8 +173,8 @@ TEST(ForcePrior, IsTheSumOfItsKernelsAndModes) {
                          modes);
   const Points w = Points::Random(3, mesh.num_nodes());
   const Points f = prior.apply(w);
-  const Eigen::MatrixXd dense =
-      prior.kernel(0).dense() + prior.kernel(1).dense() + prior.kernel(2).dense();
+  const Eigen::MatrixXd dense = dense_of(prior.kernel(0), mesh) + dense_of(prior.kernel(1), mesh) +
+                                dense_of(prior.kernel(2), mesh);
   const Points remainders = w * dense;  // symmetric
   ASSERT_GT(remainders.norm(), 1.0);
   const VecX from_modes = modes.columns * (modes.columns.transpose() * w.reshaped());
