@@ -85,8 +85,8 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
     return invalid(fmt::format("gap between sweeps = {} s: must be >= 0", options.sweep_gap_s));
   }
   if (Status ok = check_contours(recording, contours); !ok) return tl::unexpected(ok.error());
-  auto chain = tracking::evaluate_chain(recording, constants, options.image_frame,
-                                        options.ras_frame, options.chain);
+  auto chain =
+      tracking::evaluate_chain(recording, constants, options.image_frame, "Ras", options.chain);
   if (!chain) return tl::unexpected(chain.error());
   std::stable_sort(contours.begin(), contours.end(),
                    [](const auto& a, const auto& b) { return a.frame < b.frame; });
@@ -117,8 +117,8 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
   }
   if (result.sweeps.empty()) {
     return fail(ErrorCode::kEmptySet, "no contour lies on a frame with a valid chain from " +
-                                          options.image_frame + " to " + options.ras_frame + ": " +
-                                          summary(result.lost_contours));
+                                          options.image_frame +
+                                          " to Ras: " + summary(result.lost_contours));
   }
   for (const SweepBoundary& sweep : result.sweeps) {
     if (Status ok = check_extent(sweep); !ok) return tl::unexpected(ok.error());

@@ -17,7 +17,6 @@ namespace brainshift::client {
 
 struct BoundaryOptions {
   std::string image_frame = "Image";
-  std::string ras_frame = "Ras";
   tracking::ChainOptions chain;
   double spacing_mm = ultrasound::kBoundarySpacing_mm;
   // A new sweep begins after this long without a traced contour; 0: the recording is one sweep.
