@@ -2,10 +2,7 @@
 #include "common/igtl/image.hpp"
 
 #include <algorithm>
-#include <cassert>
-#include <cmath>
 #include <cstring>
-#include <utility>
 
 #include "common/core/mesh.hpp"
 #include "common/igtl/bytes.hpp"

@@ -2,7 +2,6 @@
 #include "common/igtl/poly_data.hpp"
 
 #include <array>
-#include <numeric>
 #include <utility>
 
 #include "common/igtl/bytes.hpp"

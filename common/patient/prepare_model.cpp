@@ -3,8 +3,6 @@
 
 #include <future>
 #include <memory>
-#include <optional>
-#include <string>
 #include <utility>
 
 #include "common/anatomy/brain_model_builder.hpp"

@@ -7,8 +7,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
-#include <utility>
 #include <vector>
 
 #include "common/configuration/stereo_calibration.hpp"

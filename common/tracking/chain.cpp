@@ -5,7 +5,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 
 #include "common/tracking/transform_graph.hpp"
 

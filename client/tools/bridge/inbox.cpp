@@ -179,8 +179,7 @@ void Inbox::take_landmarks(const std::string& device, const igtl::PointList& lis
     return;
   }
   taken.found.push_back(
-      {device,
-       LandmarkPairs{io::columns_of(undeformed), io::columns_of(deformed), options_.landmark_sd_mm},
+      {device, LandmarkPairs{columns_of(undeformed), columns_of(deformed), options_.landmark_sd_mm},
        arrived, fmt::format("{}: {} landmark pairs", device, deformed.size())});
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/bridge/peer.hpp"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 

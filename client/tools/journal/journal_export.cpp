@@ -11,7 +11,6 @@
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
 #include "common/io/model/model_file.hpp"
-#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {

@@ -3,7 +3,6 @@
 // sends no observation. A daemon that goes away is told too, and watched again when it comes back.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>

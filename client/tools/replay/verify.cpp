@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "common/io/files/file_access.hpp"
-#include "common/wire/convert.hpp"
 
 namespace brainshift::client {
 namespace {

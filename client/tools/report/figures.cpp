@@ -2,7 +2,6 @@
 #include "client/tools/report/figures.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "client/tools/pictures/chart.hpp"

@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <string_view>
-#include <vector>
 
-#include "common/core/rigid_motion.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
