@@ -142,28 +142,28 @@ step "stages: where the time of an update goes" stages
 rm "$out"/*.surgery "$out"/*.h5 "$out/region.yaml"  # a gigabyte that nobody reads
 
 # One process per mesh, so that the memory of one does not count for the next.
-error_time() {
-  "$bin/bench_error_time" --case "$case_file" --repetitions "$repetitions" \
-    --method-budget-s "${BUDGET_S:-400}" --out "$out" "$@"
+error_time() {  # REPETITIONS OPTIONS...
+  "$bin/bench_error_time" --case "$case_file" --repetitions "$1" \
+    --method-budget-s "${BUDGET_S:-400}" --out "$out" "${@:2}"
 }
 for size in ${sizes//,/ }; do
   case $size in
-    5) step "error against time: 5 thousand nodes" error_time --sizes 5 ;;
+    5) step "error against time: 5 thousand nodes" error_time "$repetitions" --sizes 5 ;;
     18)
-      step "error against time: 18 thousand nodes" error_time --sizes 18 --scenarios paper \
+      step "error against time: 18 thousand nodes" error_time "$repetitions" --sizes 18 --scenarios paper \
         --methods condensed,paper,paper-woodbury --timed 2 --compared 3
       leave_out "18 thousand nodes: pcg and distension, which take an hour"
       ;;
     *)  # a truth of another stiffness costs a factorisation each
-      step "error against time: $size thousand nodes" error_time --sizes "$size" \
-        --scenarios paper --methods condensed --repetitions 3
+      step "error against time: $size thousand nodes" error_time 3 --sizes "$size" \
+        --scenarios paper --methods condensed
       leave_out "$size thousand nodes: all methods but condensed; three surgeries"
       ;;
   esac
 done
 for size in ${refined//,/ }; do
-  step "error against time: $size thousand nodes, refined" error_time --sizes "$size" \
-    --local-factor 0.6 --scenarios paper --methods condensed --repetitions 3
+  step "error against time: $size thousand nodes, refined" error_time 3 --sizes "$size" \
+    --local-factor 0.6 --scenarios paper --methods condensed
 done
 for size in 40 100; do
   case ",$sizes," in
