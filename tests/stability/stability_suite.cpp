@@ -52,8 +52,9 @@ std::string cell(std::string text) {
 }
 
 constexpr const char* kHeading =
-    "sheet,fault,parameter,x,row,answered,warned,status,backward_error,rcond,iterations,min_volume_"
-    "ratio,difference,bound,unit,must_warn,set,from_posterior_mm,scales_gain,objection,reason";
+    "sheet,fault,parameter,x,row,answered,warned,status,backward_error,rcond,iterations,"
+    "min_volume_ratio,difference,bound,unit,must_warn,set,from_posterior_mm,scales_gain,objection,"
+    "reason";
 
 // What is compared, in full; the rest with four digits.
 std::vector<std::string> cells_of(const Point& p, Fault fault) {

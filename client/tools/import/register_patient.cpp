@@ -9,7 +9,7 @@
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/pose_file.hpp"
-#include "common/io/landmarks/point_file.hpp"
+#include "common/io/landmarks/pair_file.hpp"
 #include "common/io/recording/fiducial_file.hpp"
 #include "common/io/recording/sequence_file.hpp"
 
