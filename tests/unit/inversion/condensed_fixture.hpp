@@ -18,11 +18,12 @@
 
 namespace brainshift::inversion {
 
-// Posterior mean and covariance of u for a given active set, from K_p^-1 column by column.
+// Posterior mean and covariance of u for a given active set, from solves with K_p column by column.
 struct DirectPosterior {
   VecX mean;
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance;  // where it is asked for
 };
+enum class DirectCovariance { kNo, kYes };
 
 class Condensed : public ::testing::TestWithParam<Boundary> {
  protected:
@@ -80,7 +81,8 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
 
   static DirectPosterior direct_posterior(Boundary boundary, const SparseData& data,
                                           const std::vector<NodeIndex>& active_nodes,
-                                          const PriorScaleValues& scales = kAsInTheCase) {
+                                          const PriorScaleValues& scales = kAsInTheCase,
+                                          DirectCovariance covariance = DirectCovariance::kNo) {
     const PreparedModel& model = prepared(boundary);
     const prior::ForcePrior forces = scaled_prior(model, scales);
     const contact::ForwardModel& forward = model.forward();
@@ -93,19 +95,26 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
     linalg::SymmetricMatrix k_p = forward.stiffness();
     forward.contact().add_stiffness(k_p, forward.dofs(), active);
     const auto factor = linalg::SparseCholesky::factorise(k_p);
-    Eigen::MatrixXd inverse(n3, n3), loaded(n3, n3);
-    for (Eigen::Index j = 0; j < n3; ++j) {
-      Points unit = Points::Zero(3, n3 / 3);
-      unit(j % 3, j / 3) = 1.0;
-      const Points column = forward.dofs().expand(factor->solve(forward.dofs().restrict_to(unit)));
-      inverse.col(j) = Eigen::Map<const VecX>(column.data(), n3);
-      const Points force = forces.apply(column);
-      loaded.col(j) = Eigen::Map<const VecX>(force.data(), n3);
-    }
-    const Eigen::MatrixXd prior = inverse * loaded;
+    const auto of_columns = [&](const Eigen::MatrixXd& right, const auto& value) {
+      Eigen::MatrixXd result(n3, right.cols());
+      for (Eigen::Index j = 0; j < right.cols(); ++j) {
+        const Points column = value(Eigen::Map<const Points>(right.col(j).data(), 3, n3 / 3));
+        result.col(j) = Eigen::Map<const VecX>(column.data(), n3);
+      }
+      return result;
+    };
+    const auto solved = [&](const Eigen::MatrixXd& right) {
+      return of_columns(right, [&](const Points& load) {
+        return forward.dofs().expand(factor->solve(forward.dofs().restrict_to(load)));
+      });
+    };
+    // The prior covariance of u times `right`.
+    const auto expected = [&](const Eigen::MatrixXd& right) {
+      return solved(of_columns(solved(right), [&](const Points& u) { return forces.apply(u); }));
+    };
     Points gaps = Points::Zero(3, n3 / 3);
     forward.contact().add_load(gaps, active);
-    const VecX shift = inverse * Eigen::Map<const VecX>(gaps.data(), n3);
+    const VecX shift = solved(Eigen::Map<const VecX>(gaps.data(), n3));
     const auto weights =
         fem::sampling_matrix(model.locator(), static_cast<int>(n3 / 3), data.positions, 1e-6);
     // A datum along n has the row n^T A; rows of zeros with d = 0 and any variance say nothing.
@@ -127,13 +136,16 @@ class Condensed : public ::testing::TestWithParam<Boundary> {
       d.segment<3>(3 * i) = measured;
       noise.segment<3>(3 * i).setConstant(data.sd_mm[i] * data.sd_mm[i]);
     }
-    Eigen::MatrixXd innovation = a * prior * a.transpose();
+    const Eigen::MatrixXd towards = expected(a.transpose());
+    Eigen::MatrixXd innovation = a * towards;
     innovation.diagonal() += noise;
     DirectPosterior posterior;
-    posterior.mean =
-        shift + prior * (a.transpose() * test_support::solve_positive(innovation, d - a * shift));
-    posterior.covariance =
-        prior - prior * a.transpose() * test_support::solve_positive(innovation, a * prior);
+    posterior.mean = shift + towards * test_support::solve_positive(innovation, d - a * shift);
+    if (covariance == DirectCovariance::kYes) {
+      posterior.covariance =
+          expected(Eigen::MatrixXd::Identity(n3, n3)) -
+          towards * test_support::solve_positive(innovation, towards.transpose());
+    }
     return posterior;
   }
 };

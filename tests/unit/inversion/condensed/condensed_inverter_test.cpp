@@ -198,7 +198,8 @@ TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
   Estimate estimate;
   auto inverter = Condensed::inverter(GetParam());
   ASSERT_TRUE(inverter.update(data, estimate));
-  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves);
+  const auto direct = direct_posterior(GetParam(), data, estimate.active_slaves, kAsInTheCase,
+                                       DirectCovariance::kYes);
   const auto& region = operators(GetParam())->region;
   // Widened by what the data lie off more than they should.
   double squares = 0.0;

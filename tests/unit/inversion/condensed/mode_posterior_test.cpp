@@ -39,9 +39,10 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
   ContactSystem system(*brain, window, 1.0, team);
   ContactReduction no_contact(*brain, window, system);
+  const SparseData sagging = sagging_data(Boundary::kFixed, 0.3, 4);
   int agreed = 0, contradicted = 0, under_the_first = 0;
   for (int trial = 0; trial < 80; ++trial) {
-    SparseData data = sagging_data(Boundary::kFixed, 0.3, 4);
+    SparseData data = sagging;
     const int half = data.size() / 2, rest = data.size() - half;
     data.displacements *= 0.025;
     data.displacements.rightCols(rest).colwise() += Vec3(0.0, 0.01 * trial, 0.0);
