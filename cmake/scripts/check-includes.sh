@@ -9,6 +9,7 @@
 #      server/main, which may be a client (client/lib).
 #   4  Protobuf headers stay in common/wire, ZeroMQ headers in server/transport and client/lib, CGAL
 #      headers in folders whose CMakeLists.txt links CGAL.
+#   5  Sources are called .hpp or .cpp, and include one another by the path from the root.
 # Prints one line per violation. Exit status: 0 none, 1 violations, 2 nothing to check.
 set -euo pipefail
 build=${1:?usage: check-includes.sh BUILD_DIR [SOURCE_DIR]}
@@ -20,12 +21,18 @@ cd "${2:-$(dirname "$0")/../..}"
 mapfile -t files < <(find common server client -path client/examples -prune -o -name '*.[ch]pp' -print | LC_ALL=C sort)
 [ ${#files[@]} -gt 0 ] || { echo "check-includes: no sources below $PWD" >&2; exit 2; }
 
-includes() {  # "FILE INCLUDED", one line for each #include
+other_names() {
+  find common server client -path client/examples -prune -o \
+    -regextype egrep -regex '.*\.(c|cc|cxx|h|hh|hxx|inl|ipp|tpp)' -printf '%p: sources are called .hpp or .cpp\n'
+}
+includes() {  # "FILE INCLUDED KIND", one line for each #include; KIND: its first quotation mark
   awk '/^[ \t]*#[ \t]*include[ \t]*[<"]/ {
     name = $0
-    sub(/^[^<"]*[<"]/, "", name)
+    sub(/^[^<"]*/, "", name)
+    kind = substr(name, 1, 1)
+    name = substr(name, 2)
     sub(/[>"].*$/, "", name)
-    print FILENAME, name
+    print FILENAME, name, kind
   }' "${files[@]}"
 }
 cgal_folders() { grep -lr --include=CMakeLists.txt 'CGAL::' common server client | sed 's|/CMakeLists.txt$||' || true; }
@@ -96,7 +103,11 @@ found=$(awk -v cgal="$(cgal_folders | tr '\n' ' ')" '
     } else if (included ~ /^CGAL\//) {
       if (!in_list(folder, cgal)) report(file, included, folder "/CMakeLists.txt does not link CGAL")
     }
-    if (included !~ /^(common|server|client)\//) next
+    if (included !~ /^(common|server|client)\//) {
+      if ($3 == "\"" && included !~ /^brainshift\/v1\/[a-z]+\.pb\.h$/)
+        report(file, included, "not a path from the root in common, server or client")
+      next
+    }
 
     target = folder_of(included)
     from = part_of(file)
@@ -121,7 +132,7 @@ found=$(awk -v cgal="$(cgal_folders | tr '\n' ' ')" '
     }
   }
   END { for (i = 1; i <= count; ++i) if (state[units[i]] == "") visit(units[i]) }
-' "$links" <(includes))
+' "$links" <(includes); other_names)
 
 if [ -n "$found" ]; then
   echo "$found"

@@ -4,7 +4,7 @@
 
 In a unity build (BRAINSHIFT_UNITY) a name of an unnamed namespace is visible in the files behind it: two equal names do not
 compile, or, worse, a call reaches the other file's overload. What two files share stands once, in a header. Exit status 1
-with one line for each name.
+with one line for each name. 2: the build was to compile several files as one and does not. 77: it was not to.
 """
 import collections
 import json
@@ -85,6 +85,10 @@ def main():
             if len(places) > 1 and not equal_aliases and name != "PrintTo":
                 print(f"{folder}: {name} in {', '.join(sorted(file for file, _ in places))}")
                 bad += 1
+    if compared == 0:
+        asked = "BRAINSHIFT_UNITY:BOOL=ON" in (pathlib.Path(sys.argv[1]) / "CMakeCache.txt").read_text()
+        print("check-names: no files are compiled as one")
+        return 2 if asked else 77
     print(f"check-names: {compared} files, {bad} names that stand twice in what is compiled as one")
     return 1 if bad else 0
 
