@@ -24,7 +24,7 @@ struct RouterOptions {
   std::chrono::milliseconds handshake_limit{2000};
   // How long the loop may wait before it calls RequestHandler::turned() again; -1: for ever.
   std::chrono::milliseconds longest_wait{-1};
-  std::optional<ServerKeys> keys;  // nullopt: everybody who reaches the endpoint is an admin
+  std::optional<ServerKeys> keys;  // nullopt: any peer that can connect has full access
   Limits limits;
 };
 
