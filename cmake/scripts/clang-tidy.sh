@@ -19,7 +19,8 @@ cmake --build "$build" --target brainshift_proto  # Protobuf's headers
 # clang-tidy 14 needs tens of minutes for a source that instantiates CGAL; those few rely on the compiler.
 mapfile -t files < <(git ls-files "${folders[@]/%//*.cpp}" | xargs grep -L '#include <CGAL/' | sed "s|.*|^$root/&\$|")
 [ ${#files[@]} -gt 0 ] || { echo "clang-tidy.sh: no source in: ${folders[*]}" >&2; exit 2; }
-# Only findings: neither the command lines nor the count of warnings in system headers. GCC's own warning options
+# Only findings: neither the command lines nor the count of warnings in system headers. Options that only GCC knows
 # stand in the compile commands.
-run-clang-tidy -quiet -extra-arg=-Wno-unknown-warning-option -p "$build" -j "${JOBS:-$(nproc)}" "${files[@]}" 2>&1 |
+run-clang-tidy -quiet -extra-arg=-Wno-unknown-warning-option \
+  -extra-arg=-Wno-unused-command-line-argument -p "$build" -j "${JOBS:-$(nproc)}" "${files[@]}" 2>&1 |
   { grep --line-buffered -vE '^clang-tidy|warnings? generated|^$' || true; }

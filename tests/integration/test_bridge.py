@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from igtl_peer import Peer
 from igtl_reader import image_of, points_of, status_of
-from programs import Background, brainshift as command, good, refused, serve
+from programs import TIMEOUT_FACTOR, Background, brainshift as command, good, refused, serve
 
 import brainshift
 
@@ -162,12 +162,12 @@ def test_the_bridge_blanks_before_it_ends(theatre):
         next_field(peer)
         theatre.bridge.process.send_signal(signal.SIGTERM)
         blank, reason = False, ""
-        while (message := peer.receive(2.0)) is not None:
+        while (message := peer.receive(TIMEOUT_FACTOR * 10.0)) is not None:  # until it hangs up
             if message.device == "brainshift_u":
                 blank = is_blank(message)
             if message.type == "STATUS":
                 _, reason = status_of(message)
-        assert theatre.bridge.end() == 0
+        assert theatre.bridge.process.wait(TIMEOUT_FACTOR * 10.0) == 0  # a second signal would kill it
         assert blank, "the last volume that came"
         assert reason == "the bridge has ended"
 

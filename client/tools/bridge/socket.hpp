@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A TCP socket that never waits, and its address. Private to client/tools/bridge, but for the address.
+// A TCP socket that never waits, and its address. Private to client/tools/bridge, but for the
+// address.
 #pragma once
 
 #include <cstddef>
