@@ -25,7 +25,7 @@ other_names() {
   find common server client -path client/examples -prune -o \
     -regextype egrep -regex '.*\.(c|cc|cxx|h|hh|hxx|inl|ipp|tpp)' -printf '%p: sources are called .hpp or .cpp\n'
 }
-includes() {  # "FILE INCLUDED KIND", one line for each #include; KIND: its first quotation mark
+includes() {  # "FILE INCLUDED KIND", one line for each #include; KIND: < or "
   awk '/^[ \t]*#[ \t]*include[ \t]*[<"]/ {
     name = $0
     sub(/^[^<"]*/, "", name)

@@ -18,7 +18,7 @@ import vtk
 from BrainshiftLib.colours import FULL_SCALE_MM
 from BrainshiftLib.grid import FieldError, check_field, field_from_image, grid_transform
 from BrainshiftLib.label import LabelError, Light, Verdict, may_be_shown, parse_metadata, parse_state
-from BrainshiftLib.scene import FIELD, STATE, SceneNodes, bridge_node
+from BrainshiftLib.scene import FIELD, STATE, TRANSFORM, SceneNodes, bridge_node
 from slicer.ScriptedLoadableModule import (ScriptedLoadableModule, ScriptedLoadableModuleLogic,
                                            ScriptedLoadableModuleTest, ScriptedLoadableModuleWidget)
 from slicer.util import VTKObservationMixin
