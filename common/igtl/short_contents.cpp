@@ -32,7 +32,7 @@ Matrix34f take_matrix(ByteReader& reader) {
 }
 
 Status validate_point(const NamedPoint& point) {
-  const Status texts =
+  Status texts =
       check_padded("name of a point", point.name, kNameBytes)
           .and_then([&] { return check_padded("group of a point", point.group, kGroupBytes); })
           .and_then([&] { return check_padded("owner of a point", point.owner, kOwnerBytes); });

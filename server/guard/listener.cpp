@@ -168,7 +168,7 @@ Result<Listener> Listener::open_ipc(const std::string& endpoint) {
   unlink(path.c_str());
   if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
       listen(fd, kBacklog) != 0) {
-    const auto failure = system_failure(endpoint);
+    auto failure = system_failure(endpoint);
     ::close(fd);
     return failure;
   }

@@ -147,7 +147,7 @@ Result<Admission> Session::submit(Observation observation, TimePoint now) {
     return tl::unexpected(status.error());
   }
   const auto waiting = boxes_.find(observation.source);
-  const auto admission = running_->sources.admit(
+  auto admission = running_->sources.admit(
       observation, now.time_since_epoch() / std::chrono::nanoseconds(1), waiting != boxes_.end());
   if (!admission || admission->repeated) return admission;
   observation.daemon_ns = observation.acquired_ns = admission->daemon_ns;

@@ -191,7 +191,7 @@ struct CheckpointFile::Impl {
       good = write_at(file.get(), piece(i), pieces.bytes, block.payload_at + pieces.from(i));
     }
     if (!good) {
-      const auto error = write_error("append block " + std::to_string(index));
+      auto error = write_error("append block " + std::to_string(index));
       // What is left when this fails too is dropped on the next opening.
       [[maybe_unused]] const int cut = ::ftruncate(file.get(), static_cast<off_t>(end));
       return error;
