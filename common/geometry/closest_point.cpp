@@ -173,7 +173,7 @@ Vec3 ClosestPointIndex::triangle_normal(int triangle) const {
 
 Vec3 ClosestPointIndex::pseudo_normal(const ClosestPoint& closest) const {
   const int t = closest.triangle;
-  const Vec3 n = impl_->face_normals.col(t);
+  Vec3 n = impl_->face_normals.col(t);
   // Weight of corner k: area of the triangle that the point makes with the opposite edge.
   Vec3 weights;
   for (int k = 0; k < 3; ++k) {

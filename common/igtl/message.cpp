@@ -36,7 +36,7 @@ Status encode_one(const Envelope& envelope, const T& content, std::string& out) 
 // What one decoder makes of a content.
 template <auto kDecode>
 Result<Content> decoded_by(std::string_view content) {
-  return kDecode(content).map([](auto&& one) { return Content(std::move(one)); });
+  return kDecode(content).map([](auto&& one) { return Content(std::forward<decltype(one)>(one)); });
 }
 
 template <typename T>

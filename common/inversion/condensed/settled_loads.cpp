@@ -203,7 +203,7 @@ Result<bool> SettledLoads::follow(const MovingData* moving) {
   const bool reweighed = reweigh();
   bool relocated = false;
   if (moving != nullptr) {
-    const auto changed = relocate(*moving);
+    auto changed = relocate(*moving);
     if (!changed) return changed;
     relocated = *changed;
   }
