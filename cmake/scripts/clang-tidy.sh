@@ -30,9 +30,11 @@ for entry in json.loads((pathlib.Path(build) / "compile_commands.json").read_tex
 PY
 )
 [ ${#files[@]} -gt 0 ] || { echo "clang-tidy.sh: no source in: ${folders[*]}" >&2; exit 2; }
-# Only findings: neither the command lines nor the count of warnings in system headers. Options that only GCC knows
-# stand in the compile commands. A file that reads the sources of a folder includes them.
-run-clang-tidy -quiet -extra-arg=-Wno-unknown-warning-option -extra-arg=-Wno-unused-command-line-argument \
+# Findings, and which source was read last; neither the command lines nor the count of warnings in system headers.
+# Options that only GCC knows stand in the compile commands. A file that reads the sources of a folder includes them.
+PYTHONUNBUFFERED=1 run-clang-tidy -quiet -extra-arg=-Wno-unknown-warning-option -extra-arg=-Wno-unused-command-line-argument \
   -header-filter='/(common|server|client)/.*\.[ch]pp$' -checks=-bugprone-suspicious-include \
   -p "$build" -j "${JOBS:-$(nproc)}" "${files[@]}" 2>&1 |
-  { grep --line-buffered -vE '^clang-tidy|warnings? generated|^$' || true; }
+  awk -v all="${#files[@]}" '/^clang-tidy/ { sub(/.*\/CMakeFiles\//, ""); print ++n "/" all " " $0; fflush(); next }
+                             /warnings? generated|^$/ { next }
+                             { print; fflush() }'
