@@ -32,9 +32,14 @@ PY
 [ ${#files[@]} -gt 0 ] || { echo "clang-tidy.sh: no source in: ${folders[*]}" >&2; exit 2; }
 # Findings, and which source was read last; neither the command lines nor the count of warnings in system headers.
 # Options that only GCC knows stand in the compile commands. A file that reads the sources of a folder includes them.
+done_=0
 PYTHONUNBUFFERED=1 run-clang-tidy -quiet -extra-arg=-Wno-unknown-warning-option -extra-arg=-Wno-unused-command-line-argument \
   -header-filter='/(common|server|client)/.*\.[ch]pp$' -checks=-bugprone-suspicious-include \
   -p "$build" -j "${JOBS:-$(nproc)}" "${files[@]}" 2>&1 |
-  awk -v all="${#files[@]}" '/^clang-tidy/ { sub(/.*\/CMakeFiles\//, ""); print ++n "/" all " " $0; fflush(); next }
-                             /warnings? generated|^$/ { next }
-                             { print; fflush() }'
+  while IFS= read -r line; do
+    case $line in
+      clang-tidy*) read=${line##*/CMakeFiles/}; echo "$((++done_))/${#files[@]} ${read%%.dir/*}" ;;
+      "" | *" warnings generated." | *" warning generated.") ;;
+      *) printf '%s\n' "$line" ;;
+    esac
+  done

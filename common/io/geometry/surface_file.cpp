@@ -291,11 +291,12 @@ TriangleSurface read_obj(const std::string& content) {
       int count = 0;
       while (words >> word) {
         long long number = 0;
-        if (!parse_vertex_number(word, number))
-          refuse_format(place + "'" + word + "' is no vertex");
+        if (!parse_vertex_number(word, number)) {
+          refuse_format(fmt::format("{}'{}' is no vertex", place, word));
+        }
         const long long index = number < 0 ? known + number : number - 1;
         const bool fits = number != 0 && index >= 0 && index <= std::numeric_limits<int>::max();
-        if (!fits) refuse_format(place + "vertex " + word + " does not exist");
+        if (!fits) refuse_format(fmt::format("{}vertex {} does not exist", place, word));
         corners.push_back(static_cast<int>(index));
         ++count;
       }
