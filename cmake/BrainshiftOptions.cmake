@@ -20,6 +20,12 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
 endif()
 
+# With debug symbols GNU ld needs nine seconds for a test program of 200 MB, lld two.
+find_program(BRAINSHIFT_LLD ld.lld DOC "Linker of debug builds; empty: the compiler's own")
+if(BRAINSHIFT_LLD AND CMAKE_BUILD_TYPE STREQUAL "Debug")
+  add_link_options(-fuse-ld=lld)
+endif()
+
 add_library(brainshift_warnings INTERFACE)
 target_compile_options(brainshift_warnings INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Werror)
