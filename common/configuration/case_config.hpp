@@ -109,6 +109,9 @@ struct PriorConfig {
   // Standard deviation of the direction of gravity. A mode across it has gravity_mode_sd times the
   // tangent of this angle.
   double gravity_direction_sd_deg = 0.0;
+  // How differently fluid drains, or air enters, on the left and on the right, and in front and at
+  // the back; in units of the full buoyancy load.
+  double gravity_sides_sd = 0.25, gravity_ends_sd = 0.25;
   // Fluid planes below the reference plane.
   std::vector<double> gravity_levels_mm = {-40.0, -20.0, 0.0, 20.0, 40.0, 60.0};
   // Volume strain of swelling or shrinking tissue around the tumour: standard deviation at its
@@ -124,6 +127,9 @@ struct PriorConfig {
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
+  // Weight of the hypothesis that every part has the case's strength, whatever the data say about
+  // single ones: they see a part of the brain, and it keeps what they cannot see.
+  double broad_weight = 0.1;
 };
 // Greatest strength of a part of the prior, in units of the case's standard deviation.
 inline constexpr double kLargestStrength = 8.0;
@@ -185,7 +191,7 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
   // Largest number of prior modes kept, those of the load families among them.
-  int max_rank = 116;
+  int max_rank = 168;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.

@@ -221,6 +221,13 @@ void visit(A& a, V& v) {
      "The modes across gravity are weaker than those along it by the tangent. 0: no such modes; "
      "the coarse residual field stands for a pose that is off."},
     v.gravity_direction_sd_deg, between(0.0, 80.0));
+  a({"gravity_sides_sd", "in units of the full buoyancy load",
+     "How differently fluid drains on the left and on the right: air on one side", "decision 0037",
+     "0: no such modes."},
+    v.gravity_sides_sd, between(0.0, 8.0));
+  a({"gravity_ends_sd", "in units of the full buoyancy load", "The same in front and at the back",
+     "decision 0037", "0: no such modes."},
+    v.gravity_ends_sd, between(0.0, 8.0));
   a({"gravity_levels_mm", "mm below the reference plane along gravity",
      "Fluid planes of these modes", "", "May be empty."},
     v.gravity_levels_mm, between(-300.0, 300.0));
@@ -255,6 +262,12 @@ void visit(A& a, V& v) {
      "estimated: from the data of every update; a part that they do not need vanishes, and none "
      "is more than eight times as strong as above (method condensed). fixed: as above."},
     v.estimate_scales, kScalesWords);
+  a({"broad_weight", "",
+     "Weight of the hypothesis that every part has the strength above, whatever the data say",
+     "decision 0037",
+     "Data see a part of the brain; the error bars keep what they cannot see. 0: strengths "
+     "estimated from the data hold everywhere (scales estimated)."},
+    v.broad_weight, between(0.0, 1.0));
 }
 
 template <typename A, Of<InversionConfig> V>

@@ -67,14 +67,24 @@ ForceKernel ForceKernel::compact(const Points& nodes, const VecX& nodal_volumes,
   return kernel;
 }
 
-ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, double length_mm,
-                               double force_density_sd) {
-  assert(nodal_volumes.size() == nodes.cols());
+namespace {
+
+// So many as the length asks for, spread over the mesh.
+std::vector<NodeIndex> centres_of(const Points& nodes, const VecX& nodal_volumes,
+                                  double length_mm) {
   const double wanted =
-      kCentresPerLength * nodal_volumes.sum() / (length_mm * length_mm * length_mm);
-  const int count =
-      static_cast<int>(std::clamp(wanted, double{kFewestCentres}, double{kMaxCentres}));
-  const Points centres = nodes(Eigen::all, geometry::spread_nodes(nodes, count));
+      ForceKernel::kCentresPerLength * nodal_volumes.sum() / (length_mm * length_mm * length_mm);
+  return geometry::spread_nodes(
+      nodes, static_cast<int>(std::clamp(wanted, double{ForceKernel::kFewestCentres},
+                                         double{ForceKernel::kMaxCentres})));
+}
+
+}  // namespace
+
+ForceKernel ForceKernel::of_centres(const Points& nodes, const VecX& nodal_volumes,
+                                    double length_mm, double force_density_sd,
+                                    const Points& centres) {
+  assert(nodal_volumes.size() == nodes.cols());
   const Eigen::Index m = centres.cols();
   Eigen::MatrixXd among(m, m);
   for (Eigen::Index j = 0; j < m; ++j) {
@@ -97,9 +107,48 @@ ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, d
   return kernel;
 }
 
+ForceKernel ForceKernel::basis(const Points& nodes, const VecX& nodal_volumes, double length_mm,
+                               double force_density_sd) {
+  const Points centres = nodes(Eigen::all, centres_of(nodes, nodal_volumes, length_mm));
+  return of_centres(nodes, nodal_volumes, length_mm, force_density_sd, centres);
+}
+
+// By Cholesky factorisation the first columns of the basis are what the first centres explain.
+ForceKernel::NearAndFar ForceKernel::basis_about(const Points& nodes, const VecX& nodal_volumes,
+                                                 double length_mm, double force_density_sd,
+                                                 const std::vector<NodeIndex>& places,
+                                                 double near_mm) {
+  std::vector<NodeIndex> centres = centres_of(nodes, nodal_volumes, length_mm);
+  const Points about = nodes(Eigen::all, places);
+  const auto far = std::stable_partition(centres.begin(), centres.end(), [&](NodeIndex centre) {
+    return about.cols() > 0 &&
+           (about.colwise() - nodes.col(centre)).colwise().squaredNorm().minCoeff() <
+               near_mm * near_mm;
+  });
+  const auto first = far - centres.begin();
+  const ForceKernel all =
+      of_centres(nodes, nodal_volumes, length_mm, force_density_sd, nodes(Eigen::all, centres));
+  NearAndFar parts;
+  parts.near.basis_ = all.basis_.leftCols(first);
+  parts.far.basis_ = all.basis_.rightCols(all.basis_.cols() - first);
+  return parts;
+}
+
+ForceKernel ForceKernel::sum_of(const ForceKernel& a, const ForceKernel& b) {
+  assert(a.basis_.rows() == b.basis_.rows());
+  ForceKernel sum;
+  sum.basis_.resize(a.basis_.rows(), a.basis_.cols() + b.basis_.cols());
+  sum.basis_ << a.basis_, b.basis_;
+  return sum;
+}
+
 void ForceKernel::multiply(const Fields& in, Eigen::Map<RowMajor> out) const {
   if (compact_.rows() > 0) {
     out.noalias() = compact_ * in;
+    return;
+  }
+  if (basis_.size() == 0) {
+    out.setZero();
     return;
   }
   const Eigen::Map<const Eigen::MatrixXd> basis(basis_.data(), basis_.cols(), basis_.rows());
@@ -136,6 +185,8 @@ VecX ForceKernel::variance_along(const Eigen::MatrixXd& w) const {
     RowMajor forces(fields.rows(), fields.cols());
     multiply(fields, {forces.data(), forces.rows(), forces.cols()});
     each = fields.cwiseProduct(forces).colwise().sum();
+  } else if (basis_.size() == 0) {
+    each = VecX::Zero(fields.cols());
   } else {
     each = project(fields).rowwise().squaredNorm();
   }

@@ -2,11 +2,12 @@
 // ForcePrior: prior on the forcing b, zero-mean Gaussian with covariance Sigma = W_b^-1 (paper
 // eq. 4).
 //
-//   Sigma = Sigma_fine + Sigma_medium + Sigma_coarse + M M^T
+//   Sigma = Sigma_fine + Sigma_medium + Sigma_coarse + Sigma_far + M M^T
 //
-// The first three are smooth residual fields of three correlation lengths (ForceKernel): fine
-// is the paper's, compact; medium and coarse have a basis. M: load modes, one nodal force field per
-// column, each times its standard deviation (load_modes.hpp).
+// The first are smooth residual fields of three correlation lengths (ForceKernel): fine is the
+// paper's, compact; medium and coarse have a basis. Of these two Sigma_far is what lies far from
+// where data may come from (ForceKernel::basis_about): no data say how strong it is. M: load modes,
+// one nodal force field per column, each times its standard deviation (load_modes.hpp).
 // Assumption: forces in different directions and of different parts are independent.
 #pragma once
 
@@ -14,6 +15,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "common/core/types.hpp"
 #include "common/prior/load_modes.hpp"
@@ -47,6 +49,14 @@ class ForceKernel {
                              double force_density_sd);
   static ForceKernel basis(const Points& nodes, const VecX& nodal_volumes, double length_mm,
                            double force_density_sd);
+  // The same covariance as basis() with its centres in another order, in two independent parts:
+  // what the centres near the nodes `places` explain of it, and the rest given that.
+  struct NearAndFar;
+  static NearAndFar basis_about(const Points& nodes, const VecX& nodal_volumes, double length_mm,
+                                double force_density_sd, const std::vector<NodeIndex>& places,
+                                double near_mm);
+  // Of the sum of two independent fields, each with a basis.
+  static ForceKernel sum_of(const ForceKernel& a, const ForceKernel& b);
 
   // f += Sigma w for one nodal field; w, f: 3 x n.
   void add_to(const Points& w, Points& f) const;
@@ -66,6 +76,8 @@ class ForceKernel {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   // A component of a field in a column of its own.
   using Fields = Eigen::Map<const RowMajor>;
+  static ForceKernel of_centres(const Points& nodes, const VecX& nodal_volumes, double length_mm,
+                                double force_density_sd, const Points& centres);
   // out = sigma_f^2 V R V in: n rows, both apart in memory.
   void multiply(const Fields& in, Eigen::Map<RowMajor> out) const;
   // basis_^T in, transposed: a row per component.
@@ -74,6 +86,14 @@ class ForceKernel {
   Eigen::SparseMatrix<double, Eigen::RowMajor> compact_;  // sigma_f^2 V R V, or empty
   RowMajor basis_;  // sigma_f V k_nc L_cc^-T with L_cc L_cc^T = k_cc, or empty
 };
+
+struct ForceKernel::NearAndFar {
+  ForceKernel near, far;
+};
+
+// A centre is near the data when it lies within this distance of a node of their region: about the
+// lengths over which the fields' displacements reach.
+inline constexpr double kNearMedium_mm = 30.0, kNearCoarse_mm = 40.0;
 
 // rho(r) above.
 double wendland_c2(double r, double support);
@@ -87,7 +107,7 @@ class ForcePrior {
   void apply(const Points& w, Points& f) const;
   Points apply(const Points& w) const;
 
-  // field: 0 fine, 1 medium, 2 coarse.
+  // field: 0 fine, 1 medium, 2 coarse, 3 far.
   const ForceKernel& kernel(int field) const { return kernels_[static_cast<std::size_t>(field)]; }
   int num_modes() const { return modes_.size(); }
   const Eigen::MatrixXd& modes() const { return modes_.columns; }

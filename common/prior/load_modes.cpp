@@ -49,7 +49,7 @@ void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out
   const PriorConfig& prior = config.prior;
   if (prior.gravity_mode_sd == 0.0) return;
   const Vec3 g = model.gravity_direction;
-  const auto load = [&](double level_mm, const Vec3& direction) {
+  const auto load = [&](double level_mm, const Vec3& direction) -> Points {
     return fem::buoyancy_load(model.mesh, config.material, g, model.fluid_plane_depth_mm + level_mm,
                               direction);
   };
@@ -58,12 +58,25 @@ void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out
   }
   const double across_sd =
       prior.gravity_mode_sd * std::tan(prior.gravity_direction_sd_deg * std::numbers::pi / 180.0);
-  if (across_sd == 0.0) return;
-  const auto [first, second] = across(g);
-  for (const double level : prior.gravity_levels_mm) {
-    out.add(PriorPart::kAcrossGravity, across_sd, load(level, first));
-    out.add(PriorPart::kAcrossGravity, across_sd, load(level, second));
+  if (across_sd > 0.0) {
+    const auto [first, second] = across(g);
+    for (const double level : prior.gravity_levels_mm) {
+      out.add(PriorPart::kAcrossGravity, across_sd, load(level, first));
+      out.add(PriorPart::kAcrossGravity, across_sd, load(level, second));
+    }
   }
+  const Vec3 middle =
+      0.5 * (model.mesh.nodes.rowwise().minCoeff() + model.mesh.nodes.rowwise().maxCoeff());
+  const auto add_uneven = [&](PriorPart part, double sd, int axis) {
+    if (sd == 0.0) return;
+    const Eigen::RowVectorXd side =
+        ((model.mesh.nodes.row(axis).array() - middle[axis]) / kMidlineWidth_mm).tanh();
+    for (const double level : prior.gravity_levels_mm) {
+      out.add(part, sd, load(level, g).array().rowwise() * side.array());
+    }
+  };
+  add_uneven(PriorPart::kGravitySides, prior.gravity_sides_sd, 0);
+  add_uneven(PriorPart::kGravityEnds, prior.gravity_ends_sd, 1);
 }
 
 // Bumps of one radius, at the places i, j, k of a lattice about the tumour.

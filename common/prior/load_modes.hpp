@@ -5,6 +5,9 @@
 //   along, across gravity  for each fluid level of the case the buoyancy of a fluid plane at that
 //                          level: along gravity (drainage is unknown), and along the two directions
 //                          across it (pose is unknown)
+//   gravity sides, ends    the same along gravity, times tanh(x / kMidlineWidth_mm) of the distance
+//                          x from the brain's middle to the right, or to the front: fluid does not
+//                          drain, nor air enter, everywhere alike
 //   tumour volume          tissue that changes its volume by the strain theta near the tumour with
 //                          centre c (fem/body_loads.hpp): oedema lies beside a tumour and differs
 //                          from place to place. For each radius s of the case bumps

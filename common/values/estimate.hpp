@@ -60,6 +60,8 @@ struct IterationRecord {
 enum class PriorPart {
   kAlongGravity,   // buoyancy along gravity: drainage
   kAcrossGravity,  // buoyancy across it: pose
+  kGravitySides,   // buoyancy along it that differs between left and right: air on one side
+  kGravityEnds,    // the same between front and back
   kTumourVolume,   // swelling or shrinking of tissue about the tumour
   kBrainVolume,    // the same of the whole brain and of its halves
   kResection,      // removed tissue: its weight, and the stress that it carried
@@ -67,19 +69,20 @@ enum class PriorPart {
   kFine,           // smooth residual field, shortest correlation length
   kMedium,
   kCoarse,  // longest
+  kFar,     // what of the medium and coarse fields lies far from where data come from
 };
-inline constexpr int kPriorParts = 9;
-// "along_gravity", "across_gravity", "tumour_volume", "brain_volume", "resection", "opening",
-// "fine", "medium", "coarse"
+inline constexpr int kPriorParts = 12;
+// "along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume",
+// "brain_volume", "resection", "opening", "fine", "medium", "coarse", "far"
 std::string_view to_string(PriorPart part);
 // One value for each part, in units of the case's standard deviations.
 template <typename T>
 using PerPart = std::array<T, kPriorParts>;  // in the order of PriorPart
 using PriorScaleValues = PerPart<double>;
-// The residual fields, one for each correlation length: the last parts.
-inline constexpr int kRemainders = 3;
+// The residual fields, one for each correlation length and the far one: the last parts.
+inline constexpr int kRemainders = 4;
 inline constexpr int kLoadParts = kPriorParts - kRemainders;
-inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1};
+inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
 
 // One set of strengths, and how probable the data make it.
 struct Hypothesis {
@@ -134,6 +137,13 @@ struct Estimate {
   // n, mm: root mean square over the three components of the standard deviation of a node's
   // displacement. Empty when uncertainty was not computed.
   VecX sd_mm;
+  // n, 0 to 1: how much of a node's variance before the data they took away. 0: the displacement
+  // there is a guess from the prior alone; 1: the data know it. Empty when uncertainty was not
+  // computed, and for methods other than condensed.
+  VecX known;
+  // Mean of `known` over the region that was prepared for data: about the tumour and under the
+  // opening. NaN: not computed.
+  double region_known = std::numeric_limits<double>::quiet_NaN();
   ContactSummary contact;
   std::vector<NodeIndex> active_slaves;
   VecX contact_force_n;       // one per active slave, >= 0 pushes the brain inwards

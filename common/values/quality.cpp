@@ -24,6 +24,7 @@ std::string_view to_string(QualityFlag flag) {
     case QualityFlag::kDeadline: return "deadline";
     case QualityFlag::kContactNotCertified: return "contact_not_certified";
     case QualityFlag::kIterationLimit: return "iteration_limit";
+    case QualityFlag::kMostlyPrior: return "mostly_prior";
     case QualityFlag::kInvertedElements: return "inverted_elements";
     case QualityFlag::kVolumeLost: return "volume_lost";
     case QualityFlag::kBeyondSkull: return "beyond_skull";
@@ -44,6 +45,8 @@ std::string_view sentence(QualityFlag flag) {
     case QualityFlag::kContactNotCertified:
       return "contact holds less well than its certificate asks";
     case QualityFlag::kIterationLimit: return "the inversion ended at its limit of iterations";
+    case QualityFlag::kMostlyPrior:
+      return "the data say little about the region of surgery: the field there is mostly a guess";
     case QualityFlag::kInvertedElements: return "elements are turned inside out";
     case QualityFlag::kVolumeLost: return "tissue loses more volume than it can";
     case QualityFlag::kBeyondSkull: return "the brain moves farther than a skull allows";

@@ -39,6 +39,7 @@ enum class QualityFlag : std::uint32_t {
   kDeadline = 1u << 4,             // the best iterate when the time ran out
   kContactNotCertified = 1u << 5,  // decrement or violation of contact above its bound
   kIterationLimit = 1u << 6,       // the stop rule did not hold
+  kMostlyPrior = 1u << 7,          // the data know less than kLeastKnown of the region of surgery
   kInvertedElements = 1u << 16,    // elements with det F <= 0
   kVolumeLost = 1u << 17,          // a nodal volume ratio is below kMinVolumeRatio
   kBeyondSkull = 1u << 18,         // a node moves, or a slave penetrates, farther than a skull lets
@@ -48,14 +49,17 @@ inline constexpr std::array kAllQualityFlags = {
     QualityFlag::kMisfitUnexplained, QualityFlag::kStrengthAtBound,
     QualityFlag::kSourcesContradict, QualityFlag::kDataOutsideRegion,
     QualityFlag::kDeadline,          QualityFlag::kContactNotCertified,
-    QualityFlag::kIterationLimit,    QualityFlag::kInvertedElements,
-    QualityFlag::kVolumeLost,        QualityFlag::kBeyondSkull,
-    QualityFlag::kNotFinite};
+    QualityFlag::kIterationLimit,    QualityFlag::kMostlyPrior,
+    QualityFlag::kInvertedElements,  QualityFlag::kVolumeLost,
+    QualityFlag::kBeyondSkull,       QualityFlag::kNotFinite};
 std::string_view to_string(QualityFlag flag);  // "misfit_unexplained", ..., for programs
 std::string_view sentence(QualityFlag flag);   // the same for people, in words without figures
 
 // Root mean square of the whitened residuals. 600 independent residuals never exceed it by chance.
 inline constexpr double kUnexplainedMisfit = 1.5;
+// Of the prior variance about the tumour and under the opening, so much must have been taken away
+// by the data.
+inline constexpr double kLeastKnown = 0.5;
 // Contact is certified up to these: a thousandth of the loads' posterior standard deviation, and a
 // hundredth of the 1 mm gap, from which on a slave counts as penetrating.
 inline constexpr double kMaxContactDecrement = 1e-3;

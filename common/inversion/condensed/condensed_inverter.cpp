@@ -82,6 +82,8 @@ struct CondensedInverter::Impl {
   Stopwatch watch;                  // of the update
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   std::vector<IterationRecord> history;
+  linalg::GrowingMatrix explained;  // by the data, under the broad hypothesis
+  VecX prior_variances;             // of the modes, under the same
   OmissionErrors errors;
 };
 
@@ -127,8 +129,17 @@ Status CondensedInverter::Impl::finish(Estimate& estimate) {
                                loads.remainder_variances(), estimate.sd_mm);
     // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
     if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
+    if (!loads.strengths().explained_broadly(explained, prior_variances)) {
+      return fail(ErrorCode::kNotFinite, "inversion: the broad hypothesis is not finite");
+    }
+    rebuild.known(team, explained, prior_variances, estimate.known);
+    double sum = 0.0;
+    for (const NodeIndex node : operators->region) sum += estimate.known[node];
+    estimate.region_known = sum / static_cast<double>(operators->region.size());
   } else {
     estimate.sd_mm.resize(0);
+    estimate.known.resize(0);
+    estimate.region_known = std::numeric_limits<double>::quiet_NaN();
   }
   const ContactAtLoads& contact = descent.contact();
   {

@@ -115,8 +115,13 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       factor_(window.count, window.count),
       conditioned_(control_modes_.rows(), window.count),
       spread_(control_modes_.rows(), window.count),
+      explained_(new float[static_cast<std::size_t>(
+          window.count * (window.count + Eigen::Index{SparseData::kMaxCommonErrors}))]),
+      seen_(new float[static_cast<std::size_t>(
+          control_modes_.rows() * (window.count + Eigen::Index{SparseData::kMaxCommonErrors}))]),
       contact_storage_(new float[static_cast<std::size_t>(control_contact_.size())]),
-      control_variance_(static_cast<Eigen::Index>(operators.control.size())) {
+      control_variance_(static_cast<Eigen::Index>(operators.control.size())),
+      control_known_(control_variance_.size()) {
   const auto most =
       static_cast<std::size_t>(window.count) + static_cast<std::size_t>(operators.num_slaves());
   terms_.reserve(most);
@@ -304,16 +309,44 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
                              operators_.truncated_variance_mm2.row(i).dot(left_out);
     }
   });
-  team.split(sd.size(), [&](long begin, long end) {
+  interpolate(team, control_variance_, sd);
+  sd = sd.cwiseSqrt();
+}
+
+void FieldRebuild::interpolate(ThreadTeam& team, const VecX& at_control, VecX& out) const {
+  team.split(out.size(), [&](long begin, long end) {
     for (long i = begin; i < end; ++i) {
-      double variance = 0.0;
+      double value = 0.0;
       for (int c = 0; c < 4; ++c) {
-        variance += static_cast<double>(operators_.control_weights(c, i)) *
-                    control_variance_[operators_.control_neighbours(c, i)];
+        value += static_cast<double>(operators_.control_weights(c, i)) *
+                 at_control[operators_.control_neighbours(c, i)];
       }
-      sd[i] = std::sqrt(variance);
+      out[i] = value;
     }
   });
+}
+
+void FieldRebuild::known(ThreadTeam& team, const linalg::blas::In<double>& explained,
+                         const VecX& variances, VecX& known) {
+  const Eigen::Index r = window_.count, k = explained.rows();
+  known.resize(operators_.num_nodes());
+  Eigen::Map<Eigen::MatrixXf> x(explained_.get(), r, k);
+  x = explained.transpose().cast<float>();
+  Eigen::Map<Eigen::MatrixXf> seen(seen_.get(), conditioned_.rows(), k);
+  const Eigen::VectorXf squares = variances.cast<float>();
+  team.split(static_cast<long>(operators_.control.size()), [&](long begin, long end) {
+    const Eigen::Index first = 3 * begin, rows = 3 * (end - begin);
+    const auto v = conditioned_.middleRows(first, rows);
+    if (k > 0) linalg::blas::multiply(1.0F, v, x, 0.0F, seen.middleRows(first, rows));
+    for (long i = begin; i < end; ++i) {
+      const double prior = static_cast<double>(
+          (conditioned_.middleRows<3>(3 * i).array().square().matrix() * squares).sum());
+      const double all = prior + 3.0 * operators_.truncated_variance_mm2.row(i).sum();
+      const double taken = static_cast<double>(seen.middleRows<3>(3 * i).squaredNorm());
+      control_known_[i] = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
+    }
+  });
+  interpolate(team, control_known_, known);
 }
 
 }  // namespace brainshift::inversion

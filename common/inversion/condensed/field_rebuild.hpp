@@ -5,6 +5,8 @@
 //   u = U z + G_A f                                            every node, single precision
 //   Cov(u) = V Cov(z) V^T + left out,   V = U - G_A T           at the control nodes, interpolated
 //                                                               to the others
+//   known = 1 - Cov_0(u) / Cov_0(u without data), traces, Cov_0: of the broad hypothesis
+//
 // sd of a node: root mean square of its three components' standard deviations. Given the active
 // set: which slaves touch is taken as known.
 //
@@ -78,6 +80,11 @@ class FieldRebuild {
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
                           const linalg::blas::In<double>& covariance_factor,
                           const RemainderVariances& left_out, VecX& sd);
+  // How much of a node's prior variance the data took away, under the hypothesis that every part has
+  // the case's strength: 0 none, 1 all. explained: X, k x r, variances: S^2, r, with Cov(z) = S^2 -
+  // X^T X. For the contact of the last standard_deviation(). known: n.
+  void known(ThreadTeam& team, const linalg::blas::In<double>& explained, const VecX& variances,
+             VecX& known);
 
  private:
   const CondensedOperators& operators_;
@@ -105,8 +112,10 @@ class FieldRebuild {
   std::vector<char> has_block_;
   // Control nodes: rows of U and G, V, and what a set needs of them.
   Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
+  std::unique_ptr<float[]> explained_, seen_;  // X^T, and V X^T
   std::unique_ptr<float[]> contact_storage_;
-  VecX control_variance_;
+  VecX control_variance_, control_known_;
+  void interpolate(ThreadTeam& team, const VecX& at_control, VecX& out) const;
 };
 
 }  // namespace brainshift::inversion

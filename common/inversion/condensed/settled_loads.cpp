@@ -19,9 +19,12 @@ constexpr int kMaxFirstRounds = 6;  // of weights
 constexpr double kSameVariance = 0.1;
 
 // By how much the displacement of a brain differs whose tissue is 30 % stiffer here and softer
-// there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, more where tissue
-// swells (decision 0018). There the strength of the same part grows with the data.
-constexpr double kModelError = 0.1;
+// there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, 0.07 to 0.28 where
+// tissue swells (decisions 0018, 0037). The first value counts before any load is known.
+constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.2;
+constexpr bool is_volume(PriorPart part) {
+  return part == PriorPart::kTumourVolume || part == PriorPart::kBrainVolume;
+}
 
 // Standard deviation of a displacement component that the modes of `part` stand for, mm; 0 without
 // modes.
@@ -48,7 +51,7 @@ SettledLoads::SettledLoads(const std::shared_ptr<const CondensedOperators>& oper
       profile_(profile),
       sampled_(operators, std::move(locator), window, config.condensed.outside_region, team),
       strengths_(operators->part_columns, window, SparseData::kMaxCommonErrors,
-                 config.prior.estimate_scales, team),
+                 config.prior.estimate_scales, config.prior.broad_weight, team),
       descent_(*operators, window, config.contact.penalty_n_per_mm, contact, team, profile),
       robust_(config.sensing.robust_weights),
       medium_sd_mm_(displacement_sd_mm(*operators, PriorPart::kMedium)) {}
@@ -88,6 +91,8 @@ Status SettledLoads::begin(const DescentLimits& limits, EstimateStatus& outcome)
   if (auto status = sample(); !status) return status;
   if (auto status = distrust_outliers(); !status) return status;
   set_model_error_floor();  // once more, without them
+  if (auto status = find_strengths(limits, outcome); !status) return status;
+  if (outcome != EstimateStatus::kConverged || !set_model_error_floor_of_loads()) return {};
   return find_strengths(limits, outcome);
 }
 
@@ -212,6 +217,46 @@ Result<bool> SettledLoads::follow(const MovingData* moving) {
   return reweighed || relocated || resampled;
 }
 
+double SettledLoads::motion_of_part(PriorPart part) {
+  const auto [first, count] = strengths_.modes_of(part);
+  const ModePosterior& posterior = descent_.posterior();
+  int data = 0;
+  if (count == 0) return 0.0;
+  const auto columns = posterior.jacobian().middleCols(sampled_.common() + first, count);
+  const auto z = posterior.z().segment(first, count);
+  for (int i = 0; i < data_->size(); ++i) {
+    if (weights_.values()[i] < kOutlierWeight) continue;
+    const int row = sampled_.first_row(i), rows = sampled_.first_row(i + 1) - row;
+    norms_[data++] = sampled_.sd(i) * (columns.middleRows(row, rows) * z).norm();
+  }
+  return data > 0 ? upper_quartile(data) : 0.0;
+}
+
+double SettledLoads::upper_quartile(int count) {
+  double* const upper = norms_.data() + 3 * count / 4;
+  std::nth_element(norms_.data(), upper, norms_.data() + count);
+  return *upper;
+}
+
+// Of each family the upper quartile of the motion that its loads explain at the data. Whether that
+// makes a difference.
+bool SettledLoads::set_model_error_floor_of_loads() {
+  const double before = strengths_.floor(PriorPart::kMedium);
+  if (!(medium_sd_mm_ > 0.0) || before == 0.0) return false;
+  double squares = 0.0, plain = 0.0;
+  for (int g = 0; g < kPriorParts; ++g) {
+    const double moved = motion_of_part(static_cast<PriorPart>(g));
+    const double share = is_volume(static_cast<PriorPart>(g)) ? kModelErrorOfVolume : kModelError;
+    squares += share * share * moved * moved;
+    plain += kModelError * kModelError * moved * moved;
+  }
+  if (!(plain > 0.0)) return false;
+  const double floor = before * std::sqrt(squares / plain);
+  if (floor * floor <= (1.0 + kSameVariance) * before * before) return false;
+  strengths_.set_floor(PriorPart::kMedium, floor);
+  return true;
+}
+
 // The upper quartile of the measured motion without outliers: of a surface that is measured along
 // its normals it is near the motion itself.
 void SettledLoads::set_model_error_floor() {
@@ -222,9 +267,7 @@ void SettledLoads::set_model_error_floor() {
     norms_[count++] = data_->displacements.col(i).norm();
   }
   if (medium_sd_mm_ > 0.0 && count > 0) {
-    double* const upper = norms_.data() + 3 * count / 4;
-    std::nth_element(norms_.data(), upper, norms_.data() + count);
-    floor = kModelError * *upper / (std::sqrt(3.0) * medium_sd_mm_);
+    floor = kModelError * upper_quartile(count) / (std::sqrt(3.0) * medium_sd_mm_);
   }
   strengths_.set_floor(PriorPart::kMedium, floor);
 }

@@ -79,6 +79,11 @@ class SettledLoads {
   Status sample();
   // Of the part that stands for the model's own error, in units of its standard deviation.
   void set_model_error_floor();
+  bool set_model_error_floor_of_loads();
+  // At the data, of the minimum of the linear model: upper quartile over the data, mm.
+  double motion_of_part(PriorPart part);
+  // Of the first `count` of norms_, which it orders anew.
+  double upper_quartile(int count);
   Status distrust_outliers();
   // PriorStrengths::fit and refit for the present linear model.
   Status fit();

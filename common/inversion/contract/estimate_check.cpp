@@ -130,6 +130,11 @@ void judge_algorithm(const Estimate& estimate, Judge& judge) {
 }
 
 void judge_data(const Estimate& estimate, Judge& judge) {
+  if (estimate.region_known < kLeastKnown) {
+    judge.set(QualityFlag::kMostlyPrior,
+              "%.0f %% of its variance before the data, at least %.0f %%",
+              100.0 * estimate.region_known, 100.0 * kLeastKnown);
+  }
   if (estimate.misfit_ratio > kUnexplainedMisfit) {
     judge.set(QualityFlag::kMisfitUnexplained, "%.2g standard deviations, at most %g",
               estimate.misfit_ratio, kUnexplainedMisfit);

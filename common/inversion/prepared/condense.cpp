@@ -28,6 +28,8 @@ constexpr int kBlock = BlockRunner::kBlock;
 // recommend, because the spectrum falls slowly: 32 left 0.013 mm in a swollen brain with 659 active
 // slaves, about 200 left 0.008 mm.
 constexpr int kOversampling = 192;
+// The far field's modes are not seen by data and need no such care.
+constexpr int kOversamplingFar = 64;
 // Weight of slaves in the test vectors, against 1 near the data: they matter through contact only.
 // On the default head 0.1 halves the error of 0 and of 0.3 (docs/decisions/0008).
 constexpr double kSlaveWeight = 0.1;
@@ -62,9 +64,11 @@ struct TestVectors {
   }
 };
 
-TestVectors test_vectors(const CondensedOperators& operators, int count) {
+// region: where they have no weight but 1.
+TestVectors test_vectors(const CondensedOperators& operators, const std::vector<NodeIndex>& region,
+                         int count) {
   TestVectors omega;
-  omega.nodes = operators.region;
+  omega.nodes = region;
   omega.nodes.insert(omega.nodes.end(), operators.slaves.begin(), operators.slaves.end());
   std::sort(omega.nodes.begin(), omega.nodes.end());
   omega.nodes.erase(std::unique(omega.nodes.begin(), omega.nodes.end()), omega.nodes.end());
@@ -76,7 +80,7 @@ TestVectors test_vectors(const CondensedOperators& operators, int count) {
   omega.numbers.setZero(count, 3 * static_cast<Eigen::Index>(omega.nodes.size()));
   for (int j = 0; j < count; ++j) {
     auto vector = omega.numbers.row(j);
-    for (const NodeIndex node : operators.region) {
+    for (const NodeIndex node : region) {
       for (int axis = 0; axis < 3; ++axis) vector[place(node) + axis] = random.normal();
     }
     for (std::size_t i = 0; i < operators.slaves.size(); ++i) {
@@ -91,11 +95,14 @@ TestVectors test_vectors(const CondensedOperators& operators, int count) {
 // How many modes each residual field keeps of those that the load families leave of `max_rank`.
 std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eigen::Index rows) {
   // A coarse field needs fewer than a fine one.
-  std::array<double, kRemainders> share = {0.4, 0.4, 0.2};
+  std::array<double, kRemainders> share = {0.3, 0.3, 0.15, 0.55};
+  const bool medium = config.prior.medium_density_sd_n_m3 > 0.0;
+  const bool coarse = config.prior.coarse_density_sd_n_m3 > 0.0;
   if (config.prior.force_density_sd_n_m3 == 0.0) share[0] = 0.0;
-  if (config.prior.medium_density_sd_n_m3 == 0.0) share[1] = 0.0;
-  if (config.prior.coarse_density_sd_n_m3 == 0.0) share[2] = 0.0;
-  const double all = share[0] + share[1] + share[2];  // 0: no residual field
+  if (!medium) share[1] = 0.0;
+  if (!coarse) share[2] = 0.0;
+  if (!medium && !coarse) share[3] = 0.0;
+  const double all = share[0] + share[1] + share[2] + share[3];  // 0: no residual field
   const int left = std::max(kRemainders, config.condensed.max_rank - loads);
   std::array<int, kRemainders> kept{};
   for (std::size_t g = 0; g < kept.size(); ++g) {
@@ -166,8 +173,13 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   const prior::ForcePrior& prior = model.prior();
   const int loads = prior.num_modes();
   const auto kept = kept_modes(model.config(), loads, rows);
-  const int tested = static_cast<int>(
-      std::min<Eigen::Index>(*std::max_element(kept.begin(), kept.end()) + kOversampling, rows));
+  constexpr std::size_t kFarField = kRemainders - 1;
+  const auto tested_for = [&](int most, int oversampling) {
+    return static_cast<int>(std::min<Eigen::Index>(most + oversampling, rows));
+  };
+  const int tested =
+      tested_for(*std::max_element(kept.begin(), kept.begin() + kFarField), kOversampling);
+  const int tested_far = kept[kFarField] > 0 ? tested_for(kept[kFarField], kOversamplingFar) : 0;
 
   MatrixXd load_modes(loads, rows);
   auto status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
@@ -180,27 +192,40 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   append_modes(load_modes, modes, result);
   load_modes.resize(0, 0);
 
-  const TestVectors omega = test_vectors(result, tested);
+  const TestVectors omega = test_vectors(result, result.region, tested);
+  const std::vector<NodeIndex> everywhere =
+      geometry::spread_nodes(model.model().mesh.nodes, model.config().condensed.uncertainty_nodes);
+  const TestVectors omega_far = test_vectors(result, everywhere, tested_far);
   std::array<MatrixXd, kRemainders> sketches;
   for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] > 0) sketches[g].resize(tested, rows);
+    if (kept[g] > 0) sketches[g].resize(g == kFarField ? tested_far : tested, rows);
   }
+  const auto sketch = [&](std::size_t g, int first, int count, auto& own) -> Status {
+    prior.kernel(static_cast<int>(g)).apply(own.solved, own.loads);
+    if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
+    sketches[g].middleRows(first, count) = own.loads;
+    return {};
+  };
   status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
     omega.write(first, count, rows, own.loads);
     if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-    for (int g = 0; g < kRemainders; ++g) {
-      if (kept[static_cast<std::size_t>(g)] == 0) continue;
-      prior.kernel(g).apply(own.solved, own.loads);
-      if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
-      sketches[static_cast<std::size_t>(g)].middleRows(first, count) = own.loads;
+    for (std::size_t g = 0; g < kFarField; ++g) {
+      if (kept[g] == 0) continue;
+      if (auto sketched = sketch(g, first, count, own); !sketched) return sketched;
     }
     return {};
+  });
+  if (!status) return status;
+  status = runner.run("prior modes", tested_far, [&](int first, int count, auto& own) -> Status {
+    omega_far.write(first, count, rows, own.loads);
+    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+    return sketch(kFarField, first, count, own);
   });
   if (!status) return status;
   result.part_columns = prior.columns_of_part();
   for (std::size_t g = 0; g < kept.size(); ++g) {
     if (kept[g] == 0) continue;
-    const auto leading = leading_modes(omega, sketches[g], kept[g]);
+    const auto leading = leading_modes(g == kFarField ? omega_far : omega, sketches[g], kept[g]);
     if (!leading) return tl::unexpected(leading.error());
     sketches[g].resize(0, 0);
     result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
@@ -394,8 +419,8 @@ std::uint64_t condense_memory_bytes(const CondenseSizes& sizes) {
   // Two matrices of a member, three of its solver.
   const std::uint64_t blocks = 5 * 8 * rows * kBlock * of(sizes.threads);
   const std::uint64_t modes = 4 * rows * m, compliance = 8 * s * s;
-  // Two residual fields, as the default case has them; the third is rare.
-  const std::uint64_t sketches = 8 * tested * (2 * rows + 3 * (of(sizes.region) + s));
+  // Three residual fields, as the default case has them; the fourth is rare.
+  const std::uint64_t sketches = 8 * tested * (3 * rows + 3 * (of(sizes.region) + s));
   const std::uint64_t solving =
       sizes.model_bytes + modes + blocks + std::max(sketches, compliance + columns);
   // Compact columns take less than half of single precision, and are there twice when joined.

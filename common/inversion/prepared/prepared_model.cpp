@@ -22,14 +22,29 @@ prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config
     return scales[static_cast<std::size_t>(part)] * units::force_density_from_n_m3(n_m3);
   };
   const Points& nodes = model.mesh.nodes;
+  const std::vector<NodeIndex> region = data_region(model);
   using prior::ForceKernel;
+  const auto field = [&](PriorPart part, double length_mm, double n_m3, double near_mm) {
+    auto parts =
+        ForceKernel::basis_about(nodes, volumes, length_mm, sd(part, n_m3), region, near_mm);
+    // Whatever becomes of the near field, the far one has the case's strength.
+    if (scales[static_cast<std::size_t>(part)] !=
+        scales[static_cast<std::size_t>(PriorPart::kFar)]) {
+      parts.far = ForceKernel::basis_about(nodes, volumes, length_mm, sd(PriorPart::kFar, n_m3),
+                                           region, near_mm)
+                      .far;
+    }
+    return parts;
+  };
+  auto medium = field(PriorPart::kMedium, config.medium_length_mm, config.medium_density_sd_n_m3,
+                      prior::kNearMedium_mm);
+  auto coarse = field(PriorPart::kCoarse, config.coarse_length_mm, config.coarse_density_sd_n_m3,
+                      prior::kNearCoarse_mm);
+  auto far = ForceKernel::sum_of(medium.far, coarse.far);
   return prior::ForcePrior(
       {ForceKernel::compact(nodes, volumes, config.correlation_length_mm,
                             sd(PriorPart::kFine, config.force_density_sd_n_m3)),
-       ForceKernel::basis(nodes, volumes, config.medium_length_mm,
-                          sd(PriorPart::kMedium, config.medium_density_sd_n_m3)),
-       ForceKernel::basis(nodes, volumes, config.coarse_length_mm,
-                          sd(PriorPart::kCoarse, config.coarse_density_sd_n_m3))},
+       std::move(medium.near), std::move(coarse.near), std::move(far)},
       std::move(modes));
 }
 

@@ -57,9 +57,10 @@ PerPart<int> modes_of_window(const PerPart<int>& columns, ModeWindow window) {
 }  // namespace
 
 PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common,
-                               bool estimate, ThreadTeam& team)
+                               bool estimate, double broad_weight, ThreadTeam& team)
     : window_(window),
       estimate_(estimate),
+      broad_weight_(broad_weight),
       team_(&team),
       count_(modes_of_window(columns, window)),
       evidence_(count_, max_common),
@@ -69,8 +70,8 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
   for (std::size_t part = 0; part < count_.size(); ++part) {
     part_of_mode_.insert(part_of_mode_.end(), static_cast<std::size_t>(count_[part]), part);
   }
-  hypotheses_.reserve(kMaxHypotheses);
-  done_.reserve(kMaxHypotheses);
+  hypotheses_.reserve(kMaxHypotheses + 1);
+  done_.reserve(kMaxHypotheses + 1);
   candidates_.reserve((1 + kPriorParts) * kPriorParts * kStrengths.size());
   reset();
 }
@@ -86,6 +87,21 @@ PriorScaleValues PriorStrengths::as_in_the_case() const {
   PriorScaleValues scales = kAsInTheCase;
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (count_[part] == 0) scales[part] = 0.0;
+  }
+  return scales;
+}
+
+PriorStrengths::Modes PriorStrengths::modes_of(PriorPart part) const {
+  const auto which = static_cast<std::size_t>(part);
+  Modes modes{0, count_[which]};
+  for (std::size_t before = 0; before < which; ++before) modes.first += count_[before];
+  return modes;
+}
+
+PriorScaleValues PriorStrengths::absent_parts() const {
+  PriorScaleValues scales = as_in_the_case();
+  for (std::size_t part = 0; part < count_.size(); ++part) {
+    if (searched(part)) scales[part] = 0.0;
   }
   return scales;
 }
@@ -114,7 +130,7 @@ bool PriorStrengths::log_posterior(const PriorScaleValues& scales, Workspace& wo
                                    double& out) const {
   if (!evidence_.log_evidence(variances(scales), work, out)) return false;
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (count_[part] > 0) out += log_prior_[index_of(scales[part])];
+    if (searched(part)) out += log_prior_[index_of(scales[part])];
   }
   return true;
 }
@@ -132,7 +148,7 @@ bool PriorStrengths::ascend(PriorScaleValues& scales, Projection& projection,
     }
     add_prior(log_p);
     for (std::size_t part = 0; part < count_.size(); ++part) {
-      if (count_[part] == 0) continue;
+      if (!searched(part)) continue;
       const auto best = std::max_element(log_p[part].begin(), log_p[part].end());
       if (*best - log_p[part][index_of(scales[part])] <= gain) continue;
       gain = *best - log_p[part][index_of(scales[part])];
@@ -151,7 +167,7 @@ bool PriorStrengths::search(PriorScaleValues& best) {
     double log_p = 0.0;
     bool done = false;
   };
-  std::array<Ascent, 2> ascents{Ascent{{}}, Ascent{as_in_the_case()}};
+  std::array<Ascent, 2> ascents{Ascent{absent_parts()}, Ascent{as_in_the_case()}};
   team_->split(2, [&](long begin, long end) {
     for (long i = begin; i < end; ++i) {
       Ascent& each = ascents[static_cast<std::size_t>(i)];
@@ -181,7 +197,7 @@ bool PriorStrengths::weigh(const PriorScaleValues& best) {
 void PriorStrengths::gather_neighbours(const Profiles& log_p, const PriorScaleValues& from,
                                        double log_weight) {
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (count_[part] == 0) continue;
+    if (!searched(part)) continue;
     const std::size_t own = index_of(from[part]);
     for (std::size_t i = 0; i < kStrengths.size(); ++i) {
       if (i == own) continue;
@@ -204,7 +220,7 @@ bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
   auto profile = [&](int member) {
     const auto own = static_cast<std::size_t>(member);
     for (std::size_t part = own; part < count_.size(); part += works_.size()) {
-      if (count_[part] == 0) continue;
+      if (!searched(part)) continue;
       PriorScaleValues changed = best;
       changed[part] = kStrengths[other[part]];
       const bool found = evidence_.changed_profiles(projections_.front(), variances(best), part,
@@ -218,7 +234,7 @@ bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
   candidates_.clear();
   gather_neighbours(profiles_, best, 0.0);
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (count_[part] == 0) continue;
+    if (!searched(part)) continue;
     if (!done[part]) return false;
     PriorScaleValues changed = best;
     changed[part] = kStrengths[other[part]];
@@ -252,8 +268,9 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
   while (hypotheses_.size() > 1 && hypotheses_.back().weight < kMinWeight * all) {
     hypotheses_.pop_back();
   }
-  const double kept = sum();
+  const double kept = sum() / (1.0 - broad_weight_);
   for (Hypothesis& each : hypotheses_) each.weight /= kept;
+  if (broad_weight_ > 0.0) hypotheses_.push_back({as_in_the_case(), broad_weight_});
 }
 
 bool PriorStrengths::climb() {
@@ -348,6 +365,16 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
   factor.diagonal().array() += kJitter * (1.0 + factor.diagonal().maxCoeff());
   factor.triangularView<Eigen::StrictlyUpper>().setZero();
   return blas::cholesky(factor);
+}
+
+bool PriorStrengths::explained_broadly(linalg::GrowingMatrix& x, VecX& variances_of_modes) {
+  const PerPart<double> broad = variances(as_in_the_case());
+  variances_of_modes.resize(window_.count);
+  for (int i = 0; i < window_.count; ++i) {
+    variances_of_modes[i] = broad[part_of_mode_[static_cast<std::size_t>(i)]];
+  }
+  x.resize(evidence_.rank(), window_.count);
+  return evidence_.explained(broad, works_.front(), x);
 }
 
 PriorScaleValues PriorStrengths::mean() const {

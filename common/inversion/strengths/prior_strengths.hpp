@@ -23,6 +23,11 @@
 //
 //   z = sum w_h m_h        Cov = sum w_h (C_h + (m_h - z)(m_h - z)^T)
 //
+// What the data cannot see keeps its prior. Data near the tumour say that a part is absent *there*,
+// and would switch it off everywhere; two things stand against that. The far part (PriorPart::kFar)
+// always has the case's strength. And the *broad hypothesis*, that every part has the case's
+// strength, has a weight of its own that no data change (PriorConfig::broad_weight); it comes last.
+//
 // The result depends on G and b alone, not on earlier updates. Neighbours are weighed by all
 // threads of the team, each by one of them. Allocates nothing after construction but when more
 // columns are needed than ever before.
@@ -55,7 +60,7 @@ class PriorStrengths {
   // columns: of the operators, by part. estimate: false keeps every strength at 1. Keeps a
   // reference to the team, which shares the work.
   PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common, bool estimate,
-                 ThreadTeam& team);
+                 double broad_weight, ThreadTeam& team);
 
   // gram: G, lower triangle; right: b; the common errors come first. kNotFinite when G is not
   // positive semidefinite or not finite.
@@ -73,7 +78,10 @@ class PriorStrengths {
     if (estimate_) floor_[static_cast<std::size_t>(part)] = floor;
   }
 
-  // The held one first; the weights of the others fall. They sum to 1.
+  double floor(PriorPart part) const { return floor_[static_cast<std::size_t>(part)]; }
+
+  // The held one first; the weights of the others fall, but for the broad one, which is the last.
+  // They sum to 1.
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   // Of the hypothesis that a descent is for: a most probable one.
   const PriorScaleValues& held() const { return hypotheses_.front().scales; }
@@ -83,6 +91,11 @@ class PriorStrengths {
   double scale_of(int mode, const PriorScaleValues& scales) const {
     return std::sqrt(variance(part_of_mode_[static_cast<std::size_t>(mode)], scales));
   }
+  // Modes of a part in the window.
+  struct Modes {
+    int first = 0, count = 0;
+  };
+  Modes modes_of(PriorPart part) const;
   // Mean of s_g, and of s_g^2 with the floor, over the hypotheses; probability of s_g = 0.
   PriorScaleValues mean() const;
   PriorScaleValues mean_square() const;
@@ -95,6 +108,9 @@ class PriorStrengths {
   // Lower Cholesky factor F of the covariance of z, F F^T, r x r. Precondition: mean_shift() for
   // the same linear model. false when it cannot be computed.
   [[nodiscard]] bool covariance(linalg::blas::Out<double> factor);
+  // Of the broad hypothesis: X, whose Cov(z) = S^2 - X^T X, and S^2. What the data take off the
+  // prior where nothing else is known. Precondition: as covariance(). False as there.
+  [[nodiscard]] bool explained_broadly(linalg::GrowingMatrix& x, VecX& variances);
 
  private:
   using Workspace = StrengthEvidence::Workspace;
@@ -109,6 +125,12 @@ class PriorStrengths {
   }
   PerPart<double> variances(const PriorScaleValues& scales) const;
   PriorScaleValues as_in_the_case() const;
+  // Whether the data choose the strength of a part.
+  bool searched(std::size_t part) const {
+    return count_[part] > 0 && part != static_cast<std::size_t>(PriorPart::kFar);
+  }
+  // The start of a search: none of the parts that the data choose.
+  PriorScaleValues absent_parts() const;
   PerPart<double> floors() const;
   // To the next maximum over one part at a time.
   bool ascend(PriorScaleValues& scales, Projection& projection, Workspace& work) const;
@@ -131,6 +153,7 @@ class PriorStrengths {
 
   ModeWindow window_;
   bool estimate_;
+  double broad_weight_;
   ThreadTeam* team_;
   std::vector<std::size_t> part_of_mode_;  // of the window
   PerPart<int> count_ = {};                // modes of the window, by part
