@@ -12,7 +12,7 @@ namespace brainshift::inversion {
 
 void RobustWeights::reserve(int data) {
   sorted_.reserve(static_cast<std::size_t>(data));
-  weights_.resize(data);
+  weights_.conservativeResize(data);  // those that data which move have so far
   next_.resize(data);
   residuals_.resize(data);
 }
@@ -25,11 +25,7 @@ void RobustWeights::reset(int data) {
 
 void RobustWeights::follow(const std::vector<DataSource>& before, const SparseData& now) {
   if (now.sources.empty() && now.size() == size_) return;
-  if (now.size() > weights_.size()) {  // reserve() would forget the weights
-    const VecX kept = weights_;
-    reserve(now.size());
-    weights_.head(kept.size()) = kept;
-  }
+  if (now.size() > weights_.size()) reserve(now.size());
   next_.head(now.size()).setOnes();
   for (const DataSource& source : now.sources) {
     const auto same = std::find_if(before.begin(), before.end(), [&](const DataSource& one) {

@@ -285,7 +285,7 @@ Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const 
   if (!evidence_.take(gram, right)) return not_finite();
   if (!estimate_) return {};
   PriorScaleValues best;
-  if (!search(best) || !weigh(best) || !climb()) return not_finite();
+  if (!search(best) || !weigh(best) || !climb()) keep_held();
   return {};
 }
 
@@ -294,11 +294,16 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
   if (!evidence_.holds(gram, right)) {
     const PriorScaleValues same = held();
     if (!evidence_.take(gram, right)) return not_finite();
-    if (estimate_ && !weigh(same)) return not_finite();
+    if (estimate_ && !weigh(same)) keep_held();
   }
   if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
-  if (!climb()) return not_finite();
+  if (!climb()) keep_held();
   return true;
+}
+
+void PriorStrengths::keep_held() {
+  candidates_.clear();
+  weigh_candidates(PriorScaleValues(held()));
 }
 
 template <typename Work>

@@ -136,6 +136,9 @@ class PriorStrengths {
   bool ascend(PriorScaleValues& scales, Projection& projection, Workspace& work) const;
   bool search(PriorScaleValues& best);
   bool weigh(const PriorScaleValues& best);
+  // The held hypothesis alone, where rounding leaves no profile: an update is worth more than the
+  // weights of its neighbours.
+  void keep_held();
   // candidates_: those that differ from `from`, whose profiles are given, in one part. Their
   // weights are ln p, `log_weight` that of `from`.
   void gather_neighbours(const Profiles& log_p, const PriorScaleValues& from, double log_weight);
