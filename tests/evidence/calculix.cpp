@@ -232,14 +232,4 @@ Result<Points> read_calculix_truth(const fs::path& folder, int patient, const Po
   return u;
 }
 
-GivenTruth::GivenTruth(Points displacement, const contact::PenaltyContact& contact) {
-  truth_.active = contact::count(contact.penetrating(displacement));
-  if (contact.num_slaves() > 0) {
-    truth_.max_penetration_mm = contact.penetration(displacement).maxCoeff();
-  }
-  truth_.displacement = std::move(displacement);
-}
-
-Result<client::Truth> GivenTruth::solve(const Points& /*load*/) { return truth_; }
-
 }  // namespace brainshift::evidence

@@ -17,8 +17,8 @@
 
 #include <filesystem>
 
-#include "client/tools/twin/truth.hpp"
 #include "client/tools/twin/truth_brain.hpp"
+#include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 
@@ -54,16 +54,5 @@ Result<Points> read_points(const std::filesystem::path& file);
 // read_points; kInvalidArgument: the fields belong to another mesh.
 Result<Points> read_calculix_truth(const std::filesystem::path& folder, int patient,
                                    const Points& nodes);
-
-// One displacement, whatever the load.
-class GivenTruth final : public client::TruthSource {
- public:
-  // Keeps a reference to the contact, by which slaves in the skull are counted.
-  GivenTruth(Points displacement, const contact::PenaltyContact& contact);
-  Result<client::Truth> solve(const Points& load) override;
-
- private:
-  client::Truth truth_;
-};
 
 }  // namespace brainshift::evidence

@@ -106,7 +106,7 @@ Result<client::SimulatedSurgery> PatientTwin::play_calculix(const PlayedBrain& p
                                                             std::uint64_t seed) {
   auto displacement = read_calculix_truth(calculix_, patient_, head_.model->mesh.nodes);
   if (!displacement) return tl::unexpected(displacement.error());
-  GivenTruth given(std::move(*displacement), played.forward.contact());
+  client::GivenTruth given(std::move(*displacement), played.forward.contact());
   scenario.tumour_displacement_mm.reset();  // the load is what it was
   return client::play_scenario(played.brain, given, scenario, seed);
 }

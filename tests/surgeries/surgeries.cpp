@@ -19,6 +19,7 @@
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "tests/simulation/variation.hpp"
+#include "tests/surgeries/outside/kinds.hpp"
 #include "tests/surgeries/study_program.hpp"
 #include "tests/surgeries/surgery_place.hpp"
 
@@ -36,8 +37,15 @@ struct Arguments : StudyArguments {
   fs::path head = BRAINSHIFT_DEFAULT_CASE;
   int places = 5;
   int seeds = 4;  // per place
-  std::vector<std::string> scenarios = kScenarios;
+  // Names; both lists in full when neither is given.
+  std::vector<std::string> scenarios, kinds;
 };
+
+std::vector<std::string> every_kind() {
+  std::vector<std::string> names;
+  for (const outside::Kind& kind : outside::all_kinds()) names.push_back(kind.name);
+  return names;
+}
 
 std::vector<std::uint64_t> seeds_of(const Arguments& arguments, int place) {
   std::vector<std::uint64_t> seeds;
@@ -50,21 +58,25 @@ std::vector<std::uint64_t> seeds_of(const Arguments& arguments, int place) {
 
 bool finished(const PlacePlan& plan, const RowFile& rows) {
   for (const std::uint64_t seed : plan.seeds) {
-    for (const std::string& scenario : plan.scenarios) {
-      if (!rows.has(SurgeryKey{plan.head, plan.place, seed, scenario}.texts())) return false;
+    for (const auto* names : {&plan.scenarios, &plan.kinds}) {
+      for (const std::string& name : *names) {
+        if (!rows.has(SurgeryKey{plan.head, plan.place, seed, name}.texts())) return false;
+      }
     }
   }
   return true;
 }
 
 void tell(const SurgeryKey& key, const Row& last, double seconds) {
-  std::fprintf(stderr,
-               "  seed %llu %-17s recovered %s %%, field %s mm (at most %s), coverage %s, %s; "
-               "%.1f s\n",
-               static_cast<unsigned long long>(key.seed), key.scenario.c_str(),
-               text_of(last, "recovered_pct").c_str(), text_of(last, "field_mean_mm").c_str(),
-               text_of(last, "field_max_mm").c_str(), text_of(last, "coverage_90").c_str(),
-               text_of(last, "status").c_str(), seconds);
+  std::fprintf(
+      stderr,
+      "  seed %llu %-17s recovered %s %%, field %s of %s mm (at most %s), coverage near %s, "
+      "far %s, %s, %s; %.1f s\n",
+      static_cast<unsigned long long>(key.seed), key.scenario.c_str(),
+      text_of(last, "recovered_pct").c_str(), text_of(last, "field_mean_mm").c_str(),
+      text_of(last, "none_field_mean_mm").c_str(), text_of(last, "field_max_mm").c_str(),
+      text_of(last, "near_coverage_90").c_str(), text_of(last, "far_coverage_90").c_str(),
+      text_of(last, "quality").c_str(), text_of(last, "status").c_str(), seconds);
 }
 
 Status run_place(const Arguments& arguments, const CaseConfig& config, const TetMesh& brain,
@@ -85,7 +97,11 @@ Status run_place(const Arguments& arguments, const CaseConfig& config, const Tet
   return play_place(*head, plan, rows, tell);
 }
 
-Status run(const Arguments& arguments) {
+Status run(Arguments arguments) {
+  if (arguments.scenarios.empty() && arguments.kinds.empty()) {
+    arguments.scenarios = kScenarios;
+    arguments.kinds = every_kind();
+  }
   const auto config = read_head(arguments.head);
   if (!config) return tl::unexpected(config.error());
   auto rows = open_surgeries(arguments.out, arguments.resume);
@@ -93,9 +109,12 @@ Status run(const Arguments& arguments) {
   const auto brain = patient::build_patient(*config);
   if (!brain) return tl::unexpected(brain.error());
   for (int place = 1; place <= arguments.places; ++place) {
-    PlacePlan plan{config->case_id, place,
+    PlacePlan plan{config->case_id,
+                   place,
                    arguments.first_seed + static_cast<std::uint64_t>(place - 1),
-                   seeds_of(arguments, place), arguments.scenarios};
+                   seeds_of(arguments, place),
+                   arguments.scenarios,
+                   arguments.kinds};
     if (finished(plan, *rows)) continue;
     if (Status ok = run_place(arguments, *config, brain->mesh, plan, *rows); !ok) {
       return fail(ok.error().code,
@@ -122,6 +141,13 @@ int main(int argc, char** argv) {
   app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces")
       ->check([](const std::string& name) {
         return brainshift::client::find_scenario(name) ? "" : name + " is unknown";
+      });
+  app.add_option("--kinds", arguments.kinds,
+                 "of truths from outside, separated by commas; with --scenarios or --kinds only "
+                 "what is named is played")
+      ->delimiter(',')
+      ->check([](const std::string& name) {
+        return brainshift::outside::find_kind(name) ? "" : name + " is unknown";
       });
   brainshift::surgeries::add_study_options(app, arguments);
   return brainshift::surgeries::run_study(app, argc, argv,

@@ -13,6 +13,7 @@
 #include "common/inversion/inverter.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "tests/simulation/variation.hpp"
+#include "tests/surgeries/outside/outside_truth.hpp"
 #include "tests/surgeries/played_brain.hpp"
 
 namespace brainshift::surgeries {
@@ -137,9 +138,8 @@ class Sessions {
 };
 
 Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts,
-                              const client::Scenario& scenario, PlayedBrain& played,
-                              Sessions& sessions) {
-  const auto surgery = client::play_scenario(played.brain, played.solver, scenario, facts.key.seed);
+                              const client::Scenario& scenario,
+                              const Result<client::SimulatedSurgery>& surgery, Sessions& sessions) {
   if (!surgery && surgery.error().code == ErrorCode::kInvalidArgument) {
     return std::vector<Row>{
         refused_row(facts, 0, surgery.error().message)};  // it does nothing here
@@ -155,7 +155,7 @@ Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts
       rows.push_back(refused_row(facts, stage, update.error().message));
       continue;
     }
-    const auto score = score_update(*head.model, surgery->truths[i], update->estimate);
+    const auto score = score_update(*head.model, surgery->truths[i], update->estimate, stage);
     if (!score) return tl::unexpected(score.error());
     const bool last = i + 1 == observations.size();
     const double warm_cold =
@@ -163,6 +163,34 @@ Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts
     rows.push_back(row_of(facts, scenario, surgery->truths[i], stage, *update, *score, warm_cold));
   }
   return rows;
+}
+
+// What the instruments of kSeenBy see of a truth from outside, and of what the scenario says of the
+// brain the noise alone. The truth's own scalars are those of outside::OutsideTruth.
+Result<client::SimulatedSurgery> play_outside(const bench::Head& head,
+                                              outside::OutsideTruths& truths,
+                                              const outside::Kind& kind, std::uint64_t seed) {
+  auto truth = truths.make(kind, seed);
+  if (!truth) {
+    if (truth.error().code != ErrorCode::kNotConverged) return tl::unexpected(truth.error());
+    return invalid(truth.error().message);  // a row, as of a scenario that does nothing
+  }
+  client::Scenario scenario = *client::find_scenario(kSeenBy);
+  scenario.stiffness_sd = 0.0;
+  if (truth->resected_fraction) scenario.resection = client::Resection{*truth->resected_fraction};
+  const auto brain = client::truth_brain(*head.model, head.config, scenario, seed);
+  if (!brain) return tl::unexpected(brain.error());
+  client::GivenTruth given(truth->displacement, head.prepared->forward().contact());
+  auto surgery = client::play_scenario(*brain, given, scenario, seed);
+  if (!surgery) return surgery;
+  for (io::SurgeryTruth& each : surgery->truths) {
+    each.scalars["outside"] = 1.0;
+    each.scalars["load_scale"] = truth->load_scale;
+    each.scalars["volume_loss"] = truth->volume_loss;
+    each.scalars["max_displacement_mm"] = truth->largest_mm;
+    each.scalars.erase("fluid_level_mm");
+  }
+  return surgery;
 }
 
 }  // namespace
@@ -175,6 +203,17 @@ Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows,
   facts.nodes = head.model->mesh.num_nodes();
   facts.slaves = static_cast<int>(head.model->slaves.size());
   facts.full_solve_ms = contact::measure_full_solve_ms(head.prepared->forward());
+  const auto finish = [&](const client::Scenario& scenario,
+                          const Result<client::SimulatedSurgery>& surgery,
+                          const Stopwatch& watch) -> Status {
+    const std::string& name = facts.key.scenario;
+    const auto played = play(head, facts, scenario, surgery, **sessions);
+    if (!played) return fail(played.error().code, name + ": " + played.error().message);
+    if (Status ok = rows.append(*played); !ok) return ok;
+    if (told) told(facts.key, played->back(), watch.seconds());
+    return {};
+  };
+  std::unique_ptr<outside::OutsideTruths> truths;
   for (const std::uint64_t seed : plan.seeds) {
     PlayedBrains brains(head, seed);
     for (const std::string& name : plan.scenarios) {
@@ -184,10 +223,20 @@ Status play_place(const bench::Head& head, const PlacePlan& plan, RowFile& rows,
       const client::Scenario scenario = client::vary(*client::find_scenario(name), seed);
       const auto brain = brains.of(scenario);
       if (!brain) return fail(brain.error().code, name + ": " + brain.error().message);
-      const auto played = play(head, facts, scenario, **brain, **sessions);
-      if (!played) return fail(played.error().code, name + ": " + played.error().message);
-      if (Status ok = rows.append(*played); !ok) return ok;
-      if (told) told(facts.key, played->back(), watch.seconds());
+      const auto surgery = client::play_scenario((*brain)->brain, (*brain)->solver, scenario, seed);
+      if (Status ok = finish(scenario, surgery, watch); !ok) return ok;
+    }
+    for (const std::string& name : plan.kinds) {
+      facts.key = {plan.head, plan.place, seed, name};
+      if (rows.has(facts.key.texts())) continue;
+      const Stopwatch watch;
+      if (!truths) {
+        auto made = outside::OutsideTruths::make(*head.model, head.config);
+        if (!made) return tl::unexpected(made.error());
+        truths = std::move(*made);
+      }
+      const auto surgery = play_outside(head, *truths, *outside::find_kind(name), seed);
+      if (Status ok = finish(client::Scenario{}, surgery, watch); !ok) return ok;
     }
   }
   return {};

@@ -2,6 +2,7 @@
 #include "tests/surgeries/surgery_rows.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <span>
 
@@ -13,7 +14,6 @@ namespace brainshift::surgeries {
 namespace {
 
 constexpr double kNotScored = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNormalQuantile90 = 1.6448536269514722;
 
 // Nodes of tissue, ascending.
 std::vector<int> tissue_nodes(const io::SurgeryTruth& truth) {
@@ -53,8 +53,8 @@ Result<FieldErrors> errors_of(const BrainModel& model, const io::SurgeryTruth& t
   return errors;
 }
 
-// The displacement of every node under the best rigid motion of the tumour's surface.
-Result<Points> rigid_motion(const BrainModel& model, const io::SurgeryTruth& truth) {
+// The tumour's outline as far as an instrument sees it.
+std::vector<io::ScorePoint> outline(const io::SurgeryTruth& truth) {
   std::vector<io::ScorePoint> surface;
   for (const char* kind : {"sparse", "cross"}) {
     const auto found = truth.points.find(kind);
@@ -62,6 +62,12 @@ Result<Points> rigid_motion(const BrainModel& model, const io::SurgeryTruth& tru
       surface.insert(surface.end(), found->second.begin(), found->second.end());
     }
   }
+  return surface;
+}
+
+// The displacement of every node under the best rigid motion of the tumour's surface.
+Result<Points> rigid_motion(const BrainModel& model, const io::SurgeryTruth& truth) {
+  const std::vector<io::ScorePoint> surface = outline(truth);
   const Points before = client::at_points(model.mesh.nodes, surface);
   const Points after = before + client::at_points(truth.displacement, surface);
   const auto fit = registration::register_fiducials(before, after);
@@ -82,11 +88,17 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
     const double excess = error.norm() - truth.displacement.col(node).norm() - kRadius90 * sd;
     score.worse_nodes += excess > 0.0 ? 1 : 0;
     score.worst_excess_mm = std::max(score.worst_excess_mm, excess);
-    inside += (error.array().abs() <= kNormalQuantile90 * sd).count();
+    inside += (error.array().abs() <= kNormalQuantile95 * sd).count();
     for (std::size_t i = 0; i < within.size(); ++i) {
       within[i] += (error.array().abs() <= kIntervals[i].radius * sd).count();
     }
     sum += sd;
+  }
+  const double band = simultaneous_radius(static_cast<long>(nodes.size()));
+  for (const int node : nodes) {
+    const double error = (estimate.displacement.col(node) - truth.displacement.col(node)).norm();
+    const double sd = has_sd ? estimate.sd_mm[node] : 0.0;
+    score.beyond_band += error - truth.displacement.col(node).norm() > band * sd ? 1 : 0;
   }
   const auto count = static_cast<double>(nodes.size());
   score.coverage_90 = has_sd ? static_cast<double>(inside) / (3.0 * count) : kNotScored;
@@ -94,6 +106,31 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
     score.coverage[i] = has_sd ? static_cast<double>(within[i]) / (3.0 * count) : kNotScored;
   }
   score.mean_sd_mm = has_sd ? sum / count : kNotScored;
+}
+
+void score_regions(const BrainModel& model, const io::SurgeryTruth& truth,
+                   const std::vector<int>& nodes, const Estimate& estimate, int stage,
+                   UpdateScore& score) {
+  Points places = client::at_points(model.mesh.nodes, outline(truth));
+  if (stage > 0) {
+    Points both(3, places.cols() + static_cast<Eigen::Index>(model.craniotomy.size()));
+    both << places, model.mesh.nodes(Eigen::all, model.craniotomy);
+    places = std::move(both);
+  }
+  const std::vector<int> near = nodes_near(model.mesh.nodes, nodes, places, kNear_mm);
+  std::vector<int> far, opened = model.craniotomy, cortex;
+  std::set_difference(nodes.begin(), nodes.end(), near.begin(), near.end(),
+                      std::back_inserter(far));
+  std::sort(opened.begin(), opened.end());
+  std::set_intersection(nodes.begin(), nodes.end(), opened.begin(), opened.end(),
+                        std::back_inserter(cortex));
+  const auto of = [&](const std::vector<int>& some) {
+    return score_region(estimate.displacement, truth.displacement, estimate.sd_mm, some);
+  };
+  score.all = of(nodes);
+  score.near = of(near);
+  score.far = of(far);
+  score.cortex = of(cortex);
 }
 
 constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
@@ -105,6 +142,17 @@ void add_errors(const std::string& prefix, const FieldErrors& errors, Cells& cel
   cells.add(prefix + "field_mean_mm", errors.mean_mm);
   cells.add(prefix + "field_p50_mm", errors.p50_mm);
   cells.add(prefix + "field_max_mm", errors.max_mm);
+}
+
+void add_region(const std::string& prefix, const RegionScore& score, Cells& cells) {
+  cells.add(prefix + "nodes", score.nodes);
+  cells.add(prefix + "error_mm", score.error_mm);
+  cells.add(prefix + "none_mm", score.none_mm);
+  cells.add(prefix + "coverage_90", score.coverage_90);
+  cells.add(prefix + "interval_mm", score.interval_mm);
+  cells.add(prefix + "crps_mm", score.crps_mm);
+  cells.add(prefix + "rms_sd_mm", score.rms_sd_mm);
+  cells.add(prefix + "rms_error_mm", score.rms_error_mm);
 }
 
 void add_key(const SurgeryFacts& facts, int stage, Cells& cells) {
@@ -133,6 +181,7 @@ void add_truth(const SurgeryFacts& facts, const client::Scenario& scenario,
   cells.add("removed_nodes", scalar("removed_nodes"));
   cells.add("true_active", scalar("active_slaves"));
   cells.add("true_max_mm", scalar("max_displacement_mm"));
+  for (const char* name : {"outside", "load_scale", "volume_loss"}) cells.add(name, scalar(name));
 }
 
 void add_score(const UpdateScore& score, Cells& cells) {
@@ -144,6 +193,11 @@ void add_score(const UpdateScore& score, Cells& cells) {
   cells.add("worst_excess_mm", score.worst_excess_mm);
   cells.add("coverage_90", score.coverage_90);
   cells.add("mean_sd_mm", score.mean_sd_mm);
+  cells.add("beyond_band", score.beyond_band);
+  add_region("all_", score.all, cells);
+  add_region("near_", score.near, cells);
+  add_region("far_", score.far, cells);
+  add_region("cortex_", score.cortex, cells);
 }
 
 std::string flag_names(const QualityFlags& flags) {
@@ -164,6 +218,7 @@ void add_quality(const Estimate& estimate, Cells& cells) {
   }
   cells.add("quality", std::string(to_string(estimate.quality.quality)));
   cells.add("flags", flag_names(estimate.quality.flags));
+  cells.add("quality_reason", estimate.quality.reason);
   cells.add("inverted", estimate.inverted_elements);
   cells.add("min_volume_ratio", estimate.min_volume_ratio);
   cells.add("sources", static_cast<double>(estimate.sources.size()));
@@ -194,7 +249,7 @@ void add_prior(const Estimate& estimate, Cells& cells) {
 }  // namespace
 
 Result<UpdateScore> score_update(const BrainModel& model, const io::SurgeryTruth& truth,
-                                 const Estimate& estimate) {
+                                 const Estimate& estimate, int stage) {
   const std::vector<int> nodes = tissue_nodes(truth);
   const auto rigid_field = rigid_motion(model, truth);
   if (!rigid_field) return tl::unexpected(rigid_field.error());
@@ -210,6 +265,7 @@ Result<UpdateScore> score_update(const BrainModel& model, const io::SurgeryTruth
   score.rigid = *rigid;
   score.recovered_pct = 100.0 * (1.0 - of_estimate->tumour_mm / none->tumour_mm);
   score_intervals(truth, nodes, estimate, score);
+  score_regions(model, truth, nodes, estimate, stage, score);
   return score;
 }
 

@@ -17,6 +17,7 @@
 #include "common/io/recording/surgery_file.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
+#include "tests/surgeries/interval_scores.hpp"
 #include "tests/surgeries/row_file.hpp"
 
 namespace brainshift::surgeries {
@@ -51,16 +52,23 @@ struct UpdateScore {
   double coverage_90 = 0.0;  // of nodal components within 1.6449 sd; NaN without sd
   std::array<double, kIntervals.size()> coverage = {};  // the same for each of kIntervals
   double mean_sd_mm = 0.0;                              // NaN without sd
+  // All nodes; within kNear_mm of what was measured; the rest; those of the opening.
+  RegionScore all, near, far, cortex;
+  // Like worse_nodes, but by more than a band that holds all nodes at once with 90 %
+  // (simultaneous_radius).
+  int beyond_band = 0;
 };
+inline constexpr double kNear_mm = 30.0;
 
 // Radius of the ball that holds 90 % of an isotropic Gaussian in three dimensions, in standard
 // deviations of a component: the square root of the 0.9 quantile of chi-square with 3 degrees of
 // freedom, 6.2514.
 inline constexpr double kRadius90 = 2.5003;
 
-// Errors of client::score and registration::register_fiducials.
+// stage: says what was measured, as below: the tumour's outline as far as it is seen, from stage 1
+// on the opening too. Errors of client::score and registration::register_fiducials.
 Result<UpdateScore> score_update(const BrainModel& model, const io::SurgeryTruth& truth,
-                                 const Estimate& estimate);
+                                 const Estimate& estimate, int stage = 0);
 
 // The table that `surgeries` writes: one row per update, all rows of a surgery at once.
 // Which surgery a row belongs to.

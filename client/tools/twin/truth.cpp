@@ -86,6 +86,16 @@ Result<Truth> TruthSolver::solve(const Points& load) {
                                             std::to_string(kMaxIterations) + " solves");
 }
 
+GivenTruth::GivenTruth(Points displacement, const contact::PenaltyContact& contact) {
+  truth_.active = contact::count(contact.penetrating(displacement));
+  if (contact.num_slaves() > 0) {
+    truth_.max_penetration_mm = contact.penetration(displacement).maxCoeff();
+  }
+  truth_.displacement = std::move(displacement);
+}
+
+Result<Truth> GivenTruth::solve(const Points& /*load*/) { return truth_; }
+
 // truth_forward() of truth_brain.hpp.
 
 Result<contact::ForwardModel> truth_forward(const TruthBrain& brain, const Progress& progress) {

@@ -48,6 +48,17 @@ class TruthSolver final : public TruthSource {
   contact::WoodburySystem system_;
 };
 
+// One displacement, whatever the load.
+class GivenTruth final : public TruthSource {
+ public:
+  // Keeps a reference to the contact, by which slaves in the skull are counted.
+  GivenTruth(Points displacement, const contact::PenaltyContact& contact);
+  Result<Truth> solve(const Points& load) override;
+
+ private:
+  Truth truth_;
+};
+
 // The forward model of the brain with contact. On the case's own mesh and gap that of
 // contact::ForwardModel::build. Otherwise
 //   nodes     a middle of an edge between two boundary nodes is free where both ends are, fixed

@@ -230,23 +230,6 @@ TEST(ShippedFields, AreOfEveryPatientAndMoveItsTumourAsTheTwinDoes) {
   }
 }
 
-TEST(GivenTruth, CountsTheSlavesInTheSkull) {
-  std::vector<contact::ContactPair> pairs(2);
-  pairs[0].slave = 0;
-  pairs[1].slave = 1;
-  for (contact::ContactPair& pair : pairs) {
-    pair.normal = Vec3(0, 0, -1);  // out of the skull
-    pair.initial_penetration_mm = -1.0;
-  }
-  Points u = Points::Zero(3, 2);
-  u(2, 0) = 1.5;
-  GivenTruth truth(u, contact::PenaltyContact(pairs, 5.0));
-  const auto solved = value_or_fail(truth.solve(Points::Zero(3, 2)));
-  EXPECT_EQ(solved.displacement, u);
-  EXPECT_EQ(solved.active, 1);
-  EXPECT_NEAR(solved.max_penetration_mm, 0.5, 1e-12);
-}
-
 }  // namespace
 
 }  // namespace brainshift::evidence
