@@ -54,7 +54,8 @@ SettledLoads::SettledLoads(const std::shared_ptr<const CondensedOperators>& oper
                  config.prior.estimate_scales, config.prior.broad_weight, team),
       descent_(*operators, window, config.contact.penalty_n_per_mm, contact, team, profile),
       robust_(config.sensing.robust_weights),
-      medium_sd_mm_(displacement_sd_mm(*operators, PriorPart::kMedium)) {}
+      medium_sd_mm_(displacement_sd_mm(*operators, PriorPart::kMedium)),
+      far_sd_mm_(displacement_sd_mm(*operators, PriorPart::kFar)) {}
 
 void SettledLoads::reserve(int data) {
   if (data <= norms_.size()) return;
@@ -253,8 +254,16 @@ bool SettledLoads::set_model_error_floor_of_loads() {
   if (!(plain > 0.0)) return false;
   const double floor = before * std::sqrt(squares / plain);
   if (floor * floor <= (1.0 + kSameVariance) * before * before) return false;
-  strengths_.set_floor(PriorPart::kMedium, floor);
+  set_floor(floor);
   return true;
+}
+
+// Far from the data nothing corrects what the model gets wrong.
+void SettledLoads::set_floor(double of_medium) {
+  strengths_.set_floor(PriorPart::kMedium, of_medium);
+  if (far_sd_mm_ > 0.0) {
+    strengths_.set_floor(PriorPart::kFar, of_medium * medium_sd_mm_ / far_sd_mm_);
+  }
 }
 
 // The upper quartile of the measured motion without outliers: of a surface that is measured along
@@ -269,7 +278,7 @@ void SettledLoads::set_model_error_floor() {
   if (medium_sd_mm_ > 0.0 && count > 0) {
     floor = kModelError * upper_quartile(count) / (std::sqrt(3.0) * medium_sd_mm_);
   }
-  strengths_.set_floor(PriorPart::kMedium, floor);
+  set_floor(floor);
 }
 
 Status SettledLoads::sample() {

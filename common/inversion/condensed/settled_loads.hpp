@@ -80,6 +80,7 @@ class SettledLoads {
   // Of the part that stands for the model's own error, in units of its standard deviation.
   void set_model_error_floor();
   bool set_model_error_floor_of_loads();
+  void set_floor(double of_medium);
   // At the data, of the minimum of the linear model: upper quartile over the data, mm.
   double motion_of_part(PriorPart part);
   // Of the first `count` of norms_, which it orders anew.
@@ -103,7 +104,8 @@ class SettledLoads {
   LoadDescent descent_;
   RobustWeights weights_;
   bool robust_;
-  double medium_sd_mm_;  // of a displacement component that the medium remainder stands for
+  // Of a displacement component that the medium and the far remainder stand for.
+  double medium_sd_mm_, far_sd_mm_;
 
   const SparseData* data_ = nullptr;        // the caller's, or moved_
   SparseData moved_;                        // the data where they are now, when they move

@@ -33,6 +33,18 @@ StrengthProfile log_prior() {
   return result;
 }
 
+// Root mean square of a strength before the data, absence among them.
+double before_data() {
+  const StrengthProfile log_p = log_prior();
+  double mean_square = 0.0;
+  for (std::size_t i = 1; i < kStrengths.size(); ++i) {
+    mean_square += std::exp(log_p[i]) * kStrengths[i] * kStrengths[i];
+  }
+  return std::sqrt(mean_square);
+}
+
+const double kBeforeData = before_data();  // 1.70
+
 std::size_t index_of(double strength) {
   return static_cast<std::size_t>(std::find(kStrengths.begin(), kStrengths.end(), strength) -
                                   kStrengths.begin());
@@ -78,6 +90,7 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
 
 void PriorStrengths::reset() {
   hypotheses_.assign(1, {as_in_the_case(), 1.0});
+  set_far(hypotheses_.front().scales);
   floor_ = {};
   evidence_.forget();
 }
@@ -96,6 +109,22 @@ PriorStrengths::Modes PriorStrengths::modes_of(PriorPart part) const {
   Modes modes{0, count_[which]};
   for (std::size_t before = 0; before < which; ++before) modes.first += count_[before];
   return modes;
+}
+
+void PriorStrengths::set_far(PriorScaleValues& scales) const {
+  const auto of = [&](PriorPart part) -> double& { return scales[static_cast<std::size_t>(part)]; };
+  if (!estimate_ || count_[static_cast<std::size_t>(PriorPart::kFar)] == 0) return;
+  of(PriorPart::kFar) = std::max({kBeforeData, of(PriorPart::kMedium), of(PriorPart::kCoarse)});
+}
+
+PriorScaleValues PriorStrengths::broad() const {
+  PriorScaleValues scales = as_in_the_case();
+  if (!estimate_) return scales;
+  for (std::size_t part = 0; part < scales.size(); ++part) {
+    scales[part] *= std::max(kBeforeData, held()[part]);
+  }
+  set_far(scales);
+  return scales;
 }
 
 PriorScaleValues PriorStrengths::absent_parts() const {
@@ -251,6 +280,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
     return a.weight != b.weight ? a.weight > b.weight : a.scales < b.scales;
   });
   hypotheses_.assign(1, {best, 1.0});
+  set_far(hypotheses_.front().scales);
   for (const Hypothesis& each : candidates_) {
     if (hypotheses_.size() >= kMaxHypotheses) break;
     // The same pair of changes may come in either order.
@@ -259,6 +289,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
                     [&](const Hypothesis& other) { return other.scales == each.scales; });
     if (!known) hypotheses_.push_back({each.scales, std::exp(each.weight)});
   }
+  for (Hypothesis& each : hypotheses_) set_far(each.scales);
   const auto sum = [&] {
     double total = 0.0;
     for (const Hypothesis& each : hypotheses_) total += each.weight;
@@ -270,7 +301,7 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
   }
   const double kept = sum() / (1.0 - broad_weight_);
   for (Hypothesis& each : hypotheses_) each.weight /= kept;
-  if (broad_weight_ > 0.0) hypotheses_.push_back({as_in_the_case(), broad_weight_});
+  if (broad_weight_ > 0.0) hypotheses_.push_back({broad(), broad_weight_});
 }
 
 bool PriorStrengths::climb() {
@@ -373,13 +404,13 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
 }
 
 bool PriorStrengths::explained_broadly(linalg::GrowingMatrix& x, VecX& variances_of_modes) {
-  const PerPart<double> broad = variances(as_in_the_case());
+  const PerPart<double> variances_of_parts = variances(broad());
   variances_of_modes.resize(window_.count);
   for (int i = 0; i < window_.count; ++i) {
-    variances_of_modes[i] = broad[part_of_mode_[static_cast<std::size_t>(i)]];
+    variances_of_modes[i] = variances_of_parts[part_of_mode_[static_cast<std::size_t>(i)]];
   }
   x.resize(evidence_.rank(), window_.count);
-  return evidence_.explained(broad, works_.front(), x);
+  return evidence_.explained(variances_of_parts, works_.front(), x);
 }
 
 PriorScaleValues PriorStrengths::mean() const {
