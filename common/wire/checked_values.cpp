@@ -199,7 +199,8 @@ void set(const VecX& values, RepeatedField<float>* out) {
 std::string to_bytes(const VecX& shares) {
   std::string bytes(static_cast<std::size_t>(shares.size()), '\0');
   std::transform(shares.begin(), shares.end(), bytes.begin(), [](double share) {
-    return share > 0.0 ? static_cast<char>(std::lround(kByteMax * std::min(share, 1.0))) : '\0';
+    const double byte = share > 0.0 ? kByteMax * std::min(share, 1.0) + 0.5 : 0.0;
+    return static_cast<char>(static_cast<unsigned char>(byte));
   });
   return bytes;
 }
