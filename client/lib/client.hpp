@@ -40,8 +40,8 @@
 // that the user can be told why; latest_usable() keeps the field before it. Draw that one. When it
 // is older than the newest message, say so: what is drawn is then the last that was usable.
 //
-// Parts. A viewer may choose a region, a spacing, changes beyond a tolerance, and no standard
-// deviations (common/values/session_state.hpp); the choices combine:
+// Parts. A viewer may choose a region, a spacing, changes beyond a tolerance, and no uncertainty
+// (common/values/session_state.hpp); the choices combine:
 //
 //   FieldChoice near{.region = TumourRegion{40.0}, .tolerance_mm = 0.1};   // mm
 //   if (auto ok = client->subscribe(1, near); !ok) return show(ok.error().message);
@@ -53,8 +53,9 @@
 //
 // Conventions. Coordinates are patient RAS in millimetres. Points are 3 x n matrices, a column per
 // point. A displacement moves an undeformed point to its deformed place; its columns are in the
-// order of BrainModel::mesh.nodes, or of Update::part. Estimate::sd_mm has one entry per column,
-// mm, or none at all.
+// order of BrainModel::mesh.nodes, or of Update::part. Estimate::sd_mm and Estimate::known have one
+// entry per column, or none at all: the standard deviation, mm, and how much of the variance before
+// the data they took away, from 0 (a guess from the prior alone) to 1.
 //
 // Errors. Every call returns a value or an Error: a code to branch on and one sentence to show.
 //   kUnavailable    no daemon, no answer in time, a lost connection, or a daemon that is stopping

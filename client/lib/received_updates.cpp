@@ -55,11 +55,13 @@ FieldAssembly::Outcome FieldAssembly::complete(UpdateMessage& message) {
     update.part = held_->part;
     update.estimate.displacement = held_->displacement;
     update.estimate.sd_mm = held_->sd_mm;
+    update.estimate.known = held_->known;
     return Outcome::kWhole;
   }
   if (holds_ && !message.error && update.usable()) {
-    held_ = Held{message.key(), update.sequence, update.part, update.estimate.displacement,
-                 update.estimate.sd_mm};
+    held_ =
+        Held{message.key(),         update.sequence,      update.part, update.estimate.displacement,
+             update.estimate.sd_mm, update.estimate.known};
     waiting_ = false;
   }
   return Outcome::kWhole;
@@ -73,9 +75,12 @@ bool FieldAssembly::apply(const UpdateMessage& message) {
   }
   const int mesh_nodes =
       held_->part ? held_->part->mesh_nodes : static_cast<int>(held_->displacement.cols());
-  const bool has_sd = changes.sd_mm.size() > 0;
+  const bool has_sd = changes.sd_mm.size() > 0, has_known = changes.known.size() > 0;
   if (part.mesh_nodes != mesh_nodes) return false;
-  if (!part.nodes.empty() && has_sd != (held_->sd_mm.size() > 0)) return false;
+  if (!part.nodes.empty() &&
+      (has_sd != (held_->sd_mm.size() > 0) || has_known != (held_->known.size() > 0))) {
+    return false;
+  }
   std::vector<Eigen::Index> columns;
   columns.reserve(part.nodes.size());
   for (const NodeIndex node : part.nodes) {
@@ -92,6 +97,7 @@ bool FieldAssembly::apply(const UpdateMessage& message) {
     const auto from = static_cast<Eigen::Index>(i);
     held_->displacement.col(columns[i]) = changes.displacement.col(from);
     if (has_sd) held_->sd_mm[columns[i]] = changes.sd_mm[from];
+    if (has_known) held_->known[columns[i]] = changes.known[from];
   }
   return true;
 }

@@ -64,7 +64,7 @@ class FieldAssembly {
     std::uint64_t sequence = 0;
     std::optional<FieldPart> part;
     Points displacement;
-    VecX sd_mm;
+    VecX sd_mm, known;
   };
   // Puts the message's nodes into what is held; false when they do not fit it.
   bool apply(const UpdateMessage& message);

@@ -111,9 +111,11 @@ struct FieldChoice {
   // every node of the region has one of them nearer than this; every boundary node a boundary node.
   double spacing_mm = 0.0;
   // 0: every chosen node of every update. Otherwise a node travels again when its displacement, or
-  // its standard deviation, differs by more than this from what the viewer holds.
+  // its standard deviation, differs by more than this from what the viewer holds, or what is known
+  // of it by more than 0.05.
   double tolerance_mm = 0.0;
-  bool with_sd = true;  // a quarter of a field's bytes
+  // Estimate::sd_mm and Estimate::known: three tenths of a field's bytes.
+  bool with_sd = true;
 
   bool operator==(const FieldChoice&) const = default;
 };

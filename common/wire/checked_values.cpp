@@ -17,6 +17,8 @@ using google::protobuf::RepeatedField;
 // A direction sent with three decimals passes. Values are kept as sent.
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kRotationTolerance = 1e-6;
+constexpr double kShareTolerance = 1e-9;
+constexpr double kByteMax = 255.0;
 // Head meshes have 5.5 tetrahedra per node; 8 leaves room for any sound mesh.
 constexpr int kMaxCells = 8 * kMaxPoints;
 
@@ -55,6 +57,12 @@ double Checked::number(double value, std::string_view field) {
 double Checked::non_negative(double value, std::string_view field) {
   number(value, field);
   if (value < 0.0) require(false, field, show(value) + ", must not be negative");
+  return value;
+}
+
+double Checked::share(double value, std::string_view field) {
+  non_negative(value, field);
+  require(value <= 1.0 + kShareTolerance, field, show(value) + ", must be at most 1");
   return value;
 }
 
@@ -186,6 +194,21 @@ void set(const Points& points, RepeatedField<float>* xyz) {
 void set(const VecX& values, RepeatedField<float>* out) {
   out->Resize(static_cast<int>(values.size()), 0.0f);
   Eigen::Map<Eigen::VectorXf>(out->mutable_data(), values.size()) = values.cast<float>();
+}
+
+std::string to_bytes(const VecX& shares) {
+  std::string bytes(static_cast<std::size_t>(shares.size()), '\0');
+  std::transform(shares.begin(), shares.end(), bytes.begin(), [](double share) {
+    const double byte = share > 0.0 ? kByteMax * std::min(share, 1.0) + 0.5 : 0.0;
+    return static_cast<char>(static_cast<unsigned char>(byte));
+  });
+  return bytes;
+}
+
+VecX from_bytes(std::string_view bytes) {
+  return VecX::NullaryExpr(static_cast<Eigen::Index>(bytes.size()), [&](Eigen::Index i) {
+    return static_cast<unsigned char>(bytes[static_cast<std::size_t>(i)]) / kByteMax;
+  });
 }
 
 void set(const std::vector<int>& values, RepeatedField<std::int32_t>* out) {

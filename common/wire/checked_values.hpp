@@ -48,6 +48,8 @@ class Checked {
   Points points(const google::protobuf::RepeatedField<float>& xyz, std::string_view field);
   // At most kMaxPoints finite numbers.
   VecX numbers(const google::protobuf::RepeatedField<float>& values, std::string_view field);
+  // kNotFinite; kProtocol: not from 0 to 1, but for the rounding of a sum. Kept as sent.
+  double share(double value, std::string_view field);
 
   // 0-based indices in [0, limit), at most kMaxPoints.
   std::vector<int> indices(const google::protobuf::RepeatedField<std::int32_t>& values, int limit,
@@ -81,6 +83,9 @@ SessionKey session_key_from(const pb::SessionKey& value);
 void set(const Points& points, pb::PointSet* out);
 void set(const Points& points, google::protobuf::RepeatedField<float>* xyz);
 void set(const VecX& values, google::protobuf::RepeatedField<float>* out);
+// Shares from 0 to 1 as bytes from 0 to 255. What is no number counts as 0: nothing is known of it.
+std::string to_bytes(const VecX& shares);
+VecX from_bytes(std::string_view bytes);
 void set(const std::vector<int>& values, google::protobuf::RepeatedField<std::int32_t>* out);
 void set(const TriangleSurface& surface, pb::Surface* out);
 void set(const Vec3& vector, google::protobuf::RepeatedField<double>* xyz);

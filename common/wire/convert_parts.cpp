@@ -29,17 +29,7 @@ pb::QualityFlag number_of(QualityFlag flag) {
   return static_cast<pb::QualityFlag>(std::countr_zero(static_cast<std::uint32_t>(flag)) + 1);
 }
 
-// Sums of weights may round to a little more than 1. Values are kept as sent.
-constexpr double kProbabilityTolerance = 1e-9;
-
-double probability(double value, std::string_view field, Checked& checked) {
-  checked.non_negative(value, field);
-  checked.require(value <= 1.0 + kProbabilityTolerance, field,
-                  std::to_string(value) + ", must be at most 1");
-  return value;
-}
-
-// The parts as the peer lists them: all of them once, in any order.
+// The parts as the peer lists them: each once, in any order.
 std::vector<std::size_t> listed_parts(const pb::Update& message, Checked& checked) {
   std::vector<std::size_t> parts;
   for (const auto& strength : message.prior_strengths()) {
@@ -56,9 +46,6 @@ std::vector<std::size_t> listed_parts(const pb::Update& message, Checked& checke
     }
     parts.push_back(index);
   }
-  checked.require(parts.empty() || parts.size() == kPriorParts, "update.prior_strengths",
-                  std::to_string(parts.size()) + " entries, must be 0 or one for each of " +
-                      std::to_string(kPriorParts) + " parts");
   return parts;
 }
 
@@ -203,12 +190,17 @@ void get_prior(const pb::Update& message, Estimate& estimate, Checked& checked) 
                        "are present without update.prior_strengths")) {
     return;
   }
+  // Parts that an older prior does not have are absent from it.
+  if (!parts.empty()) {
+    estimate.prior_scales.fill(0.0);
+    estimate.prior_absent.fill(1.0);
+  }
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const auto& strength = message.prior_strengths(static_cast<int>(i));
     estimate.prior_scales[parts[i]] =
         checked.non_negative(strength.mean(), "update.prior_strengths.mean");
     estimate.prior_absent[parts[i]] =
-        probability(strength.absent(), "update.prior_strengths.absent", checked);
+        checked.share(strength.absent(), "update.prior_strengths.absent");
     estimate.prior_at_bound[parts[i]] = strength.at_bound();
   }
   estimate.hypotheses.reserve(static_cast<std::size_t>(message.hypotheses_size()));
@@ -219,8 +211,8 @@ void get_prior(const pb::Update& message, Estimate& estimate, Checked& checked) 
                 std::to_string(parts.size()) + " strengths")) {
       return;
     }
-    Hypothesis hypothesis;
-    hypothesis.weight = probability(entry.weight(), "update.hypotheses.weight", checked);
+    Hypothesis hypothesis{PriorScaleValues{}};
+    hypothesis.weight = checked.share(entry.weight(), "update.hypotheses.weight");
     for (std::size_t i = 0; i < parts.size(); ++i) {
       hypothesis.scales[parts[i]] =
           checked.non_negative(entry.scales(static_cast<int>(i)), "update.hypotheses.scales");

@@ -28,9 +28,9 @@ QualityVerdict get_verdict(const pb::Update& message, Checked& checked);
 // prior_scales, prior_absent, prior_at_bound and hypotheses. Strengths that are the case's, with no
 // hypothesis, are not sent.
 void set_prior(const Estimate& estimate, pb::Update& out);
-// kNotFinite; kProtocol: an unknown part, a part that is missing or occurs twice, a probability
-// outside [0, 1], a negative strength, hypotheses without parts, of another size, or more than
-// kMaxHypotheses.
+// Parts that a peer with an older prior does not list are absent: strength 0, probability 1.
+// kNotFinite; kProtocol: an unknown part, a part that occurs twice, a probability outside [0, 1], a
+// negative strength, hypotheses without parts, of another size, or more than kMaxHypotheses.
 void get_prior(const pb::Update& message, Estimate& estimate, Checked& checked);
 
 }  // namespace brainshift::wire

@@ -75,6 +75,8 @@ void set_estimate(const Estimate& estimate, pb::Update& out) {
   if (estimate.quality.flags.has(QualityFlag::kNotFinite)) return;
   set(estimate.displacement, out.mutable_displacement()->mutable_xyz_mm());
   set(estimate.sd_mm, out.mutable_sd_mm());
+  out.set_known(to_bytes(estimate.known));
+  if (!std::isnan(estimate.region_known)) out.set_region_known(estimate.region_known);
   set_contact(estimate, out.mutable_contact());
   set(estimate.initial_misfit_mm, out.mutable_initial_misfit());
   set(estimate.misfit_mm, out.mutable_misfit());
@@ -172,6 +174,14 @@ Estimate get_estimate(const pb::Update& message, const std::optional<FieldPart>&
   checked.require(message.sd_mm_size() == 0 || message.sd_mm_size() == nodes, "update.sd_mm",
                   std::to_string(message.sd_mm_size()) + " values, must be 0 or one per node (" +
                       std::to_string(nodes) + ")");
+  const auto known = static_cast<int>(message.known().size());
+  checked.require(
+      known == 0 || known == nodes, "update.known",
+      std::to_string(known) + " values, must be 0 or one per node (" + std::to_string(nodes) + ")");
+  estimate.known = from_bytes(message.known());
+  if (message.has_region_known()) {
+    estimate.region_known = checked.share(message.region_known(), "update.region_known");
+  }
   get_contact(message.contact(), part ? part->mesh_nodes : nodes, estimate, checked);
   estimate.initial_misfit_mm = checked.mean_std(message.initial_misfit(), "update.initial_misfit");
   estimate.misfit_mm = checked.mean_std(message.misfit(), "update.misfit");

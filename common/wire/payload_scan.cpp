@@ -116,12 +116,13 @@ class Scanner {
       if ((seen & bit) != 0) return refuse(field.full_name(), "occurs more than once");
       seen |= bit;
     }
-    if (packed) {
+    const bool bytes = field.type() == gp::FieldDescriptor::TYPE_BYTES;
+    if (packed || bytes) {
       if (expected == kFixed64 && value.size() % 8 != 0)
         return refuse(field.full_name(), "truncated");
       if (expected == kFixed32 && value.size() % 4 != 0)
         return refuse(field.full_name(), "truncated");
-      numbers_ += count_packed(expected, value);
+      numbers_ += bytes ? value.size() : count_packed(expected, value);
       if (numbers_ > kMaxNumbers) {
         return refuse(field.full_name(), more_than(kMaxNumbers, " numbers in one payload"));
       }

@@ -21,7 +21,8 @@ namespace brainshift::wire {
 
 // An update with 8,000 iterations of history has about 64,000 fields; packed numbers count as one.
 inline constexpr int kMaxFields = 1 << 16;
-// Numbers in all packed fields of a payload together: 64 MiB of 4-byte floats.
+// Numbers in all packed fields of a payload together: 64 MiB of 4-byte floats. A byte of a `bytes`
+// field counts as one.
 inline constexpr std::size_t kMaxNumbers = std::size_t{1} << 24;
 // Bytes of one text field.
 inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 16;

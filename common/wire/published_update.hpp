@@ -31,8 +31,10 @@ class PublishedUpdate {
   int nodes() const { return static_cast<int>(xyz_mm_.size() / 3); }
   const std::vector<float>& xyz_mm() const { return xyz_mm_; }  // 3 per node
   const std::vector<float>& sd_mm() const { return sd_mm_; }    // one per node, or none
+  const std::string& known() const { return known_; }           // a byte per node, or none
 
-  // The payload with the nodes of the part only; empty: all nodes. sd: with standard deviations.
+  // The payload with the nodes of the part only; empty: all nodes. sd: with standard deviations and
+  // what is known.
   // Precondition: the part is of this update's mesh.
   std::string cut(const std::optional<FieldPart>& part, bool sd) const;
 
@@ -42,6 +44,7 @@ class PublishedUpdate {
   bool usable_ = false;
   std::vector<float> xyz_mm_;
   std::vector<float> sd_mm_;
+  std::string known_;
   std::string rest_;  // everything but the field
 };
 

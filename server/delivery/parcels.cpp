@@ -24,6 +24,7 @@ std::shared_ptr<HeldField> all_of(const PublishedUpdate& update, const Selection
   held->sequence = update.sequence();
   const bool sd = selection.choice.with_sd && !update.sd_mm().empty();
   held->xyz_mm.reserve(3 * selection.nodes.size());
+  const bool known = selection.choice.with_sd && !update.known().empty();
   if (sd) held->sd_mm.reserve(selection.nodes.size());
   for (const NodeIndex node : selection.nodes) {
     const auto i = static_cast<std::size_t>(node);
@@ -31,6 +32,7 @@ std::shared_ptr<HeldField> all_of(const PublishedUpdate& update, const Selection
       held->xyz_mm.push_back(update.xyz_mm()[3 * i + axis]);
     }
     if (sd) held->sd_mm.push_back(update.sd_mm()[i]);
+    if (known) held->known.push_back(update.known()[i]);
   }
   return held;
 }
@@ -42,6 +44,10 @@ bool differs(const HeldField& a, const HeldField& b, std::size_t i, double toler
     squared += step * step;
   }
   if (std::sqrt(squared) > tolerance_mm) return true;
+  if (!a.known.empty()) {
+    const auto byte = [i](const HeldField& of) { return static_cast<unsigned char>(of.known[i]); };
+    if (std::abs(byte(a) - byte(b)) > 255 * Parcels::kKnownTolerance) return true;
+  }
   if (a.sd_mm.empty()) return false;
   return std::abs(static_cast<double>(a.sd_mm[i]) - static_cast<double>(b.sd_mm[i])) > tolerance_mm;
 }
@@ -60,7 +66,7 @@ Parcel make_parcel(const Bytes& whole, const PublishedUpdate& update, const Sele
   const double tolerance_mm = selection.choice.tolerance_mm;
   if (tolerance_mm == 0.0 || !update.usable()) return {complete(whole, update, selection), {}};
   auto now = all_of(update, selection);
-  if (!base || base->sd_mm.size() != now->sd_mm.size()) {
+  if (!base || base->sd_mm.size() != now->sd_mm.size() || base->known.size() != now->known.size()) {
     return {complete(whole, update, selection), std::move(now)};
   }
   FieldPart changes{selection.mesh_nodes, {}, base->sequence};
@@ -72,6 +78,7 @@ Parcel make_parcel(const Bytes& whole, const PublishedUpdate& update, const Sele
     std::copy_n(base->xyz_mm.begin() + static_cast<std::ptrdiff_t>(3 * i), 3,
                 now->xyz_mm.begin() + static_cast<std::ptrdiff_t>(3 * i));
     if (!now->sd_mm.empty()) now->sd_mm[i] = base->sd_mm[i];
+    if (!now->known.empty()) now->known[i] = base->known[i];
   }
   const auto most = kMaxOfTheChoice * static_cast<double>(selection.nodes.size());
   if (static_cast<double>(changes.nodes.size()) > most) {

@@ -6,10 +6,11 @@
 // viewers with the same choice and, where a choice has a tolerance, the same held field.
 //
 // With a tolerance t, and u what the update says of a node, h what the viewer holds of it: the node
-// travels when |u - h| > t, or when the standard deviations differ by more than t. Both ends
-// compute with the same 32-bit floats, so that what a viewer holds is known here exactly. The whole
-// choice travels, and replaces what is held, when the viewer holds nothing of this session, when
-// most of it changed, and when standard deviations come or go. An update that is not usable travels
+// travels when |u - h| > t, when the standard deviations differ by more than t, or what is known by
+// more than kKnownTolerance. Both ends compute with the same 32-bit floats and bytes, so that what a
+// viewer holds is known here exactly. The whole choice travels, and replaces what is held, when the
+// viewer holds nothing of this session, when most of it changed, and when standard deviations, or
+// what is known, come or go. An update that is not usable travels
 // with the whole choice; nobody holds it.
 //
 // Plain bookkeeping of the transport thread, of which a turn makes at most kMakesPerTurn parcels.
@@ -40,6 +41,7 @@ struct HeldField {
   std::uint64_t sequence = 0;  // of the update that brought it up to date
   std::vector<float> xyz_mm;   // 3 per node of the choice
   std::vector<float> sd_mm;    // one per node of the choice, or none
+  std::string known;           // the same in bytes, 255: all
 };
 using Held = std::shared_ptr<const HeldField>;
 
@@ -51,6 +53,7 @@ struct Parcel {
 class Parcels {
  public:
   static constexpr int kMakesPerTurn = 8;
+  static constexpr double kKnownTolerance = 0.05;
   // The newest usable update, the newest failure since and an iterate.
   static constexpr std::size_t kUpdatesKept = 3;
 

@@ -118,7 +118,8 @@ UpdateMessage answer_to(client::Client& client, const Observation& observation) 
 bool same_bits(const Update& one, const Update& other) {
   return one.estimate.displacement.size() > 0 &&
          same_bytes(one.estimate.displacement, other.estimate.displacement) &&
-         same_bytes(one.estimate.sd_mm, other.estimate.sd_mm);
+         same_bytes(one.estimate.sd_mm, other.estimate.sd_mm) &&
+         same_bytes(one.estimate.known, other.estimate.known);
 }
 
 int differing(const std::vector<Update>& updates, const std::vector<Update>& expected) {

@@ -109,6 +109,7 @@ def test_nodes_land_where_the_daemon_says_within_the_stated_error(theatre):
         assert np.linalg.norm(u, axis=1).max() > 3.0, "otherwise zeros would do"
 
         assert image_of(peer.receive_from("brainshift_sd"))[0].max() > 0.1
+        assert 0.1 < image_of(peer.receive_from("brainshift_known"))[0].max() <= 1.0
         tumour, _ = points_of(peer.receive_from("brainshift_tumour"))
         assert len(tumour) == len(theatre.model.tumour.vertices)
         assert np.linalg.norm(tumour - theatre.model.tumour.vertices, axis=1).max() > 1.0
@@ -149,7 +150,7 @@ def test_the_bridge_goes_blank_within_the_lease_when_the_daemon_is_killed(theatr
         assert is_blank(message)
         assert message.metadata["currency"] == "stale"
         assert message.metadata["blank"] == "true"
-        assert is_blank(peer.receive_from("brainshift_sd"))
+        assert is_blank(peer.receive_from("brainshift_sd")) and is_blank(peer.receive_from("brainshift_known"))
         tumour, _ = points_of(peer.receive_from("brainshift_tumour"))
         undeformed = theatre.model.tumour.vertices
         assert np.linalg.norm(tumour - undeformed) <= 1e-5 * np.linalg.norm(undeformed)

@@ -19,8 +19,8 @@ from brainshift.v1 import brainshift_pb2 as pb
 
 # Scripts rely on these keys of a run in report.json.
 REPORT_KEYS = ("case", "scenario", "method", "boundary", "mesh", "prepare_s", "model_bytes", "full_solve_ms", "updates",
-               "latency_ms", "cold_ms", "stages_ms", "error_mm", "recovery_pct", "field_error_pct", "coverage_90", "contact",
-               "principal_direction_deg", "left_out", "quality", "prior_strengths", "hypotheses")
+               "latency_ms", "cold_ms", "stages_ms", "error_mm", "recovery_pct", "field_error_pct", "coverage_90",
+               "region_known", "contact", "principal_direction_deg", "left_out", "quality", "prior_strengths", "hypotheses")
 
 
 @pytest.fixture

@@ -253,7 +253,7 @@ def check_files(records, grid, resampling, modeling):
     records.at_least("VTK files with SPACE = RAS of three", sum(map(says_ras, files)), 3, "VTK 9.1")
     for surface in files[1:]:
         names = {surface.GetPointData().GetArrayName(i) for i in range(surface.GetPointData().GetNumberOfArrays())}
-        assert names == {"displacement_mm", "sd_mm"}, names
+        assert names == {"displacement_mm", "sd_mm", "known"}, names
 
     for title, folder, of, sign in (("modeling", modeling, mesh, 1.0), ("resampling", resampling, deformed(mesh), -1.0)):
         _, field = field_ras(folder)

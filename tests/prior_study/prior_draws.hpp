@@ -49,7 +49,7 @@ VecX scaled_modes(const CondensedOperators& operators, const PriorScaleValues& s
 Result<PriorScaleValues> parse_strengths(const std::vector<std::string>& texts);
 
 // Root mean square of the three components' standard deviations, mm, at each place: what the modes
-// leave out of the three residual fields together.
+// leave out of the residual fields together.
 std::array<double, kPlaces> left_out_sd_mm(const CondensedOperators& operators,
                                            const std::array<MeshPoint, kPlaces>& places);
 

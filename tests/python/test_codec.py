@@ -33,6 +33,10 @@ def test_an_update_has_the_numbers_that_were_sent(name):
     expected = np.asarray(described["displacement"]["xyz_mm"], np.float32).reshape(-1, 3)
     assert update.displacement_mm.dtype == np.float32 and np.array_equal(update.displacement_mm, expected)
     assert np.array_equal(update.sd_mm, np.asarray(described["sd_mm"], np.float32))
+    known = bytes.fromhex(described.get("known", ""))
+    assert (update.known is None) == (known == b"")
+    assert known == b"" or np.array_equal(update.known, np.frombuffer(known, np.uint8) / np.float32(255.0))
+    assert update.region_known == described.get("region_known")
     assert update.session == brainshift.SessionKey(described["boot_id"], described["session_id"], described["model_id"])
     assert update.quality == described.get("quality", 0)
     assert list(update.quality_flags) == described.get("quality_flags", [])
@@ -47,7 +51,7 @@ def test_a_part_names_its_nodes():
     update = codec.update(bytes_read)
     assert np.array_equal(update.nodes, np.cumsum(described["part"]["node_steps"]))
     assert update.mesh_nodes == 18475
-    assert update.sd_mm is None
+    assert update.sd_mm is None and update.known is None
 
 
 def test_only_final_fields_that_were_judged_usable_are_usable():
@@ -110,6 +114,7 @@ def test_arrays_that_no_daemon_takes_are_named(body, named):
 @pytest.mark.parametrize("change, named", [
     (lambda m: m.displacement.xyz_mm.append(1.0), "multiple of 3"),
     (lambda m: m.sd_mm.append(1.0), "sd_mm"),
+    (lambda m: setattr(m, "known", b"\xff"), "known"),
     (lambda m: m.part.node_steps.append(1), "part"),
     (lambda m: m.quality_flags.append(9), "flag"),
 ])

@@ -14,9 +14,10 @@ import subprocess
 GLOSSARY = (pathlib.Path(os.environ["BRAINSHIFT_SOURCE"]) / "docs" / "glossary.md").read_text()
 PAPER_COLUMNS = {"Ji et al.", "paper, simulated case", "the same", "paper, mean of five patients"}
 FLAGS = ["misfit_unexplained", "strength_at_bound", "sources_contradict", "data_outside_region", "deadline",
-         "contact_not_certified", "iteration_limit", "mostly_prior", "inverted_elements", "volume_lost", "beyond_skull", "not_finite"]
-PARTS = ["along_gravity", "across_gravity", "tumour_volume", "brain_volume", "resection", "opening", "fine", "medium",
-         "coarse"]
+         "contact_not_certified", "iteration_limit", "mostly_prior", "inverted_elements", "volume_lost", "beyond_skull",
+         "not_finite"]
+PARTS = ["along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume", "brain_volume", "resection",
+         "opening", "fine", "medium", "coarse", "far"]
 PLAYED = {"case": "box", "scenario": "SCENARIO", "method": "METHOD", "boundary": "contact"}
 RUN = PLAYED | {
     "error_mm": {"initial": {"mean": 2.0, "std": 0.5}},

@@ -14,7 +14,7 @@ import slicer_paths
 import vtk
 from slicer_fields import image_of, label_values, metadata, ras_grid, sampled, smooth
 
-from BrainshiftLib.colours import sd_colours
+from BrainshiftLib.colours import known_colours, sd_colours
 from BrainshiftLib.grid import FieldError, VectorField, check_field, field_from_image, grid_transform
 from BrainshiftLib.label import (ATTRIBUTE_PREFIX, KEYS, Label, LabelError, Light, belongs, may_be_shown, parse_metadata,
                                  parse_state)
@@ -216,12 +216,19 @@ def test_a_missing_key_is_named(key):
         parse_metadata(found.get)
 
 
+def test_a_bridge_from_before_says_nothing_of_what_is_known():
+    values, found = label_values(), attributes()
+    del values["has_known"], found[ATTRIBUTE_PREFIX + "has_known"]
+    assert not parse_state(json.dumps(values)).has_known and not parse_metadata(found.get).has_known
+    assert label().has_known
+
+
 @pytest.mark.parametrize("key,value", [
     ("sequence", -1), ("sequence", 1.5), ("sequence", True), ("sequence", "x"), ("sequence", None), ("sequence", []),
     ("session_id", 1.5), ("model_id", None), ("case_id", {}), ("quality", "fine"), ("quality", 3), ("currency", "Current"),
     ("currency", []), ("age_ms", -1.0), ("age_ms", "soon"), ("age_ms", False), ("age_ms", float("nan")),
     ("grid_error_mm", float("inf")), ("spacing_mm", []), ("direction", 1.0), ("blank", "yes"), ("blank", None), ("has_sd", 1),
-    ("flags", ["a"]), ("reason", None)])
+    ("has_known", None), ("flags", ["a"]), ("reason", None)])
 def test_a_value_without_sense_is_named(key, value):
     with pytest.raises(LabelError, match=f"^{key}: "):
         parse_state(json.dumps(label_values(**{key: value})))
@@ -333,6 +340,7 @@ def test_colours_grow_lighter_with_the_value():
     colours = sd_colours(64)
     assert colours.shape == (64, 3) and colours.min() >= 0.0 and colours.max() <= 1.0
     assert (np.diff(colours @ [0.2126, 0.7152, 0.0722]) > 0.0).all()
+    assert np.array_equal(known_colours(64)[-1], colours[0]), "sure is dark in both"
     with pytest.raises(ValueError, match="count"):
         sd_colours(1)
 

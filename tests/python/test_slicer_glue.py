@@ -11,8 +11,9 @@ import slicer_stub
 from slicer_fields import image_of, label_values, metadata, ras_grid, sampled, smooth
 from slicer_stub import CLASSES
 
-FIELD, SD, STATE = "brainshift_u", "brainshift_sd", "brainshift_state"
-KINDS = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", STATE: "vtkMRMLTextNode",
+FIELD, SD, KNOWN, STATE = "brainshift_u", "brainshift_sd", "brainshift_known", "brainshift_state"
+KINDS = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", KNOWN: "vtkMRMLScalarVolumeNode",
+         STATE: "vtkMRMLTextNode",
          "brainshift_tumour": "vtkMRMLModelNode", "brainshift_cortex": "vtkMRMLModelNode"}
 
 
@@ -71,7 +72,7 @@ class Room:
     def send(self, **changes):
         """An update, as the bridge sends it."""
         self.send_field(**changes)
-        for name in (SD, "brainshift_tumour", "brainshift_cortex"):
+        for name in (SD, KNOWN, "brainshift_tumour", "brainshift_cortex"):
             self.receive(name, lambda node: None, metadata(**changes))
         self.send_state(**changes)
 
@@ -364,7 +365,7 @@ def test_a_deleted_follower_disturbs_nothing(shown):
 
 def test_the_sd_lies_over_the_slices_only_with_the_field(shown):
     assert shown.slicer.layers == []
-    shown.logic.show_sd(True)
+    shown.logic.show_overlay(SD, True)
     shown.logic.tick()
     (layer,) = shown.slicer.layers
     assert layer["foreground"] is shown.node(SD) and 0.0 < layer["foregroundOpacity"] < 1.0
@@ -378,7 +379,7 @@ def test_the_sd_lies_over_the_slices_only_with_the_field(shown):
 
 
 def test_the_sd_of_another_update_is_not_shown(shown):
-    shown.logic.show_sd(True)
+    shown.logic.show_overlay(SD, True)
     shown.send_field(sequence=8)
     shown.send_state(sequence=8)
     assert shown.logic.tick().show
@@ -389,9 +390,31 @@ def test_the_sd_of_another_update_is_not_shown(shown):
 
 
 def test_deviations_that_nobody_sent_are_not_shown_as_certainty(shown):
-    shown.logic.show_sd(True)
+    shown.logic.show_overlay(SD, True)
     shown.send(sequence=8, has_sd=False)
     assert shown.logic.tick().show and shown.slicer.layers[-1] == {"foreground": None}
+
+
+def test_what_is_known_lies_over_the_slices_in_place_of_the_sd_and_a_guess_is_drawn(shown):
+    shown.logic.show_overlay(SD, True)
+    shown.logic.show_overlay(KNOWN, True)
+    assert shown.slicer.layers[-1]["foreground"] is shown.node(KNOWN)
+    calls = shown.node(KNOWN).GetDisplayNode().calls
+    assert calls["window"] == (0.0, 1.0) and calls["threshold"] == 0
+    colours = shown.scene.GetNodeByID(calls["colour"]).colours
+    assert colours[0][1:4] > colours[255][1:4] and colours[255][0] == "1.00"
+    shown.logic.show_overlay(SD, False)  # its box was cleared
+    assert shown.slicer.layers[-1]["foreground"] is shown.node(KNOWN)
+    shown.send(sequence=8, has_known=False)
+    assert shown.logic.tick().show and shown.slicer.layers[-1] == {"foreground": None}
+
+
+def test_one_box_clears_the_other(panel):
+    panel.widget.sd.checked = True
+    panel.widget.on_known(True)
+    assert panel.widget.sd.checked is False and panel.logic.nodes.overlay_wanted == KNOWN
+    panel.widget.on_known(False)
+    assert panel.logic.nodes.overlay_wanted is None
 
 
 def test_surfaces_are_hidden_with_the_field_and_come_back_with_it(shown):

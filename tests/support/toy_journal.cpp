@@ -59,6 +59,7 @@ UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Qualit
   estimate.status = EstimateStatus::kConverged;
   estimate.displacement = toy_displacement(model.mesh.nodes, scale);
   estimate.sd_mm = VecX::Constant(model.mesh.num_nodes(), 0.25);
+  estimate.known = VecX::Constant(model.mesh.num_nodes(), 0.6);
   estimate.quality.quality = quality;
   if (quality == Quality::kCaution) estimate.quality.flags.set(QualityFlag::kDeadline);
   if (quality == Quality::kUnusable) estimate.quality.flags.set(QualityFlag::kVolumeLost);

@@ -20,7 +20,7 @@ BrainModel toy_model(int cells = 3);
 Points toy_displacement(const Points& x, double scale = 1.0);
 
 // A final update of session 41 with the field toy_displacement(., scale), a standard deviation of
-// 0.25 mm everywhere, and the flag, if any, that makes its quality.
+// 0.25 mm everywhere, 0.6 known, and the flag, if any, that makes its quality.
 UpdateMessage toy_update(const BrainModel& model, std::uint64_t sequence, Quality quality,
                          double scale = 1.0);
 

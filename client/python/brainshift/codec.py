@@ -225,6 +225,11 @@ def update(payload: bytes) -> v.Update:
     sd = np.fromiter(m.sd_mm, np.float32, len(m.sd_mm)) if len(m.sd_mm) > 0 else None
     if sd is not None and (displacement is None or len(sd) != len(displacement)):
         raise ProtocolError("Update: sd_mm is not of the nodes of the displacement")
+    known: Optional[v.Singles] = None
+    if len(m.known) > 0:  # a byte per node
+        known = np.frombuffer(m.known, np.uint8).astype(np.float32) / np.float32(255.0)
+        if displacement is None or len(known) != len(displacement):
+            raise ProtocolError("Update: known is not of the nodes of the displacement")
     nodes: Optional[v.Indices] = None
     if m.HasField("part"):
         nodes = np.cumsum(np.asarray(m.part.node_steps, dtype=np.int64)).astype(np.int32)
@@ -237,7 +242,7 @@ def update(payload: bytes) -> v.Update:
     return v.Update(
         case_id=m.case_id, session=_key(m), sequence=m.sequence, observation_sequence=m.observation_sequence,
         method=m.method, boundary=m.boundary, final=m.final, status=m.status, reason=m.reason,
-        error_code=m.error_code, displacement_mm=displacement, sd_mm=sd, nodes=nodes,
+        error_code=m.error_code, displacement_mm=displacement, sd_mm=sd, known=known, nodes=nodes,
         mesh_nodes=m.part.mesh_nodes if nodes is not None else None, quality=quality, quality_flags=flags,
         quality_reason=m.quality_reason, contact=_contact(m.contact) if m.HasField("contact") else None,
         initial_misfit=_mean_std(m, "initial_misfit"), misfit=_mean_std(m, "misfit"),
@@ -248,7 +253,8 @@ def update(payload: bytes) -> v.Update:
         sources=tuple(_source(s) for s in m.sources),
         prior_strengths=tuple(v.PriorStrength(s.part, s.mean, s.absent, s.at_bound) for s in m.prior_strengths),
         min_volume_ratio=_optional(m, "min_volume_ratio"), inverted_elements=m.inverted_elements,
-        misfit_ratio=_optional(m, "misfit_ratio"), data_outside_region=m.data_outside_region)
+        misfit_ratio=_optional(m, "misfit_ratio"), data_outside_region=m.data_outside_region,
+        region_known=_optional(m, "region_known"))
 
 
 def _mean_std(message: Any, name: str) -> Optional[v.MeanStd]:

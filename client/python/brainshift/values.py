@@ -101,8 +101,8 @@ class Model:
     def to_meshio(self, update: Optional[Update] = None) -> Any:
         """The mesh as a meshio.Mesh, undeformed, with an update's field as point data.
 
-        Point data: displacement_mm (n, 3) and, when the update has it, sd_mm (n,). ValueError when
-        the update is of another model or has no whole field. Needs the package meshio.
+        Point data: displacement_mm (n, 3) and, when the update has them, sd_mm and known (n,). ValueError
+        when the update is of another model or has no whole field. Needs the package meshio.
         """
         import meshio
 
@@ -187,7 +187,7 @@ class Choice:
 
     region: Union[Ball, NearTumour, None] = None
     spacing_mm: float = 0.0
-    without_sd: bool = False
+    without_sd: bool = False  # neither sd_mm nor known
 
 
 # ---------- updates ----------
@@ -210,6 +210,7 @@ class QualityFlag(enum.IntEnum):
     DEADLINE = 5
     CONTACT_NOT_CERTIFIED = 6
     ITERATION_LIMIT = 7
+    MOSTLY_PRIOR = 8  # the data say little about the region of surgery
     INVERTED_ELEMENTS = 17
     VOLUME_LOST = 18
     BEYOND_SKULL = 19
@@ -296,6 +297,7 @@ class Update:
     error_code: str  # set when status is "failed"
     displacement_mm: Optional[Singles]  # (n, 3)
     sd_mm: Optional[Singles]  # (n,)
+    known: Optional[Singles]  # (n,): share of the variance that the data took away; 0: a guess, 1: known
     nodes: Optional[Indices]  # of the mesh that the rows are of; None: all, in order
     mesh_nodes: Optional[int]  # nodes of the whole mesh, with `nodes`
     quality: Quality
@@ -313,6 +315,7 @@ class Update:
     inverted_elements: int
     misfit_ratio: Optional[float]  # 1: data as far off as their errors say
     data_outside_region: int
+    region_known: Optional[float]  # mean of known over the region of surgery
 
     @property
     def failed(self) -> bool:
@@ -324,7 +327,7 @@ class Update:
         return self.final and not self.failed and self.quality in (Quality.GOOD, Quality.CAUTION)
 
     def point_data(self, model: Model) -> dict[str, Any]:
-        """displacement_mm and sd_mm for every node of the model; ValueError when it has not all."""
+        """displacement_mm, sd_mm and known for every node of the model; ValueError when it has not all."""
         if self.session.model_id != model.model_id:
             raise ValueError(f"the update is of model {self.session.model_id}, this is {model.model_id}")
         if self.displacement_mm is None or len(self.displacement_mm) != len(model.nodes):
@@ -332,6 +335,8 @@ class Update:
         data: dict[str, Any] = {"displacement_mm": self.displacement_mm}
         if self.sd_mm is not None:
             data["sd_mm"] = self.sd_mm
+        if self.known is not None:
+            data["known"] = self.known
         return data
 
 

@@ -18,7 +18,7 @@ import vtk
 from BrainshiftLib.colours import FULL_SCALE_MM
 from BrainshiftLib.grid import FieldError, check_field, field_from_image, grid_transform
 from BrainshiftLib.label import LabelError, Light, Verdict, may_be_shown, parse_metadata, parse_state
-from BrainshiftLib.scene import FIELD, STATE, TRANSFORM, SceneNodes, bridge_node
+from BrainshiftLib.scene import FIELD, KNOWN, SD, STATE, TRANSFORM, SceneNodes, bridge_node
 from slicer.ScriptedLoadableModule import (ScriptedLoadableModule, ScriptedLoadableModuleLogic,
                                            ScriptedLoadableModuleTest, ScriptedLoadableModuleWidget)
 from slicer.util import VTKObservationMixin
@@ -166,8 +166,12 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         self.tick()
         return refused
 
-    def show_sd(self, wanted):
-        self.nodes.sd_wanted = bool(wanted)
+    def show_overlay(self, name, wanted):
+        """SD or KNOWN over the slices; one at a time."""
+        if wanted:
+            self.nodes.overlay_wanted = name
+        elif self.nodes.overlay_wanted == name:
+            self.nodes.overlay_wanted = None
         self.tick()
 
     # ---- what is shown
@@ -289,7 +293,10 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.followers.connect("checkedNodesChanged()", self.on_followers)
         self.sd = qt.QCheckBox(f"Standard deviation over the slices, 0 to {FULL_SCALE_MM:g} mm")
         self.sd.connect("toggled(bool)", self.on_sd)
-        for label, widget in (("", self.light), ("", self.details), ("Moves", self.followers), ("", self.sd)):
+        self.known = qt.QCheckBox("What the data know over the slices: dark 1, yellow 0 (a guess)")
+        self.known.connect("toggled(bool)", self.on_known)
+        for label, widget in (("", self.light), ("", self.details), ("Moves", self.followers), ("", self.sd),
+                              ("", self.known)):
             form.addRow(label, widget)
 
     def cleanup(self):
@@ -322,7 +329,14 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
             slicer.util.errorDisplay("\n".join(refused))
 
     def on_sd(self, wanted):
-        self.logic.show_sd(wanted)
+        self.logic.show_overlay(SD, wanted)
+        if wanted:
+            self.known.checked = False
+
+    def on_known(self, wanted):
+        self.logic.show_overlay(KNOWN, wanted)
+        if wanted:
+            self.sd.checked = False
 
     def on_tick(self):
         verdict, state = self.logic.tick(), self.logic.state
@@ -349,6 +363,8 @@ def describe(state, largest_mm):
             lines.append(f"fades to nothing over the outer {state.fade_mm:.0f} mm of the grid")
         if not state.has_sd:
             lines.append("came without standard deviations")
+        if not state.has_known:
+            lines.append("came without word of what the data know")
     return "\n".join(lines)
 
 

@@ -27,7 +27,7 @@ Broadcast::Broadcast(PicturePtr picture, Part part, std::uint32_t message_id)
   devices_ = {Device::kStatus, Device::kState};
   if (whole() && picture_->rest) {
     devices_.push_back(Device::kField);
-    if (picture_->rest->with_sd) devices_.push_back(Device::kSd);
+    if (picture_->rest->with_sd) devices_.insert(devices_.end(), {Device::kSd, Device::kKnown});
     if (picture_->rest->tumour) devices_.push_back(Device::kTumour);
     if (picture_->rest->cortex) devices_.push_back(Device::kCortex);
   }
@@ -72,6 +72,9 @@ Status Broadcast::encode(Device device, std::uint16_t version, std::string& out)
     case Device::kSd:
       envelope.device = "brainshift_sd";
       return encode_volume(envelope, rest->geometry, 1, picture_->sd, out);
+    case Device::kKnown:
+      envelope.device = "brainshift_known";
+      return encode_volume(envelope, rest->geometry, 1, picture_->known, out);
     case Device::kTumour:
       envelope.device = "brainshift_tumour";
       return igtl::encode(envelope, picture_->tumour ? *picture_->tumour : *rest->tumour, out);

@@ -6,6 +6,7 @@
 //   brainshift_state  STRING    JSON
 //   brainshift_u      IMAGE     float32 x 3
 //   brainshift_sd     IMAGE     float32
+//   brainshift_known  IMAGE     float32
 //   brainshift_tumour, brainshift_cortex   POLYDATA
 //
 // Belongs to one thread.
@@ -41,7 +42,7 @@ class Broadcast {
   std::size_t held_bytes() const;
 
  private:
-  enum class Device { kStatus, kState, kField, kSd, kTumour, kCortex };
+  enum class Device { kStatus, kState, kField, kSd, kKnown, kTumour, kCortex };
   Status encode(Device device, std::uint16_t version, std::string& out) const;
 
   PicturePtr picture_;

@@ -13,7 +13,8 @@ namespace brainshift::client {
 namespace {
 
 constexpr const char* kDisplacement = "displacement_mm";
-constexpr const char* kSd = "sd_mm";
+// In this order behind the displacement.
+constexpr const char* kScalars[] = {"sd_mm", "known"};
 // A ball is asked for with this much to spare, so that rounding leaves out no node.
 constexpr double kSpare_mm = 1e-3;
 
@@ -22,9 +23,10 @@ igtl::PolyData resting(const TriangleSurface& surface, bool with_sd) {
   const auto count = surface.vertices.cols();
   data.attributes.push_back(
       {kDisplacement, igtl::AttributeKind::kVector, false, Eigen::MatrixXf::Zero(3, count)});
-  if (with_sd) {
+  if (!with_sd) return data;
+  for (const char* name : kScalars) {
     data.attributes.push_back(
-        {kSd, igtl::AttributeKind::kScalar, false, Eigen::MatrixXf::Zero(1, count)});
+        {name, igtl::AttributeKind::kScalar, false, Eigen::MatrixXf::Zero(1, count)});
   }
   return data;
 }
@@ -77,7 +79,7 @@ Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOpti
   stream.choice_ = stream.smallest_choice(model);
   stream.choice_.with_sd = options.with_sd;
   stream.u_ = Points::Zero(3, model.mesh.nodes.cols());
-  stream.sd_ = VecX::Zero(model.mesh.nodes.cols());
+  stream.sd_.values = stream.known_.values = VecX::Zero(model.mesh.nodes.cols());
   return stream;
 }
 
@@ -115,14 +117,16 @@ Status FieldStream::take(const UpdateMessage& message) {
     return invalid("update of model " + message.update.model_id + ", must be of " + model_id_);
   }
   const auto columns = estimate.displacement.cols();
-  has_sd_ = rest_->with_sd && estimate.sd_mm.size() == columns;
+  sd_.has = rest_->with_sd && estimate.sd_mm.size() == columns;
+  known_.has = rest_->with_sd && estimate.known.size() == columns;
   const auto& part = message.update.part;
   if (!part) {
     if (columns != u_.cols()) {
       return invalid(fmt::format("update of {} nodes, must be of {}", columns, u_.cols()));
     }
     u_ = estimate.displacement;
-    if (has_sd_) sd_ = estimate.sd_mm;
+    if (sd_.has) sd_.values = estimate.sd_mm;
+    if (known_.has) known_.values = estimate.known;
     return {};
   }
   if (part->mesh_nodes != u_.cols() ||
@@ -133,7 +137,8 @@ Status FieldStream::take(const UpdateMessage& message) {
   for (Eigen::Index i = 0; i < columns; ++i) {
     const NodeIndex node = part->nodes[static_cast<std::size_t>(i)];
     u_.col(node) = estimate.displacement.col(i);
-    if (has_sd_) sd_[node] = estimate.sd_mm[i];
+    if (sd_.has) sd_.values[node] = estimate.sd_mm[i];
+    if (known_.has) known_.values[node] = estimate.known[i];
   }
   return {};
 }
@@ -143,14 +148,16 @@ igtl::PolyData FieldStream::deformed(const igtl::PolyData& rest, const Anchors& 
   Eigen::MatrixXf& moved = data.attributes[0].values;
   for (Eigen::Index i = 0; i < anchors.nodes.cols(); ++i) {
     Vec3 u = Vec3::Zero();
-    double sd = 0.0;
+    double sd = 0.0, known = 0.0;
     for (int corner = 0; corner < 4; ++corner) {
       const int node = anchors.nodes(corner, i);
       u += anchors.weights(corner, i) * u_.col(node);
-      sd += anchors.weights(corner, i) * sd_[node];
+      sd += anchors.weights(corner, i) * sd_.values[node];
+      known += anchors.weights(corner, i) * known_.values[node];
     }
     moved.col(i) = u.cast<float>();
-    if (has_sd_) data.attributes[1].values(0, i) = static_cast<float>(sd);
+    if (sd_.has) data.attributes[1].values(0, i) = static_cast<float>(sd);
+    if (known_.has) data.attributes[2].values(0, i) = static_cast<float>(known);
   }
   data.points += moved;
   return data;
@@ -162,9 +169,11 @@ Result<std::shared_ptr<Picture>> FieldStream::picture(const UpdateMessage& messa
   picture->rest = rest_;
   picture->u.resize(3 * grid().num_voxels());
   sampler_.sample(u_, picture->u.data());
-  if (has_sd_) {
-    picture->sd.resize(grid().num_voxels());
-    sampler_.sample_scalar(sd_, picture->sd.data());
+  for (const auto& [scalar, voxels] :
+       {std::pair{&sd_, &picture->sd}, std::pair{&known_, &picture->known}}) {
+    if (!scalar->has) continue;
+    voxels->resize(grid().num_voxels());
+    sampler_.sample_scalar(scalar->values, voxels->data());
   }
   if (rest_->tumour) picture->tumour = deformed(*rest_->tumour, tumour_);
   if (rest_->cortex) picture->cortex = deformed(*rest_->cortex, cortex_);
@@ -178,7 +187,8 @@ Result<std::shared_ptr<Picture>> FieldStream::picture(const UpdateMessage& messa
   state.quality = to_string(verdict.quality);
   state.flags = flag_names(message.update);
   state.blank = false;
-  state.has_sd = has_sd_;
+  state.has_sd = sd_.has;
+  state.has_known = known_.has;
   state.grid_error_mm = sampler_.interpolation_error_mm(u_, picture->u.data());
   state.spacing_mm = grid().spacing_mm;
   state.fade_mm = fade_mm_;

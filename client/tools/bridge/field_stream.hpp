@@ -24,7 +24,7 @@ struct StreamOptions {
   Region region = TumourRegion{40.0};
   double margin_mm = 10.0;
   double spacing_mm = 2.0;
-  bool with_sd = true;
+  bool with_sd = true;  // and what is known
   bool with_surfaces = true;
 };
 
@@ -65,8 +65,11 @@ class FieldStream {
   FieldChoice choice_;
   // Of the newest update, at every node; zero where the choice has none.
   Points u_;
-  VecX sd_;
-  bool has_sd_ = false;
+  struct Scalar {
+    VecX values;
+    bool has = false;  // the newest update has it
+  };
+  Scalar sd_, known_;
 };
 
 }  // namespace brainshift::client

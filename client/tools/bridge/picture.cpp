@@ -33,6 +33,7 @@ ordered_json to_object(const ShownState& state) {
                          {"direction", "modeling"},
                          {"blank", state.blank},
                          {"has_sd", state.has_sd},
+                         {"has_known", state.has_known},
                          {"grid_error_mm", state.grid_error_mm},
                          {"spacing_mm", state.spacing_mm},
                          {"fade_mm", state.fade_mm}};
@@ -88,7 +89,7 @@ igtl::Timestamp time_now() {
 
 PicturePtr blank_picture(const std::shared_ptr<const Rest>& rest, ShownState state) {
   state.blank = true;
-  state.has_sd = false;
+  state.has_sd = state.has_known = false;
   state.sequence = 0;
   state.grid_error_mm = 0.0;
   auto picture = std::make_shared<Picture>();

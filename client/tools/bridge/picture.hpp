@@ -36,6 +36,7 @@ struct ShownState {
   double age_ms = std::numeric_limits<double>::quiet_NaN();  // NaN: not known
   bool blank = true;           // the volumes are zero, the surfaces undeformed
   bool has_sd = false;         // the field came with standard deviations
+  bool has_known = false;      // and with how much of it is known
   double grid_error_mm = 0.0;  // of trilinear interpolation at the mesh's nodes
   double spacing_mm = 0.0;     // of the grid; 0: there is none yet
   double fade_mm = 0.0;        // before the rim; the field is exact farther inside only
@@ -48,7 +49,7 @@ struct ShownState {
 std::string flag_names(const Update& update);
 
 // Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null when
-// not known), direction ("modeling"), blank, has_sd, grid_error_mm, spacing_mm, fade_mm. UTF-8;
+// not known), direction ("modeling"), blank, has_sd, has_known, grid_error_mm, spacing_mm, fade_mm. UTF-8;
 // bytes that are none are replaced.
 std::string to_json(const ShownState& state);
 // The same keys; a number as JSON writes it, an unknown age as "unknown".
@@ -59,7 +60,7 @@ igtl::StatusReport to_status(const ShownState& state);
 // What stays the same for as long as the model does.
 struct Rest {
   igtl::ImageGeometry geometry;
-  bool with_sd = true;  // volume and attribute sd_mm
+  bool with_sd = true;  // volumes and attributes sd_mm and known
   // Undeformed, with attributes of zeros; empty when surfaces are not wanted.
   std::optional<igtl::PolyData> tumour;
   std::optional<igtl::PolyData> cortex;
@@ -72,8 +73,9 @@ struct Picture {
   // Null: no model is known yet, and there is nothing but the state.
   std::shared_ptr<const Rest> rest;
   // Empty when blank, which stands for zeros.
-  std::vector<float> u;   // 3 per voxel, mm
-  std::vector<float> sd;  // 1 per voxel, mm
+  std::vector<float> u;      // 3 per voxel, mm
+  std::vector<float> sd;     // 1 per voxel, mm
+  std::vector<float> known;  // 1 per voxel, 0 to 1
   std::optional<igtl::PolyData> tumour;
   std::optional<igtl::PolyData> cortex;
 };

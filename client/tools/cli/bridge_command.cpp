@@ -78,7 +78,8 @@ void add_stream_options(CLI::App& command, BridgeArguments& arguments) {
   add_with_default(command, "--margin", arguments.margin,
                    "how far the volumes reach beyond the region; there the field fades to zero");
   add_with_default(command, "--spacing", arguments.spacing, "between voxels");
-  command.add_flag("--no-sd", arguments.without_sd, "send no standard deviations");
+  command.add_flag("--no-sd", arguments.without_sd,
+                   "send neither standard deviations nor what is known");
   command.add_flag("--no-surfaces", arguments.without_surfaces,
                    "send neither tumour nor cortex; receive the region alone from the daemon");
   command.add_flag("--json", arguments.options.json, "a line is a JSON object");
@@ -141,9 +142,9 @@ void add_bridge(CLI::App& app, Status& status) {
   add_inbound_options(*command, *arguments);
   command->footer(
       R"(It starts no session. Clients get, on the undeformed brain in RAS and mm: brainshift_u (the
-displacement, undeformed to deformed), brainshift_sd, brainshift_tumour, brainshift_cortex,
-brainshift_state (JSON) and brainshift (STATUS). When the field is not current, the volumes
-are blank and the reason is given. Examples:
+displacement, undeformed to deformed), brainshift_sd, brainshift_known (0 a guess, 1 known by the
+data), brainshift_tumour, brainshift_cortex, brainshift_state (JSON) and brainshift (STATUS). When
+the field is not current, the volumes are blank and the reason is given. Examples:
   brainshift bridge
       then, in Slicer's OpenIGTLinkIF: a client connector to localhost, port 18945
   brainshift bridge --region brain --margin 20mm --spacing 3mm --no-surfaces

@@ -163,7 +163,8 @@ void add_watch(CLI::App& app, Status& status) {
   add_with_default(*command, "--tolerance", choice.tolerance,
                    "receive a node again only when it differs by more than this from what was "
                    "received; 0mm: always");
-  command->add_flag("--no-sd", choice.without_sd, "receive no standard deviations");
+  command->add_flag("--no-sd", choice.without_sd,
+                    "receive neither standard deviations nor what is known");
   add_with_default(*command, "--count", options.count, "end after so many updates; 0: never")
       ->check(CLI::Range(0, 1000000000));
   command->add_flag("--json", options.json, "a line is a JSON object");

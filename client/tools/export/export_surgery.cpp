@@ -173,7 +173,7 @@ class Writing {
     if (!fields) return tl::unexpected(fields.error());
     manifest_.files.push_back(
         {"series/" + options_.surgery.stem().string() + ".pvd",
-         fmt::format("{} usable fields on the undeformed mesh by time: displacement, sd_mm",
+         fmt::format("{} usable fields on the undeformed mesh by time: displacement, sd_mm, known",
                      *fields),
          "modeling", "RAS", "RAS", "mm", "ParaView (Warp By Vector); each .vtu also 3D Slicer",
          false});
@@ -209,6 +209,15 @@ class Writing {
         return ok;
       }
     }
+    if (wants(ExportFormat::kKnown) && !samples.known.values.empty()) {
+      if (Status ok = scalar(samples.known, "known.nii.gz",
+                             "share of the variance that the data took away: 0 a guess from the "
+                             "prior alone, 1 known; 0 outside of the brain",
+                             "1");
+          !ok) {
+        return ok;
+      }
+    }
     if (!wants(ExportFormat::kJacobian)) return {};
     return scalar(samples.jacobian, "jacobian.nii.gz",
                   "volume of the tissue after over before, det(I + grad u); below 1 compressed, 0 "
@@ -224,17 +233,16 @@ class Writing {
   Status surfaces() {
     if (!wants(ExportFormat::kSurfaces)) return {};
     const Estimate& estimate = inputs_.chosen.message.update.estimate;
+    const Uncertainty of{estimate.sd_mm, estimate.known};
     const auto write = [&](const std::string& name, const DeformedSurface& made) -> Status {
       const std::string file =
-          list({name, "deformed surface; vertices carry displacement_mm and sd_mm", "modeling",
-                "RAS", "RAS", "mm", "3D Slicer, ParaView, VTK"});
+          list({name, "deformed surface; vertices carry displacement_mm, sd_mm and known",
+                "modeling", "RAS", "RAS", "mm", "3D Slicer, ParaView, VTK"});
       return io::write_surface(place_ / file, made.surface, made.vertex_fields);
     };
-    return write("tumour.vtp",
-                 deformed_tumour(inputs_.model, estimate.displacement, estimate.sd_mm))
+    return write("tumour.vtp", deformed_tumour(inputs_.model, estimate.displacement, of))
         .and_then([&] {
-          return write("cortex.vtp",
-                       deformed_cortex(inputs_.model, estimate.displacement, estimate.sd_mm));
+          return write("cortex.vtp", deformed_cortex(inputs_.model, estimate.displacement, of));
         });
   }
 
@@ -304,9 +312,9 @@ Manifest manifest_of(const ExportOptions& options, const Inputs& inputs,
 Result<FieldSamples> samples_of(const ExportOptions& options, const Inputs& inputs,
                                 const Progress& progress) {
   const Update& update = inputs.chosen.message.update;
-  auto samples =
-      sample_field(inputs.model.mesh, update.estimate.displacement, update.estimate.sd_mm,
-                   inputs.grid, *options.direction, options.taper, progress);
+  auto samples = sample_field(inputs.model.mesh, update.estimate.displacement,
+                              {update.estimate.sd_mm, update.estimate.known}, inputs.grid,
+                              *options.direction, options.taper, progress);
   if (!samples) {
     return about(fmt::format("{}: update {}", options.surgery.string(), update.sequence),
                  samples.error());
@@ -316,7 +324,8 @@ Result<FieldSamples> samples_of(const ExportOptions& options, const Inputs& inpu
         fmt::format("--like: {}: no voxel lies in the brain: is it in the patient's RAS frame?",
                     options.like.string()));
   }
-  for (std::string* note : {&samples->field.note, &samples->sd_mm.note, &samples->jacobian.note}) {
+  for (std::string* note : {&samples->field.note, &samples->sd_mm.note, &samples->known.note,
+                            &samples->jacobian.note}) {
     *note = note_of(update);
   }
   return samples;

@@ -76,6 +76,7 @@ std::string_view to_string(ExportFormat format) {
     case ExportFormat::kNrrd: return "nrrd";
     case ExportFormat::kItk: return "itk";
     case ExportFormat::kSd: return "sd";
+    case ExportFormat::kKnown: return "known";
     case ExportFormat::kJacobian: return "jacobian";
     case ExportFormat::kSurfaces: return "surfaces";
     case ExportFormat::kSeries: return "series";

@@ -24,16 +24,17 @@ enum class ExportFormat {
   kNrrd,      // the field for elastix, plastimatch, 3D Slicer
   kItk,       // the field as a transform of ITK
   kSd,
+  kKnown,
   kJacobian,
   kSurfaces,
   kSeries,  // every usable field of the journal, for ParaView
 };
-inline constexpr std::array kAllExportFormats = {ExportFormat::kNiftiLps, ExportFormat::kNiftiRas,
-                                                 ExportFormat::kNrrd,     ExportFormat::kItk,
-                                                 ExportFormat::kSd,       ExportFormat::kJacobian,
-                                                 ExportFormat::kSurfaces, ExportFormat::kSeries};
+inline constexpr std::array kAllExportFormats = {
+    ExportFormat::kNiftiLps, ExportFormat::kNiftiRas, ExportFormat::kNrrd,
+    ExportFormat::kItk,      ExportFormat::kSd,       ExportFormat::kKnown,
+    ExportFormat::kJacobian, ExportFormat::kSurfaces, ExportFormat::kSeries};
 
-// "nifti-1007", "nifti-1006", "nrrd", "itk", "sd", "jacobian", "surfaces", "series"
+// "nifti-1007", "nifti-1006", "nrrd", "itk", "sd", "known", "jacobian", "surfaces", "series"
 std::string_view to_string(ExportFormat format);
 
 using ExportFormats = std::set<ExportFormat>;

@@ -35,12 +35,12 @@ TetMesh deformed(const TetMesh& mesh, const Points& u) {
 
 class Sampling {
  public:
-  Sampling(const TetMesh& mesh, const Points& u, const VecX& sd_mm, const OutsideTaper& taper,
+  Sampling(const TetMesh& mesh, const Points& u, const Uncertainty& of, const OutsideTaper& taper,
            FieldSamples& out)
       : locator_(out.field.direction == FieldDirection::kResampling ? deformed(mesh, u) : mesh),
         ratios_(volume_ratios(mesh, u)),
         u_(u),
-        sd_mm_(sd_mm),
+        of_(of),
         taper_(taper),
         out_(out),
         grid_(out.field.grid),
@@ -81,16 +81,18 @@ class Sampling {
     }
     if (!inside) return false;
     out_.jacobian.values[index] = static_cast<float>(ratios_[at.tet]);
-    if (sd_mm_.size() > 0) {
-      out_.sd_mm.values[index] = static_cast<float>(geometry::value_at(at, sd_mm_));
-    }
+    const auto sample = [&](const VecX& values, io::ScalarVolume& out) {
+      if (values.size() > 0) out.values[index] = static_cast<float>(geometry::value_at(at, values));
+    };
+    sample(of_.sd_mm, out_.sd_mm);
+    sample(of_.known, out_.known);
     return true;
   }
 
   geometry::TetLocator locator_;
   VecX ratios_;
   const Points& u_;
-  const VecX& sd_mm_;
+  const Uncertainty& of_;
   const OutsideTaper& taper_;
   FieldSamples& out_;
   const io::VoxelGrid& grid_;
@@ -142,13 +144,13 @@ VecX volume_ratios(const TetMesh& mesh, const Points& u) {
   return ratios;
 }
 
-Result<FieldSamples> sample_field(const TetMesh& mesh, const Points& u, const VecX& sd_mm,
+Result<FieldSamples> sample_field(const TetMesh& mesh, const Points& u, const Uncertainty& of,
                                   const io::VoxelGrid& grid, FieldDirection direction,
                                   const OutsideTaper& taper, const Progress& progress) {
   if (Status ok = validate(grid); !ok) return tl::unexpected(ok.error());
   if (Status ok = validate(taper); !ok) return tl::unexpected(ok.error());
-  if (!u.allFinite() || !sd_mm.allFinite()) {
-    return fail(ErrorCode::kNotFinite, "the displacement or its standard deviation is not finite");
+  if (!u.allFinite() || !of.sd_mm.allFinite() || !of.known.allFinite()) {
+    return fail(ErrorCode::kNotFinite, "the displacement or its uncertainty is not finite");
   }
   if (direction == FieldDirection::kResampling) {
     if (Status ok = check_invertible(mesh, u); !ok) return tl::unexpected(ok.error());
@@ -156,10 +158,11 @@ Result<FieldSamples> sample_field(const TetMesh& mesh, const Points& u, const Ve
   FieldSamples out;
   out.field = {grid, direction, std::vector<float>(3 * grid.num_voxels(), 0.0F), ""};
   out.jacobian = {grid, std::vector<float>(grid.num_voxels(), 1.0F), ""};
-  out.sd_mm.grid = grid;
-  if (sd_mm.size() > 0) out.sd_mm.values.assign(grid.num_voxels(), 0.0F);
+  out.sd_mm.grid = out.known.grid = grid;
+  if (of.sd_mm.size() > 0) out.sd_mm.values.assign(grid.num_voxels(), 0.0F);
+  if (of.known.size() > 0) out.known.values.assign(grid.num_voxels(), 0.0F);
 
-  const Sampling sampling(mesh, u, sd_mm, taper, out);
+  const Sampling sampling(mesh, u, of, taper, out);
   ThreadTeam team;
   std::atomic<std::size_t> inside{0};
   const long rows = (grid.dims[1] + kBlock - 1) / kBlock;

@@ -35,26 +35,32 @@ Result<io::VoxelGrid> grid_around_brain(const TetMesh& mesh, const Points& u, do
 //
 // With the field come, on the same voxels:
 //   sd_mm      standard deviation, barycentric; 0 outside of the brain
+//   known      how much the data say, 0 to 1, barycentric; 0 outside of the brain
 //   jacobian   det(I + grad u): volume after over volume before, of the element that holds the
 //              voxel. Below 1 compressed, at 0 and below folded. 1 outside of the brain
 
 // One per tetrahedron: det(I + grad u). Precondition: check_mesh(mesh), a column of u per node.
 VecX volume_ratios(const TetMesh& mesh, const Points& u);
 
+// Of an estimate: one value per node each, or none (Estimate::sd_mm and Estimate::known).
+struct Uncertainty {
+  VecX sd_mm = {}, known = {};
+};
+
 struct FieldSamples {
   io::DisplacementField field;
-  io::ScalarVolume sd_mm;  // no values without a standard deviation
+  io::ScalarVolume sd_mm, known;  // no values where the estimate has none
   io::ScalarVolume jacobian;
   std::size_t voxels_inside = 0;  // in the brain: undeformed for modeling, deformed for resampling
   double largest_mm = 0.0;        // of the field's vectors
 };
 
-// u: 3 x n, mm; sd_mm: n, or empty. Every slice of the grid is shared out in fixed parts: the
+// u: 3 x n, mm. Every slice of the grid is shared out in fixed parts: the
 // result depends on no timing. Stages of `progress`: "sampling the field".
 // Errors of validate(grid) and validate(taper). kInvalidArgument: resampling, and u turns a
 // tetrahedron inside out, so that there is no inverse (the sentence says how many). kNotFinite: u.
 // Precondition: check_mesh(mesh), and as many columns as nodes.
-Result<FieldSamples> sample_field(const TetMesh& mesh, const Points& u, const VecX& sd_mm,
+Result<FieldSamples> sample_field(const TetMesh& mesh, const Points& u, const Uncertainty& of,
                                   const io::VoxelGrid& grid, io::FieldDirection direction,
                                   const OutsideTaper& taper = {}, const Progress& progress = {});
 

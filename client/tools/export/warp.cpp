@@ -48,12 +48,13 @@ double interpolated(const VoxelImage& image, const Vec3& index) {
   return value;
 }
 
-DeformedSurface moved(TriangleSurface surface, const Points& u, const VecX& sd_mm) {
+DeformedSurface moved(TriangleSurface surface, const Points& u, const Uncertainty& of) {
   DeformedSurface out;
   out.surface = std::move(surface);
   out.surface.vertices += u;
   out.vertex_fields.push_back({"displacement_mm", u});
-  if (sd_mm.size() > 0) out.vertex_fields.push_back({"sd_mm", sd_mm.transpose()});
+  if (of.sd_mm.size() > 0) out.vertex_fields.push_back({"sd_mm", of.sd_mm.transpose()});
+  if (of.known.size() > 0) out.vertex_fields.push_back({"known", of.known.transpose()});
   return out;
 }
 
@@ -91,23 +92,29 @@ Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::Displacem
   return warped;
 }
 
-DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const Uncertainty& of) {
   const geometry::TetLocator locator(model.mesh);
-  Points at_vertices(3, model.tumour.num_vertices());
-  VecX sd(sd_mm.size() > 0 ? model.tumour.num_vertices() : 0);
-  for (int v = 0; v < model.tumour.num_vertices(); ++v) {
+  const int vertices = model.tumour.num_vertices();
+  Points at_vertices(3, vertices);
+  Uncertainty there{VecX(of.sd_mm.size() > 0 ? vertices : 0),
+                    VecX(of.known.size() > 0 ? vertices : 0)};
+  for (int v = 0; v < vertices; ++v) {
     const auto at = locator.locate(model.tumour.vertices.col(v));
     at_vertices.col(v) = geometry::value_at(at, u);
-    if (sd.size() > 0) sd[v] = geometry::value_at(at, sd_mm);
+    if (there.sd_mm.size() > 0) there.sd_mm[v] = geometry::value_at(at, of.sd_mm);
+    if (there.known.size() > 0) there.known[v] = geometry::value_at(at, of.known);
   }
-  return moved(model.tumour, at_vertices, sd);
+  return moved(model.tumour, at_vertices, there);
 }
 
-DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm) {
+DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const Uncertainty& of) {
   std::vector<NodeIndex> node_of_vertex;
   TriangleSurface surface = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  const auto there = [&](const VecX& values) {
+    return values.size() > 0 ? VecX(values(node_of_vertex)) : VecX();
+  };
   return moved(std::move(surface), u(Eigen::all, node_of_vertex),
-               sd_mm.size() > 0 ? VecX(sd_mm(node_of_vertex)) : VecX());
+               {there(of.sd_mm), there(of.known)});
 }
 
 }  // namespace brainshift::client

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "client/tools/export/sample_field.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 #include "common/io/fields/displacement_field.hpp"
@@ -25,17 +26,18 @@ Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::Displacem
 //
 //   vertices         x + u(x), RAS, mm
 //   displacement_mm  u(x), three components; moves undeformed to deformed
-//   sd_mm            standard deviation of u(x); left out where the update has none
+//   sd_mm            standard deviation of u(x)
+//   known            how much the data say of it, 0 to 1; both are left out where the update has none
 struct DeformedSurface {
   TriangleSurface surface;
   std::vector<io::NodeField> vertex_fields;
 };
 
-// u: 3 x nodes of the mesh; sd_mm: one per node, or empty.
+// u: 3 x nodes of the mesh.
 // The tumour's vertices lie anywhere in the mesh: u is interpolated there (outside of the mesh: at
 // its closest point).
-DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const VecX& sd_mm);
+DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const Uncertainty& of);
 // The whole surface of the brain's mesh, brainstem included.
-DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const VecX& sd_mm);
+DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const Uncertainty& of);
 
 }  // namespace brainshift::client

@@ -60,6 +60,7 @@ Status write_field(const fs::path& out, const BrainModel& model, const Estimate&
   std::vector<io::NodeField> fields;
   fields.push_back({"displacement", estimate.displacement});
   if (estimate.sd_mm.size() > 0) fields.push_back({"sd_mm", estimate.sd_mm.transpose()});
+  if (estimate.known.size() > 0) fields.push_back({"known", estimate.known.transpose()});
   return io::write_vtu(out, model.mesh, fields);
 }
 

@@ -160,10 +160,12 @@ Result<Session> start_session(const Surgery& surgery, const ReplayOptions& optio
   return Session{std::move(*client), std::move(*daemon), std::move(*info), std::move(*model)};
 }
 
-Status write_fields(const fs::path& path, const BrainModel& model, const Points& estimated,
+Status write_fields(const fs::path& path, const BrainModel& model, const Estimate& estimate,
                     const std::optional<io::SurgeryTruth>& truth) {
+  const Points& estimated = estimate.displacement;
   std::vector<io::NodeField> fields;
   fields.push_back({"displacement_estimated", estimated});
+  if (estimate.known.size() > 0) fields.push_back({"known", estimate.known.transpose()});
   if (truth) {
     fields.push_back({"displacement_true", truth->displacement});
     fields.push_back({"error_mm", (estimated - truth->displacement).colwise().norm()});
@@ -210,7 +212,7 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
     return *truth ? cross_error(**truth, displacement) : std::nullopt;
   });
   run.field_file = field_file.filename().string();
-  return write_fields(field_file, model, update.estimate.displacement, *truth);
+  return write_fields(field_file, model, update.estimate, *truth);
 }
 
 fs::path csv_path(const ReplayOptions& options, Boundary boundary) {

@@ -81,6 +81,8 @@ class Comparison {
 
   void exact(const Estimate& a, const Estimate& b) {
     entries("contact forces", a.contact_force_n, b.contact_force_n);
+    entries("known", a.known, b.known);
+    if (!same(a.region_known, b.region_known)) differs("known of the region");
     if (!same(a.initial_misfit_mm, b.initial_misfit_mm)) differs("initial misfit");
     if (!same(a.misfit_mm, b.misfit_mm)) differs("misfit");
     if (!same(a.contact.max_penetration_mm, b.contact.max_penetration_mm)) differs("penetration");

@@ -29,6 +29,7 @@ const Stroke kSliceEstimated{palette::kOrange, 3, 0.0};
 struct Estimated {
   std::string boundary;
   const Points* displacement = nullptr;
+  Points known = {};  // 3 x n, what is known in the first row; no columns: not told
 };
 
 // One group's fields on one mesh.
@@ -208,30 +209,42 @@ cv::Mat difference_sheet(const Scene& scene) {
   return compose(sheet);
 }
 
-// Precondition: truth.
-cv::Mat error_sheet(const Scene& scene) {
+// The length of a field on a slice, for each estimate: those that give one. `sheet` has its title
+// and the colour scale's label; a scale without an end gets one.
+cv::Mat map_sheet(const Scene& scene, const std::function<Points(const Estimated&)>& field_of,
+                  Sheet sheet) {
   const SliceWindow window =
       whole_head(scene.mesh.nodes, scene.head.craniotomy_centre, Plane::kAxial);
   const SliceSamples samples = sample_slice(scene.locator, window, kMapSpacing_mm);
-  double largest = 0.0;
-  for (const Estimated& e : scene.estimates) {
-    largest = std::max(largest, largest_on(samples, *e.displacement - *scene.truth));
+  if (sheet.colour_max == 0.0) {
+    double largest = 0.0;
+    for (const Estimated& e : scene.estimates) {
+      largest = std::max(largest, largest_on(samples, field_of(e)));
+    }
+    sheet.colour_max = round_up(largest);
   }
-  Sheet sheet;
-  sheet.title = "Error of the estimate: " + scene.scenario;
+  sheet.title += ": " + scene.scenario;
   sheet.subtitle =
       slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
-  sheet.colour_max = round_up(largest);
-  sheet.colour_label = "|estimated - true| (mm)";
   sheet.legend = {{"tumour before", kSliceBefore}};
   for (const Estimated& e : scene.estimates) {
+    const Points field = field_of(e);
+    if (field.cols() == 0) continue;
     SlicePanel panel = background(scene, window, 0.9);
-    panel.draw_magnitude_map(samples, *e.displacement - *scene.truth, sheet.colour_max, 0.7);
+    panel.draw_magnitude_map(samples, field, sheet.colour_max, 0.7);
     panel.draw_section(scene.head.tumour, kSliceBefore);
     panel.draw_orientation(20.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
   }
   return compose(sheet);
+}
+
+Sheet map_of(const char* title, const char* colour_label, double colour_max = 0.0) {
+  Sheet sheet;
+  sheet.title = title;
+  sheet.colour_label = colour_label;
+  sheet.colour_max = colour_max;
+  return sheet;
 }
 
 constexpr double kHalf_mm = 50.0;
@@ -306,7 +319,12 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
   for (const ReportedRun* run : shown) {
     if (run->field->estimated.cols() != first.mesh.num_nodes())
       continue;  // not the same mesh after all
-    scene.estimates.push_back({run->report.boundary, &run->field->estimated});
+    Estimated& added = scene.estimates.emplace_back();
+    added.boundary = run->report.boundary;
+    added.displacement = &run->field->estimated;
+    const VecX& known = run->field->known;
+    added.known = Points::Zero(3, known.size());
+    added.known.row(0) = known;
   }
 
   const std::string what =
@@ -328,14 +346,27 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
                            what + ".",
                        close_up_sheet(scene, plane)});
   }
+  const bool tells = std::any_of(scene.estimates.begin(), scene.estimates.end(),
+                                 [](const Estimated& e) { return e.known.cols() > 0; });
+  if (tells) {
+    figures.push_back(
+        {"known-" + group.name + ".png",
+         "Where the field is known: 1, the data say it; 0, it is a guess of the prior; " + what +
+             ".",
+         map_sheet(
+             scene, [](const Estimated& e) { return e.known; },
+             map_of("What the data know", "share of the variance taken away", 1.0))});
+  }
   if (scene.truth == nullptr) return figures;
   figures.push_back({"difference-" + group.name + ".png",
                      "True displacement, and estimated minus true, magnified as its title says; " +
                          what + " (compare Fig. 4c and d).",
                      difference_sheet(scene)});
-  figures.push_back({"error-" + group.name + ".png",
-                     "Length of estimated minus true displacement; " + what + ".",
-                     error_sheet(scene)});
+  figures.push_back(
+      {"error-" + group.name + ".png", "Length of estimated minus true displacement; " + what + ".",
+       map_sheet(
+           scene, [&](const Estimated& e) -> Points { return *e.displacement - *scene.truth; },
+           map_of("Error of the estimate", "|estimated - true| (mm)"))});
   return figures;
 }
 

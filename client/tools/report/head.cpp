@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <tuple>
 
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
@@ -50,23 +51,29 @@ Result<RunField> load_field(const std::filesystem::path& path) {
     }
     return nullptr;
   };
-  const auto fits = [&](const Eigen::MatrixXd& values) {
-    return values.rows() == 3 && values.cols() == file->mesh.num_nodes() && values.allFinite();
+  const auto fits = [&](const Eigen::MatrixXd& values, int rows) {
+    return values.rows() == rows && values.cols() == file->mesh.num_nodes() && values.allFinite();
   };
   const Eigen::MatrixXd* estimated = find("displacement_estimated");
   const Eigen::MatrixXd* truth = find("displacement_true");
-  for (const auto& [values, name] :
-       {std::pair{estimated, "displacement_estimated"}, std::pair{truth, "displacement_true"}}) {
+  const Eigen::MatrixXd* known = find("known");
+  const std::tuple<const Eigen::MatrixXd*, const char*, int> arrays[] = {
+      {estimated, "displacement_estimated", 3},
+      {truth, "displacement_true", 3},
+      {known, "known", 1}};
+  for (const auto& [values, name, rows] : arrays) {
     const bool required = values == estimated;
-    if ((values == nullptr && required) || (values != nullptr && !fits(*values))) {
-      return fail(ErrorCode::kUnreadable, path.string() + ": point array " + name +
-                                              " must hold 3 finite numbers for each of the " +
+    if ((values == nullptr && required) || (values != nullptr && !fits(*values, rows))) {
+      return fail(ErrorCode::kUnreadable, path.string() + ": point array " + name + " must hold " +
+                                              std::to_string(rows) +
+                                              " finite number(s) for each of the " +
                                               std::to_string(file->mesh.num_nodes()) + " nodes");
     }
   }
   RunField field;
   field.estimated = *estimated;
   if (truth != nullptr) field.truth = Points(*truth);
+  if (known != nullptr) field.known = known->transpose();
   field.mesh = std::move(file->mesh);
   return field;
 }

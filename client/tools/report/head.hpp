@@ -32,8 +32,9 @@ struct RunField {
   TetMesh mesh;
   Points estimated;  // 3 x n displacement, undeformed to deformed, mm
   std::optional<Points> truth;
+  VecX known = {};  // n, 0 to 1 (Estimate::known), or empty
 };
-// kNotFound; kUnreadable when the array displacement_estimated is missing or misshapen.
+// kNotFound; kUnreadable when the array displacement_estimated is missing or an array misshapen.
 Result<RunField> load_field(const std::filesystem::path& path);
 
 // A run with its field, if it has one.

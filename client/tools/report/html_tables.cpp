@@ -299,6 +299,8 @@ std::string quality_table(const std::vector<ReportedRun>& runs) {
               return "<span class=\"words\">" + plain(q.reason) + "</span>";
             }));
   table.row("updates: good / with caution / unusable", of_quality(counts));
+  table.row("known about the region of surgery (share)",
+            [](const RunReport& run) { return number(run.region_known, 2); });
   add_flag_rows(runs, table);
   for (const std::string& part : parts_of(runs)) {
     table.row("strength of the prior: " + escape_html(part),

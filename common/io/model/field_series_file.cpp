@@ -71,9 +71,11 @@ Status FieldSeriesFile::add(const Update& update, double time_s) {
     const std::string group = fmt::format("updates/{:06}", update.sequence);
     out.group(group);
     out.write(group + "/displacement_mm", Eigen::Matrix3Xf(estimate.displacement.cast<float>()));
-    if (estimate.sd_mm.size() > 0) {
-      out.write(group + "/sd_mm", Eigen::VectorXf(estimate.sd_mm.cast<float>()));
-    }
+    const auto write_scalars = [&](const char* name, const VecX& values) {
+      if (values.size() > 0) out.write(group + name, Eigen::VectorXf(values.cast<float>()));
+    };
+    write_scalars("/sd_mm", estimate.sd_mm);
+    write_scalars("/known", estimate.known);
     out.number(group, "time_s", time_s);
     out.number(group, "sequence", update.sequence);
     out.number(group, "observation_sequence", update.observation_sequence);

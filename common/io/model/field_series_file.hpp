@@ -5,7 +5,7 @@
 //   /mesh/nodes_mm                n x 3 doubles, undeformed places
 //   /mesh/tets                    m x 4 integers, node indices from 0
 //   /updates/000012/displacement_mm   n x 3 floats, from undeformed to deformed place
-//   /updates/000012/sd_mm         n floats, where the update has them
+//   /updates/000012/{sd_mm,known}     n floats each, where the update has them; known has no unit
 //   /updates/000012               attributes: time_s, sequence, observation_sequence, status,
 //                                 quality
 //

@@ -139,7 +139,7 @@ std::vector<InputFile> read_inputs(const Hdf5Reader& in) {
 
 constexpr std::size_t kHeaderSize = 512;  // the smallest user block that HDF5 knows
 constexpr std::string_view kMagic = "brainshift model file\n";
-constexpr std::string_view kFormat = "format 6\n";
+constexpr std::string_view kFormat = "format 7\n";
 
 // The file's first block; see model_file.hpp.
 std::string header_text(const FileChecksum& body) {
@@ -171,7 +171,7 @@ Status check_header(const fs::path& path) {
   }
   if (std::string_view(header).substr(kMagic.size(), kFormat.size()) != kFormat) {
     return refuse("is a model file of " + quoted_line(header, kMagic.size()) +
-                  ": must be 'format 6', run brainshiftd prepare again");
+                  ": must be 'format 7', run brainshiftd prepare again");
   }
   FileChecksum written;
   unsigned long long bytes = 0;

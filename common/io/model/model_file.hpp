@@ -3,7 +3,7 @@
 // to a temporary name, synced, renamed: a reader finds the old file or the new one.
 //
 // The file begins with a block of 512 bytes, filled up with zeros, that HDF5 tools skip:
-//   brainshift model file\nformat 6\nbytes N\ncrc32 XXXXXXXX\n
+//   brainshift model file\nformat 7\nbytes N\ncrc32 XXXXXXXX\n
 // N is the size of the whole file, XXXXXXXX the CRC-32 of everything behind the block. It is
 // checked first, because the HDF5 library itself is not safe against damaged files.
 //
@@ -42,7 +42,7 @@
 //     region                  e           int32    sorted
 //     region_responses        r + s x 3e  float32         rows of [U G] at the region, by columns
 //     control                 c           int32    sorted
-//     truncated_variance_mm2  3 x c       float64           one residual field per row
+//     truncated_variance_mm2  4 x c       float64           one residual field per row
 //     control_neighbours      n x 4       int32    into control; 0 x 4 without control nodes
 //     control_weights         n x 4       float32
 // model_id is the hash of the model (common/values/model_id.hpp).

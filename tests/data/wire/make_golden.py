@@ -13,7 +13,7 @@ import pathlib
 import struct
 import zlib
 
-# message: field name -> (number, kind). "*kind" is repeated (numbers packed); "?kind" is sent even if zero.
+# message: field name -> (number, kind). "*kind" is repeated (numbers packed); "?kind" is sent even if zero; "hex" are bytes.
 SCHEMA = {
     "PointSet": {"xyz_mm": (1, "*double")},
     "Displacements": {"xyz_mm": (1, "*float")},
@@ -87,7 +87,8 @@ SCHEMA = {
         "quality_flags": (23, "*int"), "quality_reason": (24, "text"),
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
-        "boot_id": (31, "fixed"), "part": (32, "FieldPart"), "answer_time": (33, "AnswerTime")},
+        "boot_id": (31, "fixed"), "part": (32, "FieldPart"), "answer_time": (33, "AnswerTime"),
+        "known": (34, "hex"), "region_known": (35, "?double")},
     "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int")},
     "LatencyFigures": {
         "count": (1, "int"), "p50_ms": (2, "double"), "p95_ms": (3, "double"), "p99_ms": (4, "double"),
@@ -222,7 +223,7 @@ MESSAGES = {
         "left_out": [], "quality": 3, "quality_flags": [1, 17],
         "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
         "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7,
-        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1}}),
+        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1}, "known": "ff80", "region_known": 0.0}),
     "update_changes": (12, 0, "Update", UPDATE | {
         "status": "converged", "reason": "contact holds", "quality": 1, "quality_flags": [],
         "quality_reason": "", "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]},
@@ -316,6 +317,8 @@ def encode_field(number, kind, value):
         return block(number, packed) if packed else b""
     present = kind.startswith("?")
     kind = kind.lstrip("?")
+    if kind == "hex":
+        return block(number, bytes.fromhex(value))
     if kind == "text":
         return block(number, value.encode()) if value else b""
     if kind in WIRE_TYPE:

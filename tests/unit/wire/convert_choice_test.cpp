@@ -86,6 +86,7 @@ TEST(FieldPartOnTheWire, ChangesMayHoldNoNode) {
   sent.update.part->nodes.clear();
   sent.update.estimate.displacement.resize(3, 0);
   sent.update.estimate.sd_mm.resize(0);
+  sent.update.estimate.known.resize(0);
   const auto received = value_or_fail(decode_update(encode(sent)));
   EXPECT_EQ(received.update.part, sent.update.part);
 }

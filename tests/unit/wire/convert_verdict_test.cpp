@@ -28,7 +28,7 @@ TEST(VerdictRefusal, VerdictsThatAreUnknownOrContradictTheirFlags) {
   expect("update.quality: 0, must be that of its flags: 3", [](auto& m) { m.clear_quality(); });
   expect("update.quality: 3, must be that of its flags: 1",
          [](auto& m) { m.clear_quality_flags(); });
-  for (const int unknown : {0, 8, 16, 21, 33, -1}) {
+  for (const int unknown : {0, 9, 16, 21, 33, -1}) {
     expect("is unknown", [=](auto& m) { m.set_quality_flags(0, pb::QualityFlag(unknown)); });
     expect("update.quality_flags",
            [=](auto& m) { m.set_quality_flags(0, pb::QualityFlag(unknown)); });
@@ -69,7 +69,6 @@ TEST(VerdictRefusal, StrengthsOfUnknownMissingOrRepeatedParts) {
          [](auto& m) { m.mutable_prior_strengths(0)->set_part(m.prior_strengths(1).part()); });
   expect("occurs more than once",
          [](auto& m) { m.add_prior_strengths()->set_part(m.prior_strengths(1).part()); });
-  expect("update.prior_strengths: ", [](auto& m) { m.mutable_prior_strengths()->RemoveLast(); });
   expect("update.hypotheses: are present without", [](auto& m) { m.clear_prior_strengths(); });
   expect("update.prior_strengths.mean: -1, must not be negative",
          [](auto& m) { m.mutable_prior_strengths(0)->set_mean(-1.0); });
@@ -88,6 +87,8 @@ TEST(VerdictRefusal, StrengthsOfUnknownMissingOrRepeatedParts) {
   });
   expect("update.contact.decrement: -1", [](auto& m) { m.mutable_contact()->set_decrement(-1.0); });
   expect("update.misfit_ratio: -1", [](auto& m) { m.set_misfit_ratio(-1.0); });
+  expect("update.region_known: -1", [](auto& m) { m.set_region_known(-1.0); });
+  expect("update.region_known: 1.5, must be at most 1", [](auto& m) { m.set_region_known(1.5); });
   expect("update.inverted_elements", [](auto& m) { m.set_inverted_elements(1u << 31); });
   expect("update.data_outside_region", [](auto& m) { m.set_data_outside_region(1u << 31); });
 }
@@ -106,6 +107,23 @@ TEST(Verdict, PartsMayComeInAnyOrder) {
   EXPECT_EQ(estimate.hypotheses[1].scales, expected.hypotheses[1].scales);
 }
 
+// Recordings outlive priors.
+TEST(Verdict, APartThatAnOlderPriorDoesNotListIsAbsent) {
+  const auto decoded = decode_changed_verdict([](auto& m) {
+    m.mutable_prior_strengths()->RemoveLast();
+    for (auto& hypothesis : *m.mutable_hypotheses()) hypothesis.mutable_scales()->RemoveLast();
+  });
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  const Estimate& estimate = decoded->update.estimate;
+  const Estimate sent = sample_judged_update().update.estimate;
+  EXPECT_EQ(estimate.prior_scales.back(), 0.0);
+  EXPECT_EQ(estimate.prior_absent.back(), 1.0);
+  EXPECT_FALSE(estimate.prior_at_bound.back());
+  EXPECT_EQ(estimate.hypotheses[1].scales.back(), 0.0);
+  EXPECT_EQ(estimate.prior_scales[1], sent.prior_scales[1]);
+  EXPECT_EQ(estimate.hypotheses[1].scales[1], sent.hypotheses[1].scales[1]);
+}
+
 class NotFiniteVerdict : public ::testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Values, NotFiniteVerdict, ::testing::ValuesIn(kNotFinite), name_of_number);
 
@@ -118,6 +136,7 @@ TEST_P(NotFiniteVerdict, IsRefusedNamingTheField) {
   expect("update.contact.max_violation_mm",
          [=](auto& m) { m.mutable_contact()->set_max_violation_mm(bad); });
   expect("update.misfit_ratio", [=](auto& m) { m.set_misfit_ratio(bad); });
+  expect("update.region_known", [=](auto& m) { m.set_region_known(bad); });
   expect("update.min_volume_ratio", [=](auto& m) { m.set_min_volume_ratio(bad); });
   expect("update.prior_strengths.mean",
          [=](auto& m) { m.mutable_prior_strengths(0)->set_mean(bad); });

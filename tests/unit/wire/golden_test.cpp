@@ -112,6 +112,15 @@ Estimate estimate_from(const json& value) {
   estimate.reason = value["reason"];
   estimate.displacement = points_from(value["displacement"]["xyz_mm"]);
   estimate.sd_mm = vector_from(value["sd_mm"]);
+  if (value.contains("known")) {
+    const std::string hex = value["known"];
+    estimate.known.resize(static_cast<Eigen::Index>(hex.size() / 2));
+    for (Eigen::Index i = 0; i < estimate.known.size(); ++i) {
+      estimate.known[i] =
+          std::stoi(hex.substr(static_cast<std::size_t>(2 * i), 2), nullptr, 16) / 255.0;
+    }
+    estimate.region_known = value["region_known"];
+  }
   const json& contact = value["contact"];
   estimate.contact = {contact["active"], contact["penetrating"], contact["max_penetration_mm"],
                       contact["iterations"]};

@@ -46,18 +46,23 @@ TEST(PublishedUpdate, APartHoldsItsColumnsAndEverythingElseOfTheUpdate) {
   expected.update.part = FieldPart{4, {0, 3}, 0};
   part.displacement = whole.displacement(Eigen::all, std::vector<int>{0, 3});
   part.sd_mm = whole.sd_mm(std::vector<int>{0, 3});
+  part.known = whole.known(std::vector<int>{0, 3});
   const auto received = value_or_fail(decode_update(update.cut(expected.update.part, true)));
   expect_same(received, expected);
 
   part.sd_mm.resize(0);
+  part.known.resize(0);
   const auto without = value_or_fail(decode_update(update.cut(expected.update.part, false)));
   expect_same(without, expected);
 }
 
-TEST(PublishedUpdate, TheWholeFieldWithoutDeviationsNamesNoNodes) {
+TEST(PublishedUpdate, TheWholeFieldWithoutUncertaintyNamesNoNodes) {
   UpdateMessage expected = usable_update();
   const PublishedUpdate update = opened(expected);
+  const auto whole = value_or_fail(decode_update(update.cut(std::nullopt, true)));
+  expect_same(whole, expected);
   expected.update.estimate.sd_mm.resize(0);
+  expected.update.estimate.known.resize(0);
   const auto received = value_or_fail(decode_update(update.cut(std::nullopt, false)));
   expect_same(received, expected);
 }
@@ -69,7 +74,10 @@ TEST(PublishedUpdate, IsNotOpenedWhenItIsAPartOrMalformed) {
                  "payload");
   expect_refused(
       PublishedUpdate::open(changed<v1::Update>(payload, [](auto& m) { m.add_sd_mm(1.0f); })),
-      ErrorCode::kProtocol, "12 displacement components, 5 standard deviations");
+      ErrorCode::kProtocol, "12 displacement components, 5 standard deviations, 4 bytes");
+  expect_refused(
+      PublishedUpdate::open(changed<v1::Update>(payload, [](auto& m) { m.set_known("abc"); })),
+      ErrorCode::kProtocol, "4 standard deviations, 3 bytes of what is known");
   expect_refused(PublishedUpdate::open(changed<v1::Update>(
                      payload, [](auto& m) { m.mutable_displacement()->add_xyz_mm(1.0f); })),
                  ErrorCode::kProtocol, "13 displacement components");

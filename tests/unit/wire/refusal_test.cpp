@@ -157,6 +157,8 @@ TEST(Refusal, WrongCountsInAModelOrUpdate) {
                  ErrorCode::kProtocol, "displacement.xyz_mm: 13 numbers");
   expect_refused(decode_changed_update([](auto& m) { m.add_sd_mm(0); }), ErrorCode::kProtocol,
                  "sd_mm: 5 values, must be 0 or one per node (4)");
+  expect_refused(decode_changed_update([](auto& m) { m.set_known("\xff\x80\x01"); }),
+                 ErrorCode::kProtocol, "update.known: 3 values, must be 0 or one per node (4)");
   expect_refused(decode_changed_update([](auto& m) { m.mutable_contact()->add_force_n(0); }),
                  ErrorCode::kProtocol, "3 forces for 2 active slaves");
   expect_refused(decode_changed_update(

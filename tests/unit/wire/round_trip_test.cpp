@@ -68,6 +68,18 @@ TEST(RoundTrip, VerdictStrengthsAndCertificateAreReproduced) {
   expect_round_trip(sample_judged_update(), decode_update);
 }
 
+TEST(RoundTrip, WhatIsKnownIsReproducedToHalfAByteAndNothingElseIsKnown) {
+  UpdateMessage message = sample_update();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  message.update.estimate.known = Eigen::Vector4d(0.123, 1.0 + 1e-12, -1e-12, nan);
+  const auto known = value_or_fail(decode_update(encode(message))).update.estimate.known;
+  ASSERT_EQ(known.size(), 4);
+  EXPECT_NEAR(known[0], 0.123, 0.5 / 255.0);
+  EXPECT_EQ(known[1], 1.0);
+  EXPECT_EQ(known[2], 0.0);
+  EXPECT_EQ(known[3], 0.0);
+}
+
 TEST(RoundTrip, EveryVerdictIsReproduced) {
   UpdateMessage message = sample_update();
   message.update.estimate.quality.quality = Quality::kGood;
@@ -106,6 +118,7 @@ TEST(RoundTrip, AnEstimateThatIsNotFiniteTravelsWithoutItsNumbers) {
   EXPECT_EQ(received.quality.reason, estimate.quality.reason);
   EXPECT_EQ(received.displacement.cols(), 0);
   EXPECT_EQ(received.sd_mm.size(), 0);
+  EXPECT_EQ(received.known.size(), 0);
   EXPECT_EQ(decoded.update.left_out.size(), message.update.left_out.size());
 }
 
@@ -205,12 +218,14 @@ TEST(RoundTrip, AFieldOfAHeadMeshIsReproducedAsFloats) {
   message.update.estimate.displacement =
       Points::NullaryExpr(3, 18475, [&] { return normal(random); });
   message.update.estimate.sd_mm = VecX::NullaryExpr(18475, [&] { return normal(random); });
+  message.update.estimate.known = VecX::Constant(18475, 0.5);
   const std::string payload = encode(message);
   const auto decoded = value_or_fail(decode_update(payload));
   expect_same_matrix(decoded.update.estimate.displacement.cast<float>(),
                      message.update.estimate.displacement.cast<float>());
-  // Four bytes per number and next to nothing else.
-  EXPECT_LT(payload.size(), 4u * 4u * 18475u + 2000u);
+  // Four bytes per number, one for what is known, and next to nothing else.
+  EXPECT_LT(payload.size(), (4u * 4u + 1u) * 18475u + 2000u);
+  EXPECT_NEAR((decoded.update.estimate.known.array() - 0.5).abs().maxCoeff(), 0.5 / 255.0, 1e-9);
 }
 
 TEST(Text, BytesThatAreNotUtf8AreReplacedSoThatThePeerCanRead) {

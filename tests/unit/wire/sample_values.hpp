@@ -142,6 +142,8 @@ inline UpdateMessage sample_judged_update() {
   estimate.quality.flags.set(QualityFlag::kInvertedElements);
   estimate.quality.quality = Quality::kUnusable;
   estimate.quality.reason = "éléments retournés (3)";
+  estimate.known = Eigen::Vector4d(0, 1, 128, 255) / 255.0;  // as bytes hold it
+  estimate.region_known = 1.0 / 3.0;
   estimate.contact.decrement = 1.0 / 3.0;
   estimate.contact.max_violation_mm = -0.1;  // every slave is open
   estimate.misfit_ratio = 1.7;

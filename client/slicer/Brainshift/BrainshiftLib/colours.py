@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colours of the standard deviation: dark blue is sure, yellow is not. Lightness grows with the value, so the order
+"""Colours of the uncertainty: dark blue is sure, yellow is not. Lightness grows with the value, so the order
 shows in grey as well, and no pair is one of red and green."""
 from __future__ import annotations
 
@@ -17,3 +17,8 @@ def sd_colours(count: int = 256) -> npt.NDArray[np.float64]:
         raise ValueError(f"count: {count} is less than 2")
     at = np.linspace(0.0, 1.0, count)
     return np.stack([np.interp(at, _VALUES, [colour[part] for colour in _COLOURS]) for part in range(3)], axis=1)
+
+
+def known_colours(count: int = 256) -> npt.NDArray[np.float64]:
+    """The same for what is known, from 0 (a guess: yellow) to 1."""
+    return sd_colours(count)[::-1]

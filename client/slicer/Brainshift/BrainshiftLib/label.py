@@ -15,6 +15,7 @@ from typing import Any, Callable, Mapping, Optional
 
 KEYS = ("sequence", "session_id", "model_id", "case_id", "quality", "flags", "currency", "reason", "age_ms", "direction",
         "blank", "has_sd", "grid_error_mm", "spacing_mm", "fade_mm")
+OPTIONAL_KEYS = ("has_known",)  # of newer bridges
 ATTRIBUTE_PREFIX = "OpenIGTLink."  # how SlicerOpenIGTLink names the attribute of a metadata entry
 LONGEST_STATE = 65536  # characters; the bridge needs less than a thousand
 QUALITIES = ("good", "caution", "unusable", "none")
@@ -46,6 +47,7 @@ class Label:
     direction: str
     blank: bool   # the volumes are zero and the surfaces undeformed, since there is nothing to be shown
     has_sd: bool  # False: the standard deviations are zero because nobody sent any
+    has_known: bool  # False: the same of how much the data say
     grid_error_mm: Optional[float]  # largest difference between grid and mesh at a node
     spacing_mm: Optional[float]
     fade_mm: Optional[float]  # before the grid's rim; the field is that of the mesh farther inside only
@@ -67,7 +69,7 @@ def parse_state(text: str) -> Label:
 def parse_metadata(get: Callable[[str], Optional[str]]) -> Optional[Label]:
     """The attributes of a node (`get` is its GetAttribute). None where there are none at all, as after a message
     of OpenIGTLink version 1. Raises LabelError when some are missing or make no sense."""
-    found = {key: get(ATTRIBUTE_PREFIX + key) for key in KEYS}
+    found = {key: get(ATTRIBUTE_PREFIX + key) for key in KEYS + OPTIONAL_KEYS}
     present = {key: value for key, value in found.items() if value is not None}
     return _label(present) if present else None
 
@@ -89,6 +91,7 @@ def _label(values: Mapping[str, Any]) -> Label:
         direction=_text("direction", values["direction"]),
         blank=_truth("blank", values["blank"]),
         has_sd=_truth("has_sd", values["has_sd"]),
+        has_known=_truth("has_known", values.get("has_known", False)),
         grid_error_mm=_length("grid_error_mm", values["grid_error_mm"]),
         spacing_mm=_length("spacing_mm", values["spacing_mm"]),
         fade_mm=_length("fade_mm", values["fade_mm"]))

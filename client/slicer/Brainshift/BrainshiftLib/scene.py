@@ -1,20 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of the scene that show a field: its transform, what follows it, the standard deviation, the deformed surfaces.
+"""The nodes of the scene that show a field: its transform, what follows it, its uncertainty, the deformed surfaces.
 
 Needs Slicer, unlike label, grid and colours beside it.
 """
 from __future__ import annotations
 
+from typing import Callable, NamedTuple
+
 import slicer
 
-from .colours import FULL_SCALE_MM, sd_colours
+from .colours import FULL_SCALE_MM, known_colours, sd_colours
 from .grid import grid_transform
 from .label import LabelError, belongs, parse_metadata
 
 # The devices of `brainshift bridge`; SlicerOpenIGTLink gives their nodes the same names.
-FIELD, SD, STATE = "brainshift_u", "brainshift_sd", "brainshift_state"
+FIELD, SD, KNOWN, STATE = "brainshift_u", "brainshift_sd", "brainshift_known", "brainshift_state"
 SURFACES = ("brainshift_tumour", "brainshift_cortex")
-_CLASSES = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", STATE: "vtkMRMLTextNode"}
+_CLASSES = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", KNOWN: "vtkMRMLScalarVolumeNode",
+            STATE: "vtkMRMLTextNode"}
+
+
+class Overlay(NamedTuple):
+    """A volume that may lie over the slices."""
+
+    has: str  # the truth of the label that says whether it holds anything
+    full_scale: float
+    unit: str
+    colours: Callable
+    clear_below: float  # under it nothing is drawn
+
+
+# 0 of the standard deviation is the outside of the brain. 0 of what is known is a guess: it is drawn, outside too.
+OVERLAYS = {SD: Overlay("has_sd", FULL_SCALE_MM, " mm", sd_colours, 1e-3),
+            KNOWN: Overlay("has_known", 1.0, "", known_colours, 0.0)}
 TRANSFORM = "brainshift_transform"
 # A singleton's ID is its class and this tag. Slicer writes a node's reference to the transform into a scene file although
 # the transform itself is not saved. With an ID that no other node takes, the reference can never find another transform.
@@ -29,11 +47,11 @@ def bridge_node(name):
 class SceneNodes:
     def __init__(self):
         self.largest_mm = None  # of the field that is shown
-        self.sd_wanted = False
+        self.overlay_wanted = None  # one of OVERLAYS
         self._built = None      # the VectorField that the transform was made of; None: there is no transform
         self._followers = []    # ids of the nodes that the user chose
-        self._transform_id = self._colours_id = None
-        self._sd_on = False
+        self._transform_id = self._overlay_on = None
+        self._colour_ids = {}   # by overlay
         self._behind = {}       # device -> since when its data have been of another update than the field
         self._hidden = set()    # ids of the surfaces that were visible and were hidden here
 
@@ -41,7 +59,7 @@ class SceneNodes:
         """Volumes and models that the field moves. Returns one line for every node that is refused."""
         refused, chosen = [], []
         for node in nodes:
-            if node.GetName() in (FIELD, SD, *SURFACES):
+            if node.GetName() in (FIELD, *OVERLAYS, *SURFACES):
                 refused.append(f"{node.GetName()} comes from the bridge and is deformed already")
             elif node.GetTransformNodeID() not in (None, "", self._transform_id):
                 refused.append(f"{node.GetName()} lies under another transform: harden that one first")
@@ -64,7 +82,9 @@ class SceneNodes:
             # A node that the user has put under another transform since then is left alone.
             if follower is not None and not follower.GetTransformNodeID():
                 follower.SetAndObserveTransformNodeID(node.GetID())
-        self._show_sd(self.sd_wanted and label.has_sd and self._goes_with(SD, label, now))
+        name = self.overlay_wanted
+        shown = name is not None and getattr(label, OVERLAYS[name].has) and self._goes_with(name, label, now)
+        self._show_overlay(name if shown else None)
         for name in SURFACES:
             self._set_surface_visible(name, self._goes_with(name, label, now))
 
@@ -75,7 +95,7 @@ class SceneNodes:
         if node is not None and self._built is not None:
             node.SetAndObserveTransformToParent(None)
         self._built = self.largest_mm = None
-        self._show_sd(False)
+        self._show_overlay(None)
         for name in SURFACES:
             self._set_surface_visible(name, False)
 
@@ -86,9 +106,9 @@ class SceneNodes:
         node = self._existing_transform_node()
         if node is not None:
             slicer.mrmlScene.RemoveNode(node)
-        wanted = self.sd_wanted
+        wanted = self.overlay_wanted
         self.__init__()
-        self.sd_wanted = wanted  # as the panel's box still says
+        self.overlay_wanted = wanted  # as the panel's boxes still say
 
     def release_surfaces(self):
         """After the end of a connection: surfaces that were hidden here stay hidden and are the user's again."""
@@ -119,33 +139,35 @@ class SceneNodes:
         if node is not None and self._transform_id is not None and node.GetTransformNodeID() == self._transform_id:
             node.SetAndObserveTransformNodeID(None)
 
-    def _show_sd(self, show):
-        if show == self._sd_on:
+    def _show_overlay(self, name):
+        if name == self._overlay_on:
             return
-        self._sd_on = show
-        if not show:
+        self._overlay_on = name
+        if name is None:
             slicer.util.setSliceViewerLayers(foreground=None)
             return
-        volume = bridge_node(SD)
+        overlay, volume = OVERLAYS[name], bridge_node(name)
         display = volume.GetDisplayNode()  # the connector makes it with the volume
-        display.SetAndObserveColorNodeID(self._colour_node().GetID())
+        display.SetAndObserveColorNodeID(self._colour_node(name).GetID())
         display.SetAutoWindowLevel(0)
-        display.SetWindowLevelMinMax(0.0, FULL_SCALE_MM)
-        display.SetLowerThreshold(1e-3)  # 0: outside the brain
-        display.SetApplyThreshold(1)
+        display.SetWindowLevelMinMax(0.0, overlay.full_scale)
+        display.SetLowerThreshold(overlay.clear_below)
+        display.SetApplyThreshold(int(overlay.clear_below > 0.0))
         slicer.util.setSliceViewerLayers(foreground=volume, foregroundOpacity=0.4)
 
-    def _colour_node(self):
-        node = None if self._colours_id is None else slicer.mrmlScene.GetNodeByID(self._colours_id)
+    def _colour_node(self, name):
+        node = slicer.mrmlScene.GetNodeByID(self._colour_ids[name]) if name in self._colour_ids else None
         if node is None:
-            node = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLColorTableNode", "brainshift_sd_colours")
+            overlay = OVERLAYS[name]
+            node = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLColorTableNode", f"{name}_colours")
             node.SetTypeToUser()
             node.SetSaveWithScene(False)
-            colours = sd_colours()
+            colours = overlay.colours()
             node.SetNumberOfColors(len(colours))
             for index, (red, green, blue) in enumerate(colours):
-                node.SetColor(index, f"{index * FULL_SCALE_MM / (len(colours) - 1):.2f} mm", red, green, blue, 1.0)
-            self._colours_id = node.GetID()
+                value = index * overlay.full_scale / (len(colours) - 1)
+                node.SetColor(index, f"{value:.2f}{overlay.unit}", red, green, blue, 1.0)
+            self._colour_ids[name] = node.GetID()
         return node
 
     def _goes_with(self, name, label, now):

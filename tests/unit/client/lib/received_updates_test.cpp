@@ -92,7 +92,8 @@ TEST(UpdateQueue, IteratesAloneNeverExceedTheCapacity) {
 
 const SessionKey kSession{7, 1, "model"};
 
-// Every column of the displacement holds the value, every deviation a tenth of it.
+// Every column of the displacement holds the value, every deviation a tenth of it, and a quarter is
+// known.
 UpdateMessage assembled_update(std::uint64_t sequence, double value, int columns,
                                std::optional<FieldPart> part = std::nullopt) {
   UpdateMessage message;
@@ -103,6 +104,7 @@ UpdateMessage assembled_update(std::uint64_t sequence, double value, int columns
   message.update.estimate.quality.quality = Quality::kGood;
   message.update.estimate.displacement = Points::Constant(3, columns, value);
   message.update.estimate.sd_mm = VecX::Constant(columns, 0.1 * value);
+  message.update.estimate.known = VecX::Constant(columns, 0.25 * value);
   message.update.part = std::move(part);
   return message;
 }
@@ -134,6 +136,7 @@ TEST(FieldAssembly, ChangesComeOutAsTheWholeChoice) {
   EXPECT_EQ(message.update.part, (FieldPart{10, {2, 3, 5, 8}, 0}));
   EXPECT_EQ(message.update.estimate.displacement.row(2), Eigen::RowVector4d(1, 2, 1, 2));
   EXPECT_EQ(message.update.estimate.sd_mm, Eigen::Vector4d(0.1, 0.2, 0.1, 0.2));
+  EXPECT_EQ(message.update.estimate.known, Eigen::Vector4d(0.25, 0.5, 0.25, 0.5));
 
   auto none = changes(7, 0.0, {}, 6);
   ASSERT_EQ(held.complete(none), Outcome::kWhole);
@@ -170,6 +173,7 @@ TEST(FieldAssembly, WhatDoesNotFitIsLostAndChangesNothing) {
          m.update.part->nodes = {3, 9};
        }},
       {"no deviations", [](auto& m) { m.update.estimate.sd_mm.resize(0); }},
+      {"nothing known", [](auto& m) { m.update.estimate.known.resize(0); }},
   };
   for (const auto& [name, damage] : damages) {
     FieldAssembly held = holding_a_part();

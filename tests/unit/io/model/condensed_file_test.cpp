@@ -155,8 +155,9 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
        [](Operators& o) { o.part_columns[0] = 4; }},
       {"along_gravity_modes = -1: must", [](Operators& o) { o.part_columns[0] = -1; }},
       {"fine_modes = 2: must be from 0 to the 1 modes",
-       [](Operators& o) { o.part_columns[6] = 2; }},
-      {"responses has 1 columns of no part", [](Operators& o) { o.part_columns[6] = 0; }},
+       [](Operators& o) { o.part_columns[test_example::kFinePart] = 2; }},
+      {"responses has 1 columns of no part",
+       [](Operators& o) { o.part_columns[test_example::kFinePart] = 0; }},
       {"compliance is 2 x 1: must be 2 x 2",
        [](Operators& o) { o.compliance.conservativeResize(2, 1); }},
       {"compliance is not symmetric", [](Operators& o) { o.compliance(0, 1) += 1e-9; }},
@@ -193,7 +194,7 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
        [](Operators& o) {
          o.control = {1, 1};
        }},
-      {"truncated_variance_mm2 is 3 x 3: must be 2 x 3",
+      {"truncated_variance_mm2 is 3 x 4: must be 2 x 4",
        [](Operators& o) { o.truncated_variance_mm2.setZero(3, kRemainders); }},
       {"control_neighbours is 4 x 4: must be 4 x 5",
        [](Operators& o) { o.control_neighbours.conservativeResize(4, 4); }},

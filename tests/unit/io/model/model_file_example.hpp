@@ -95,13 +95,16 @@ inline CompactColumns silent_responses(int nodes, Eigen::Index columns) {
   return CompactColumns::from_parts(std::move(parts)).value();
 }
 
+inline constexpr auto kFinePart = static_cast<std::size_t>(PriorPart::kFine);
+
 // Fits model_file(): 5 nodes, 3 modes, 2 slaves (the other way round than in the model), 2
 // control nodes.
 inline CondensedOperators operators(Boundary boundary) {
   CondensedOperators result;
   result.boundary = boundary;
   result.model_id = model_file().model.model_id;
-  result.part_columns = {2, 0, 0, 0, 0, 0, 1, 0, 0};
+  result.part_columns[0] = 2;
+  result.part_columns[kFinePart] = 1;
   result.slaves = boundary == Boundary::kContact ? std::vector<int>{3, 2} : std::vector<int>{};
   const auto s = static_cast<Eigen::Index>(result.slaves.size());
   result.responses = responses(3 + s, boundary == Boundary::kContact ? 200 : 100);
@@ -134,7 +137,7 @@ inline std::string with_header(const std::string& bytes) {
   const auto crc =
       crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
   std::ostringstream header;
-  header << "brainshift model file\nformat 6\nbytes " << bytes.size() << "\ncrc32 " << std::hex
+  header << "brainshift model file\nformat 7\nbytes " << bytes.size() << "\ncrc32 " << std::hex
          << std::setw(8) << std::setfill('0') << crc << "\n";
   std::string block = header.str();
   block.resize(512, '\0');

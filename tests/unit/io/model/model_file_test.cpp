@@ -180,10 +180,10 @@ TEST_F(ModelFileTest, HeaderWithoutHdf5IsRefused) {
 
 TEST_F(ModelFileTest, OtherFormatIsNamedWithTheWayOut) {
   std::string bytes = content_of(written());
-  bytes.replace(bytes.find("format 6"), 8, "format 5");
+  bytes.replace(bytes.find("format 7"), 8, "format 6");
   EXPECT_THAT(
       sentence_of(read_bytes(bytes)),
-      HasSubstr("is a model file of 'format 5': must be 'format 6', run brainshiftd prepare "
+      HasSubstr("is a model file of 'format 6': must be 'format 7', run brainshiftd prepare "
                 "again"));
 }
 

@@ -37,6 +37,8 @@ class Surgery {
     UpdateMessage message = in_session(usable(sequence_, kNodes));
     message.update.estimate.displacement = field_;
     message.update.estimate.sd_mm = sd_mm_;
+    message.update.estimate.known = known_;
+    if (random_.uniform() < 0.05) message.update.estimate.known.resize(0);
     if (random_.uniform() < 0.05) message.update.estimate.sd_mm.resize(0);
     if (what < 0.2) {
       message.update.estimate.displacement.array() += 500.0;
@@ -58,6 +60,7 @@ class Surgery {
     sequence_ = 0;
     field_ = Points::Constant(3, kNodes, 100.0 * static_cast<double>(session_));
     sd_mm_ = VecX::Constant(kNodes, 0.5);
+    known_ = VecX::Constant(kNodes, 0.5);
   }
   void move() {
     const bool jump = random_.uniform() < 0.1;
@@ -65,6 +68,7 @@ class Surgery {
       if (!jump && random_.uniform() < 0.5) continue;
       field_.col(node) += (jump ? 5.0 : 0.1) * random_.normal() * random_.direction();
       sd_mm_[node] = std::abs(sd_mm_[node] + 0.02 * random_.normal());
+      known_[node] = std::clamp(known_[node] + 0.01 * random_.normal(), 0.0, 1.0);
     }
   }
   UpdateMessage in_session(UpdateMessage message) const {
@@ -75,7 +79,7 @@ class Surgery {
   Random& random_;
   std::uint64_t session_ = 0, sequence_ = 0;
   Points field_;
-  VecX sd_mm_;
+  VecX sd_mm_, known_;
   std::map<std::pair<std::uint64_t, std::uint64_t>, Estimate> truth_;
 };
 
@@ -164,6 +168,8 @@ class Watched {
     ASSERT_EQ(held.displacement.cols(), static_cast<Eigen::Index>(nodes.size()));
     const bool sd = selection_->choice.with_sd && truth.sd_mm.size() > 0;
     ASSERT_EQ(held.sd_mm.size(), sd ? static_cast<Eigen::Index>(nodes.size()) : 0);
+    const bool known = selection_->choice.with_sd && truth.known.size() > 0;
+    ASSERT_EQ(held.known.size(), known ? static_cast<Eigen::Index>(nodes.size()) : 0);
     // Floats of some hundred mm are rounded to 2e-5 mm.
     const double within = selection_->choice.tolerance_mm + 1e-4;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -171,6 +177,10 @@ class Watched {
       EXPECT_LE((held.displacement.col(column) - truth.displacement.col(nodes[i])).norm(), within);
       if (sd) {
         EXPECT_LE(std::abs(held.sd_mm[column] - truth.sd_mm[nodes[i]]), within);
+      }
+      if (known) {  // bytes are rounded by half a step
+        EXPECT_LE(std::abs(held.known[column] - truth.known[nodes[i]]),
+                  Parcels::kKnownTolerance + 0.5 / 255.0 + 1e-9);
       }
     }
   }

@@ -44,9 +44,11 @@ TEST(Parcels, ARegionTravelsWithTheNamesOfItsNodes) {
   EXPECT_EQ(received.update.part, (FieldPart{6, {1, 4}, 0}));
   EXPECT_EQ(received.update.estimate.displacement(1, 1), 7.5);
   EXPECT_EQ(received.update.estimate.sd_mm.size(), 2);
+  EXPECT_EQ(received.update.estimate.known, VecX::Ones(2));
   const auto bare =
       decoded(made(parcels, frame_of(whole), selection({.with_sd = false}, {1, 4})).bytes);
   EXPECT_EQ(bare.update.estimate.sd_mm.size(), 0);
+  EXPECT_EQ(bare.update.estimate.known.size(), 0);
 }
 
 TEST(Parcels, NodesTravelAgainOnceTheyAreBeyondTheTolerance) {
@@ -85,6 +87,27 @@ TEST(Parcels, ADeviationThatChangesTravelsToo) {
   message.update.estimate.sd_mm.resize(0);
   const auto without = decoded(made(parcels, frame_of(message), chosen, held).bytes);
   EXPECT_EQ(without.update.part, std::nullopt) << "deviations that end travel with everything";
+}
+
+TEST(Parcels, WhatIsKnownTravelsOnceItChangesByMoreThanItsTolerance) {
+  Parcels parcels;
+  const auto chosen = selection({.tolerance_mm = 0.5}, kAll);
+  auto message = usable(1, 6);
+  Held held = made(parcels, frame_of(message), chosen).held;
+  // Node 3 loses 0.03 an update: beyond 0.05 of what is held at every second.
+  std::vector<std::size_t> sent;
+  for (std::uint64_t sequence = 2; sequence <= 5; ++sequence) {
+    message.update.sequence = sequence;
+    message.update.estimate.known[3] -= 0.03;
+    const Parcel parcel = made(parcels, frame_of(message), chosen, held);
+    sent.push_back(decoded(parcel.bytes).update.part->nodes.size());
+    held = parcel.held;
+  }
+  EXPECT_EQ(sent, (std::vector<std::size_t>{0, 1, 0, 1}));
+  message.update.sequence = 6;
+  message.update.estimate.known.resize(0);
+  EXPECT_EQ(decoded(made(parcels, frame_of(message), chosen, held).bytes).update.part, std::nullopt)
+      << "of an older prior: it ends with everything";
 }
 
 TEST(Parcels, MostOfTheChoiceTravelsAsAllOfIt) {

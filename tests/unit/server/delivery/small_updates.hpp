@@ -15,7 +15,8 @@
 
 namespace brainshift::server {
 
-// Of session 1: every node moves by (1, 2, 3) mm, its standard deviation is 0.5 mm.
+// Of session 1: every node moves by (1, 2, 3) mm, its standard deviation is 0.5 mm, all of
+// it is known.
 inline UpdateMessage usable(std::uint64_t sequence, int nodes) {
   UpdateMessage message;
   message.session_id = 1;
@@ -26,6 +27,7 @@ inline UpdateMessage usable(std::uint64_t sequence, int nodes) {
   message.update.estimate.quality.quality = Quality::kGood;
   message.update.estimate.displacement = Vec3(1, 2, 3).replicate(1, nodes);
   message.update.estimate.sd_mm = VecX::Constant(nodes, 0.5);
+  message.update.estimate.known = VecX::Ones(nodes);
   return message;
 }
 

@@ -30,6 +30,7 @@ UpdateMessage streamed_update(const BrainModel& model) {
     estimate.displacement.col(i) = linear_field(model.mesh.nodes.col(i));
   }
   estimate.sd_mm = VecX::Constant(model.mesh.nodes.cols(), 0.5);
+  estimate.known = VecX::Constant(model.mesh.nodes.cols(), 0.8);
   return message;
 }
 
@@ -41,10 +42,12 @@ UpdateMessage part_of(const BrainModel& model, const std::vector<NodeIndex>& nod
   Estimate& estimate = part.update.estimate;
   estimate.displacement.resize(3, static_cast<Eigen::Index>(nodes.size()));
   estimate.sd_mm.resize(static_cast<Eigen::Index>(nodes.size()));
+  estimate.known.resize(static_cast<Eigen::Index>(nodes.size()));
   for (Eigen::Index i = 0; i < estimate.sd_mm.size(); ++i) {
     const NodeIndex node = nodes[static_cast<std::size_t>(i)];
     estimate.displacement.col(i) = whole.update.estimate.displacement.col(node);
     estimate.sd_mm[i] = whole.update.estimate.sd_mm[node];
+    estimate.known[i] = whole.update.estimate.known[node];
   }
   return part;
 }
@@ -62,6 +65,7 @@ TEST(FieldStream, APictureHasFieldSurfacesAndState) {
                 .norm(),
             kFloat);
   EXPECT_NEAR(picture->sd[centre], 0.5, kFloat);
+  EXPECT_NEAR(picture->known[centre], 0.8, kFloat);
   for (Eigen::Index i = 0; i < model.tumour.vertices.cols(); ++i) {
     const Vec3 at = model.tumour.vertices.col(i);
     EXPECT_LT((picture->tumour->points.col(i).cast<double>() - at - linear_field(at)).norm(),
@@ -72,7 +76,9 @@ TEST(FieldStream, APictureHasFieldSurfacesAndState) {
   }
   EXPECT_EQ(picture->tumour->attributes[0].name, "displacement_mm");
   EXPECT_EQ(picture->tumour->attributes[1].name, "sd_mm");
+  EXPECT_EQ(picture->tumour->attributes[2].name, "known");
   EXPECT_TRUE((picture->cortex->attributes[1].values.array() == 0.5F).all());
+  EXPECT_TRUE((picture->cortex->attributes[2].values.array() == 0.8F).all());
   EXPECT_EQ(picture->cortex->points.cols(), geometry::boundary_surface(model.mesh).vertices.cols());
 
   const ShownState& state = picture->state;
@@ -82,7 +88,7 @@ TEST(FieldStream, APictureHasFieldSurfacesAndState) {
   EXPECT_EQ(state.quality, "caution");
   EXPECT_EQ(state.flags, to_string(QualityFlag::kDeadline));
   EXPECT_FALSE(state.blank);
-  EXPECT_TRUE(state.has_sd);
+  EXPECT_TRUE(state.has_sd && state.has_known);
   EXPECT_DOUBLE_EQ(state.spacing_mm, 2.0);
   EXPECT_DOUBLE_EQ(state.fade_mm, 8.0);
   EXPECT_LT(state.grid_error_mm, kFloat) << "a linear field is the same on both";
@@ -132,6 +138,7 @@ TEST(FieldStream, AsksForTheBallThatHoldsWhatItNeedsAndForAllWithSurfaces) {
   const auto whole = without.picture(streamed_update(model)).value();
   EXPECT_EQ((*part)->u, whole->u);
   EXPECT_EQ((*part)->sd, whole->sd);
+  EXPECT_EQ((*part)->known, whole->known);
   EXPECT_EQ((*part)->state.grid_error_mm, whole->state.grid_error_mm);
 }
 
@@ -147,10 +154,16 @@ TEST(FieldStream, RefusesUpdatesThatAreNotOfItsModel) {
   EXPECT_THAT(stream.picture(part_of(model, {0, 1, 2})).error().message, HasSubstr("leaves out"));
 }
 
-TEST(FieldStream, AFieldWithoutStandardDeviationsSaysSo) {
+TEST(FieldStream, AFieldWithoutUncertaintySaysSo) {
   const BrainModel model = test_support::toy_patient(5);
   FieldStream stream = FieldStream::build(model, {}).value();
   auto message = streamed_update(model);
+  message.update.estimate.known.resize(0);  // of an older daemon
+  const auto older = stream.picture(message).value();
+  EXPECT_TRUE(older->state.has_sd);
+  EXPECT_FALSE(older->state.has_known);
+  EXPECT_TRUE(older->known.empty());
+  EXPECT_TRUE(older->cortex->attributes[2].values.isZero(0.0F));
   message.update.estimate.sd_mm.resize(0);
   const auto picture = stream.picture(message).value();
   EXPECT_FALSE(picture->state.has_sd);

@@ -27,6 +27,7 @@ ShownState current() {
   state.age_ms = 81.7;
   state.blank = false;
   state.has_sd = true;
+  state.has_known = true;
   state.grid_error_mm = 0.125;
   state.spacing_mm = 2.0;
   state.fade_mm = 8.0;
@@ -47,6 +48,7 @@ TEST(ShownState, JsonHasEveryKey) {
                           {"direction", "modeling"},
                           {"blank", false},
                           {"has_sd", true},
+                          {"has_known", true},
                           {"grid_error_mm", 0.125},
                           {"spacing_mm", 2.0},
                           {"fade_mm", 8.0}}));
@@ -165,6 +167,7 @@ UpdateMessage update_of(const BrainModel& model) {
   message.update.estimate.quality.quality = Quality::kGood;
   message.update.estimate.displacement = Points::Constant(3, model.mesh.nodes.cols(), 1.5);
   message.update.estimate.sd_mm = VecX::Constant(model.mesh.nodes.cols(), 0.5);
+  message.update.estimate.known = VecX::Constant(model.mesh.nodes.cols(), 0.8);
   return message;
 }
 
@@ -205,8 +208,8 @@ TEST_F(BroadcastOfAToy, HasEveryDeviceAndTheStateFirst) {
   Broadcast whole(field(), Broadcast::Part::kWhole, 7);
   EXPECT_THAT(devices(sent(whole, 1)),
               ElementsAre("STATUS brainshift", "STRING brainshift_state", "IMAGE brainshift_u",
-                          "IMAGE brainshift_sd", "POLYDATA brainshift_tumour",
-                          "POLYDATA brainshift_cortex"));
+                          "IMAGE brainshift_sd", "IMAGE brainshift_known",
+                          "POLYDATA brainshift_tumour", "POLYDATA brainshift_cortex"));
   Broadcast state(field(), Broadcast::Part::kState, 7);
   EXPECT_THAT(devices(sent(state, 1)), ElementsAre("STATUS brainshift", "STRING brainshift_state"));
   EXPECT_EQ(whole.error(), "");
@@ -250,6 +253,9 @@ TEST_F(BroadcastOfAToy, TheVolumeLiesWhereTheGridDoes) {
   EXPECT_LT((T * Vec3(3, 2, 1) - grid.voxel_mm(3, 2, 1)).norm(), 1e-4);
   const auto& voxels = std::get<std::vector<float>>(image.voxels);
   EXPECT_EQ(voxels, whole.picture().u);
+  const auto known = std::get<igtl::Image>(sent(whole, 1)[4].message.content);
+  EXPECT_EQ(known.geometry.dims, grid.dims);
+  EXPECT_EQ(std::get<std::vector<float>>(known.voxels), whole.picture().known);
 }
 
 TEST_F(BroadcastOfAToy, ABlankPictureIsZeroAndUndeformedAndSaysWhy) {
@@ -260,7 +266,7 @@ TEST_F(BroadcastOfAToy, ABlankPictureIsZeroAndUndeformedAndSaysWhy) {
   state.grid_error_mm = 1.0;
   Broadcast whole(blank_picture(stream.rest(), state), Broadcast::Part::kWhole, 1);
   const auto all = sent(whole, 2);
-  ASSERT_EQ(all.size(), 6u) << "nothing may be left standing";
+  ASSERT_EQ(all.size(), 7u) << "nothing may be left standing";
   const auto& status = std::get<igtl::StatusReport>(all[0].message.content);
   EXPECT_EQ(status.code, igtl::kStatusNotReady);
   EXPECT_EQ(status.text, "no word from the daemon");
@@ -268,12 +274,12 @@ TEST_F(BroadcastOfAToy, ABlankPictureIsZeroAndUndeformedAndSaysWhy) {
   EXPECT_EQ(said.at("blank"), true);
   EXPECT_EQ(said.at("sequence"), 0);
   EXPECT_EQ(said.at("grid_error_mm"), 0.0);
-  for (const std::size_t i : {2, 3}) {
+  for (const std::size_t i : {2, 3, 4}) {
     const auto& image = std::get<igtl::Image>(all[i].message.content);
     EXPECT_EQ(image.geometry.dims, stream.grid().dims);
     EXPECT_THAT(std::get<std::vector<float>>(image.voxels), Each(0.0F));
   }
-  const auto& tumour = std::get<igtl::PolyData>(all[4].message.content);
+  const auto& tumour = std::get<igtl::PolyData>(all[5].message.content);
   EXPECT_TRUE(tumour.points.isApprox(model.tumour.vertices.cast<float>()));
   for (const auto& attribute : tumour.attributes) EXPECT_TRUE(attribute.values.isZero(0.0F));
 }

@@ -95,6 +95,7 @@ TEST_F(ChooseUpdate, AFieldOfAnotherMeshIsRefused) {
   auto other = message(1, Quality::kGood);
   other.update.estimate.displacement.conservativeResize(3, 10);
   other.update.estimate.sd_mm.conservativeResize(10);
+  other.update.estimate.known.conservativeResize(10);
   write_updates({other});
   expect_refused({}, ErrorCode::kUnreadable, "displacement of 10 nodes, the model has 64");
 }
@@ -167,8 +168,8 @@ TEST_F(ExportSurgery, TheFolderHoldsWhatTheManifestLists) {
   EXPECT_THAT(names(options.out),
               UnorderedElementsAre("displacement-1007.nii.gz", "displacement-1006.nii.gz",
                                    "displacement.nrrd", "displacement.h5", "sd_mm.nii.gz",
-                                   "jacobian.nii.gz", "warped-t1.nii.gz", "tumour.vtp",
-                                   "cortex.vtp", "series", "export.json"));
+                                   "known.nii.gz", "jacobian.nii.gz", "warped-t1.nii.gz",
+                                   "tumour.vtp", "cortex.vtp", "series", "export.json"));
   EXPECT_THAT(names(options.out / "series"),
               UnorderedElementsAre("a.pvd", "a-000001.vtu", "a-000002.vtu"));
   const json read = manifest();
@@ -176,12 +177,12 @@ TEST_F(ExportSurgery, TheFolderHoldsWhatTheManifestLists) {
   EXPECT_EQ(read.at("session_id"), 41);
   EXPECT_EQ(read.at("quality").at("verdict"), "caution");
   EXPECT_EQ(read.at("direction"), "resampling");
-  EXPECT_EQ(read.at("files").size(), 10u);
+  EXPECT_EQ(read.at("files").size(), 11u);
   for (const json& file : read.at("files")) {
     EXPECT_TRUE(fs::exists(options.out / file.at("file").get<std::string>())) << file;
     EXPECT_EQ(file.at("model_id"), model.model_id);
   }
-  EXPECT_EQ(made.files.size(), 10u);
+  EXPECT_EQ(made.files.size(), 11u);
 }
 
 TEST_F(ExportSurgery, FormatsChooseFiles) {
@@ -203,6 +204,20 @@ TEST_F(ExportSurgery, TheGridOfAnImageIsTaken) {
   EXPECT_EQ(made.voxels_in_brain,
             static_cast<std::size_t>(std::count_if(sd.values.begin(), sd.values.end(),
                                                    [](float v) { return v > 0.0F; })));
+}
+
+TEST_F(ExportSurgery, WhatIsKnownIsAVolumeAndOfAnOlderJournalThereIsNone) {
+  options.formats = {ExportFormat::kKnown};
+  ASSERT_TRUE(export_surgery(options));
+  const auto known = value_or_fail(io::read_nifti(options.out / "known.nii.gz"));
+  EXPECT_NEAR(*std::max_element(known.values.begin(), known.values.end()), 0.6, 1e-6);
+  EXPECT_EQ(manifest().at("files").at(0).at("units"), "1");
+  auto before = message(1, Quality::kGood);
+  before.update.estimate.known.resize(0);
+  write_updates({before});
+  options.out = folder / "before";
+  ASSERT_TRUE(export_surgery(options));
+  EXPECT_THAT(names(options.out), ElementsAre("export.json"));
 }
 
 TEST_F(ExportSurgery, AnImageIsWarpedThroughTheField) {

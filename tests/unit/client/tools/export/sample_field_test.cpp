@@ -171,10 +171,10 @@ TEST(SampleField, OutsideTheBrainTheSurfaceValueFallsToZero) {
   const OutsideTaper taper{3.0, 9.0};
   for (const auto direction : {FieldDirection::kModeling, FieldDirection::kResampling}) {
     const bool resampling = direction == FieldDirection::kResampling;
-    const auto samples =
-        sample_field(mesh, affine_field(mesh, Mat3::Zero(), shift), VecX::Ones(mesh.num_nodes()),
-                     oblique_grid(), direction, taper)
-            .value();
+    const auto samples = sample_field(mesh, affine_field(mesh, Mat3::Zero(), shift),
+                                      {VecX::Ones(mesh.num_nodes()), VecX::Ones(mesh.num_nodes())},
+                                      oblique_grid(), direction, taper)
+                             .value();
     std::size_t partly = 0, zero = 0;
     for_each_voxel(samples.field.grid, [&](const Vec3& x, std::size_t voxel) {
       const Vec3 in_brain = resampling ? Vec3(x - shift) : x;
@@ -186,6 +186,7 @@ TEST(SampleField, OutsideTheBrainTheSurfaceValueFallsToZero) {
       partly += factor > 0.0 && factor < 1.0 ? 1 : 0;
       zero += factor == 0.0 ? 1 : 0;
       EXPECT_EQ(samples.sd_mm.values[voxel], 0.0F);
+      EXPECT_EQ(samples.known.values[voxel], 0.0F);
       EXPECT_EQ(samples.jacobian.values[voxel], 1.0F);
     });
     EXPECT_GT(partly, 1000u);
@@ -193,23 +194,25 @@ TEST(SampleField, OutsideTheBrainTheSurfaceValueFallsToZero) {
   }
 }
 
-TEST(SampleField, StandardDeviationAndVolumeRatioComeAlong) {
+TEST(SampleField, UncertaintyAndVolumeRatioComeAlong) {
   const TetMesh mesh = brain();
   const Mat3 gradient = Vec3(0.1, -0.2, 0.0).asDiagonal();
   VecX sd(mesh.num_nodes());
   for (int i = 0; i < sd.size(); ++i) sd[i] = 0.1 + 0.01 * mesh.nodes(0, i);
-  const auto samples = sample_field(mesh, affine_field(mesh, gradient, Vec3::Zero()), sd,
-                                    oblique_grid(), FieldDirection::kResampling)
+  const auto samples = sample_field(mesh, affine_field(mesh, gradient, Vec3::Zero()),
+                                    {sd, 0.5 * sd}, oblique_grid(), FieldDirection::kResampling)
                            .value();
   for_each_voxel(samples.field.grid, [&](const Vec3& x, std::size_t voxel) {
     const Vec3 undeformed(x[0] / 1.1, x[1] / 0.8, x[2]);
     if (!in_box(undeformed, 0.001)) return;
     EXPECT_NEAR(samples.sd_mm.values[voxel], 0.1 + 0.01 * undeformed[0], 1e-6);
+    EXPECT_NEAR(samples.known.values[voxel], 0.05 + 0.005 * undeformed[0], 1e-6);
     EXPECT_NEAR(samples.jacobian.values[voxel], 1.1 * 0.8, 1e-6);
   });
-  EXPECT_TRUE(sample_field(mesh, Points::Zero(3, mesh.num_nodes()), {}, oblique_grid(),
-                           FieldDirection::kModeling)
-                  ->sd_mm.values.empty());
+  const auto without = sample_field(mesh, Points::Zero(3, mesh.num_nodes()), {}, oblique_grid(),
+                                    FieldDirection::kModeling)
+                           .value();
+  EXPECT_TRUE(without.sd_mm.values.empty() && without.known.values.empty());
 }
 
 TEST(SampleField, VolumeRatiosAreDeterminants) {

@@ -97,9 +97,10 @@ Points linear_field(const Points& x) {
 VecX linear_sd(const Points& x) { return (0.01 * x.row(2)).transpose().array() + 0.2; }
 
 void expect_moved(const DeformedSurface& made, const TriangleSurface& before) {
-  ASSERT_EQ(made.vertex_fields.size(), 2u);
+  ASSERT_EQ(made.vertex_fields.size(), 3u);
   EXPECT_EQ(made.vertex_fields[0].name, "displacement_mm");
   EXPECT_EQ(made.vertex_fields[1].name, "sd_mm");
+  EXPECT_EQ(made.vertex_fields[2].name, "known");
   EXPECT_EQ(made.surface.triangles, before.triangles);
   const Points u = linear_field(before.vertices);
   EXPECT_LT((made.vertex_fields[0].values - u).cwiseAbs().maxCoeff(), 1e-9);
@@ -107,18 +108,20 @@ void expect_moved(const DeformedSurface& made, const TriangleSurface& before) {
   EXPECT_LT(
       (made.vertex_fields[1].values.transpose() - linear_sd(before.vertices)).cwiseAbs().maxCoeff(),
       1e-9);
+  EXPECT_LT((made.vertex_fields[2].values - 0.5 * made.vertex_fields[1].values).norm(), 1e-9);
 }
 
 TEST(DeformedSurface, TumourAndCortexMoveWithTheirField) {
   const BrainModel model = test_support::toy_patient(4);
   const Points u = linear_field(model.mesh.nodes);
   const VecX sd = linear_sd(model.mesh.nodes);
+  const Uncertainty of{sd, 0.5 * sd};
   ASSERT_GT(model.tumour.num_vertices(), 20);
-  expect_moved(deformed_tumour(model, u, sd), model.tumour);
-  expect_moved(deformed_cortex(model, u, sd), geometry::boundary_surface(model.mesh));
+  expect_moved(deformed_tumour(model, u, of), model.tumour);
+  expect_moved(deformed_cortex(model, u, of), geometry::boundary_surface(model.mesh));
 }
 
-TEST(DeformedSurface, WithoutAStandardDeviationThereIsNoSuchField) {
+TEST(DeformedSurface, WithoutUncertaintyThereIsNoSuchField) {
   const BrainModel model = test_support::toy_patient(3);
   const Points u = Points::Zero(3, model.mesh.num_nodes());
   EXPECT_EQ(deformed_tumour(model, u, {}).vertex_fields.size(), 1u);

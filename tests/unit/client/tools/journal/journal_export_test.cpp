@@ -92,10 +92,12 @@ TEST_F(ExportJournal, TheSeriesHasAFieldPerUsableUpdateAndAListByTime) {
   EXPECT_THAT(list, HasSubstr("timestep=\"1.250000\" file=\"a-000002.vtu\""));
   const auto read = value_or_fail(io::read_vtu(to / "a-000002.vtu"));
   EXPECT_EQ(read.mesh.num_nodes(), model.mesh.num_nodes());
-  ASSERT_EQ(read.node_fields.size(), 2u);
+  ASSERT_EQ(read.node_fields.size(), 3u);
   EXPECT_EQ(read.node_fields[0].name, "displacement");
   EXPECT_EQ(read.node_fields[0].values(0, 5), 0.25);
   EXPECT_EQ(read.node_fields[1].values(0, 5), 0.5);
+  EXPECT_EQ(read.node_fields[2].name, "known");
+  EXPECT_NEAR(read.node_fields[2].values(0, 5), 0.2, 1e-9);
 }
 
 // Read with HDF5's own high-level calls, as another program would.
@@ -120,6 +122,7 @@ TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
   const auto nodes = floats(file, "mesh/nodes_mm");
   const auto displacement = floats(file, "updates/000002/displacement_mm");
   const auto sd = floats(file, "updates/000002/sd_mm");
+  const auto known = floats(file, "updates/000002/known");
   H5Fclose(file);
   ASSERT_EQ(nodes.size(), static_cast<std::size_t>(model.mesh.nodes.size()));
   EXPECT_EQ(nodes[3 * 5 + 1], static_cast<float>(model.mesh.nodes(1, 5)));
@@ -128,6 +131,8 @@ TEST_F(ExportJournal, TheFileHoldsTheMeshAndAFieldPerUsableUpdate) {
   EXPECT_EQ(displacement[3 * 5 + 1], 0.0f);
   ASSERT_EQ(3 * sd.size(), nodes.size());
   EXPECT_EQ(sd[5], 0.5f);
+  ASSERT_EQ(known.size(), sd.size());
+  EXPECT_EQ(known[5], 0.2f);
 }
 
 TEST_F(ExportJournal, AFileIsNotLeftBehindHalfWritten) {

@@ -47,6 +47,7 @@ class SmallJournal : public testing::Test {
     estimate.displacement = Points::Zero(3, model.mesh.num_nodes());
     estimate.displacement.row(0).setConstant(0.125 * static_cast<double>(sequence));
     estimate.sd_mm = VecX::Constant(model.mesh.num_nodes(), 0.5);
+    estimate.known = VecX::Constant(model.mesh.num_nodes(), 0.2);
     estimate.contact.active = 11;
     estimate.quality.flags.set(QualityFlag::kDeadline);
     estimate.quality.flags.set(QualityFlag::kStrengthAtBound);

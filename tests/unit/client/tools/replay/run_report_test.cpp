@@ -41,6 +41,7 @@ RunReport full_run() {
   run.field_error_pct = FieldError{1, 5, 9};
   run.contact = ContactSummary{400, 3, 0.04, 6};
   run.principal_direction_deg = 3.1;
+  run.region_known = 0.75;
   run.truth_scalars["fluid_level_mm"] = 40.0;
   run.left_out = {{"pressure", "drained", "0.02 %"}};
   run.sources = {{"ius", 41, 0.25, 200, 3, 31.5, 28.75, 0.125, true}, {"stereopsis", 40, 2.0, 300}};
@@ -96,6 +97,7 @@ TEST(RunReport, HasEveryKeyOfTheContract) {
   EXPECT_EQ(run["hypotheses"][0]["weight"], 0.75);
   EXPECT_TRUE(run["left_out"][0].contains("estimated_error"));
   EXPECT_EQ(run["error_mm"]["initial"]["mean"], 2.9);
+  EXPECT_EQ(run["region_known"], 0.75);
 }
 
 TEST(RunReport, NotApplicableAndNotFiniteAreNull) {

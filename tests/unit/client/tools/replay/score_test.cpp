@@ -103,6 +103,16 @@ TEST_F(SinkingBox, CoverageCountsComponentsWithinTheNinetyPercentInterval) {
   EXPECT_FALSE(scored(displacement).coverage_90);
 }
 
+TEST_F(SinkingBox, WhatIsKnownOfTheRegionIsToldAndOtherwiseAbsent) {
+  Estimate estimate;
+  RunReport run;
+  describe(model, estimate, run);
+  EXPECT_FALSE(run.region_known);
+  estimate.region_known = 0.25;
+  describe(model, estimate, run);
+  EXPECT_EQ(run.region_known, 0.25);
+}
+
 TEST_F(SinkingBox, WithoutScorePointsOnlyTheFieldIsScored) {
   truth.points.clear();
   const RunReport run = scored(0.9 * truth.displacement);

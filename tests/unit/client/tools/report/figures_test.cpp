@@ -41,8 +41,13 @@ TEST(Figures, OfAGroupShowEveryPictureThatItsDataAllow) {
     EXPECT_THAT(figure.caption, HasSubstr("a b/c, method condensed, fixed boundary"));
   }
 
+  runs[0].field->known = VecX::Constant(box_mesh().num_nodes(), 0.5);
+  figures = slice_figures(groups[0], runs, head);
+  ASSERT_EQ(figures.size(), 7u);
+  EXPECT_EQ(figures[4].file_name, "known-a-b-c.png");
+  EXPECT_LT(figures[4].image.cols, figures[6].image.cols) << "of the run that tells it alone";
   for (ReportedRun& run : runs) run.field->truth.reset();
-  EXPECT_EQ(slice_figures(groups[0], runs, head).size(), 4u);
+  EXPECT_EQ(slice_figures(groups[0], runs, head).size(), 5u);
   for (ReportedRun& run : runs) run.field.reset();
   EXPECT_TRUE(slice_figures(groups[0], runs, head).empty());
 }

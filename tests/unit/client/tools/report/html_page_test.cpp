@@ -63,6 +63,7 @@ RunReport doubtful_run() {
                            "the time <ran> out",
                            {5, 2, 1, 0},
                            {{"deadline", 2}, {"inverted_elements", 1}, {"invented_later", 4}}};
+  run.region_known = 0.375;
   run.prior_strengths = {{"along_gravity", 1.25, 0.25, false}, {"other", 3.0, 0.0, true}};
   run.hypotheses = {{{{"along_gravity", 2.5}, {"other", 3.0}}, 0.6},
                     {{{"along_gravity", 0.0}, {"other", 0.0}}, 0.3},
@@ -80,6 +81,8 @@ TEST(QualityTable, TellsVerdictsByWordAndSignBesideTheColour) {
   EXPECT_THAT(table, HasSubstr("&#9651; caution"));
   EXPECT_THAT(table, HasSubstr("<td>5 / 2 / 1</td><td>1 / 0 / 0</td>"));
   EXPECT_THAT(table, HasSubstr("the time &lt;ran&gt; out"));
+  EXPECT_THAT(table, HasSubstr("known about the region of surgery (share)</th><td>0.38</td>"
+                               "<td>&ndash;</td>"));
 }
 
 TEST(QualityTable, HasARowPerFlagThatOccursWithItsSentence) {
