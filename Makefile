@@ -59,7 +59,7 @@ interchange: setup ## exported fields in ITK, elastix, plastimatch, workbench, n
 	cmake --build --preset $(PRESET) -j $(JOBS) --target interchange_programs
 	cmake/scripts/interchange.sh $(BUILD)
 
-surgeries: configure ## many different simulated surgeries on two heads, scored, into out/surgeries; an hour; RESUME=1 goes on
+surgeries: configure ## many different simulated surgeries on two heads, scored, into out/surgeries; hours; KINDS=a,b; RESUME=1 goes on
 	cmake --build --preset $(PRESET) -j $(JOBS) --target surgery_programs
 	cmake/scripts/surgeries.sh $(BUILD)
 

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # surgeries.sh BUILD_DIR [OUT_DIR]: many different simulated surgeries on two heads, estimated with the
 # defaults (docs/surgeries.md). Empties OUT_DIR (default: out/surgeries) and writes to it:
-# rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures, tables.md,
+# rows-HEAD.csv (a row per update), outside.md (a line per head, kind and data), points.csv, checks.csv, left_out.csv, pictures, tables.md,
 # summary.json. Exit status 0 only if every check holds.
 #   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/; without it the second head is left out
 #   RESUME=1         keep the surgeries that OUT_DIR has, after an interruption
 #   BEFORE=DIR       rows-*.csv of an earlier estimate on the same surgeries, to compare with
 #                    (default: docs/surgeries/before)
+#   KINDS=a,b        these kinds of truths from outside, and no scenario (docs/surgeries.md)
 #   QUICK=1          2 places x 2 seeds, from 1001 and 1101, on 6 thousand nodes
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -24,6 +25,9 @@ before=${BEFORE:-docs/surgeries/before}
 if [ "${QUICK:-0}" = 1 ]; then
   options+=(--places 2 --seeds 2 --thousand-nodes 6)
   first=1001
+fi
+if [ -n "${KINDS:-}" ]; then
+  options+=(--kinds "$KINDS")
 fi
 resume_study "$out" "${RESUME:-0}"
 

@@ -11,7 +11,7 @@ import signal
 
 import inputs as shared
 import pytest
-from programs import LOCAL, brainshift as command, good, serve
+from programs import COARSE_CASE, LOCAL, brainshift as command, good, refused, serve, write
 from recordings import SurgeryFile
 
 import brainshift
@@ -181,6 +181,41 @@ def test_a_journal_is_checked_exported_and_repaired(folder, daemon, inputs, pape
     good(command("journal", "repair", damaged, "--out", mended))
     good(command("journal", "check", mended))
     assert command("journal", "repair", damaged, "--out", mended).returncode == 1, "nothing is replaced"
+
+
+def test_a_field_on_the_case_s_mesh_becomes_a_surgery_with_this_truth(folder, daemon, inputs, paper):
+    """An exported field is measured and scored; one on another mesh is refused in a line."""
+    running = daemon()
+    replay(paper, running, folder / "report.json", "--boundary", "contact")
+    journal = next((folder / "journal").glob("*.surgery"))
+    good(command("journal", "export", journal, "--vtu", folder / "fields", "--model", inputs / "head" / "model.h5"))
+    field = next((folder / "fields").glob("*.vtu"))
+
+    def simulate(truth, *more):
+        return command("simulate", "--case", COARSE_CASE, "--truth", truth, "--out", folder / "mine.surgery", *more)
+
+    refused(simulate(field, "--adverse", "gap"), "--adverse gap", "--truth")
+    other = write(folder / "other.vtu", OTHER_MESH)
+    refused(simulate(other), other, "has 4 points, the case's mesh has ")
+    assert not (folder / "mine.surgery").exists()
+    good(simulate(field))
+    assert SurgeryFile(folder / "mine.surgery").meta["scenario"] == "joint-sag+truth"
+    runs, _ = replay(folder / "mine.surgery", running, folder / "mine.json", "--boundary", "contact")
+    assert "fluid_level_mm" not in runs[0]["truth_scalars"]
+    assert runs[0]["recovery_pct"] > 80.0
+    assert running.end() == 0
+
+
+OTHER_MESH = """<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>
+<Piece NumberOfPoints="4" NumberOfCells="1"><Points>
+<DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 9 0 0 0 9 0 0 0 9</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">4</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
+<PointData><DataArray type="Float64" Name="displacement" NumberOfComponents="3" format="ascii">
+0 0 1 0 0 1 0 0 1 0 0 1</DataArray></PointData></Piece></UnstructuredGrid></VTKFile>
+"""
 
 
 def test_after_a_crash_the_replay_goes_on_to_the_same_final_field(folder, daemon):

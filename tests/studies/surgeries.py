@@ -3,15 +3,15 @@
 
 Rows (rows-HEAD.csv) are those of the program `surgeries`, one per update. Means are over surgeries;
 unless stated, of the last update, which knows all sources. A refused update recovers nothing and
-covers nothing.
+covers nothing. Truths from outside the prior have bounds of their own (outside.py).
 """
 import math
 from functools import partial
 from pathlib import Path
 
-from . import chart
+from . import chart, outside
 from .checks import Record
-from .common import study_parser
+from .common import study_parser, write_file
 from .rows import Table, study_rows
 from .stats import over, percentile
 from .summary import finish
@@ -159,8 +159,11 @@ class HeadChecks:
 
 
 def judge(rows, before, record):
-    for head, own in rows.groups("head").items():
+    own_truths, from_outside = outside.split(rows)
+    for head, own in own_truths.groups("head").items():
         HeadChecks(own, before.where(head=head), record).run()
+    outside.sharpness(own_truths, last_updates, record)
+    outside.judge(from_outside, last_updates, record)
 
 
 def draw(rows, folder):
@@ -196,4 +199,7 @@ def main(arguments):
     judge(rows, before, record)
     record.save()
     draw(rows, options.dir)
+    from_outside = outside.split(rows)[1]
+    if len(from_outside):
+        write_file(options.dir / "outside.md", outside.table_text(from_outside))
     return finish(options)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // surgeries: many different simulated surgeries on one head, estimated by the default method with
-// the case's defaults, one row of a table per update.
+// the case's defaults, one row of a table per update. The truths are those of scenarios
+// (client/tools/twin) and of kinds from outside the prior (outside/kinds.hpp).
 //
 // Place k of a run is the patient of seed `first_seed` + k - 1
 // (tests/simulation/variation.hpp); its surgeries have the seeds that follow those of the

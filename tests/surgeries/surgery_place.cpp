@@ -165,8 +165,7 @@ Result<std::vector<Row>> play(const bench::Head& head, const SurgeryFacts& facts
   return rows;
 }
 
-// What the instruments of kSeenBy see of a truth from outside, and of what the scenario says of the
-// brain the noise alone. The truth's own scalars are those of outside::OutsideTruth.
+// What the instruments of kSeenBy see of a truth from outside.
 Result<client::SimulatedSurgery> play_outside(const bench::Head& head,
                                               outside::OutsideTruths& truths,
                                               const outside::Kind& kind, std::uint64_t seed) {
@@ -176,19 +175,15 @@ Result<client::SimulatedSurgery> play_outside(const bench::Head& head,
     return invalid(truth.error().message);  // a row, as of a scenario that does nothing
   }
   client::Scenario scenario = *client::find_scenario(kSeenBy);
-  scenario.stiffness_sd = 0.0;
   if (truth->resected_fraction) scenario.resection = client::Resection{*truth->resected_fraction};
-  const auto brain = client::truth_brain(*head.model, head.config, scenario, seed);
-  if (!brain) return tl::unexpected(brain.error());
-  client::GivenTruth given(truth->displacement, head.prepared->forward().contact());
-  auto surgery = client::play_scenario(*brain, given, scenario, seed);
+  auto surgery =
+      client::play_given(*head.model, head.config, scenario, std::move(truth->displacement), seed);
   if (!surgery) return surgery;
   for (io::SurgeryTruth& each : surgery->truths) {
     each.scalars["outside"] = 1.0;
     each.scalars["load_scale"] = truth->load_scale;
     each.scalars["volume_loss"] = truth->volume_loss;
     each.scalars["max_displacement_mm"] = truth->largest_mm;
-    each.scalars.erase("fluid_level_mm");
   }
   return surgery;
 }

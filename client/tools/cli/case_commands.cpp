@@ -55,7 +55,8 @@ Status run_simulate(const SimulateArguments& arguments) {
     return invalid(std::string(option) + " is required (or --list)");
   };
   if (Status ok = required(!arguments.options.case_file.empty(), "--case"); !ok) return ok;
-  if (Status ok = required(!arguments.options.scenario.empty(), "--scenario"); !ok) return ok;
+  const bool known = !arguments.options.scenario.empty() || !arguments.options.truth.empty();
+  if (Status ok = required(known, "--scenario or --truth"); !ok) return ok;
   if (Status ok = required(!arguments.options.out.empty(), "--out"); !ok) return ok;
   if (Status ok = io::check_output_file("--out", arguments.options.out); !ok) return ok;
   return simulate(arguments.options, terminal_progress());
@@ -89,6 +90,9 @@ void add_simulate(CLI::App& app, Status& status) {
   command->add_option("--adverse", options.adverse,
                       "what the truth has and the estimate does not believe: names separated by "
                       "commas, or all; --list shows them");
+  command->add_option("--truth", options.truth,
+                      "VTU whose point array displacement (mm) is the truth, on the case's mesh; "
+                      "--scenario then says whose instruments look (default: joint-sag)");
   command->add_option("--seed", options.seed, "seed of noise and point selection")
       ->check(CLI::NonNegativeNumber)  // CLI11 would let a negative one wrap
       ->capture_default_str();
@@ -99,7 +103,10 @@ void add_simulate(CLI::App& app, Status& status) {
       "Example: the paper's section 2.6 (sagging head, 200 of about 2,541 tumour points, 0.51 mm "
       "noise):\n"
       "  brainshift simulate --case config/cases/colin27.yaml --scenario paper --seed 1 --out "
-      "paper.surgery");
+      "paper.surgery\n"
+      "Your own truth, from any solver, on the mesh that 'brainshift journal export --vtu' "
+      "writes:\n"
+      "  brainshift simulate --case config/cases/colin27.yaml --truth mine.vtu --out mine.surgery");
   command->callback([arguments, &status] { status = run_simulate(*arguments); });
 }
 

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/twin/simulate.hpp"
 
+#include <fmt/format.h>
+
+#include <utility>
+
 #include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/scenario.hpp"
 #include "client/tools/twin/surgery.hpp"
 #include "common/core/utc_time.hpp"
+#include "common/io/geometry/mesh_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"
 #include "common/wire/convert.hpp"
@@ -46,19 +51,58 @@ io::SurgeryMeta simulated_meta(const BrainModel& model, const std::filesystem::p
           .software = software};
 }
 
+Result<Points> read_truth_field(const std::filesystem::path& path, const BrainModel& model) {
+  const auto file = io::read_vtu(path);
+  if (!file) return tl::unexpected(file.error());
+  const Points& nodes = model.mesh.nodes;
+  const auto refuse = [&](const std::string& what) {
+    return invalid(path.string() + ": " + what + " (--truth: a field on the mesh of case " +
+                   model.case_id + ")");
+  };
+  if (file->mesh.nodes.cols() != nodes.cols()) {
+    return refuse(fmt::format("has {} points, the case's mesh has {} nodes",
+                              file->mesh.nodes.cols(), nodes.cols()));
+  }
+  Eigen::Index worst = 0;
+  const double apart = (file->mesh.nodes - nodes).colwise().norm().maxCoeff(&worst);
+  if (!(apart <= kSameNode_mm)) {
+    return refuse(fmt::format("its point {} lies {:.3g} mm beside the case's node", worst, apart));
+  }
+  for (const io::NodeField& field : file->node_fields) {
+    if (field.name != "displacement") continue;
+    if (field.values.rows() != 3) {
+      return refuse(fmt::format("its point array displacement has {} components instead of 3",
+                                field.values.rows()));
+    }
+    for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+      if (!field.values.col(i).allFinite()) {
+        return refuse(fmt::format("displacement of point {} is not finite", i));
+      }
+    }
+    return Points(field.values);
+  }
+  return refuse("has no point array displacement");
+}
+
 Status simulate(const SimulateOptions& options, const Progress& progress) {
-  const Scenario* scenario = find_scenario(options.scenario);
+  const bool given = !options.truth.empty();
+  const std::string name =
+      given && options.scenario.empty() ? kInstrumentsOfTruth : options.scenario;
+  const Scenario* scenario = find_scenario(name);
   if (scenario == nullptr) {
     std::string known;
     for (const Scenario& each : all_scenarios()) known += (known.empty() ? "" : ", ") + each.name;
-    return fail(ErrorCode::kNotFound,
-                "scenario " + options.scenario + " is unknown; known: " + known);
+    return fail(ErrorCode::kNotFound, "scenario " + name + " is unknown; known: " + known);
   }
   Ingredients ingredients;
   if (!options.adverse.empty()) {
     const auto named = ingredients_from(options.adverse);
     if (!named) return tl::unexpected(named.error());
     ingredients = *named;
+  }
+  if (given && !ingredients.empty()) {
+    return invalid("--adverse " + options.adverse +
+                   ": a truth that --truth gives has no ingredients");
   }
   if (std::filesystem::exists(options.out)) {
     return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
@@ -69,12 +113,18 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
   const auto adverse =
       with_ingredients(*scenario, ingredients, patient->model.gravity_direction, options.seed);
   if (!adverse) return tl::unexpected(adverse.error());
+  Result<Points> field = Points();
+  if (given) field = read_truth_field(options.truth, patient->model);
+  if (!field) return tl::unexpected(field.error());
   const auto surgery =
-      play_scenario(patient->model, patient->config, *adverse, options.seed, progress);
+      given ? play_given(patient->model, patient->config, *adverse, std::move(*field), options.seed)
+            : play_scenario(patient->model, patient->config, *adverse, options.seed, progress);
   if (!surgery) return tl::unexpected(surgery.error());
   report(progress, "write", 0.0);
-  const std::string suffix = ingredients.empty() ? "" : "+" + name_of(ingredients);
-  return write_surgery(options, options.scenario + suffix, *patient, *surgery);
+  const std::string suffix = given                 ? "+truth"
+                             : ingredients.empty() ? ""
+                                                   : "+" + name_of(ingredients);
+  return write_surgery(options, name + suffix, *patient, *surgery);
 }
 
 }  // namespace brainshift::client

@@ -23,18 +23,28 @@
 
 namespace brainshift::client {
 
+inline constexpr const char* kInstrumentsOfTruth = "joint-sag";
+
 struct SimulateOptions {
   std::filesystem::path case_file;
-  std::string scenario;
-  std::string adverse;  // "mesh,gap" or "all" (adverse.hpp); empty: none
+  std::string scenario;         // with a truth: whose instruments look; empty: kInstrumentsOfTruth
+  std::string adverse;          // "mesh,gap" or "all" (adverse.hpp); empty: none
+  std::filesystem::path truth;  // empty: that of the scenario; else read_truth_field()
   std::uint64_t seed = 1;
   std::filesystem::path out;  // must not exist; nothing is left behind on failure
 };
 
-// The surgery file calls the scenario NAME, or NAME+INGREDIENT+... or NAME+all.
+// A displacement, mm, of every node of the model's mesh: the point array `displacement` of a .vtu,
+// as `brainshift journal export` writes it. kInvalidArgument, with file and key: points of another
+// mesh, no such array, a value that is not finite. Errors of io::read_vtu.
+inline constexpr double kSameNode_mm = 0.001;  // farther apart: a node of another mesh
+Result<Points> read_truth_field(const std::filesystem::path& path, const BrainModel& model);
+
+// The surgery file calls the scenario NAME, or NAME+INGREDIENT+... or NAME+all, or NAME+truth.
 // kNotFound for an unknown scenario or ingredient; the sentence lists the known ones.
-// kInvalidArgument when an ingredient does nothing (truth_load.hpp). kWriteFailed when `out` exists
-// or cannot be written. Other errors: of reading the case, building its model, and play_scenario.
+// kInvalidArgument when an ingredient does nothing (truth_load.hpp), or stands beside a truth.
+// kWriteFailed when `out` exists or cannot be written. Other errors: of reading the case, building
+// its model, read_truth_field and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 
 // What a surgery file says of a simulated surgery of this model, made now by `software`. The case

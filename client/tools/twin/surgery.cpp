@@ -278,4 +278,21 @@ Result<SimulatedSurgery> play_scenario(const BrainModel& model, const CaseConfig
   return play_scenario(*brain, solver, scenario, seed, progress);
 }
 
+Result<SimulatedSurgery> play_given(const BrainModel& model, const CaseConfig& config,
+                                    Scenario scenario, Points displacement, std::uint64_t seed) {
+  scenario.stiffness_sd = 0.0;
+  scenario.tumour_displacement_mm.reset();
+  scenario.contact_free = false;
+  const auto brain = truth_brain(model, config, scenario, seed);
+  if (!brain) return tl::unexpected(brain.error());
+  auto pairs = contact::search_contact(model.mesh.nodes, model.slaves, model.skull);
+  if (!pairs) return tl::unexpected(pairs.error());
+  GivenTruth given(std::move(displacement),
+                   contact::PenaltyContact(std::move(*pairs), config.contact.penalty_n_per_mm));
+  auto surgery = play_scenario(*brain, given, scenario, seed);
+  if (!surgery) return surgery;
+  for (io::SurgeryTruth& truth : surgery->truths) truth.scalars.erase("fluid_level_mm");
+  return surgery;
+}
+
 }  // namespace brainshift::client

@@ -45,4 +45,10 @@ Result<SimulatedSurgery> play_scenario(const TruthBrain& brain, TruthSource& sol
                                        const Scenario& scenario, std::uint64_t seed,
                                        const Progress& progress = {});
 
+// What the scenario's instruments see of a displacement that is given at the nodes of the model,
+// the same at every moment. Of the scenario's loads and stiffness nothing counts, of a resection
+// that the cavity is neither seen nor scored. There is no truth scalar fluid_level_mm.
+Result<SimulatedSurgery> play_given(const BrainModel& model, const CaseConfig& config,
+                                    Scenario scenario, Points displacement, std::uint64_t seed);
+
 }  // namespace brainshift::client
