@@ -127,7 +127,7 @@ struct PriorConfig {
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
-  // Weight of the hypothesis that every part has the case's strength, whatever the data say about
+  // Weight of the hypothesis that every part is as strong as before the data, whatever they say about
   // single ones: they see a part of the brain, and it keeps what they cannot see.
   double broad_weight = 0.1;
 };

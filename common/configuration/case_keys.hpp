@@ -263,7 +263,7 @@ void visit(A& a, V& v) {
      "is more than eight times as strong as above (method condensed). fixed: as above."},
     v.estimate_scales, kScalesWords);
   a({"broad_weight", "",
-     "Weight of the hypothesis that every part has the strength above, whatever the data say",
+     "Weight of the hypothesis that every part is as strong as before the data, whatever they say",
      "decision 0037",
      "Data see a part of the brain; the error bars keep what they cannot see. 0: strengths "
      "estimated from the data hold everywhere (scales estimated)."},
@@ -342,7 +342,7 @@ void visit(A& a, V& v) {
 template <typename A, Of<CondensedConfig> V>
 void visit(A& a, V& v) {
   a({"max_rank", "", "Largest number of prior modes kept, those of the load families among them",
-     "docs/decisions/0030"},
+     "docs/decisions/0037"},
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));

@@ -112,6 +112,7 @@ CaseConfig stability_config() {
   config.brain = "toy";  // validate() asks for a mask to mesh; the toy patient needs none
   config.condensed.max_rank = 600;
   // What the reference assembles: gravity and the paper's residual field.
+  config.prior.gravity_sides_sd = config.prior.gravity_ends_sd = config.prior.broad_weight = 0.0;
   config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;
   config.prior.tumour_volume_strain_sd = config.prior.brain_volume_strain_sd = 0.0;
   config.prior.resection_weight_sd = config.prior.resection_stress_sd_pa = 0.0;

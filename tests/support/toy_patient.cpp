@@ -49,6 +49,8 @@ CaseConfig toy_config() {
   // other loads, and there are few enough modes to keep all.
   config.prior.force_density_sd_n_m3 = 1000.0;
   config.prior.gravity_direction_sd_deg = 10.0;
+  config.prior.gravity_sides_sd = config.prior.gravity_ends_sd = 0.0;
+  config.prior.broad_weight = 0.0;
   config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;
   config.prior.tumour_volume_strain_sd = config.prior.brain_volume_strain_sd = 0.0;
   config.prior.resection_weight_sd = config.prior.resection_stress_sd_pa = 0.0;

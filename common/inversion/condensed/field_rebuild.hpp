@@ -80,8 +80,8 @@ class FieldRebuild {
   void standard_deviation(ThreadTeam& team, const ContactReduction& contact,
                           const linalg::blas::In<double>& covariance_factor,
                           const RemainderVariances& left_out, VecX& sd);
-  // How much of a node's prior variance the data took away, under the hypothesis that every part has
-  // the case's strength: 0 none, 1 all. explained: X, k x r, variances: S^2, r, with Cov(z) = S^2 -
+  // How much of a node's prior variance the data took away, under the broad hypothesis
+  // (prior_strengths.hpp): 0 none, 1 all. explained: X, k x r, variances: S^2, r, with Cov(z) = S^2 -
   // X^T X. For the contact of the last standard_deviation(). known: n.
   void known(ThreadTeam& team, const linalg::blas::In<double>& explained, const VecX& variances,
              VecX& known);

@@ -160,6 +160,30 @@ TEST(ForceKernel, DoesNotDependOnTheMesh) {
   }
 }
 
+// Near and far are one field's two independent parts, and far ones are small where data come from.
+TEST(ForceKernel, NearAndFarSumUpToTheWholeField) {
+  const TetMesh mesh = test_support::box_mesh(8, 4, 4, Vec3(160, 60, 60));
+  const VecX volumes = fem::nodal_volumes(mesh);
+  std::vector<NodeIndex> places;  // the left end
+  for (int i = 0; i < mesh.num_nodes(); ++i) {
+    if (mesh.nodes(0, i) < 20.0) places.push_back(i);
+  }
+  const auto parts = ForceKernel::basis_about(mesh.nodes, volumes, 20.0, 0.2, places, 30.0);
+  const Eigen::MatrixXd near = dense_of(parts.near, mesh), far = dense_of(parts.far, mesh);
+  const Eigen::MatrixXd whole = dense_of(ForceKernel::basis(mesh.nodes, volumes, 20.0, 0.2), mesh);
+  EXPECT_LT((near + far - whole).norm(), 1e-6 * whole.norm());
+  EXPECT_LT((dense_of(ForceKernel::sum_of(parts.near, parts.far), mesh) - whole).norm(),
+            1e-6 * whole.norm());
+  for (int i = 0; i < mesh.num_nodes(); ++i) {
+    const double share = far(i, i) / whole(i, i);
+    if (mesh.nodes(0, i) < 1.0) EXPECT_LT(share, 0.1) << i;
+    if (mesh.nodes(0, i) > 120.0) EXPECT_GT(share, 0.9) << i;
+  }
+  // Without a place where data come from, all is far.
+  const auto nowhere = ForceKernel::basis_about(mesh.nodes, volumes, 20.0, 0.2, {}, 30.0);
+  EXPECT_EQ(dense_of(nowhere.near, mesh).norm(), 0.0);
+}
+
 TEST(ForcePrior, IsTheSumOfItsKernelsAndModes) {
   const TetMesh mesh = test_support::box_mesh(3, 3, 3, Vec3(30, 30, 30));
   const VecX volumes = fem::nodal_volumes(mesh);
@@ -169,12 +193,13 @@ TEST(ForcePrior, IsTheSumOfItsKernelsAndModes) {
   modes.of_part[0] = 2;
   const ForcePrior prior({ForceKernel::compact(mesh.nodes, volumes, 6.0, 0.3),
                           ForceKernel::basis(mesh.nodes, volumes, 20.0, 0.2),
-                          ForceKernel::basis(mesh.nodes, volumes, 60.0, 0.1)},
+                          ForceKernel::basis(mesh.nodes, volumes, 60.0, 0.1),
+                          ForceKernel::basis(mesh.nodes, volumes, 40.0, 0.15)},
                          modes);
   const Points w = Points::Random(3, mesh.num_nodes());
   const Points f = prior.apply(w);
   const Eigen::MatrixXd dense = dense_of(prior.kernel(0), mesh) + dense_of(prior.kernel(1), mesh) +
-                                dense_of(prior.kernel(2), mesh);
+                                dense_of(prior.kernel(2), mesh) + dense_of(prior.kernel(3), mesh);
   const Points remainders = w * dense;  // symmetric
   ASSERT_GT(remainders.norm(), 1.0);
   const VecX from_modes = modes.columns * (modes.columns.transpose() * w.reshaped());

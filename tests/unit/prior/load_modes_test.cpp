@@ -43,7 +43,7 @@ LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
 TEST(LoadModes, StandInTheOrderOfTheirParts) {
   const BrainModel patient = test_support::toy_patient(8);
   const LoadModes modes = modes_of(patient, only(1.0, 0.05, 0.01, 1.0, 300.0, 600.0));
-  const PerPart<int> expected = {2, 4, 27, 4, 9, 21, 0, 0, 0};
+  const PerPart<int> expected = {2, 4, 0, 0, 27, 4, 9, 21, 0, 0, 0, 0};
   EXPECT_EQ(modes.of_part, expected);
   EXPECT_EQ(modes.size(), 67);
   EXPECT_EQ(part_of_column(1, modes.of_part), PriorPart::kAlongGravity);
@@ -51,6 +51,32 @@ TEST(LoadModes, StandInTheOrderOfTheirParts) {
   EXPECT_EQ(part_of_column(6, modes.of_part), PriorPart::kTumourVolume);
   EXPECT_EQ(part_of_column(66, modes.of_part), PriorPart::kOpening);
   EXPECT_EQ(modes_of(patient, only(0, 0, 0, 0, 0, 0)).size(), 0);
+}
+
+// The halves of a brain that loses buoyancy on one side only: full and sides together or against
+// one another leave one half without a load.
+TEST(LoadModes, BuoyancyDiffersBetweenSidesAndBetweenEnds) {
+  const BrainModel patient = test_support::toy_patient(8);
+  CaseConfig config = only(1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+  config.prior.gravity_direction_sd_deg = 0.0;
+  config.prior.gravity_sides_sd = 0.5;
+  config.prior.gravity_ends_sd = 0.25;
+  const LoadModes modes = modes_of(patient, config);
+  const PerPart<int> expected = {2, 0, 2, 2};
+  ASSERT_EQ(modes.of_part, expected);
+  const Points& nodes = patient.mesh.nodes;
+  for (int axis : {0, 1}) {
+    const double middle = 0.5 * (nodes.row(axis).minCoeff() + nodes.row(axis).maxCoeff());
+    for (int level : {0, 1}) {
+      const auto along = mode(modes.columns, level);
+      const auto uneven = mode(modes.columns, 2 + 2 * axis + level);
+      const double sd = axis == 0 ? 0.5 : 0.25;
+      for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+        const double side = std::tanh((nodes(axis, i) - middle) / kMidlineWidth_mm);
+        ASSERT_LT((uneven.col(i) - sd * side * along.col(i)).norm(), 1e-12 * along.norm());
+      }
+    }
+  }
 }
 
 // No net force and no net moment.

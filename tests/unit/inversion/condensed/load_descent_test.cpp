@@ -201,7 +201,7 @@ struct Descent {
       : operators(std::move(given)),
         window{0, operators->num_modes()},
         sampled(operators, std::move(locator), window, OutsideRegion::kExtend, team),
-        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors, true, team),
+        strengths(operators->part_columns, window, SparseData::kMaxCommonErrors, true, 0.0, team),
         descent(*operators, window, config.contact.penalty_n_per_mm, true, team, profile) {
     limits.out_of_time = [] { return false; };
     limits.on_step = [] {};

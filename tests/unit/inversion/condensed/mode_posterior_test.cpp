@@ -53,7 +53,7 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
     ModePosterior posterior(window);
     posterior.reserve(data.size());
     posterior.linearise(sampled, no_contact, team);
-    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, team);
+    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, 0.0, team);
     ASSERT_TRUE(strengths.fit(posterior.gram(), posterior.right_hand_side()));
     Consistency found;
     ASSERT_TRUE(posterior.check_source(sampled, strengths, {"pointer", half, rest}, found));

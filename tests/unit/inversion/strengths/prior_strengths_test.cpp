@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 
 constexpr int kModes = 48, kCommon = 2, kData = 300;
 constexpr ModeWindow kWindow{0, kModes};
-// Along gravity, across it, tumour volume, fine; the model lacks the other parts.
+// Four parts; the model lacks the others.
 constexpr PerPart<int> kColumns = {2, 4, 8, 0, 0, 0, 34, 0, 0};
 constexpr std::size_t kPresent[] = {0, 1, 2, 6};
 
@@ -91,8 +91,8 @@ double log_posterior(const Problem& problem, const PriorScaleValues& scales) {
          test_support::cholesky_factor(covariance).diagonal().array().log().sum();
 }
 
-PriorStrengths fitted(const Problem& problem, bool estimate = true) {
-  PriorStrengths result(kColumns, kWindow, kCommon, estimate, team());
+PriorStrengths fitted(const Problem& problem, bool estimate = true, double broad_weight = 0.0) {
+  PriorStrengths result(kColumns, kWindow, kCommon, estimate, broad_weight, team());
   EXPECT_TRUE(result.fit(problem.gram(), problem.right()));
   return result;
 }
@@ -270,14 +270,14 @@ TEST(PriorStrengths, MomentsAreThoseOfTheMixture) {
 
 TEST(PriorStrengths, AFloorIsVarianceThatNoHypothesisTakesAway) {
   const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.0), 5);
-  PriorStrengths result(kColumns, kWindow, kCommon, true, team());
+  PriorStrengths result(kColumns, kWindow, kCommon, true, 0.0, team());
   result.set_floor(static_cast<PriorPart>(6), 0.4);
   ASSERT_TRUE(result.fit(problem.gram(), problem.right()));
   EXPECT_EQ(result.held()[6], 0.0) << "the test shows nothing";
   EXPECT_EQ(result.scale_of(kModes - 1), 0.4);
   EXPECT_GE(result.mean_square()[6], 0.16);
   expect_moments_of_the_mixture(problem, result, 6, 0.4);
-  PriorStrengths fixed(kColumns, kWindow, kCommon, false, team());
+  PriorStrengths fixed(kColumns, kWindow, kCommon, false, 0.0, team());
   fixed.set_floor(static_cast<PriorPart>(6), 0.4);
   EXPECT_EQ(fixed.scale_of(kModes - 1), 1.0) << "without effect where strengths are given";
 }
@@ -290,9 +290,70 @@ TEST(PriorStrengths, StrengthsThatAreNotEstimatedStayAsInTheCase) {
   expect_moments_of_the_mixture(problem, result);
 }
 
+// Of a strength before the data, absence among them.
+double root_mean_square_of_strength() {
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t i = 1; i < kStrengths.size(); ++i) {
+    const double p = std::exp(-0.5 * std::pow(std::log(kStrengths[i]) / std::log(3.0), 2));
+    sum += p;
+    squares += p * kStrengths[i] * kStrengths[i];
+  }
+  return std::sqrt(kAbsent * squares / sum);
+}
+
+TEST(PriorStrengths, TheBroadHypothesisKeepsItsWeightWhateverTheDataSay) {
+  const double usual = root_mean_square_of_strength();
+  for (const auto& truth : {strengths(0.5, 0.0, 2.0, 0.0), strengths(0.0, 0.0, 0.0, 8.0)}) {
+    const Problem problem = drawn(truth, 5);
+    const PriorStrengths result = fitted(problem, true, 0.1), without = fitted(problem);
+    EXPECT_EQ(result.held(), without.held()) << "no search touches it";
+    const Hypothesis& broad = result.hypotheses().back();
+    EXPECT_DOUBLE_EQ(broad.weight, 0.1);
+    ASSERT_EQ(result.hypotheses().size(), without.hypotheses().size() + 1);
+    for (const std::size_t g : kPresent) {
+      EXPECT_DOUBLE_EQ(broad.scales[g], std::max(usual, result.held()[g]));
+    }
+    for (std::size_t h = 0; h < without.hypotheses().size(); ++h) {
+      EXPECT_NEAR(result.hypotheses()[h].weight, 0.9 * without.hypotheses()[h].weight, 1e-12);
+    }
+    expect_moments_of_the_mixture(problem, result);
+  }
+}
+
+// Data of which the far part explains nothing leave it as strong as it was.
+TEST(PriorStrengths, NoDataChooseTheStrengthOfTheFarPart) {
+  constexpr auto kFar = static_cast<std::size_t>(PriorPart::kFar);
+  const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 0.0), 5);
+  PerPart<int> columns = kColumns;
+  columns[6] = 30;
+  columns[kFar] = 4;
+  PriorStrengths result(columns, kWindow, kCommon, true, 0.0, team());
+  ASSERT_TRUE(result.fit(problem.gram(), problem.right()));
+  for (const Hypothesis& each : result.hypotheses()) {
+    EXPECT_DOUBLE_EQ(each.scales[kFar], root_mean_square_of_strength());
+  }
+}
+
+// What the data took away of the broad hypothesis's variance: S^2 - X^T X is its covariance.
+TEST(PriorStrengths, WhatIsExplainedBroadlyIsWhatTheDataTookAway) {
+  const Problem problem = drawn(strengths(0.5, 0.125, 2.0, 0.25), 3);
+  PriorStrengths result = fitted(problem, true, 0.1);
+  linalg::GrowingMatrix x;
+  VecX variances;
+  ASSERT_TRUE(result.explained_broadly(x, variances));
+  const VecX sd = prior_sd(result.hypotheses().back().scales);
+  MatrixXd inner = sd.asDiagonal() * problem.gram() * sd.asDiagonal();
+  inner.diagonal().array() += 1.0;
+  const MatrixXd covariance = sd.asDiagonal() * test_support::inverse(inner) * sd.asDiagonal();
+  MatrixXd found = -x.transpose() * x;
+  found.diagonal() += variances;
+  EXPECT_LT((found - covariance.bottomRightCorner(kModes, kModes)).norm(),
+            1e-4 * covariance.norm());
+}
+
 TEST(PriorStrengths, NumbersThatAreNotFiniteAreRejected) {
   Problem problem = drawn(strengths(1, 1, 1, 1), 3);
-  PriorStrengths result(kColumns, kWindow, kCommon, true, team());
+  PriorStrengths result(kColumns, kWindow, kCommon, true, 0.0, team());
   MatrixXd gram = problem.gram();
   gram(5, 5) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(result.fit(gram, problem.right()).error().code, ErrorCode::kNotFinite);
@@ -307,7 +368,7 @@ TEST(PriorStrengths, AWindowLeavesTheFirstModesOut) {
   const int size = kCommon + kModes - left;
   MatrixXd jacobian(kData, size);
   jacobian << problem.jacobian.leftCols(kCommon), problem.jacobian.rightCols(size - kCommon);
-  PriorStrengths result(kColumns, {left, kModes - left}, kCommon, true, team());
+  PriorStrengths result(kColumns, {left, kModes - left}, kCommon, true, 0.0, team());
   ASSERT_TRUE(result.fit(jacobian.transpose() * jacobian, jacobian.transpose() * problem.data));
   EXPECT_EQ(result.held()[0], 0.0);
   EXPECT_EQ(result.held()[1], 0.0);
