@@ -33,6 +33,11 @@ constexpr int kReadsPerTurn = 16;
 constexpr std::chrono::milliseconds kTick{100};
 // Beyond one message; what a busy client has under way.
 constexpr std::size_t kSlack = 1u << 20;
+// Messages of a connection that libzmq may hold before it is read again. Each may keep one of
+// libzmq's buffers of 18 KiB, however short it is; not with CURVE, where parts are counted and a
+// message may have some.
+constexpr std::uint64_t kMaxWaiting = 8;
+constexpr std::uint64_t kMaxWaitingParts = 64;
 
 }  // namespace
 
@@ -171,8 +176,11 @@ struct Guard::Impl {
     for (int i = 0; i < kReadsPerTurn; ++i) {
       bool more = true;
       if (up) {
+        connection.account->throttled = true;  // first: delivered() sees it, or has been seen
         held += connection.settle(Clock::now());
-        more = connection.held <= options.max_message_bytes + kSlack;
+        more =
+            connection.held <= options.max_message_bytes + kSlack &&
+            connection.waiting <= (connection.stream.encrypted() ? kMaxWaitingParts : kMaxWaiting);
         connection.account->throttled = !more;
       }
       while (!lane.empty()) {
@@ -306,6 +314,7 @@ void Guard::delivered(int inner_fd, std::size_t bytes, std::size_t parts) {
   const auto account = impl_->account_of(inner_fd);
   if (!account) return;
   account->delivered += bytes + parts * (ZmtpStream::kPartCost + kWrapping);
+  account->parts += parts;
   ++account->messages;
   if (account->throttled) impl_->nudge();
 }
