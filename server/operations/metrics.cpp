@@ -16,6 +16,8 @@
 #include <string_view>
 #include <utility>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 
@@ -34,6 +36,7 @@ MetricFamily family(MetricType type, std::string_view name, std::string_view hel
 
 void add(MetricFamily& family, double value, Labels labels = {}) {
   ClientMetric& metric = family.metric.emplace_back();
+  for (auto& label : labels) label.value = one_line(label.value, '?');
   metric.label = std::move(labels);
   (family.type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
 }

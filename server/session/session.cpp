@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 

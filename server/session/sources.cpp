@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 
 constexpr std::size_t kMaxSourceLength = 64;
-constexpr std::size_t kMaxQuoted = 64;
 
 double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
@@ -59,22 +60,11 @@ Status check_observation(const Observation& observation, std::string_view case_i
     return invalid(fmt::format("observation.source = {}: must have 1 to {} characters",
                                in_quotes(observation.source), kMaxSourceLength));
   }
-  if (std::holds_alternative<PatientPose>(observation.body)) {
-    return invalid(
-        "observation.patient_pose: a change of pose is not assimilated in this version; start a "
-        "session on a model prepared for the new pose");
+  if (one_line(observation.source) != observation.source) {
+    return invalid(fmt::format("observation.source = {}: must have no control characters",
+                               in_quotes(observation.source)));
   }
-  return {};
-}
-
-std::string in_quotes(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text.substr(0, kMaxQuoted)) {
-    const auto byte = static_cast<unsigned char>(c);
-    result += (byte < 0x20 || byte == 0x7f) ? '?' : c;
-  }
-  result += text.size() > kMaxQuoted ? "...\"" : "\"";
-  return result;
+  return std::visit([](const auto& body) { return check_size(body); }, observation.body);
 }
 
 Result<std::int64_t> recorded_time(const Observation& observation) {

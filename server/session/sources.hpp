@@ -24,10 +24,6 @@ namespace brainshift::server {
 Status check_observation(const Observation& observation, std::string_view case_id,
                          const SessionKey& running);
 
-// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a
-// one-line message whatever a peer sent.
-std::string in_quotes(std::string_view text);
-
 // The clock of one source against the daemon's, and which of its observations are plausible.
 //
 // Clocks of different machines share no zero. The offset between a source's clock and the daemon's

@@ -278,5 +278,25 @@ TEST(MetricsExporter, MonitorsThatAskAtOnceAreAllAnswered) {
   EXPECT_EQ(most, 1) << "one report at a time";
 }
 
+TEST(MetricsExporter, QuestionsThatNeverEndKeepNoMonitorOut) {
+  auto exporter =
+      value_or_fail(MetricsExporter::listen("127.0.0.1:0", [] { return wire::DaemonReport(); }));
+  std::vector<int> dripping;
+  for (int i = 0; i < 40; ++i) {
+    dripping.push_back(connect_to(exporter.port()));
+    ASSERT_EQ(send(dripping.back(), "GET /me", 7, MSG_NOSIGNAL), 7);
+  }
+  EXPECT_THAT(scrape(exporter.port()), StartsWith("HTTP/1.1 200"));
+  for (const int fd : dripping) close(fd);
+}
+
+TEST(Metrics, ANameOfASourceDrivesNoTerminal) {
+  wire::DaemonReport report;
+  report.sources.emplace_back().source = "a\x1b[2J\nb";
+  const std::string text = prometheus::TextSerializer().Serialize(metric_families(report));
+  EXPECT_THAT(text, HasSubstr("source=\"a?[2J?b\""));
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+}
+
 }  // namespace
 }  // namespace brainshift::server

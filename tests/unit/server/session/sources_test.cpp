@@ -24,15 +24,36 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
   const struct {
     void (*spoil)(Observation&);
     const char* says;
-  } rows[] = {{[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
-              {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
-              {[](Observation& o) { o.source.clear(); }, "source"},
-              {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
-              {[](Observation& o) { o.session = {}; }, "session is absent"},
-              {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
-              {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
-              {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
-              {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
+  } rows[] = {
+      {[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
+      {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
+      {[](Observation& o) { o.source.clear(); }, "source"},
+      {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
+      {[](Observation& o) { o.source = "ius\u009b2J"; }, "\"ius?2J\": must have no control"},
+      {[](Observation& o) { o.session = {}; }, "session is absent"},
+      {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
+      {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
+      {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
+      {[](Observation& o) {
+         o.body = TumourBoundary{Points::Zero(3, kMaxObservedPoints + 1), 0.5};
+       },
+       "tumour_boundary has 50001 points"},
+      {[](Observation& o) {
+         o.body = CorticalSurface{{Points::Zero(3, kMaxObservedPoints + 1), {}}, 0.5};
+       },
+       "cortical_surface has 50001 points"},
+      {[](Observation& o) {
+         CorticalSurface surface{{Points::Zero(3, 3), {}}, 0.5};
+         surface.surface.triangles.setZero(3, kMaxObservedTriangles + 1);
+         o.body = surface;
+       },
+       "cortical_surface has 100001 triangles"},
+      {[](Observation& o) {
+         const Points points = Points::Zero(3, kMaxLandmarkPairs + 1);
+         o.body = LandmarkPairs{points, points, 0.5};
+       },
+       "landmark_pairs has 1001 pairs, must be at most 1000"},
+      {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
   const SessionKey running{kBootId, 1, kModelId};
   ASSERT_TRUE(check_observation(landmarks(2), kCase, running));
   for (const auto& row : rows) {
