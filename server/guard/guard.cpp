@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "server/guard/connection.hpp"
+#include "server/guard/sheltered.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -83,16 +84,23 @@ struct Guard::Impl {
           [[maybe_unused]] const auto got = read(wake, &value, sizeof value);
           next_tick = Clock::now();
         } else if (fd == listener.fd()) {
-          accept_all();
+          if (!sheltered("a connection", [&] { accept_all(); })) listen_again(false);
         } else if (const auto found = by_fd.find(fd); found != by_fd.end()) {
-          serve(*found->second, (event.events & (EPOLLHUP | EPOLLERR)) != 0);
+          Connection& connection = *found->second;
+          const bool hung_up = (event.events & (EPOLLHUP | EPOLLERR)) != 0;
+          if (!sheltered("a connection", [&] { serve(connection, hung_up); })) close_fd(fd);
         }
       }
       if (Clock::now() >= next_tick) {
-        tick();
+        sheltered("a look at the connections", [&] { tick(); });
         next_tick = Clock::now() + kTick;
       }
     }
+  }
+
+  // Of a connection that could not be served, if it is still there.
+  void close_fd(int fd) {
+    if (const auto found = by_fd.find(fd); found != by_fd.end()) end(*found->second, nullptr, {});
   }
 
   void nudge() const {
@@ -130,8 +138,14 @@ struct Guard::Impl {
   }
 
   void open(int peer) {
-    auto connection = std::make_unique<Connection>(
-        ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+    std::unique_ptr<Connection> connection;
+    try {
+      connection = std::make_unique<Connection>(
+          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+    } catch (...) {
+      ::close(peer);
+      throw;
+    }
     connection->peer = peer;
     connection->inner = connect_inner(inner);
     if (connection->inner < 0) return;  // closes it
@@ -139,13 +153,16 @@ struct Guard::Impl {
     setsockopt(peer, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for ipc, which has none
     connection->name = socket_name(connection->inner, &getsockname);
     Connection& added = *connection;
-    by_fd[added.peer] = by_fd[added.inner] = &added;
-    {
+    connections[added.name] = std::move(connection);
+    try {
+      by_fd[added.peer] = by_fd[added.inner] = &added;
       const std::lock_guard lock(mutex);
       accounts[added.name] = added.account;
       ++counts.accepted;
+    } catch (...) {
+      end(added, nullptr, {});
+      throw;
     }
-    connections[added.name] = std::move(connection);
     watch(added.peer, EPOLLIN, EPOLL_CTL_ADD);
     watch(added.inner, EPOLLIN, EPOLL_CTL_ADD);
   }
@@ -268,7 +285,7 @@ struct Guard::Impl {
     by_fd.erase(connection.inner);
     const auto claimed = routing_ids.find(connection.stream.routing_id());
     if (claimed != routing_ids.end() && claimed->second == &connection) routing_ids.erase(claimed);
-    connections.erase(std::string(connection.name));
+    connections.erase(connections.find(connection.name));
     listen_again(true);
   }
 

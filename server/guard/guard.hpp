@@ -26,6 +26,8 @@
 // Without CURVE a routing id that another connection has is refused: its connection is closed. With
 // CURVE libzmq ignores such a peer, and it is closed when its patience ends.
 //
+// Memory that is not to be had for a connection ends that connection.
+//
 // One thread of its own. delivered(), served() and close() are for the daemon's transport thread.
 #pragma once
 

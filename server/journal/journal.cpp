@@ -58,7 +58,8 @@ void Journal::begin(const fs::path& path, const JournalMeta& meta, std::uint64_t
     const std::lock_guard lock(mutex_);
     phase_ = Phase::kRecording;
     error_.reset();
-    overrun_ = false;
+    overrun_ = exhausted_ = false;
+    session_bytes_ = 0;
     gap_ = {};
     recorded_ = {};
     recorded_.session_id = session_id;
@@ -125,13 +126,35 @@ void Journal::stop() {
 void Journal::work(const std::stop_token& stop) {
   Group group;
   std::optional<Opening> opening;
-  while (take(stop, group, opening)) {
-    if (opening) begin_file(*opening);
-    if (!group.records.empty()) write(std::move(group));
-    supervise();
+  for (bool going = true; going;) {
+    const Status done = writing([&]() -> Status {
+      going = take(stop, group, opening);
+      if (!going) return {};
+      if (opening) begin_file(*opening);
+      if (!group.records.empty()) write(std::move(group));
+      supervise();
+      return {};
+    });
+    if (!done) interrupt(done.error(), std::move(group), std::move(opening));
   }
-  lose(unwritten_.ranges());
-  end_session();
+  (void)writing([&]() -> Status {
+    lose(unwritten_.ranges());
+    end_session();
+    return {};
+  });
+}
+
+// What was to be done failed without a sink's fault, for want of memory: as if the storage had
+// failed, so that recording goes on in a new file. What was taken from the queue is tried there.
+void Journal::interrupt(const Error& error, Group group, std::optional<Opening> opening) {
+  if (opening) current_ = std::move(*opening);
+  if (!group.records.empty()) unwritten_ = std::move(group);
+  (void)writing([&]() -> Status {
+    end_file(error, false);
+    return {};
+  });
+  std::unique_lock lock(mutex_);
+  wake_.wait_for(lock, options_.commit_interval, [] { return false; });
 }
 
 bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening) {
@@ -156,6 +179,9 @@ bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Open
     --openings_;
     return true;
   }
+  // What follows throws nothing: no record is lost between queue and group.
+  group.records.reserve(queue_.size());
+  group.sources.reserve(queue_.size());
   while (!queue_.empty() && !queue_.front().opening) {
     Item& item = queue_.front();
     queued_bytes_ -= item.record.payload.size();
@@ -305,9 +331,9 @@ void Journal::end_file(const Error& error, bool contents_lost) {
     const std::lock_guard lock(mutex_);
     if (current_.generation == generation_) {
       phase_ = Phase::kFailed;
-      error_ = error;
       overrun_ = false;
       recorded_.recording = false;
+      error_ = error;
       recorded_.reason = error.message;
     }
   }

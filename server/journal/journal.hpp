@@ -138,6 +138,9 @@ class Journal {
   void work(const std::stop_token& stop);
   // Waits for records, a session, or the time of the next check. False at the end.
   bool take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening);
+  void interrupt(const Error& error, Group group, std::optional<Opening> opening);
+  Result<std::unique_ptr<RecordSink>> open_file(std::filesystem::path& path,
+                                                const JournalMeta& meta);
   void begin_file(const Opening& opening);
   void end_session();
   void write(Group group);

@@ -40,7 +40,8 @@ int parse_and_run(int argc, char** argv) {
       "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq .prepare.contact.factor_s");
 
   ServeArguments serve;
-  auto* serve_command = app.add_subcommand("serve", "Answer clients until SIGINT or SIGTERM");
+  auto* serve_command =
+      app.add_subcommand("serve", "Answer clients until SIGINT, SIGTERM or SIGHUP");
   serve_command->add_option("--config", serve.config_file, "Daemon file (YAML)")->required();
   serve_command->add_option("--model", serve.model, "Model file, instead of the daemon file's");
   serve_command->add_option(

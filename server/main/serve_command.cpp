@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "common/io/config/daemon_file.hpp"
@@ -31,6 +33,8 @@ namespace {
 
 // How old the figures of viewers may be that a monitor gets from an idle daemon.
 constexpr std::chrono::milliseconds kFreshViewers{1000};
+// What a preparation or an update gets to end in once the daemon stops.
+constexpr std::chrono::milliseconds kStopGrace{1500};
 
 Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
@@ -178,7 +182,7 @@ Status serve(const ServeArguments& arguments) {
   if (!config) return tl::unexpected(config.error());
   LogOptions log_options;
   log_options.level = config->log_level;
-  const Log log(log_options);
+  std::optional<Log> log(std::in_place, log_options);
   auto options = service_options(*config);
   if (!options) return tl::unexpected(options.error());
 
@@ -211,7 +215,7 @@ Status serve(const ServeArguments& arguments) {
     spdlog::info("authentication is off: any peer that can connect has full access");
   }
   Outbox outbox;
-  options->log_lines_lost = [&log] { return log.lost(); };
+  options->log_lines_lost = [&log] { return log->lost(); };
   options->on_turn = [&reporter] { reporter.turn(); };
   Service service(std::move(*options), outbox);
   reporter.watch(service);
@@ -224,8 +228,12 @@ Status serve(const ServeArguments& arguments) {
   spdlog::info("stopping");
   manager.stopping();
   exporter->reset();
-  service.stop();
-  return status;
+  if (service.stop(kStopGrace)) return status;
+  // A library that heeds no stop is at work: a factorisation, or OpenBLAS without address space.
+  spdlog::warn("ended while a preparation or an update was still at work; the journal is closed");
+  { const Router ended = std::move(*router); }  // removes the socket of an ipc path
+  log.reset();
+  std::_Exit(status ? kExitSuccess : print_error(status.error()));
 }
 
 }  // namespace

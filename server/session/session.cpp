@@ -213,9 +213,13 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
   }
   update.sequence = running_->newest_update = job.number;
   if (result && update.usable()) {
+    running_->usable_before = {running_->newest_usable, running_->usable_arrived};
     running_->newest_usable = update.sequence;
     running_->usable_arrived = job.arrived;
   } else {
+    if (running_->newest_usable == job.number) {
+      std::tie(running_->newest_usable, running_->usable_arrived) = running_->usable_before;
+    }
     running_->reason = result ? update.estimate.quality.reason : message.error->message;
     decision.reason = running_->reason;
   }

@@ -174,7 +174,8 @@ class Session {
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
     TimePoint usable_arrived = {};  // the observation that newest_usable answers
-    std::string reason = {};        // why the newest update is not usable
+    std::pair<std::uint64_t, TimePoint> usable_before = {};  // both, of the usable one before it
+    std::string reason = {};                                 // why the newest update is not usable
   };
   struct Box {
     Observation observation;
