@@ -131,14 +131,14 @@ std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame&
       if (!options_.model) return model_not_ready();
       if (encoded_model_.empty()) encoded_model_ = wire::encode(*options_.model);
       return Reply{MessageType::kModelReply, encoded_model_};
-    case MessageType::kObservation: return observe(frame);
+    case MessageType::kObservation: return observe(peer, frame);
     default: break;
   }
   return error_reply({ErrorCode::kProtocol, fmt::format("message type {} is not a request",
                                                         static_cast<int>(frame.type))});
 }
 
-Reply Service::observe(const wire::Frame& frame) {
+Reply Service::observe(const std::string& peer, const wire::Frame& frame) {
   const auto arrived = std::chrono::steady_clock::now();
   const auto refuse = [&](const std::string& source, const Error& error) {
     counters_.refused(source, arrived);
@@ -153,7 +153,7 @@ Reply Service::observe(const wire::Frame& frame) {
   if (std::exchange(observation->daemon_ns, 0) != 0) given = wire::encode(*observation);
 
   const std::lock_guard lock(mutex_);
-  const auto admission = session_->submit(std::move(*observation), arrived);
+  const auto admission = session_->submit(std::move(*observation), arrived, peer);
   if (!admission) {
     spdlog::debug("observation refused sequence={} code={} reason=\"{}\"", sequence,
                   to_string(admission.error().code), admission.error().message);

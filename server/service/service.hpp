@@ -107,7 +107,7 @@ class Service final : public RequestHandler {
   bool stop(std::chrono::milliseconds grace = std::chrono::hours(24));
 
  private:
-  Reply observe(const wire::Frame& frame);
+  Reply observe(const std::string& peer, const wire::Frame& frame);
   Reply subscribe(const wire::Frame& frame);
   DaemonStatus status() const;
   std::optional<wire::JournalFigures> journal_figures() const;

@@ -140,7 +140,8 @@ void Session::stop() {
 
 // ---------- observations ----------
 
-Result<Admission> Session::submit(Observation observation, TimePoint now) {
+Result<Admission> Session::submit(Observation observation, TimePoint now,
+                                  const std::string& client) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
                                                     : "no session is running: start one first");
@@ -149,8 +150,9 @@ Result<Admission> Session::submit(Observation observation, TimePoint now) {
     return tl::unexpected(status.error());
   }
   const auto waiting = boxes_.find(observation.source);
-  auto admission = running_->sources.admit(
-      observation, now.time_since_epoch() / std::chrono::nanoseconds(1), waiting != boxes_.end());
+  auto admission =
+      running_->sources.admit(observation, now.time_since_epoch() / std::chrono::nanoseconds(1),
+                              waiting != boxes_.end(), client);
   if (!admission || admission->repeated) return admission;
   observation.daemon_ns = observation.acquired_ns = admission->daemon_ns;
   if (waiting != boxes_.end()) {

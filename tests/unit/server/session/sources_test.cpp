@@ -214,6 +214,39 @@ TEST(Sources, EachHasAClockOfItsOwnAndFollowsOneThatWasSet) {
   EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
 }
 
+TEST(Sources, OneThatWasStartedAgainIsToldItsNumberAndHasANewClock) {
+  Sources sources(kMaxAge_s, false);
+  ASSERT_TRUE(sources.admit(with_stamp(landmarks(57, "ius"), kHour), kHour, false, "first run"));
+  EXPECT_THAT(refusal_of(sources.admit(with_stamp(landmarks(1, "ius"), 3), kHour + kSecond, false,
+                                       "second run"),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("a source that was started again numbers on from 58"));
+  EXPECT_FALSE(
+      sources.admit(with_stamp(landmarks(58, "ius"), 3), kHour + kSecond, false, "first run"))
+      << "a clock that runs backwards in one run";
+  const auto admitted = value_or_fail(
+      sources.admit(with_stamp(landmarks(58, "ius"), 3), kHour + kSecond, false, "second run"));
+  EXPECT_EQ(admitted.daemon_ns, kHour + kSecond);
+}
+
+TEST(Sources, InventedNamesKeepNoSourceOut) {
+  Sources sources(kMaxAge_s, false);
+  const auto admit = [&](const std::string& name, std::int64_t now_ns, const std::string& client) {
+    return sources.admit(with_stamp(landmarks(1, name), now_ns), now_ns, false, client);
+  };
+  for (int i = 0; i < Sources::kMaxSourcesOfOne; ++i) {
+    ASSERT_TRUE(admit("invented " + std::to_string(i), i, "joker"));
+  }
+  EXPECT_THAT(refusal_of(admit("one more", 9, "joker"), ErrorCode::kUnavailable),
+              HasSubstr("from this connection"));
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(admit("other " + std::to_string(i), kSecond, "bridge"));
+  }
+  EXPECT_THAT(refusal_of(admit("real", 2 * kSecond, "camera"), ErrorCode::kUnavailable),
+              HasSubstr("in the last 120 s"));
+  EXPECT_TRUE(admit("real", 121 * kSecond, "camera")) << "those that are silent make room";
+}
+
 TEST(Sources, OfARecordingShareItsClock) {
   Sources sources(120.0, true);
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "ius"), kHour), 7, false)->daemon_ns, kHour);
