@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brainshiftd: prepares patient models before surgery and serves estimates during it.
+#include <sys/stat.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -89,6 +91,7 @@ int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   brainshift::io::survive_failing_writes();
+  umask(077);  // files hold a patient's data
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {
