@@ -16,6 +16,8 @@ namespace fs = std::filesystem;
 
 // Nothing happens by itself before the first session; any far time will do.
 constexpr std::chrono::hours kIdle{1};
+// That are tried when others take them.
+constexpr int kNames = 16;
 
 // A sink that throws ends its file, not the thread.
 template <typename Function>
@@ -80,13 +82,17 @@ void Journal::append(io::SurgeryRecord record, std::string source) {
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kIdle) return;
+    const bool over = session_bytes_ + record.payload.size() > options_.max_session_bytes;
     const bool full = queue_.size() >= options_.max_queued ||
                       queued_bytes_ + record.payload.size() > options_.max_queued_bytes;
-    if (full && phase_ != Phase::kFailed) {
+    if ((full || over) && phase_ != Phase::kFailed) {
       phase_ = Phase::kFailed;
-      error_ =
-          Error{ErrorCode::kWriteFailed,
-                fmt::format("journal: storage is too slow, {} records are waiting", queue_.size())};
+      error_ = Error{
+          ErrorCode::kWriteFailed,
+          over
+              ? fmt::format("journal: the session has {} MiB, its limit", session_bytes_ >> 20)
+              : fmt::format("journal: storage is too slow, {} records are waiting", queue_.size())};
+      exhausted_ = over;
       overrun_ = true;
       recorded_.recording = false;
       recorded_.reason = error_->message;
@@ -99,6 +105,7 @@ void Journal::append(io::SurgeryRecord record, std::string source) {
       // The thread waits for the first record, then for the time to be up or for half a queue.
       wake = queue_.empty() || queue_.size() == options_.max_queued / 2;
       queued_bytes_ += record.payload.size();
+      session_bytes_ += record.payload.size();
       queue_.push_back(Item{std::nullopt, std::move(record), std::move(source)});
     }
   }
@@ -201,20 +208,30 @@ void Journal::end_session() {
   if (empty) io::discard_surgery(path_);
 }
 
+// Another daemon may have taken the name since it was found free: then the next one.
+Result<std::unique_ptr<RecordSink>> Journal::open_file(fs::path& path, const JournalMeta& meta) {
+  for (int tries = 1;; ++tries) {
+    auto sink = writing([&] { return options_.open(path, meta); });
+    if (sink || tries == kNames || free_path(path) == path) return sink;
+    path = free_path(path);
+  }
+}
+
 void Journal::begin_file(const Opening& opening) {
   end_session();
   unwritten_ = {};
   contents_ = {};
   current_ = opening;
   path_.clear();
-  auto sink = writing([&] { return options_.open(opening.path, opening.meta); });
+  fs::path path = opening.path;
+  auto sink = open_file(path, opening.meta);
   if (!sink) {
     end_file(sink.error(), false);
     next_check_ = Clock::now() + options_.retry_interval;
     return;
   }
   sink_ = std::move(*sink);
-  path_ = opening.path;
+  current_.path = path_ = path;
   next_check_ = Clock::now() + options_.check_interval;
   {
     const std::lock_guard lock(mutex_);
@@ -280,19 +297,18 @@ void Journal::supervise() {
 
 void Journal::resume() {
   next_check_ = Clock::now() + options_.retry_interval;
-  const fs::path path = free_path(current_.path, path_);
+  fs::path path = free_path(current_.path, path_);
   const auto available = free_bytes(path.parent_path());
   const bool scarce = available && *available < options_.resume_free_bytes;
   Opening next = current_;
   {
     const std::lock_guard lock(mutex_);
-    if (current_.generation != generation_ || phase_ != Phase::kFailed) return;
+    if (current_.generation != generation_ || phase_ != Phase::kFailed || exhausted_) return;
     if (!scarce) phase_ = Phase::kResuming;
     next.meta.continues = path_.filename().string();
     next.meta.gap = fmt::format("{}; not recorded: {}", error_->message, describe(gap_));
   }
-  auto sink = scarce ? fail(ErrorCode::kWriteFailed, "no space")
-                     : writing([&] { return options_.open(path, next.meta); });
+  auto sink = scarce ? fail(ErrorCode::kWriteFailed, "no space") : open_file(path, next.meta);
   if (sink) {
     sink_ = std::move(*sink);
     contents_ = {};

@@ -65,6 +65,7 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.machine = machine_type();
   options.blas_kernel = linalg::blas_kernel();
   options.journal_dir = config.journal_dir;
+  options.journal_bytes = static_cast<std::uint64_t>(config.limits.journal_gib) << 30;
   if (config.model.empty()) return options;
   // Sessions with a fixed boundary are rare: their operators are read when one starts.
   auto file = io::read_model(config.model, {Boundary::kContact});

@@ -58,6 +58,7 @@ Service::Service(ServiceOptions options, Outbox& outbox)
   if (!options_.journal_dir.empty()) {
     Journal::Options journal;
     journal.open = options_.open_journal;
+    journal.max_session_bytes = options_.journal_bytes;
     journal.on_error = [this](const Error& error) {
       spdlog::error("{}", error.message);
       sheltered("a message to the subscribers", [&] {

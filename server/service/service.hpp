@@ -73,6 +73,7 @@ struct ServiceOptions {
   MakeSessionModel make_model;              // needed with a model
   std::filesystem::path journal_dir;        // empty: no journal
   std::filesystem::path case_file;          // metadata of the journal
+  std::uint64_t journal_bytes = Journal::Options{}.max_session_bytes;
   // On what updates are computed, for the journal and for clients (DaemonStatus).
   std::string build = {};
   std::string machine = {};

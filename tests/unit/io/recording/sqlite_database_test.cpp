@@ -109,7 +109,7 @@ TEST_F(SurgeryOnDisk, AFileThatIsDeletedOrReplacedIsNoLongerInPlace) {
   std::ofstream(path) << "somebody else's";
   EXPECT_FALSE(file.in_place());
   EXPECT_EQ(refusal_of(file.close(), ErrorCode::kWriteFailed),
-            path.string() + ": was deleted or replaced while it was written");
+            path.string() + ": was deleted, replaced or cut while it was written");
   EXPECT_EQ(test_support::content_of(path), "somebody else's");
 }
 
