@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text of strangers: peers, files, arguments. It travels as UTF-8, and it is shown on one line that
-// drives no terminal.
+// Text of strangers (peers, files, arguments): it travels as UTF-8, and is shown on one line that
+// drives no terminal. And the time of day as text: for metadata and file names, never for
+// measuring.
 #pragma once
 
+#include <ctime>
 #include <string>
 #include <string_view>
 
@@ -23,5 +25,14 @@ std::string one_line(std::string_view text, char instead = ' ');
 
 // one_line with '?', between double quotes; of a longer text the first 64 characters and "...".
 std::string in_quotes(std::string_view text);
+
+// Now, UTC, written by strftime; the default is ISO 8601 to the second ("2025-01-31T12:34:56Z").
+inline std::string utc_now(const char* format = "%Y-%m-%dT%H:%M:%SZ") {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[64];
+  return {text, std::strftime(text, sizeof text, format, &utc)};
+}
 
 }  // namespace brainshift

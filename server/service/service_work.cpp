@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/core/guarded.hpp"
-#include "common/core/utc_time.hpp"
+#include "common/core/text.hpp"
 #include "common/wire/convert.hpp"
 #include "server/guard/sheltered.hpp"
 #include "server/service/service.hpp"

@@ -197,7 +197,8 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
   const auto daemon_ns = recorded_clock_ ? recorded_time(observation)
                                          : source.clock.to_daemon(observation, arrived_ns);
   if (!daemon_ns) {
-    if (!is_new && source.client == client) known->second.clock = source.clock;  // it remembers a jump that it refused
+    // It remembers a jump that it refused; but not a clock that was to begin anew.
+    if (!is_new && source.client == client) known->second.clock = source.clock;
     return tl::unexpected(daemon_ns.error());
   }
   source.last_acquired_ns = observation.acquired_ns;

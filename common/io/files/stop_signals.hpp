@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// SIGINT, SIGTERM and SIGHUP (a terminal that closes) as a file descriptor, so that a poll loop sees
-// them like any other event. A SIGHUP that was ignored before, as under nohup, stays ignored.
+// SIGINT, SIGTERM and SIGHUP (a terminal that closes) as a file descriptor, so that a poll loop
+// sees them like any other event. A SIGHUP that was ignored before, as under nohup, stays ignored.
 //
 // By handlers, not by a blocked mask and signalfd: a library may start threads before main()
 // (OpenBLAS does), which do not inherit a mask, and a signal to the process may be delivered to any

@@ -50,9 +50,9 @@ class SqliteDatabase {
   Status fold_log();
   // A -wal file with content lies beside the file.
   bool has_log() const;
-  // False when the file, its log or the log's index was deleted, moved, replaced or cut since it was
-  // opened. SQLite maps the index into memory: using a part that was cut off ends the process. So
-  // this is asked before every transaction.
+  // False when the file, its log or the log's index was deleted, moved, replaced or cut since it
+  // was opened. SQLite maps the index into memory: using a part that was cut off ends the process.
+  // So this is asked before every transaction.
   bool in_place() const;
 
   // "PATH: cannot write record: database or disk is full"

@@ -193,8 +193,8 @@ SurgeryFile& SurgeryFile::operator=(SurgeryFile&&) noexcept = default;
 SurgeryFile::~SurgeryFile() = default;
 
 Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta& meta) {
-  // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty, and
-  // gives what it keeps beside it the same mode.
+  // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty,
+  // and gives what it keeps beside it the same mode.
   const int reserved = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600);
   if (reserved < 0) {
     return write_failed(path, errno == EEXIST
