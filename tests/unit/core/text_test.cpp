@@ -34,6 +34,7 @@ TEST(InQuotes, CutsALongTextBetweenCharacters) {
   for (int i = 0; i < 65; ++i) long_text += "\u00e4";
   EXPECT_EQ(in_quotes(long_text), '"' + long_text.substr(0, 128) + "...\"");
   EXPECT_EQ(in_quotes("a\x1b[2J"), "\"a?[2J\"");
+  EXPECT_EQ(in_quotes("plain"), "\"plain\"");
 }
 
 // Seconds since the epoch of a text in the default format, by the days of the civil calendar.

@@ -174,7 +174,7 @@ TEST_F(SurgeryOnDisk, AViewInThePlaceOfATableIsRefusedAtOnce) {
   sqlite3_close(db);
   refusal_of(SurgeryFile::open(path), ErrorCode::kUnreadable);
   const auto damaged = SurgeryFile::open_damaged(path);
-  if (damaged) EXPECT_FALSE(damaged->visit([](const auto&) { return Status(); }));
+  EXPECT_FALSE(damaged && damaged->visit([](const auto&) { return Status(); }));
 }
 
 TEST_F(SurgeryOnDisk, AJournalIsItsOwnersAlone) {

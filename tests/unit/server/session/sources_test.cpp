@@ -66,12 +66,6 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
   }
 }
 
-TEST(InQuotes, IsOneShortLineWhateverItHolds) {
-  EXPECT_EQ(in_quotes("plain"), "\"plain\"");
-  EXPECT_EQ(in_quotes("a\nb\x1b"), "\"a?b?\"");
-  EXPECT_EQ(in_quotes(std::string(200, 'x')), "\"" + std::string(64, 'x') + "...\"");
-}
-
 // ---------- clocks ----------
 
 Observation seen(std::int64_t acquired_ns, std::int64_t sent_ns = 0) {
