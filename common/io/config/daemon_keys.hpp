@@ -98,7 +98,8 @@ void visit(A& a, V& v) {
        "The rest is refused and counted."},
       v.limits.session_starts_per_min, between(1, 10000));
     a({"journal_gib", "GiB", "What the journal keeps of one session, whoever sends it", "",
-       "Beyond it nothing more of the session is recorded, and every subscriber is told. An hour of "
+       "Beyond it nothing more of the session is recorded, and every subscriber is told. An hour "
+       "of "
        "four updates a second for 18 thousand nodes has 9 GiB."},
       v.limits.journal_gib, between(1, 10000));
   });

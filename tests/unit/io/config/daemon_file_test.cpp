@@ -64,7 +64,8 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
       "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n"
       "security:\n  secret_key: k\n  allow_list: a\n"
-      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n  journal_gib: 8\n"));
+      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n  "
+      "journal_gib: 8\n"));
   EXPECT_EQ(config.endpoint, "ipc:///tmp/s");
   EXPECT_TRUE(config.allow_remote);
   EXPECT_EQ(config.model, folder_ / "m.h5");
