@@ -1,21 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/core/thread_team.hpp"
 
+#include <algorithm>
+
 namespace brainshift {
+namespace {
+
+// A daemon keeps a team for each kind of session, and its service manager bounds its threads.
+constexpr int kMaxMembers = 16;
+
+void end(std::atomic<bool>& stopped, std::atomic<unsigned>& round,
+         std::vector<std::thread>& threads) {
+  stopped = true;
+  ++round;
+  round.notify_all();
+  for (std::thread& thread : threads) thread.join();
+}
+
+}  // namespace
 
 ThreadTeam::ThreadTeam(int members) {
   if (members <= 0) members = static_cast<int>(std::thread::hardware_concurrency());
-  for (int member = 1; member < members; ++member) {
-    threads_.emplace_back([this, member] { work(member); });
+  members = std::min(members, kMaxMembers);
+  try {
+    for (int member = 1; member < members; ++member) {
+      threads_.emplace_back([this, member] { work(member); });
+    }
+  } catch (...) {
+    end(stopped_, round_, threads_);
+    throw;
   }
 }
 
-ThreadTeam::~ThreadTeam() {
-  stopped_ = true;
-  ++round_;
-  round_.notify_all();
-  for (std::thread& thread : threads_) thread.join();
-}
+ThreadTeam::~ThreadTeam() { end(stopped_, round_, threads_); }
 
 void ThreadTeam::run(Function function, void* context) {
   function_ = function;

@@ -2,8 +2,8 @@
 // ThreadTeam: a fixed number of threads that work on the same task, each on its own fixed part.
 //
 // Part i of a task always runs on the same member and always covers the same items, so results do
-// not depend on timing. The caller is member 0; the other members sleep between tasks. run()
-// neither allocates nor throws.
+// not depend on timing. The caller is member 0; the others sleep between tasks. A team has at most
+// 16 members (TasksMax in docker/brainshiftd.service). run() neither allocates nor throws.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@ namespace brainshift {
 
 class ThreadTeam {
  public:
-  // Number of threads, the caller included. 0 or less: as many as the machine has cores.
+  // Threads, the caller included; 0: as many as cores. Throws std::system_error: no more threads.
   explicit ThreadTeam(int members = 0);
   ~ThreadTeam();
   ThreadTeam(const ThreadTeam&) = delete;

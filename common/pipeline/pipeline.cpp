@@ -19,11 +19,12 @@ void append(std::vector<Omission> omissions, Update& update) {
 
 Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method method,
                    Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
-                   RegistrationTargets targets)
+                   MakeInverter another, RegistrationTargets targets)
     : config_(config),
       targets_(std::move(targets)),
       evidence_(config_.sensing.max_age_s),
-      inverter_(std::move(inverter)) {
+      inverter_(std::move(inverter)),
+      another_(std::move(another)) {
   blank_.case_id = model.case_id;
   blank_.model_id = model.model_id;
   blank_.method = method;
@@ -32,23 +33,45 @@ Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method met
 }
 
 Result<Pipeline> Pipeline::build(const BrainModel& model, const CaseConfig& config, Method method,
-                                 Boundary boundary, std::unique_ptr<inversion::Inverter> inverter) {
+                                 Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
+                                 MakeInverter another) {
   auto targets = RegistrationTargets::build(model);
   if (!targets) return tl::unexpected(targets.error());
-  return Pipeline(model, config, method, boundary, std::move(inverter), std::move(*targets));
+  return Pipeline(model, config, method, boundary, std::move(inverter), std::move(another),
+                  std::move(*targets));
 }
 
 void Pipeline::reset() {
   evidence_.clear();
-  inverter_->reset();
+  if (inverter_) inverter_->reset();
 }
 
 Result<Update> Pipeline::run(const Observation& observation, const RunOptions& options) {
+  if (!inverter_) {
+    auto made = another_();
+    if (!made) return tl::unexpected(made.error());
+    inverter_ = std::move(*made);
+  }
+  try {
+    return answer(observation, options);
+  } catch (...) {
+    evidence_.drop(observation.source);
+    if (another_) {
+      inverter_.reset();
+    } else {
+      inverter_->reset();
+    }
+    throw;
+  }
+}
+
+Result<Update> Pipeline::answer(const Observation& observation, const RunOptions& options) {
   Update update = blank_;
   update.observation_sequence = observation.sequence;
 
   const Stopwatch registering;  // Observation -> SparseData
-  auto registered = register_observation(observation, targets_, config_, update.method);
+  auto registered =
+      register_observation(observation, targets_, config_, update.method, options.stop);
   if (!registered) return tl::unexpected(registered.error());
   if (registered->icp) {
     update.T_undeformed_deformed = registered->icp->T_surface_points;

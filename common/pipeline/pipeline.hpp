@@ -31,18 +31,23 @@ struct RunOptions {
   std::stop_token stop;
 };
 
+using MakeInverter = std::function<Result<std::unique_ptr<inversion::Inverter>>()>;
+
 class Pipeline {
  public:
   // Indexes the surfaces; kEmptySet or kNotFinite when the model has no usable one. inverter: for
-  // this method and boundary.
+  // this method and boundary. another: makes one more; empty: an inverter that threw is reset.
   static Result<Pipeline> build(const BrainModel& model, const CaseConfig& config, Method method,
-                                Boundary boundary, std::unique_ptr<inversion::Inverter> inverter);
+                                Boundary boundary, std::unique_ptr<inversion::Inverter> inverter,
+                                MakeInverter another = {});
 
   // Fills everything of an Update except its sequence number and the encode and journal times,
   // which belong to later stages. The inverter writes into the update's own estimate. Errors of
   // registration and inversion pass through unchanged; such an observation is not used again. One
   // without a usable estimate (values/quality.hpp) is tried once more beside the next
   // (evidence.hpp), and no later update starts from an unusable field.
+  // An exception (memory that is not to be had) passes through too. It costs this observation and
+  // the inverter, which may be half changed: the next call makes another, or returns its error.
   // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
 
@@ -51,7 +56,9 @@ class Pipeline {
 
  private:
   Pipeline(const BrainModel& model, const CaseConfig& config, Method method, Boundary boundary,
-           std::unique_ptr<inversion::Inverter> inverter, RegistrationTargets targets);
+           std::unique_ptr<inversion::Inverter> inverter, MakeInverter another,
+           RegistrationTargets targets);
+  Result<Update> answer(const Observation& observation, const RunOptions& options);
   Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
 
   CaseConfig config_;
@@ -59,7 +66,8 @@ class Pipeline {
   Update blank_;  // what is the same in every update: names, method, boundary, omissions
 
   Evidence evidence_;
-  std::unique_ptr<inversion::Inverter> inverter_;
+  std::unique_ptr<inversion::Inverter> inverter_;  // null: it threw
+  MakeInverter another_;
 };
 
 }  // namespace brainshift::pipeline

@@ -79,8 +79,10 @@ struct Alignment {
 
 // Aligned rigidly from the tracked pose, which is the identity: the points arrive in patient RAS.
 Result<Alignment> align(const Points& points, double observed_sd_mm,
-                        const registration::TargetSurface& surface, const CaseConfig& config) {
+                        const registration::TargetSurface& surface, const CaseConfig& config,
+                        const std::stop_token& stop) {
   registration::IcpOptions options;
+  options.stop = stop;
   options.rotation = config.scene.rotation != Carry::kOff;
   if (config.scene.rotation == Carry::kOn) options.observability_ratio = 0.0;
   if (observed_sd_mm > 0.0) options.sd_mm = observed_sd_mm;
@@ -125,11 +127,12 @@ bool follows_deformation(SurfaceGuidance guidance, Method method) {
 
 Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
                                             const RegistrationTargets& targets,
-                                            const CaseConfig& config, Method method) {
+                                            const CaseConfig& config, Method method,
+                                            const std::stop_token& stop) {
   const auto target = targets.tumour_distance
                           ? registration::TargetSurface(*targets.tumour_distance)
                           : registration::TargetSurface(targets.tumour->surface().at_rest());
-  auto alignment = align(body.points, body.sd_mm, target, config);
+  auto alignment = align(body.points, body.sd_mm, target, config, stop);
   if (!alignment) return tl::unexpected(alignment.error());
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
   if (!follows_deformation(config.sensing.tumour, method)) {
@@ -160,7 +163,8 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
 
 Result<RegisteredObservation> from_surface(const CorticalSurface& body,
                                            const RegistrationTargets& targets,
-                                           const CaseConfig& config, Method method) {
+                                           const CaseConfig& config, Method method,
+                                           const std::stop_token& stop) {
   if (!targets.site || targets.craniotomy == nullptr) {
     return fail(ErrorCode::kEmptySet,
                 "cortical surface: the craniotomy of the model has no triangle to compare it with");
@@ -170,8 +174,8 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   const SensingConfig& sensing = config.sensing;
   const double sd_mm = datum_sd_mm(body.sd_mm, config.inversion, method);
   if (!follows_deformation(sensing.surface, method)) {
-    auto alignment =
-        align(body.surface.vertices, body.sd_mm, targets.craniotomy->surface().at_rest(), config);
+    auto alignment = align(body.surface.vertices, body.sd_mm,
+                           targets.craniotomy->surface().at_rest(), config, stop);
     if (!alignment) return tl::unexpected(alignment.error());
     return from_alignment(body.surface.vertices, sd_mm, std::move(*alignment),
                           sensing.surface_points);
@@ -228,11 +232,12 @@ Result<RegistrationTargets> RegistrationTargets::build(const BrainModel& model) 
 
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
-                                                   const CaseConfig& config, Method method) {
+                                                   const CaseConfig& config, Method method,
+                                                   const std::stop_token& stop) {
   Result<RegisteredObservation> registered = invalid(fmt::format(
       "observation {}: a patient_pose is not assimilated in this version", observation.sequence));
   if (const auto* boundary = std::get_if<TumourBoundary>(&observation.body)) {
-    registered = from_boundary(*boundary, targets, config, method);
+    registered = from_boundary(*boundary, targets, config, method, stop);
   } else if (const auto* pairs = std::get_if<LandmarkPairs>(&observation.body)) {
     registered = from_landmarks(*pairs, config, method);
   } else if (const auto* surface = std::get_if<CorticalSurface>(&observation.body)) {
@@ -241,7 +246,7 @@ Result<RegisteredObservation> register_observation(const Observation& observatio
           fmt::format("observation {}: scene.surface = off: a cortical_surface is not taken",
                       observation.sequence));
     }
-    registered = from_surface(*surface, targets, config, method);
+    registered = from_surface(*surface, targets, config, method, stop);
   }
   if (!registered) return registered;
   registered->source = observation.source;

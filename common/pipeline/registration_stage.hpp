@@ -32,6 +32,7 @@
 
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include "common/configuration/case_config.hpp"
@@ -74,10 +75,11 @@ struct RegistrationTargets {
 // points. The sentence names the observation and the count. Precondition: the observation's numbers
 // are finite, as wire::decode_observation gives them. (Data that are not are rejected further on,
 // by check_data or by registration, with kNotFinite.) The result refers to nothing of the targets
-// but what it shares.
+// but what it shares. kNotConverged: `stop` was requested during an alignment.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config,
-                                                   Method method = Method::kCondensed);
+                                                   Method method = Method::kCondensed,
+                                                   const std::stop_token& stop = {});
 
 }  // namespace brainshift::pipeline

@@ -118,7 +118,7 @@ class Icp {
  public:
   Icp(const Points& points, const TargetSurface& surface, const RigidTransform& T_initial,
       const IcpOptions& options);
-  IcpResult run();
+  Result<IcpResult> run();
 
  private:
   void move(const RigidTransform& T, Fit& fit) const;
@@ -249,11 +249,14 @@ bool Icp::descend(const PoseInformation& data, Vec6 xi) {
   return is_small(xi);
 }
 
-IcpResult Icp::run() {
+Result<IcpResult> Icp::run() {
   IcpResult result;
   move(initial_pose_, current_);
   double scale = start_scale();
   while (result.iterations < options_.max_iterations && !result.converged) {
+    if (options_.stop.stop_requested()) {
+      return fail(ErrorCode::kNotConverged, "the alignment was stopped");
+    }
     ++result.iterations;
     weigh(scale, current_);
     const PoseInformation data = information(current_);

@@ -24,6 +24,7 @@
 #pragma once
 
 #include <functional>
+#include <stop_token>
 
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
@@ -74,6 +75,7 @@ struct IcpOptions {
   // facets of a sphere of 2,562 vertices, 3e-3 for semi-axes of 14, 13 and 20 mm, 2.6e-2 for 14,
   // 11 and 20 mm.
   double observability_ratio = 1e-2;
+  std::stop_token stop = {};  // looked at once per iteration
 };
 
 struct IcpResult {
@@ -104,7 +106,8 @@ struct IcpResult {
 // points: 3 x m, mm, m >= 3, finite and not collinear. surface: triangles or a distance volume.
 // kInvalidArgument: fewer than 3 points (with the count) or collinear ones, an option out of range
 // (named), an initial pose that is not a rigid motion. kNotFinite: names the point, or the pose.
-// An alignment that uses up its iterations is a result with converged == false.
+// kNotConverged: `stop` was requested. An alignment that uses up its iterations is a result with
+// converged == false.
 Result<IcpResult> align(const Points& points, const TargetSurface& surface,
                         const RigidTransform& T_surface_points_initial,
                         const IcpOptions& options = {});

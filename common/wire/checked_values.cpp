@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "common/core/text.hpp"
 #include "common/wire/convert.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "brainshift/v1/brainshift.pb.h"
+#include "common/core/text.hpp"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/payload_scan.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

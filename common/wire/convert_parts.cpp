@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "common/core/text.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/names.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

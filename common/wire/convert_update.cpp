@@ -3,12 +3,12 @@
 #include <cmath>
 
 #include "brainshift/v1/brainshift.pb.h"
+#include "common/core/text.hpp"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_parts.hpp"
 #include "common/wire/names.hpp"
 #include "common/wire/payload_scan.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

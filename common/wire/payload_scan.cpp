@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "common/core/text.hpp"
 #include "common/wire/frame.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

@@ -5,10 +5,10 @@
 #include <functional>
 
 #include "brainshift/v1/operations.pb.h"
+#include "common/core/text.hpp"
 #include "common/wire/checked_values.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/payload_scan.hpp"
-#include "common/wire/text.hpp"
 
 namespace brainshift::wire {
 namespace {

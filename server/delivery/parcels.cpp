@@ -119,13 +119,41 @@ std::optional<Parcel> Parcels::make(const Bytes& whole, const SelectionPtr& sele
                          held->sequence < of.update->sequence();
   const Held base = builds_on ? held : Held{};
   const auto known = std::find_if(of.made.begin(), of.made.end(), [&](const Made& made) {
-    return made.selection == selection && made.base == base;
+    return made.selection.lock() == selection && made.base == base;
   });
   if (known != of.made.end()) return known->parcel;
   if (spent()) return std::nullopt;
   ++made_;
   of.made.push_back({selection, base, make_parcel(whole, *of.update, *selection, base)});
-  return of.made.back().parcel;
+  Parcel parcel = of.made.back().parcel;
+  for (std::size_t kept = bytes_kept(); kept > kBytesKept;) {
+    auto& oldest = *std::find_if(entries_.begin(), entries_.end(),
+                                 [](const Entry& entry) { return !entry.made.empty(); });
+    kept -= oldest.made.front().bytes();
+    oldest.made.pop_front();
+  }
+  return parcel;
+}
+
+std::size_t Parcels::Made::bytes() const {
+  const Held& held = parcel.held;
+  return parcel.bytes->size() +
+         (held ? sizeof(float) * (held->xyz_mm.size() + held->sd_mm.size()) : 0);
+}
+
+std::size_t Parcels::bytes_kept() const {
+  std::size_t bytes = 0;
+  for (const Entry& entry : entries_) {
+    for (const Made& made : entry.made) bytes += made.bytes();
+  }
+  return bytes;
+}
+
+void Parcels::begin_turn() {
+  made_ = 0;
+  for (Entry& entry : entries_) {
+    std::erase_if(entry.made, [](const Made& made) { return made.selection.expired(); });
+  }
 }
 
 }  // namespace brainshift::server

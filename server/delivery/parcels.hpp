@@ -56,8 +56,13 @@ class Parcels {
   static constexpr double kKnownTolerance = 0.05;
   // The newest usable update, the newest failure since and an iterate.
   static constexpr std::size_t kUpdatesKept = 3;
+  // Of parcels that are kept for the next viewer of the same choice. Beyond that the oldest go:
+  // they would be made once more.
+  static constexpr std::size_t kBytesKept = 16u << 20;
 
-  void begin_turn() { made_ = 0; }
+  // Drops what was made for choices that no viewer has any more.
+  void begin_turn();
+  std::size_t bytes_kept() const;
   // Of a session that has ended nothing is kept.
   void forget_session() { entries_.clear(); }
   // Whether something was left to the next turn.
@@ -70,14 +75,15 @@ class Parcels {
 
  private:
   struct Made {
-    SelectionPtr selection;
+    std::weak_ptr<const Selection> selection;  // of the viewers that chose it
     Held base;
     Parcel parcel;
+    std::size_t bytes() const;
   };
   struct Entry {
     Bytes whole;
     std::optional<wire::PublishedUpdate> update;  // empty: has no field
-    std::vector<Made> made;
+    std::deque<Made> made;                        // the newest last
   };
   Entry& entry(const Bytes& whole);
 

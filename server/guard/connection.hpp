@@ -33,6 +33,7 @@ inline constexpr std::size_t kWrapping = 48;
 struct Account {
   std::atomic<std::uint64_t> delivered{0};
   std::atomic<std::uint64_t> messages{0};
+  std::atomic<std::uint64_t> parts{0};
   std::atomic<bool> served{false};
   std::atomic<bool> to_close{false};
   std::atomic<bool> throttled{false};  // it is not read until more is delivered
@@ -47,7 +48,7 @@ struct Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // Brings `held` and `moved` up to date. By how much `held` has changed, modulo 2^64.
+  // Brings `held`, `waiting` and `moved` up to date. By how much `held` has changed, modulo 2^64.
   std::uint64_t settle(TimePoint now);
   // Something cannot go on at once.
   bool stuck() const { return !up.empty() || !down.empty() || account->throttled; }
@@ -57,16 +58,20 @@ struct Connection {
   Lane up, down;     // to libzmq, to the peer
   ZmtpStream stream;
   std::shared_ptr<Account> account = std::make_shared<Account>();
-  std::uint64_t held = 0;  // by libzmq
+  std::uint64_t held = 0;     // by libzmq
+  std::uint64_t waiting = 0;  // messages that libzmq holds whole; with CURVE parts
   TimePoint opened;
   TimePoint forgiven;
   TimePoint moved;  // something was delivered, or nothing was held
 
  private:
-  // What held has taken in: of the stream's cost, of account->delivered and of account->messages.
+  // What was taken in so far: of the stream's cost and messages, and of the account.
   std::uint64_t cost_ = 0;
+  std::uint64_t complete_ = 0;
   std::uint64_t delivered_ = 0;
   std::uint64_t messages_ = 0;
+  std::uint64_t parts_ = 0;
+  std::uint64_t forgiven_bytes_ = 0;  // not yet counted as parts
 };
 
 // The abstract name of a socket (getsockname) or of its peer (getpeername); empty: it has none.

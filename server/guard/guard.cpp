@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "server/guard/connection.hpp"
+#include "server/guard/sheltered.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -33,6 +34,11 @@ constexpr int kReadsPerTurn = 16;
 constexpr std::chrono::milliseconds kTick{100};
 // Beyond one message; what a busy client has under way.
 constexpr std::size_t kSlack = 1u << 20;
+// Messages of a connection that libzmq may hold before it is read again. Each may keep one of
+// libzmq's buffers of 18 KiB, however short it is; not with CURVE, where parts are counted and a
+// message may have some.
+constexpr std::uint64_t kMaxWaiting = 8;
+constexpr std::uint64_t kMaxWaitingParts = 64;
 
 }  // namespace
 
@@ -78,16 +84,23 @@ struct Guard::Impl {
           [[maybe_unused]] const auto got = read(wake, &value, sizeof value);
           next_tick = Clock::now();
         } else if (fd == listener.fd()) {
-          accept_all();
+          if (!sheltered("a connection", [&] { accept_all(); })) listen_again(false);
         } else if (const auto found = by_fd.find(fd); found != by_fd.end()) {
-          serve(*found->second, (event.events & (EPOLLHUP | EPOLLERR)) != 0);
+          Connection& connection = *found->second;
+          const bool hung_up = (event.events & (EPOLLHUP | EPOLLERR)) != 0;
+          if (!sheltered("a connection", [&] { serve(connection, hung_up); })) close_fd(fd);
         }
       }
       if (Clock::now() >= next_tick) {
-        tick();
+        sheltered("a look at the connections", [&] { tick(); });
         next_tick = Clock::now() + kTick;
       }
     }
+  }
+
+  // Of a connection that could not be served, if it is still there.
+  void close_fd(int fd) {
+    if (const auto found = by_fd.find(fd); found != by_fd.end()) end(*found->second, nullptr, {});
   }
 
   void nudge() const {
@@ -125,8 +138,14 @@ struct Guard::Impl {
   }
 
   void open(int peer) {
-    auto connection = std::make_unique<Connection>(
-        ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+    std::unique_ptr<Connection> connection;
+    try {
+      connection = std::make_unique<Connection>(
+          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+    } catch (...) {
+      ::close(peer);
+      throw;
+    }
     connection->peer = peer;
     connection->inner = connect_inner(inner);
     if (connection->inner < 0) return;  // closes it
@@ -134,13 +153,16 @@ struct Guard::Impl {
     setsockopt(peer, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for ipc, which has none
     connection->name = socket_name(connection->inner, &getsockname);
     Connection& added = *connection;
-    by_fd[added.peer] = by_fd[added.inner] = &added;
-    {
+    connections[added.name] = std::move(connection);
+    try {
+      by_fd[added.peer] = by_fd[added.inner] = &added;
       const std::lock_guard lock(mutex);
       accounts[added.name] = added.account;
       ++counts.accepted;
+    } catch (...) {
+      end(added, nullptr, {});
+      throw;
     }
-    connections[added.name] = std::move(connection);
     watch(added.peer, EPOLLIN, EPOLL_CTL_ADD);
     watch(added.inner, EPOLLIN, EPOLL_CTL_ADD);
   }
@@ -171,8 +193,11 @@ struct Guard::Impl {
     for (int i = 0; i < kReadsPerTurn; ++i) {
       bool more = true;
       if (up) {
+        connection.account->throttled = true;  // first: delivered() sees it, or has been seen
         held += connection.settle(Clock::now());
-        more = connection.held <= options.max_message_bytes + kSlack;
+        more =
+            connection.held <= options.max_message_bytes + kSlack &&
+            connection.waiting <= (connection.stream.encrypted() ? kMaxWaitingParts : kMaxWaiting);
         connection.account->throttled = !more;
       }
       while (!lane.empty()) {
@@ -260,7 +285,7 @@ struct Guard::Impl {
     by_fd.erase(connection.inner);
     const auto claimed = routing_ids.find(connection.stream.routing_id());
     if (claimed != routing_ids.end() && claimed->second == &connection) routing_ids.erase(claimed);
-    connections.erase(std::string(connection.name));
+    connections.erase(connections.find(connection.name));
     listen_again(true);
   }
 
@@ -306,6 +331,7 @@ void Guard::delivered(int inner_fd, std::size_t bytes, std::size_t parts) {
   const auto account = impl_->account_of(inner_fd);
   if (!account) return;
   account->delivered += bytes + parts * (ZmtpStream::kPartCost + kWrapping);
+  account->parts += parts;
   ++account->messages;
   if (account->throttled) impl_->nudge();
 }

@@ -8,8 +8,9 @@
 // guard bounds what it can be made to keep:
 //
 //   a message       max_message_bytes and 1024 parts; beyond that the connection is closed
-//   a connection    is not read while libzmq holds more of it than one message and a MiB; closed
-//                   when nothing of it was delivered for `patience`
+//   a connection    is not read while libzmq holds more of it than one message and a MiB, or more
+//                   than 8 messages (with CURVE 64 parts); closed when nothing of it was delivered
+//                   for `patience`
 //   all of them     held_bytes; beyond that the one whose bytes have waited longest is closed
 //   connections     max_connections; the oldest that was never served makes room once it is 100 ms
 //                   old, or nobody is accepted until one leaves
@@ -18,8 +19,14 @@
 // the daemon has taken. With CURVE the parts of a message cannot be told from messages, and
 // heartbeats not from parts: kForgiven bytes a second are forgiven.
 //
+// libzmq itself must never stop reading: once it has, a connection that is closed and a heartbeat
+// in its buffer abort the process (_io_error, libzmq issue 4841). So its receive queue has no limit
+// (router_socket.cpp), and the bounds above are the only ones.
+//
 // Without CURVE a routing id that another connection has is refused: its connection is closed. With
 // CURVE libzmq ignores such a peer, and it is closed when its patience ends.
+//
+// Memory that is not to be had for a connection ends that connection.
 //
 // One thread of its own. delivered(), served() and close() are for the daemon's transport thread.
 #pragma once

@@ -95,6 +95,7 @@ void ZmtpStream::body_complete() {
   } else if ((flags_ & kMore) == 0) {
     parts_ = 0;
     message_bytes_ = 0;
+    ++messages_;
   }
 }
 

@@ -39,6 +39,8 @@ class ZmtpStream {
   // What libzmq may hold of what has come: bytes of data frames as far as they have come, with
   // their headers, and kPartCost for each. Grows only.
   std::uint64_t cost() const { return cost_; }
+  // Messages that have come whole; with CURVE every part counts as one. Grows only.
+  std::uint64_t messages() const { return messages_; }
   // The mechanism is CURVE; known once the greeting has come.
   bool encrypted() const { return encrypted_; }
   // The routing id that the peer chose for itself, as far as it shows: empty with CURVE, and before
@@ -64,6 +66,7 @@ class ZmtpStream {
   std::size_t parts_ = 0;   // of the message under way
   std::uint64_t message_bytes_ = 0;
   std::uint64_t cost_ = 0;
+  std::uint64_t messages_ = 0;
   std::string mechanism_;
   bool encrypted_ = false;
   std::string command_;  // the first one

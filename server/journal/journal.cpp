@@ -16,6 +16,8 @@ namespace fs = std::filesystem;
 
 // Nothing happens by itself before the first session; any far time will do.
 constexpr std::chrono::hours kIdle{1};
+// That are tried when others take them.
+constexpr int kNames = 16;
 
 // A sink that throws ends its file, not the thread.
 template <typename Function>
@@ -58,7 +60,8 @@ void Journal::begin(const fs::path& path, const JournalMeta& meta, std::uint64_t
     const std::lock_guard lock(mutex_);
     phase_ = Phase::kRecording;
     error_.reset();
-    overrun_ = false;
+    overrun_ = exhausted_ = false;
+    session_bytes_ = 0;
     gap_ = {};
     recorded_ = {};
     recorded_.session_id = session_id;
@@ -79,13 +82,17 @@ void Journal::append(io::SurgeryRecord record, std::string source) {
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kIdle) return;
+    const bool over = session_bytes_ + record.payload.size() > options_.max_session_bytes;
     const bool full = queue_.size() >= options_.max_queued ||
                       queued_bytes_ + record.payload.size() > options_.max_queued_bytes;
-    if (full && phase_ != Phase::kFailed) {
+    if ((full || over) && phase_ != Phase::kFailed) {
       phase_ = Phase::kFailed;
-      error_ =
-          Error{ErrorCode::kWriteFailed,
-                fmt::format("journal: storage is too slow, {} records are waiting", queue_.size())};
+      error_ = Error{
+          ErrorCode::kWriteFailed,
+          over
+              ? fmt::format("journal: the session has {} MiB, its limit", session_bytes_ >> 20)
+              : fmt::format("journal: storage is too slow, {} records are waiting", queue_.size())};
+      exhausted_ = over;
       overrun_ = true;
       recorded_.recording = false;
       recorded_.reason = error_->message;
@@ -98,6 +105,7 @@ void Journal::append(io::SurgeryRecord record, std::string source) {
       // The thread waits for the first record, then for the time to be up or for half a queue.
       wake = queue_.empty() || queue_.size() == options_.max_queued / 2;
       queued_bytes_ += record.payload.size();
+      session_bytes_ += record.payload.size();
       queue_.push_back(Item{std::nullopt, std::move(record), std::move(source)});
     }
   }
@@ -125,13 +133,35 @@ void Journal::stop() {
 void Journal::work(const std::stop_token& stop) {
   Group group;
   std::optional<Opening> opening;
-  while (take(stop, group, opening)) {
-    if (opening) begin_file(*opening);
-    if (!group.records.empty()) write(std::move(group));
-    supervise();
+  for (bool going = true; going;) {
+    const Status done = writing([&]() -> Status {
+      going = take(stop, group, opening);
+      if (!going) return {};
+      if (opening) begin_file(*opening);
+      if (!group.records.empty()) write(std::move(group));
+      supervise();
+      return {};
+    });
+    if (!done) interrupt(done.error(), std::move(group), std::move(opening));
   }
-  lose(unwritten_.ranges());
-  end_session();
+  (void)writing([&]() -> Status {
+    lose(unwritten_.ranges());
+    end_session();
+    return {};
+  });
+}
+
+// What was to be done failed without a sink's fault, for want of memory: as if the storage had
+// failed, so that recording goes on in a new file. What was taken from the queue is tried there.
+void Journal::interrupt(const Error& error, Group group, std::optional<Opening> opening) {
+  if (opening) current_ = std::move(*opening);
+  if (!group.records.empty()) unwritten_ = std::move(group);
+  (void)writing([&]() -> Status {
+    end_file(error, false);
+    return {};
+  });
+  std::unique_lock lock(mutex_);
+  wake_.wait_for(lock, options_.commit_interval, [] { return false; });
 }
 
 bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening) {
@@ -156,6 +186,9 @@ bool Journal::take(const std::stop_token& stop, Group& group, std::optional<Open
     --openings_;
     return true;
   }
+  // What follows throws nothing: no record is lost between queue and group.
+  group.records.reserve(queue_.size());
+  group.sources.reserve(queue_.size());
   while (!queue_.empty() && !queue_.front().opening) {
     Item& item = queue_.front();
     queued_bytes_ -= item.record.payload.size();
@@ -175,20 +208,30 @@ void Journal::end_session() {
   if (empty) io::discard_surgery(path_);
 }
 
+// Another daemon may have taken the name since it was found free: then the next one.
+Result<std::unique_ptr<RecordSink>> Journal::open_file(fs::path& path, const JournalMeta& meta) {
+  for (int tries = 1;; ++tries) {
+    auto sink = writing([&] { return options_.open(path, meta); });
+    if (sink || tries == kNames || free_path(path) == path) return sink;
+    path = free_path(path);
+  }
+}
+
 void Journal::begin_file(const Opening& opening) {
   end_session();
   unwritten_ = {};
   contents_ = {};
   current_ = opening;
   path_.clear();
-  auto sink = writing([&] { return options_.open(opening.path, opening.meta); });
+  fs::path path = opening.path;
+  auto sink = open_file(path, opening.meta);
   if (!sink) {
     end_file(sink.error(), false);
     next_check_ = Clock::now() + options_.retry_interval;
     return;
   }
   sink_ = std::move(*sink);
-  path_ = opening.path;
+  current_.path = path_ = path;
   next_check_ = Clock::now() + options_.check_interval;
   {
     const std::lock_guard lock(mutex_);
@@ -254,19 +297,18 @@ void Journal::supervise() {
 
 void Journal::resume() {
   next_check_ = Clock::now() + options_.retry_interval;
-  const fs::path path = free_path(current_.path, path_);
+  fs::path path = free_path(current_.path, path_);
   const auto available = free_bytes(path.parent_path());
   const bool scarce = available && *available < options_.resume_free_bytes;
   Opening next = current_;
   {
     const std::lock_guard lock(mutex_);
-    if (current_.generation != generation_ || phase_ != Phase::kFailed) return;
+    if (current_.generation != generation_ || phase_ != Phase::kFailed || exhausted_) return;
     if (!scarce) phase_ = Phase::kResuming;
     next.meta.continues = path_.filename().string();
     next.meta.gap = fmt::format("{}; not recorded: {}", error_->message, describe(gap_));
   }
-  auto sink = scarce ? fail(ErrorCode::kWriteFailed, "no space")
-                     : writing([&] { return options_.open(path, next.meta); });
+  auto sink = scarce ? fail(ErrorCode::kWriteFailed, "no space") : open_file(path, next.meta);
   if (sink) {
     sink_ = std::move(*sink);
     contents_ = {};
@@ -305,9 +347,9 @@ void Journal::end_file(const Error& error, bool contents_lost) {
     const std::lock_guard lock(mutex_);
     if (current_.generation == generation_) {
       phase_ = Phase::kFailed;
-      error_ = error;
       overrun_ = false;
       recorded_.recording = false;
+      error_ = error;
       recorded_.reason = error.message;
     }
   }

@@ -15,7 +15,8 @@
 // replaced, storage so slow that the queue is full) ends the file. status() and recorded() say why
 // from then on, and `on_error` is told once. The records of the failed transaction are tried again
 // in a new file at once; if that fails too, they are lost, and so is what is appended until a new
-// file can be written, which is tried every `retry_interval`. The new file has the next free name.
+// file can be written, which is tried every `retry_interval`. The new file has the next free name,
+// as has the first when another daemon took its name in the same moment.
 // Its meta names the file before it and what neither of them holds.
 #pragma once
 
@@ -85,6 +86,8 @@ class Journal {
     OpenSink open = open_surgery_file;
     std::size_t max_queued = 4096;  // records
     std::size_t max_queued_bytes = 256u << 20;
+    // Of the payloads of a session; beyond them recording ends, and says so.
+    std::uint64_t max_session_bytes = std::uint64_t{64} << 30;
     std::chrono::milliseconds commit_interval{5};
     std::chrono::milliseconds check_interval{250};  // whether the file is still there
     std::chrono::milliseconds retry_interval{1000};
@@ -138,6 +141,9 @@ class Journal {
   void work(const std::stop_token& stop);
   // Waits for records, a session, or the time of the next check. False at the end.
   bool take(const std::stop_token& stop, Group& group, std::optional<Opening>& opening);
+  void interrupt(const Error& error, Group group, std::optional<Opening> opening);
+  Result<std::unique_ptr<RecordSink>> open_file(std::filesystem::path& path,
+                                                const JournalMeta& meta);
   void begin_file(const Opening& opening);
   void end_session();
   void write(Group group);
@@ -166,9 +172,11 @@ class Journal {
   std::size_t openings_ = 0;      // in the queue
   std::uint64_t generation_ = 0;  // counts begin()
   Phase phase_ = Phase::kIdle;
-  std::optional<Error> error_;  // of the current generation
-  bool overrun_ = false;        // error_ is one that the thread has not seen yet
-  RecordRanges gap_;            // lost since the last file
+  std::optional<Error> error_;       // of the current generation
+  bool overrun_ = false;             // error_ is one that the thread has not seen yet
+  bool exhausted_ = false;           // the session has max_session_bytes: nothing more is recorded
+  std::uint64_t session_bytes_ = 0;  // of the payloads queued in it
+  RecordRanges gap_;                 // lost since the last file
   Recorded recorded_;
 
   std::jthread thread_;

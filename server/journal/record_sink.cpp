@@ -16,12 +16,13 @@ class SurgeryFileSink final : public RecordSink {
  public:
   explicit SurgeryFileSink(io::SurgeryFile file) : file_(std::move(file)) {}
   Status append(std::span<const io::SurgeryRecord> records) override {
+    if (Status ok = check(); !ok) return ok;
     return file_.append(records);
   }
   Status check() override {
     if (file_.in_place()) return {};
     return fail(ErrorCode::kWriteFailed,
-                file_.path().string() + ": was deleted or replaced while it was recorded");
+                file_.path().string() + ": was deleted, replaced or cut while it was recorded");
   }
   Status close() override { return file_.close(); }
 

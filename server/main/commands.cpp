@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "client/lib/client.hpp"
+#include "common/core/text.hpp"
 #include "common/io/config/daemon_file.hpp"
 #include "common/io/config/key_file.hpp"
 
@@ -42,8 +43,7 @@ Result<DaemonStatus> ask(const HealthArguments& arguments) {
 }  // namespace
 
 int print_error(const Error& error) {
-  std::string line = error.message;
-  std::replace(line.begin(), line.end(), '\n', ' ');
+  const std::string line = one_line(error.message);
   pollfd writable{STDERR_FILENO, POLLOUT, 0};
   if (poll(&writable, 1, kReaderLimitMs) != 0) {
     std::fprintf(stderr, "brainshiftd: %s\n", line.c_str());

@@ -35,8 +35,8 @@ struct ServeArguments {
   std::optional<std::string> endpoint;         // instead of the configuration's
 };
 
-// Prints "listening on <endpoint>" to stdout once clients can connect; serves until SIGINT or
-// SIGTERM. Returns the exit status.
+// Prints "listening on <endpoint>" to stdout once clients can connect; serves until SIGINT,
+// SIGTERM or SIGHUP. Returns the exit status.
 int run_serve(const ServeArguments& arguments);
 
 // brainshiftd health: whether a daemon answers; for containers and scripts.

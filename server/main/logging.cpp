@@ -15,6 +15,8 @@
 #include <thread>
 #include <utility>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 
@@ -57,7 +59,10 @@ class LineSink : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
  private:
   void write(const spdlog::details::log_msg& message) {
     spdlog::memory_buf_t line;
-    formatter_->format(message, line);
+    const std::string text = one_line({message.payload.data(), message.payload.size()}, '?');
+    spdlog::details::log_msg plain = message;
+    plain.payload = text;
+    formatter_->format(plain, line);
     write_line(fd_, {line.data(), line.size()});
   }
 

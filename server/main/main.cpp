@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brainshiftd: prepares patient models before surgery and serves estimates during it.
+#include <sys/stat.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -40,7 +42,8 @@ int parse_and_run(int argc, char** argv) {
       "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq .prepare.contact.factor_s");
 
   ServeArguments serve;
-  auto* serve_command = app.add_subcommand("serve", "Answer clients until SIGINT or SIGTERM");
+  auto* serve_command =
+      app.add_subcommand("serve", "Answer clients until SIGINT, SIGTERM or SIGHUP");
   serve_command->add_option("--config", serve.config_file, "Daemon file (YAML)")->required();
   serve_command->add_option("--model", serve.model, "Model file, instead of the daemon file's");
   serve_command->add_option(
@@ -88,6 +91,7 @@ int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   brainshift::io::survive_failing_writes();
+  umask(077);  // files hold a patient's data
   try {
     return parse_and_run(argc, argv);
   } catch (const std::exception& exception) {

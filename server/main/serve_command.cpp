@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "common/io/config/daemon_file.hpp"
@@ -31,6 +33,8 @@ namespace {
 
 // How old the figures of viewers may be that a monitor gets from an idle daemon.
 constexpr std::chrono::milliseconds kFreshViewers{1000};
+// What a preparation or an update gets to end in once the daemon stops.
+constexpr std::chrono::milliseconds kStopGrace{1500};
 
 Result<io::DaemonConfig> configuration(const ServeArguments& arguments) {
   auto config = io::read_daemon_config(arguments.config_file);
@@ -61,6 +65,7 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.machine = machine_type();
   options.blas_kernel = linalg::blas_kernel();
   options.journal_dir = config.journal_dir;
+  options.journal_bytes = static_cast<std::uint64_t>(config.limits.journal_gib) << 30;
   if (config.model.empty()) return options;
   // Sessions with a fixed boundary are rare: their operators are read when one starts.
   auto file = io::read_model(config.model, {Boundary::kContact});
@@ -178,7 +183,7 @@ Status serve(const ServeArguments& arguments) {
   if (!config) return tl::unexpected(config.error());
   LogOptions log_options;
   log_options.level = config->log_level;
-  const Log log(log_options);
+  std::optional<Log> log(std::in_place, log_options);
   auto options = service_options(*config);
   if (!options) return tl::unexpected(options.error());
 
@@ -211,7 +216,7 @@ Status serve(const ServeArguments& arguments) {
     spdlog::info("authentication is off: any peer that can connect has full access");
   }
   Outbox outbox;
-  options->log_lines_lost = [&log] { return log.lost(); };
+  options->log_lines_lost = [&log] { return log->lost(); };
   options->on_turn = [&reporter] { reporter.turn(); };
   Service service(std::move(*options), outbox);
   reporter.watch(service);
@@ -224,8 +229,12 @@ Status serve(const ServeArguments& arguments) {
   spdlog::info("stopping");
   manager.stopping();
   exporter->reset();
-  service.stop();
-  return status;
+  if (service.stop(kStopGrace)) return status;
+  // A library that heeds no stop is at work: a factorisation, or OpenBLAS without address space.
+  spdlog::warn("ended while a preparation or an update was still at work; the journal is closed");
+  { const Router ended = std::move(*router); }  // removes the socket of an ipc path
+  log.reset();
+  std::_Exit(status ? kExitSuccess : print_error(status.error()));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <netinet/in.h>
 #include <prometheus/metric_family.h>
 #include <prometheus/text_serializer.h>
+#include <sys/socket.h>
 
 #include <cerrno>
 #include <charconv>
@@ -15,6 +16,8 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+
+#include "common/core/text.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -34,6 +37,7 @@ MetricFamily family(MetricType type, std::string_view name, std::string_view hel
 
 void add(MetricFamily& family, double value, Labels labels = {}) {
   ClientMetric& metric = family.metric.emplace_back();
+  for (auto& label : labels) label.value = one_line(label.value, '?');
   metric.label = std::move(labels);
   (family.type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
 }
@@ -204,7 +208,8 @@ void add_process(Families& out, const wire::ProcessFigures& process) {
 
 constexpr const char* kPath = "/metrics";
 constexpr const char* kFormat = "text/plain; version=0.0.4; charset=utf-8";
-// Of monitors and people who look; more are refused.
+// Of monitors and people who look. One more, and the oldest is closed: it has had its answer, or
+// sends its question byte by byte.
 constexpr unsigned kMaxConnections = 16;
 constexpr unsigned kIdleLimit_s = 10;
 
@@ -247,6 +252,22 @@ MHD_Result respond(MHD_Connection* connection, unsigned status, const std::strin
   return queued;
 }
 
+// The sockets of the connections, the oldest first; of the server's one thread. Called by C code:
+// there is room for every one.
+void count_connection(void* all, MHD_Connection* connection, void**,
+                      MHD_ConnectionNotificationCode code) {
+  auto& open = *static_cast<std::vector<int>*>(all);
+  const int fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+  if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+    std::erase(open, fd);
+    return;
+  }
+  open.push_back(fd);
+  if (open.size() <= kMaxConnections) return;
+  shutdown(open.front(), SHUT_RDWR);  // the server then closes it
+  open.erase(open.begin());
+}
+
 // Called by C code: nothing may be thrown.
 MHD_Result answer(void* ask, MHD_Connection* connection, const char* path, const char* method,
                   const char*, const char*, std::size_t*, void**) {
@@ -282,6 +303,7 @@ std::vector<MetricFamily> metric_families(const wire::DaemonReport& report) {
 
 struct MetricsExporter::Impl {
   Ask ask;
+  std::vector<int> open;                                           // sockets
   std::unique_ptr<MHD_Daemon, decltype(&MHD_stop_daemon)> server;  // the last: it calls `ask`
 };
 
@@ -295,14 +317,15 @@ Result<MetricsExporter> MetricsExporter::listen(const std::string& endpoint, Ask
   };
   const auto address = address_of(endpoint);
   if (!address) return refuse("must be HOST:PORT with an address in numbers");
-  auto impl = std::make_unique<Impl>(Impl{std::move(ask), {nullptr, &MHD_stop_daemon}});
+  auto impl = std::make_unique<Impl>(Impl{std::move(ask), {}, {nullptr, &MHD_stop_daemon}});
+  impl->open.reserve(2 * kMaxConnections);
   unsigned flags = MHD_USE_AUTO | MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_ITC;
   if (address->ss_family == AF_INET6) flags |= MHD_USE_IPv6;
   errno = 0;
-  impl->server.reset(MHD_start_daemon(flags, 0, nullptr, nullptr, &answer, &impl->ask,
-                                      MHD_OPTION_SOCK_ADDR, &*address, MHD_OPTION_CONNECTION_LIMIT,
-                                      kMaxConnections, MHD_OPTION_CONNECTION_TIMEOUT, kIdleLimit_s,
-                                      MHD_OPTION_END));
+  impl->server.reset(MHD_start_daemon(
+      flags, 0, nullptr, nullptr, &answer, &impl->ask, MHD_OPTION_SOCK_ADDR, &*address,
+      MHD_OPTION_CONNECTION_LIMIT, 2 * kMaxConnections, MHD_OPTION_CONNECTION_TIMEOUT, kIdleLimit_s,
+      MHD_OPTION_NOTIFY_CONNECTION, &count_connection, &impl->open, MHD_OPTION_END));
   if (impl->server == nullptr) {
     return refuse(std::string("nothing can listen there: ") + std::strerror(errno));
   }

@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <functional>
 #include <random>
 #include <system_error>
 #include <utility>
 
+#include "server/guard/sheltered.hpp"
 #include "server/operations/process_figures.hpp"
 #include "server/transport/peers.hpp"
 
@@ -56,39 +58,51 @@ Service::Service(ServiceOptions options, Outbox& outbox)
   if (!options_.journal_dir.empty()) {
     Journal::Options journal;
     journal.open = options_.open_journal;
+    journal.max_session_bytes = options_.journal_bytes;
     journal.on_error = [this](const Error& error) {
       spdlog::error("{}", error.message);
-      const std::lock_guard lock(mutex_);
-      push_state();
+      sheltered("a message to the subscribers", [&] {
+        const std::lock_guard lock(mutex_);
+        push_state();
+      });
     };
     journal.on_resumed = [this](const auto& path) {
       spdlog::info("journal {}", path.string());
-      const std::lock_guard lock(mutex_);
-      push_state();
+      sheltered("a message to the subscribers", [&] {
+        const std::lock_guard lock(mutex_);
+        push_state();
+      });
     };
     journal_ = std::make_unique<Journal>(std::move(journal));
   }
   if (options_.model) {
     selections_.emplace(options_.model);
     session_.emplace(options_.model->case_id, options_.boot_id, options_.model->model_id);
-    preparer_ = std::jthread([this](const std::stop_token& stop) { prepare(stop); });
-    worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+    at_work_ = 2;
+    preparer_ = std::jthread(std::bind_front(&Service::repeat, this), &Service::prepare);
+    worker_ = std::jthread(std::bind_front(&Service::repeat, this), &Service::work);
   }
 }
 
 Service::~Service() { stop(); }
 
-void Service::stop() {
+bool Service::stop(std::chrono::milliseconds grace) {
+  bool ended = true;
   if (session_) {
-    const std::lock_guard lock(mutex_);
-    session_->stop();
-    act();
+    std::unique_lock lock(mutex_);
+    sheltered("the end of the session", [&] {
+      session_->stop();
+      act();
+    });
+    preparer_.request_stop();
+    worker_.request_stop();
+    ended = wake_.wait_for(lock, grace, [&] { return at_work_ == 0; });
   }
   for (std::jthread* thread : {&preparer_, &worker_}) {
-    thread->request_stop();
-    if (thread->joinable()) thread->join();
+    if (ended && thread->joinable()) thread->join();
   }
   if (journal_) journal_->stop();
+  return ended;
 }
 
 // ---------- requests ----------
@@ -118,14 +132,14 @@ std::optional<Reply> Service::handle(const std::string& peer, const wire::Frame&
       if (!options_.model) return model_not_ready();
       if (encoded_model_.empty()) encoded_model_ = wire::encode(*options_.model);
       return Reply{MessageType::kModelReply, encoded_model_};
-    case MessageType::kObservation: return observe(frame);
+    case MessageType::kObservation: return observe(peer, frame);
     default: break;
   }
   return error_reply({ErrorCode::kProtocol, fmt::format("message type {} is not a request",
                                                         static_cast<int>(frame.type))});
 }
 
-Reply Service::observe(const wire::Frame& frame) {
+Reply Service::observe(const std::string& peer, const wire::Frame& frame) {
   const auto arrived = std::chrono::steady_clock::now();
   const auto refuse = [&](const std::string& source, const Error& error) {
     counters_.refused(source, arrived);
@@ -140,7 +154,7 @@ Reply Service::observe(const wire::Frame& frame) {
   if (std::exchange(observation->daemon_ns, 0) != 0) given = wire::encode(*observation);
 
   const std::lock_guard lock(mutex_);
-  const auto admission = session_->submit(std::move(*observation), arrived);
+  const auto admission = session_->submit(std::move(*observation), arrived, peer);
   if (!admission) {
     spdlog::debug("observation refused sequence={} code={} reason=\"{}\"", sequence,
                   to_string(admission.error().code), admission.error().message);

@@ -73,6 +73,7 @@ struct ServiceOptions {
   MakeSessionModel make_model;              // needed with a model
   std::filesystem::path journal_dir;        // empty: no journal
   std::filesystem::path case_file;          // metadata of the journal
+  std::uint64_t journal_bytes = Journal::Options{}.max_session_bytes;
   // On what updates are computed, for the journal and for clients (DaemonStatus).
   std::string build = {};
   std::string machine = {};
@@ -101,17 +102,23 @@ class Service final : public RequestHandler {
 
   static constexpr std::chrono::milliseconds kValidity{1000};
 
-  // Ends the inversion, then writes the journal out. Idempotent.
-  void stop();
+  // Ends the inversion, then writes the journal out. Idempotent. False: a thread has not ended
+  // within the grace (a library that heeds no stop); the journal is closed, but nothing that the
+  // thread uses may be destroyed: the process must end.
+  bool stop(std::chrono::milliseconds grace = std::chrono::hours(24));
 
  private:
-  Reply observe(const wire::Frame& frame);
+  Reply observe(const std::string& peer, const wire::Frame& frame);
   Reply subscribe(const wire::Frame& frame);
   DaemonStatus status() const;
   std::optional<wire::JournalFigures> journal_figures() const;
 
-  void prepare(const std::stop_token& stop);  // the preparer's loop
-  void work(const std::stop_token& stop);     // the worker's loop
+  // Calls step() until it is stopped: the loop of preparer and worker. A step that throws (memory
+  // that is not to be had) costs what it was doing.
+  void repeat(const std::stop_token& stop, void (Service::*step)(const std::stop_token&));
+  void prepare(const std::stop_token& stop);  // one model
+  void work(const std::stop_token& stop);     // one observation
+  void answer(const Job& job, Result<Update> result);
   void publish(UpdateMessage message, const Job& job);
 
   // With the mutex held.
@@ -138,6 +145,7 @@ class Service final : public RequestHandler {
   mutable std::mutex mutex_;  // of the session, and of the order of states and records
   std::condition_variable_any wake_;
   std::optional<Session> session_;  // empty without a model
+  int at_work_ = 0;                 // preparer and worker
 
   std::jthread preparer_;  // the threads last: they use everything above
   std::jthread worker_;

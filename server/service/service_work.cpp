@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "common/core/guarded.hpp"
-#include "common/core/utc_time.hpp"
+#include "common/core/text.hpp"
 #include "common/wire/convert.hpp"
+#include "server/guard/sheltered.hpp"
 #include "server/service/service.hpp"
 
 namespace brainshift::server {
@@ -18,6 +19,8 @@ using wire::MessageType;
 
 // A throwing library must cost one observation, not the daemon.
 constexpr const char* kUnexpected = "unexpected failure";
+// Before a step that failed is tried again.
+constexpr std::chrono::milliseconds kPause{10};
 
 RecordingState recording_state(const Recorded& recorded) {
   RecordingState state;
@@ -33,72 +36,96 @@ RecordingState recording_state(const Recorded& recorded) {
 
 }  // namespace
 
-void Service::prepare(const std::stop_token& stop) {
-  while (true) {
-    std::optional<Preparation> preparation;
-    {
-      std::unique_lock lock(mutex_);
-      const bool any = wake_.wait(lock, stop, [&] {
-        preparation = session_->next_preparation();
-        act();
-        return preparation.has_value();
-      });
-      if (!any) return;
-    }
-    auto made = guarded(ErrorCode::kInternal, kUnexpected, [&] {
-      return options_.make_model(preparation->request, preparation->stop);
-    });
-    const std::lock_guard lock(mutex_);
-    session_->prepared(std::move(made));
-    act();
+void Service::repeat(const std::stop_token& stop, void (Service::*step)(const std::stop_token&)) {
+  while (!stop.stop_requested()) {
+    if (sheltered("a step of the session", [&] { (this->*step)(stop); })) continue;
+    std::unique_lock lock(mutex_);  // what failed may fail again
+    wake_.wait_for(lock, stop, kPause, [] { return false; });
   }
+  {
+    const std::lock_guard lock(mutex_);
+    --at_work_;
+  }
+  wake_.notify_all();
+}
+
+void Service::prepare(const std::stop_token& stop) {
+  std::optional<Preparation> preparation;
+  {
+    std::unique_lock lock(mutex_);
+    const bool any = wake_.wait(lock, stop, [&] {
+      preparation = session_->next_preparation();
+      act();
+      return preparation.has_value();
+    });
+    if (!any) return;
+  }
+  auto made = guarded(ErrorCode::kInternal, kUnexpected,
+                      [&] { return options_.make_model(preparation->request, preparation->stop); });
+  const std::lock_guard lock(mutex_);
+  session_->prepared(std::move(made));
+  act();
 }
 
 void Service::work(const std::stop_token& stop) {
-  while (true) {
-    std::optional<Job> job;
-    {
-      std::unique_lock lock(mutex_);
-      const bool any = wake_.wait(lock, stop, [&] {
-        job = session_->next_job(Clock::now());
-        act();
-        return job.has_value();
-      });
-      if (!any) return;
-    }
-    pipeline::RunOptions options;
-    options.stop = job->stop;
-    if (job->request.publish_iterates) {
-      options.on_iterate = [&](Update iterate) {
-        iterate.sequence = job->number;
-        const SessionKey& of = job->session;
-        publish({of.session_id, std::move(iterate), std::nullopt, of.boot_id}, *job);
-      };
-    }
-    auto result = guarded(ErrorCode::kInternal, kUnexpected,
-                          [&] { return job->model->pipeline.run(job->observation, options); });
-    std::optional<UpdateMessage> message;
-    {
-      const std::lock_guard lock(mutex_);
-      message = session_->finish(*job, std::move(result));
+  std::optional<Job> job;
+  {
+    std::unique_lock lock(mutex_);
+    const bool any = wake_.wait(lock, stop, [&] {
+      job = session_->next_job(Clock::now());
       act();
-    }
-    wake_.notify_all();  // a preparation may wait for the factor
-    if (message) publish(std::move(*message), *job);
+      return job.has_value();
+    });
+    if (!any) return;
   }
+  pipeline::RunOptions options;
+  options.stop = job->stop;
+  if (job->request.publish_iterates) {
+    options.on_iterate = [&](Update iterate) {
+      iterate.sequence = job->number;
+      const SessionKey& of = job->session;
+      publish({of.session_id, std::move(iterate), std::nullopt, of.boot_id}, *job);
+    };
+  }
+  auto result = guarded(ErrorCode::kInternal, kUnexpected,
+                        [&] { return job->model->pipeline.run(job->observation, options); });
+  const Status told = guarded(ErrorCode::kInternal, kUnexpected, [&]() -> Status {
+    answer(*job, std::move(result));
+    return {};
+  });
+  if (told) return;
+  spdlog::error("an update could not be published: {}", told.error().message);
+  answer(*job, tl::unexpected(told.error()));  // which takes little memory
+}
+
+void Service::answer(const Job& job, Result<Update> result) {
+  std::optional<UpdateMessage> message;
+  {
+    const std::lock_guard lock(mutex_);
+    message = session_->finish(job, std::move(result));
+    act();
+  }
+  wake_.notify_all();  // a preparation may wait for the factor
+  if (message) publish(std::move(*message), job);
 }
 
 void Service::act() {
   SessionEvents events = session_->take_events();
   for (const Decision& decision : events.decisions) {
-    counters_.decided(decision);
-    if (!journal_) continue;
-    journal_->append(
-        {io::RecordKind::kDecision, decision.observation_sequence, 0, wire::encode(decision)});
+    sheltered("a decision", [&] {
+      counters_.decided(decision);
+      if (!journal_) return;
+      journal_->append(
+          {io::RecordKind::kDecision, decision.observation_sequence, 0, wire::encode(decision)});
+    });
   }
-  if (events.begun) begin_journal(events.begun->request, events.begun->info);
-  if (events.changed) push_state();
-  for (const SessionEvents::Answer& answer : events.answers) reply(answer.ticket, answer.info);
+  if (events.begun) {
+    sheltered("the journal", [&] { begin_journal(events.begun->request, events.begun->info); });
+  }
+  if (events.changed) sheltered("a message to the subscribers", [&] { push_state(); });
+  for (const SessionEvents::Answer& answer : events.answers) {
+    sheltered("an answer", [&] { reply(answer.ticket, answer.info); });
+  }
 }
 
 SessionState Service::state_now() const {

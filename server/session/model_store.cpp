@@ -85,19 +85,23 @@ Result<std::shared_ptr<const CondensedOperators>> ModelStore::condensed(
   return keep(std::move(*made));
 }
 
-Result<std::unique_ptr<inversion::Inverter>> ModelStore::inverter(const SessionRequest& request,
-                                                                  const pipeline::ScenePlan& plan,
-                                                                  const std::stop_token& stop) {
+Result<pipeline::MakeInverter> ModelStore::inverters(const SessionRequest& request,
+                                                     const pipeline::ScenePlan& plan,
+                                                     const std::stop_token& stop) {
   if (request.method == Method::kCondensed) {
     const auto operators = condensed(request.boundary, stop);
     if (!operators) return tl::unexpected(operators.error());
-    return inversion::condensed_inverter(*operators, locator_, config_,
-                                         condensed_options(plan, *model_, config_));
+    return [operators = *operators, locator = locator_, config = config_,
+            options = condensed_options(plan, *model_, config_)] {
+      return inversion::condensed_inverter(operators, locator, config, options);
+    };
   }
   const auto factor = factorised(request.boundary, stop);
   if (!factor) return tl::unexpected(factor.error());
   if (stop.stop_requested()) return stopped();
-  return inversion::make_inverter(*factor, request.method, stop);
+  return [factor = *factor, method = request.method] {
+    return inversion::make_inverter(factor, method);
+  };
 }
 
 Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& request,
@@ -105,7 +109,9 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& req
   const Stopwatch watch;
   const auto plan = pipeline::plan_scene(config_, request.method, request.boundary);
   if (!plan) return tl::unexpected(plan.error());
-  auto made = inverter(request, *plan, stop);
+  auto another = inverters(request, *plan, stop);
+  if (!another) return tl::unexpected(another.error());
+  auto made = (*another)();
   if (!made) return tl::unexpected(made.error());
   SessionInfo info;
   info.model_id = model_->model_id;
@@ -114,7 +120,7 @@ Result<std::unique_ptr<SessionModel>> ModelStore::make(const SessionRequest& req
   info.slaves = static_cast<int>(model_->slaves.size());
   info.model_bytes = (*made)->bytes();
   auto pipeline = pipeline::Pipeline::build(*model_, config_, request.method, request.boundary,
-                                            std::move(*made));
+                                            std::move(*made), std::move(*another));
   if (!pipeline) return tl::unexpected(pipeline.error());
   info.prepare_s = watch.seconds();
   if (request.method == Method::kCondensed) {  // the work that was done before surgery counts

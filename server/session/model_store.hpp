@@ -48,9 +48,9 @@ class ModelStore {
   Result<std::shared_ptr<const CondensedOperators>> condensed(Boundary boundary,
                                                               const std::stop_token& stop);
   std::shared_ptr<const CondensedOperators> keep(CondensedOperators operators);
-  Result<std::unique_ptr<inversion::Inverter>> inverter(const SessionRequest& request,
-                                                        const pipeline::ScenePlan& plan,
-                                                        const std::stop_token& stop);
+  Result<pipeline::MakeInverter> inverters(const SessionRequest& request,
+                                           const pipeline::ScenePlan& plan,
+                                           const std::stop_token& stop);
 
   std::shared_ptr<const BrainModel> model_;
   CaseConfig config_;

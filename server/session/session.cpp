@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 
@@ -138,7 +140,8 @@ void Session::stop() {
 
 // ---------- observations ----------
 
-Result<Admission> Session::submit(Observation observation, TimePoint now) {
+Result<Admission> Session::submit(Observation observation, TimePoint now,
+                                  const std::string& client) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
                                                     : "no session is running: start one first");
@@ -147,8 +150,9 @@ Result<Admission> Session::submit(Observation observation, TimePoint now) {
     return tl::unexpected(status.error());
   }
   const auto waiting = boxes_.find(observation.source);
-  auto admission = running_->sources.admit(
-      observation, now.time_since_epoch() / std::chrono::nanoseconds(1), waiting != boxes_.end());
+  auto admission =
+      running_->sources.admit(observation, now.time_since_epoch() / std::chrono::nanoseconds(1),
+                              waiting != boxes_.end(), client);
   if (!admission || admission->repeated) return admission;
   observation.daemon_ns = observation.acquired_ns = admission->daemon_ns;
   if (waiting != boxes_.end()) {
@@ -211,9 +215,13 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
   }
   update.sequence = running_->newest_update = job.number;
   if (result && update.usable()) {
+    running_->usable_before = {running_->newest_usable, running_->usable_arrived};
     running_->newest_usable = update.sequence;
     running_->usable_arrived = job.arrived;
   } else {
+    if (running_->newest_usable == job.number) {
+      std::tie(running_->newest_usable, running_->usable_arrived) = running_->usable_before;
+    }
     running_->reason = result ? update.estimate.quality.reason : message.error->message;
     decision.reason = running_->reason;
   }

@@ -135,11 +135,12 @@ class Session {
   // kModelNotReady without a running session; the errors of check_observation and of
   // Sources::admit. A repeated observation gets its receipt once more, and nothing happens.
   // Precondition: the observation's numbers are finite (wire::decode_observation).
-  Result<Admission> submit(Observation observation, TimePoint now);
+  Result<Admission> submit(Observation observation, TimePoint now, const std::string& client = {});
 
   // One at a time. A session that is ready begins: whatever the job before led to is published.
   std::optional<Job> next_job(TimePoint now);
-  // What to publish; empty when the session has ended meanwhile: nobody hears of the result.
+  // What to publish; empty when the session has ended meanwhile: nobody hears of the result. Once
+  // more for the same job, with an error: its result could not be published.
   std::optional<UpdateMessage> finish(const Job& job, Result<Update> result);
 
   // Ends job, preparation and session; idempotent.
@@ -174,7 +175,8 @@ class Session {
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
     TimePoint usable_arrived = {};  // the observation that newest_usable answers
-    std::string reason = {};        // why the newest update is not usable
+    std::pair<std::uint64_t, TimePoint> usable_before = {};  // both, of the usable one before it
+    std::string reason = {};                                 // why the newest update is not usable
   };
   struct Box {
     Observation observation;

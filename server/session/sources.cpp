@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "common/core/text.hpp"
+
 namespace brainshift::server {
 namespace {
 
 constexpr std::size_t kMaxSourceLength = 64;
-constexpr std::size_t kMaxQuoted = 64;
 
 double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
@@ -24,6 +25,31 @@ Status check_stamp(const char* name, std::int64_t stamp_ns) {
 tl::unexpected<Error> refuse(const Observation& observation, const std::string& why) {
   return invalid(fmt::format("observation.acquired_ns = {} of {}: {}", observation.acquired_ns,
                              in_quotes(observation.source), why));
+}
+
+Status at_most(const char* field, const char* unit, Eigen::Index count, int limit) {
+  if (count <= limit) return {};
+  return invalid(
+      fmt::format("observation.{} has {} {}, must be at most {}", field, count, unit, limit));
+}
+
+Status check_size(const TumourBoundary& body) {
+  return at_most("tumour_boundary", "points", body.points.cols(), kMaxObservedPoints);
+}
+Status check_size(const CorticalSurface& body) {
+  const auto& [vertices, triangles] = body.surface;
+  if (auto ok = at_most("cortical_surface", "points", vertices.cols(), kMaxObservedPoints); !ok) {
+    return ok;
+  }
+  return at_most("cortical_surface", "triangles", triangles.cols(), kMaxObservedTriangles);
+}
+Status check_size(const LandmarkPairs& body) {
+  return at_most("landmark_pairs", "pairs", body.undeformed.cols(), kMaxLandmarkPairs);
+}
+Status check_size(const PatientPose&) {
+  return invalid(
+      "observation.patient_pose: a change of pose is not assimilated in this version; start a "
+      "session on a model prepared for the new pose");
 }
 
 }  // namespace
@@ -41,15 +67,18 @@ Status check_observation(const Observation& observation, std::string_view case_i
     if (given.boot_id != running.boot_id) {
       return invalid(
           fmt::format("observation.session.boot_id = {:x}: the daemon has been restarted, or this "
-                      "is another one ({:x})",
+                      "is another one ({:x}); subscribe again, and observe for the session that it "
+                      "names",
                       given.boot_id, running.boot_id));
     }
     if (given.model_id != running.model_id) {
       return invalid(fmt::format("observation.session.model_id = {}: the daemon serves model {}",
                                  in_quotes(given.model_id), in_quotes(running.model_id)));
     }
-    return invalid(fmt::format("observation.session.session_id = {}: the running session is {}",
-                               given.session_id, running.session_id));
+    return invalid(
+        fmt::format("observation.session.session_id = {}: the running session is {}; "
+                    "subscribe again, and observe for the session that is named then",
+                    given.session_id, running.session_id));
   }
   if (observation.frame != "ras") {
     return invalid(
@@ -59,22 +88,11 @@ Status check_observation(const Observation& observation, std::string_view case_i
     return invalid(fmt::format("observation.source = {}: must have 1 to {} characters",
                                in_quotes(observation.source), kMaxSourceLength));
   }
-  if (std::holds_alternative<PatientPose>(observation.body)) {
-    return invalid(
-        "observation.patient_pose: a change of pose is not assimilated in this version; start a "
-        "session on a model prepared for the new pose");
+  if (one_line(observation.source) != observation.source) {
+    return invalid(fmt::format("observation.source = {}: must have no control characters",
+                               in_quotes(observation.source)));
   }
-  return {};
-}
-
-std::string in_quotes(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text.substr(0, kMaxQuoted)) {
-    const auto byte = static_cast<unsigned char>(c);
-    result += (byte < 0x20 || byte == 0x7f) ? '?' : c;
-  }
-  result += text.size() > kMaxQuoted ? "...\"" : "\"";
-  return result;
+  return std::visit([](const auto& body) { return check_size(body); }, observation.body);
 }
 
 Result<std::int64_t> recorded_time(const Observation& observation) {
@@ -121,16 +139,46 @@ Result<std::int64_t> SourceClock::to_daemon(const Observation& observation,
   return acquired_ns + known_ns;
 }
 
+Status Sources::has_room(const Observation& observation, std::int64_t arrived_ns,
+                         const std::string& client) const {
+  const auto own = std::count_if(sources_.begin(), sources_.end(), [&](const auto& entry) {
+    return !client.empty() && entry.second.client == client;
+  });
+  const auto refuse = [&](const std::string& why) {
+    return fail(ErrorCode::kUnavailable,
+                fmt::format("observation.source = {}: {}", in_quotes(observation.source), why));
+  };
+  if (own >= kMaxSourcesOfOne) {
+    return refuse(fmt::format("{} other sources have observed from this connection already", own));
+  }
+  if (sources_.size() < kMaxSources ||
+      seconds(arrived_ns - longest_silent()->second.arrived_ns) > max_age_s_) {
+    return {};
+  }
+  return refuse(
+      fmt::format("{} other sources have observed in the last {:g} s", kMaxSources, max_age_s_));
+}
+
+Sources::Map::const_iterator Sources::longest_silent() const {
+  return std::min_element(sources_.begin(), sources_.end(), [](const auto& a, const auto& b) {
+    return a.second.arrived_ns < b.second.arrived_ns;
+  });
+}
+
 Result<Admission> Sources::admit(const Observation& observation, std::int64_t arrived_ns,
-                                 bool replaces_pending) {
+                                 bool replaces_pending, const std::string& client) {
   const auto known = sources_.find(observation.source);
   const bool is_new = known == sources_.end();
-  if (is_new && sources_.size() >= kMaxSources) {
-    return fail(ErrorCode::kUnavailable,
-                fmt::format("observation.source = {}: {} other sources have observed already",
-                            in_quotes(observation.source), sources_.size()));
+  if (is_new) {
+    if (auto room = has_room(observation, arrived_ns, client); !room) {
+      return tl::unexpected(room.error());
+    }
   }
-  Source source = is_new ? Source{SourceClock(max_age_s_), 0, {}} : known->second;
+  Source source = is_new ? Source{SourceClock(max_age_s_), 0, {}, {}, 0} : known->second;
+  // Another program, or another run of it: its clock may have begun again.
+  if (!is_new && source.client != client && observation.acquired_ns < source.last_acquired_ns) {
+    source.clock = SourceClock(max_age_s_);
+  }
   const std::uint64_t last_sequence = source.receipt.observation_sequence;  // 0: none
   if (!is_new && observation.sequence == last_sequence &&
       observation.acquired_ns == source.last_acquired_ns) {
@@ -141,19 +189,24 @@ Result<Admission> Sources::admit(const Observation& observation, std::int64_t ar
                                observation.sequence, kMaxSequence));
   }
   if (observation.sequence <= last_sequence) {
-    return invalid(
-        fmt::format("observation.sequence = {}: must be above {}, the last one accepted from {}",
-                    observation.sequence, last_sequence, in_quotes(observation.source)));
+    return invalid(fmt::format(
+        "observation.sequence = {}: must be above {}, the last one accepted from {}; a "
+        "source that was started again numbers on from {}",
+        observation.sequence, last_sequence, in_quotes(observation.source), last_sequence + 1));
   }
   const auto daemon_ns = recorded_clock_ ? recorded_time(observation)
                                          : source.clock.to_daemon(observation, arrived_ns);
   if (!daemon_ns) {
-    if (!is_new) known->second.clock = source.clock;  // it remembers a jump that it refused
+    // It remembers a jump that it refused; but not a clock that was to begin anew.
+    if (!is_new && source.client == client) known->second.clock = source.clock;
     return tl::unexpected(daemon_ns.error());
   }
   source.last_acquired_ns = observation.acquired_ns;
   source.receipt = {observation.sequence, replaces_pending};
+  source.client = client;
+  source.arrived_ns = arrived_ns;
   const Admission admission{source.receipt, *daemon_ns, false};
+  if (is_new && sources_.size() >= kMaxSources) sources_.erase(longest_silent());
   sources_.insert_or_assign(observation.source, source);
   return admission;
 }

@@ -16,17 +16,20 @@
 
 namespace brainshift::server {
 
+// What a daemon takes of one observation, so that no observation keeps it from the others for long:
+// an alignment of so many points takes less than a second, and as many pairs as a surgeon touches.
+inline constexpr int kMaxObservedPoints = 50'000;      // of a boundary or a surface
+inline constexpr int kMaxObservedTriangles = 100'000;  // of a surface
+inline constexpr int kMaxLandmarkPairs = 1'000;
+
 // Ok, or kInvalidArgument for another case, session, model or daemon than `running`, a frame other
-// than "ras", an empty or overlong source, or a body that no update uses (PatientPose). The
-// sentence names the field and its value. The numbers of the body are not looked at:
+// than "ras", an empty or overlong source, more points, triangles or pairs than an observation may
+// have (below), or a body that no update uses (PatientPose). The sentence names
+// the field and its value. The numbers of the body are not looked at:
 // wire::decode_observation has tested that they are finite and that standard deviations are not
 // negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          const SessionKey& running);
-
-// The text in quotes, at most 64 characters of it, control characters replaced by '?': safe in a
-// one-line message whatever a peer sent.
-std::string in_quotes(std::string_view text);
 
 // The clock of one source against the daemon's, and which of its observations are plausible.
 //
@@ -75,12 +78,19 @@ class Sources {
       : max_age_s_(max_age_s), recorded_clock_(recorded_clock) {}
 
   // arrived_ns: on the daemon's monotonic clock. replaces_pending: what the receipt says of it.
-  // Errors: kInvalidArgument for a sequence number that is not above the source's last one, or
-  // above kMaxSequence; those of SourceClock; kUnavailable when kMaxSources others have observed.
+  // client: the connection that it came by.
+  // Errors: kInvalidArgument for a sequence number that is not above the source's last one (the
+  // sentence tells the next), or above kMaxSequence; those of SourceClock; kUnavailable when
+  // kMaxSourcesOfOne others have observed by this connection, or kMaxSources others within
+  // max_age_s. Of those that were silent for longer the one that was so longest makes room: what it
+  // has observed is used no more.
+  // A source that comes by another connection with an earlier time than before has been started
+  // again: its clock begins anew. Its numbers go on, since the journal names observations by them.
   Result<Admission> admit(const Observation& observation, std::int64_t arrived_ns,
-                          bool replaces_pending);
+                          bool replaces_pending, const std::string& client = {});
 
   static constexpr std::size_t kMaxSources = 16;
+  static constexpr std::ptrdiff_t kMaxSourcesOfOne = 8;  // names that one peer may bring
   // The journal keeps sequence numbers as signed 64-bit integers.
   static constexpr std::uint64_t kMaxSequence = (std::uint64_t{1} << 63) - 1;
 
@@ -89,11 +99,19 @@ class Sources {
     SourceClock clock;
     std::int64_t last_acquired_ns = 0;
     ObservationReceipt receipt;  // of its last observation
+    std::string client;          // by which that came
+    std::int64_t arrived_ns = 0;
   };
+  using Map = std::map<std::string, Source>;  // by name
+
+  // For one more source.
+  Status has_room(const Observation& observation, std::int64_t arrived_ns,
+                  const std::string& client) const;
+  Map::const_iterator longest_silent() const;  // there is one
 
   double max_age_s_;
   bool recorded_clock_;
-  std::map<std::string, Source> sources_;  // by name
+  Map sources_;
 };
 
 }  // namespace brainshift::server

@@ -20,6 +20,12 @@ namespace {
 
 // Requests handled before pushes get their turn.
 constexpr int kRequestsPerTurn = 64;
+// Requests that ask how the daemon fares and nothing else. They are answered when every place for a
+// client is taken: that is when somebody asks.
+bool only_looks(wire::MessageType type) {
+  return type == wire::MessageType::kStatusRequest || type == wire::MessageType::kReportRequest;
+}
+
 // How often a full peer is tried again while it is owed a final update.
 constexpr std::chrono::milliseconds kRetryInterval{20};
 // How often the handler is told that the loop turns.
@@ -66,12 +72,14 @@ struct Router::Impl {
     }
     const Peer* known = peers.find(incoming.peer);
     if (known == nullptr || known->connection_fd != incoming.connection_fd) {
-      if (Status entered = enter(incoming); !entered) return complain(entered.error());
-      known = peers.find(incoming.peer);
+      if (Status entered = enter(incoming, only_looks(frame->type)); !entered) {
+        return complain(entered.error());
+      }
     }
     std::optional<Reply> answer;
     try {
-      if (Status may = gate.admit(known->caller, *frame, std::chrono::steady_clock::now()); !may) {
+      if (Status may = gate.admit(caller_of(incoming), *frame, std::chrono::steady_clock::now());
+          !may) {
         answer = Reply{wire::MessageType::kErrorReply, wire::encode(may.error())};
       } else {
         if (frame->type == wire::MessageType::kReportRequest) turned();
@@ -88,15 +96,21 @@ struct Router::Impl {
     if (answer->subscription) subscribe(incoming.peer, *answer);
   }
 
-  // The peer of a first message that is well-formed is added.
-  Status enter(const Incoming& incoming) {
-    // With keys a message counts for its key, without for its connection.
-    const std::string& caller = options.keys ? incoming.user_id : incoming.peer;
+  // With keys a message counts for its key, without for its connection.
+  const std::string& caller_of(const Incoming& incoming) const {
+    return options.keys ? incoming.user_id : incoming.peer;
+  }
+
+  // The peer of a first message that is well-formed is added; one that only looks need not find a
+  // place.
+  Status enter(const Incoming& incoming, bool looks) {
+    const std::string& caller = caller_of(incoming);
     if (peers.find(incoming.peer) == nullptr) {
       if (Status more = gate.enter(caller, peers.connections_of(caller)); !more) return more;
     }
     Peer* peer = peers.add(incoming.peer, incoming.connection_fd);
     if (peer == nullptr) {
+      if (looks) return {};
       return fail(ErrorCode::kUnavailable,
                   fmt::format("{} clients are connected already", options.max_clients));
     }
@@ -231,6 +245,18 @@ struct Router::Impl {
     }
   }
 
+  // What libzmq refuses ends the loop; anything else costs this step.
+  template <typename Function>
+  static void step(const char* what, Function&& function) {
+    try {
+      function();
+    } catch (const zmq::error_t&) {
+      throw;
+    } catch (const std::exception& exception) {
+      spdlog::error("{} failed: {}", what, exception.what());
+    }
+  }
+
   void turned() {
     last_turn = std::chrono::steady_clock::now();
     const GuardCounts counts = guard->counts();
@@ -304,13 +330,19 @@ Status Router::run(RequestHandler& handler, Outbox& outbox, int stop_fd) {
         if (!incoming) break;
         self.guard->delivered(incoming->connection_fd, incoming->bytes, incoming->parts);
         self.forget_closed();  // before the peer is looked up, see ConnectionMonitor
-        self.answer(*incoming);
+        self.step("an answer", [&] { self.answer(*incoming); });
         // With CURVE the guard cannot count the parts before.
         if (incoming->parts > kMaxParts) self.guard->close(incoming->connection_fd);
       }
-      for (const Outgoing& message : outbox.take()) self.deliver(message);
-      if (self.peers.anything_owed()) self.pay_owed();
-      if (std::chrono::steady_clock::now() - self.last_turn >= kTurnInterval) self.turned();
+      self.step("a delivery", [&] {
+        for (const Outgoing& message : outbox.take()) {
+          self.step("a delivery", [&] { self.deliver(message); });
+        }
+      });
+      if (self.peers.anything_owed()) self.step("a delivery", [&] { self.pay_owed(); });
+      if (std::chrono::steady_clock::now() - self.last_turn >= kTurnInterval) {
+        self.step("a report", [&] { self.turned(); });
+      }
     }
   } catch (const zmq::error_t& error) {
     return fail(ErrorCode::kInternal, fmt::format("endpoint {}: {}", endpoint(), error.what()));

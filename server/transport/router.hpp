@@ -15,6 +15,9 @@
 // gets it cut from these bytes when they are about to be sent (Parcels); a turn of the loop cuts a
 // bounded number, so that neither choices nor viewers that do not read delay anybody.
 //
+// Requests that only look (status, report) are answered without a place too: a daemon whose places
+// are all taken still says that it lives.
+//
 // Peers do not reach libzmq's socket: the guard passes their bytes on to it, and bounds what they
 // make it keep (server/guard/guard.hpp). With keys libzmq asks the ZAP handler whom to admit, and
 // the gate asks every request whether its key may (server/security).

@@ -16,8 +16,9 @@
 namespace brainshift::server {
 namespace {
 
-// Messages of one peer that may wait unread; large ones are bounded by their size.
-constexpr int kReceiveQueue = 8;
+// No limit to what a peer has unread here: libzmq would stop reading it, and abort the process when
+// the peer closes then. The guard bounds messages and bytes instead (server/guard/guard.hpp).
+constexpr int kReceiveQueue = 0;
 // What CURVE adds to a message.
 constexpr std::size_t kEncryption = 64;
 

@@ -7,6 +7,7 @@
 
 #include <bit>
 #include <cerrno>
+#include <new>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -78,7 +79,12 @@ void ZapHandler::work() {
         break;
       }
       if (items[1].revents != 0) break;
-      if (items[0].revents != 0) answer();
+      if (items[0].revents == 0) continue;
+      try {
+        answer();
+      } catch (const std::bad_alloc&) {  // this one may ask again
+        spdlog::error("a key could not be checked: no memory");
+      }
     }
   } catch (const zmq::error_t& error) {
     // Nobody is admitted from here on; who is connected stays.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/tools/monitor/keys.hpp"
+#include "common/core/text.hpp"
 
 namespace brainshift::client {
 
@@ -31,15 +32,11 @@ void print_line(const std::string& line) {
 }
 
 void print_lines(const std::vector<std::string>& lines) {
-  for (const std::string& line : lines) print_line(line);
+  for (const std::string& line : lines) print_line(one_line(line, '?'));
 }
 
 void print_error(std::string_view sentence) {
-  std::string line(sentence);
-  for (char& c : line) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  std::fprintf(stderr, "brainshift: %s\n", line.c_str());
+  std::fprintf(stderr, "brainshift: %s\n", one_line(sentence).c_str());
 }
 
 Progress terminal_progress() {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <sys/stat.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
@@ -10,6 +12,7 @@
 
 int main(int argc, char** argv) {
   brainshift::linalg::choose_blas_kernel();
+  umask(077);  // files hold a patient's data
   using namespace brainshift;
   CLI::App app{
       "brainshift: look at a case before it is prepared; simulate surgeries with known truth, "

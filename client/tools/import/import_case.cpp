@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "common/core/utc_time.hpp"
+#include "common/core/text.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/read_patient.hpp"

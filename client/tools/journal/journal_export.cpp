@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/core/text.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/field_series_file.hpp"
@@ -18,7 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // Quoted where a comma or a quote would end it.
-std::string csv_text(const std::string& text) {
+std::string csv_text(const std::string& given) {
+  const std::string text = one_line(given, '?');
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) {
@@ -30,7 +32,7 @@ std::string csv_text(const std::string& text) {
 
 std::string xml_text(const std::string& text) {
   std::string escaped;
-  for (const char c : text) {
+  for (const char c : one_line(text, '?')) {
     if (c == '&') {
       escaped += "&amp;";
     } else if (c == '<') {

@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "client/tools/stereo/pictures.hpp"
-#include "common/core/utc_time.hpp"
+#include "common/core/text.hpp"
 #include "common/io/config/calibration_file.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_file.hpp"

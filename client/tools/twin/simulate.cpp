@@ -8,7 +8,7 @@
 #include "client/tools/twin/adverse.hpp"
 #include "client/tools/twin/scenario.hpp"
 #include "client/tools/twin/surgery.hpp"
-#include "common/core/utc_time.hpp"
+#include "common/core/text.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/patient/read_patient.hpp"

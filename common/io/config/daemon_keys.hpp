@@ -27,6 +27,7 @@ struct LimitsConfig {
   int connections = 8;  // of keys only
   int observations_per_s = 2000;
   int session_starts_per_min = 60;
+  int journal_gib = 64;  // of a session, whoever sends
 };
 
 // What a daemon file says (config/daemon.yaml documents every key).
@@ -96,6 +97,11 @@ void visit(A& a, V& v) {
     a({"session_starts_per_min", "", "Sessions that one key may start in a minute", "",
        "The rest is refused and counted."},
       v.limits.session_starts_per_min, between(1, 10000));
+    a({"journal_gib", "GiB", "What the journal keeps of one session, whoever sends it", "",
+       "Beyond it nothing more of the session is recorded, and every subscriber is told. An hour "
+       "of "
+       "four updates a second for 18 thousand nodes has 9 GiB."},
+      v.limits.journal_gib, between(1, 10000));
   });
   a.section({"metrics", "", "Figures for monitors, over HTTP in the format of Prometheus", "",
              "The path is /metrics; docs/operations.md lists the figures."},

@@ -172,12 +172,13 @@ Result<std::vector<AllowedKey>> parse_allow_list(const fs::path& path, const std
 }
 
 constexpr mode_t kBesideOwner = 077;
-constexpr mode_t kOthersWrite = 02;
+constexpr mode_t kOthersWrite = 022;
 constexpr mode_t kForAll = 0644;
 constexpr mode_t kForOwner = 0600;
 
 Result<std::string> read_list_text(const fs::path& path) {
-  return read_guarded(path, kOthersWrite, "every account may change the allow-list: chmod o-w it");
+  return read_guarded(path, kOthersWrite,
+                      "other accounts may change the allow-list: chmod go-w it");
 }
 
 }  // namespace

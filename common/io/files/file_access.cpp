@@ -18,6 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr mode_t kOwnerOnly = 0600;
+constexpr mode_t kModeBits = 0777;
+
 std::string system_message(int error) {
   return std::error_code(error, std::generic_category()).message();
 }
@@ -110,9 +113,17 @@ Result<PendingFile> PendingFile::create(const fs::path& path) {
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
     return write_failed(path, "exists and is not a regular file");
   }
+  // One that is replaced keeps who may read it.
+  struct stat replaced {};
+  const mode_t mode =
+      ::stat(path.c_str(), &replaced) == 0 ? replaced.st_mode & kModeBits : kOwnerOnly;
   const fs::path temporary = folder_of(path) / name;
-  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
-  if (file.get() < 0) return write_error(path, "create a temporary file beside it", errno);
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly));
+  if (file.get() < 0 || ::fchmod(file.get(), mode) != 0) {
+    const int error = errno;
+    if (file.get() >= 0) ::unlink(temporary.c_str());
+    return write_error(path, "create a temporary file beside it", error);
+  }
   return PendingFile(path, temporary);
 }
 

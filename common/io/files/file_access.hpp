@@ -2,8 +2,8 @@
 // Whole files in and out; every write is checked, and a reader never sees half a file.
 //
 // A file is written under a temporary name in its own folder, synced, renamed over the final
-// name, and the folder is synced: after a crash there is the old file or the new one. Messages
-// begin with the path.
+// name, and the folder is synced: after a crash there is the old file or the new one. It has
+// the mode of the old one; without one it is its owner's alone. Messages begin with the path.
 #pragma once
 
 #include <filesystem>

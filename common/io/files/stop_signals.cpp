@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -55,23 +56,22 @@ Result<StopSignals> StopSignals::catch_into(int fd) {
   description.sa_handler = on_signal;
   description.sa_flags = SA_RESTART;
   sigemptyset(&description.sa_mask);
-  if (sigaction(SIGINT, &description, &signals.interrupt_) != 0 ||
-      sigaction(SIGTERM, &description, &signals.terminate_) != 0) {
-    return fail(ErrorCode::kInternal, "SIGINT and SIGTERM cannot be handled");
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    struct sigaction& before = signals.before_[i];
+    if (sigaction(kSignals[i], &description, &before) != 0) {
+      return fail(ErrorCode::kInternal, "SIGINT, SIGTERM and SIGHUP cannot be handled");
+    }
+    if (kSignals[i] == SIGHUP && before.sa_handler == SIG_IGN) sigaction(SIGHUP, &before, nullptr);
   }
   return signals;
 }
 
 StopSignals::StopSignals(StopSignals&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
-      own_(other.own_),
-      interrupt_(other.interrupt_),
-      terminate_(other.terminate_) {}
+    : fd_(std::exchange(other.fd_, -1)), own_(other.own_), before_(other.before_) {}
 
 StopSignals::~StopSignals() {
   if (fd_ < 0) return;
-  sigaction(SIGINT, &interrupt_, nullptr);
-  sigaction(SIGTERM, &terminate_, nullptr);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
   event_fd = -1;
   if (own_) close(fd_);
 }

@@ -16,6 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kBusyTimeoutMs = 500;
+// Of one record: an update of the largest mesh, a field of truth.
+constexpr int kMaxValueBytes = 256 << 20;
 
 // Absolute: SQLite gives a meaning to names such as ":memory:". Escaped: '?', '#' and '%' have one
 // in a URI.
@@ -62,6 +64,12 @@ Status SqliteDatabase::connect(Access access) {
   }
   sqlite3_extended_result_codes(db_, 1);
   sqlite3_busy_timeout(db_, kBusyTimeoutMs);
+  // A file of a stranger runs nothing here: a view in the place of a table may never end.
+  for (const int what : {SQLITE_DBCONFIG_ENABLE_VIEW, SQLITE_DBCONFIG_ENABLE_TRIGGER,
+                         SQLITE_DBCONFIG_TRUSTED_SCHEMA}) {
+    sqlite3_db_config(db_, what, 0, nullptr);
+  }
+  sqlite3_limit(db_, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
   // With this SQLite accepts a file that is shorter than its header says.
   if (access == Access::kReadDamaged && !execute("PRAGMA writable_schema = ON")) {
     return read_failure("surgery file");
@@ -73,7 +81,7 @@ Status SqliteDatabase::close() {
   if (!in_place()) sqlite3_db_config(db_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   if (sqlite3_close(db_) != SQLITE_OK) return write_failure("surgery file");
   db_ = nullptr;
-  log_id_.reset();
+  written_.clear();
   return {};
 }
 
@@ -94,7 +102,11 @@ Status SqliteDatabase::use_log() {
   }
   // Beginning to write makes the log, so that its loss can be noticed from now on.
   if (!execute("BEGIN IMMEDIATE") || !execute("COMMIT")) return write_failure("surgery file");
-  log_id_ = id_of(log_path());
+  written_.clear();
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    const fs::path path = fs::path(path_) += suffix;
+    if (const auto id = id_of(path)) written_.emplace_back(path, *id);
+  }
   return {};
 }
 
@@ -104,7 +116,7 @@ Status SqliteDatabase::fold_log() {
   if (*busy != "0" || query("PRAGMA journal_mode = DELETE") != "delete") {
     return write_failed(path_, "cannot fold the write-ahead log back: the file is in use");
   }
-  log_id_.reset();  // SQLite has removed it
+  written_.clear();  // SQLite has removed the log
   return {};
 }
 
@@ -119,7 +131,12 @@ bool SqliteDatabase::in_place() const {
   int moved = 0;
   const int rc = sqlite3_file_control(db_, "main", SQLITE_FCNTL_HAS_MOVED, &moved);
   if (rc == SQLITE_OK && moved != 0) return false;
-  return !log_id_ || id_of(log_path()) == log_id_;
+  for (auto& [path, id] : written_) {
+    const auto now = id_of(path);
+    if (!now || !id.is_still(*now)) return false;
+    id = *now;
+  }
+  return true;
 }
 
 fs::path SqliteDatabase::log_path() const { return fs::path(path_) += "-wal"; }
@@ -127,7 +144,7 @@ fs::path SqliteDatabase::log_path() const { return fs::path(path_) += "-wal"; }
 std::optional<SqliteDatabase::FileId> SqliteDatabase::id_of(const fs::path& path) {
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0) return std::nullopt;
-  return FileId{found.st_dev, found.st_ino};
+  return FileId{found.st_dev, found.st_ino, found.st_size};
 }
 
 tl::unexpected<Error> SqliteDatabase::failure(ErrorCode code, std::string_view action,

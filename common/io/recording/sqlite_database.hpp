@@ -11,6 +11,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "common/core/error.hpp"
 
@@ -48,7 +50,9 @@ class SqliteDatabase {
   Status fold_log();
   // A -wal file with content lies beside the file.
   bool has_log() const;
-  // False when the file, or its log, was deleted, moved or replaced since it was opened.
+  // False when the file, its log or the log's index was deleted, moved, replaced or cut since it
+  // was opened. SQLite maps the index into memory: using a part that was cut off ends the process.
+  // So this is asked before every transaction.
   bool in_place() const;
 
   // "PATH: cannot write record: database or disk is full"
@@ -60,7 +64,11 @@ class SqliteDatabase {
   struct FileId {
     dev_t device = 0;
     ino_t inode = 0;
-    bool operator==(const FileId&) const = default;
+    std::int64_t bytes = 0;
+    // What this is now may be longer.
+    bool is_still(const FileId& now) const {
+      return device == now.device && inode == now.inode && bytes <= now.bytes;
+    }
   };
   static std::optional<FileId> id_of(const std::filesystem::path& path);
   std::filesystem::path log_path() const;
@@ -69,7 +77,8 @@ class SqliteDatabase {
 
   std::filesystem::path path_;
   sqlite3* db_ = nullptr;
-  std::optional<FileId> log_id_;  // of the write-ahead log while this connection writes it
+  // Of file, write-ahead log and its index while this connection writes them; empty: it does not.
+  mutable std::vector<std::pair<std::filesystem::path, FileId>> written_;
 };
 
 // A prepared statement. Binding and stepping remember the first failure; done() and row() report

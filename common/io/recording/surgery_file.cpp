@@ -46,7 +46,8 @@ std::string describe(const SurgeryState& state) {
       fmt::format("{} record{}", state.records, state.records == 1 ? "" : "s");
   if (state.closed) return count + ", closed";
   return count + (state.log_beside
-                      ? ", not closed: it crashed or is still written; its -wal file is beside it"
+                      ? ", not closed: it crashed or is still written; its -wal file is beside it, "
+                        "which may have lost its end"
                       : ", not closed: its end is missing if a -wal file was left behind");
 }
 
@@ -192,8 +193,9 @@ SurgeryFile& SurgeryFile::operator=(SurgeryFile&&) noexcept = default;
 SurgeryFile::~SurgeryFile() = default;
 
 Result<SurgeryFile> SurgeryFile::create(const fs::path& path, const SurgeryMeta& meta) {
-  // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty.
-  const int reserved = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
+  // O_EXCL reserves the name: two programs cannot both create the file. SQLite accepts it empty,
+  // and gives what it keeps beside it the same mode.
+  const int reserved = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600);
   if (reserved < 0) {
     return write_failed(path, errno == EEXIST
                                   ? "exists already"
@@ -297,7 +299,7 @@ Status SurgeryFile::close() {
   impl_->insert.reset();
   Status status;
   if (impl_->writable && !database.in_place()) {
-    status = write_failed(database.path(), "was deleted or replaced while it was written");
+    status = write_failed(database.path(), "was deleted, replaced or cut while it was written");
   } else if (impl_->writable) {
     const Impl::Tail& tail = impl_->tail;
     status = write_closed_seal(database, {tail.records, chain_end(tail.crc, tail.records)});

@@ -2,8 +2,12 @@
 #include "common/core/thread_team.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <fstream>
 #include <numeric>
+#include <system_error>
 
 namespace brainshift {
 namespace {
@@ -35,6 +39,28 @@ TEST(ThreadTeam, OneMemberIsTheCaller) {
   team.split(5, [&](long, long) { id = std::this_thread::get_id(); });
   EXPECT_EQ(id, std::this_thread::get_id());
 }
+
+TEST(ThreadTeam, IsBoundedWhateverTheMachineHas) { EXPECT_EQ(ThreadTeam(128).size(), 16); }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// Room for some stacks and not for all.
+TEST(ThreadTeamDeathTest, ThreadsThatTheSystemDoesNotGiveAreAnExceptionAndNoAbort) {
+  const auto starve = [] {
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const auto bytes = static_cast<rlim_t>(pages * sysconf(_SC_PAGESIZE)) + (40u << 20);
+    const rlimit limit{bytes, bytes};
+    setrlimit(RLIMIT_AS, &limit);
+    try {
+      const ThreadTeam team(16);
+      _exit(1);
+    } catch (const std::system_error&) {
+      _exit(0);
+    }
+  };
+  EXPECT_EXIT(starve(), testing::ExitedWithCode(0), "");
+}
+#endif
 
 }  // namespace
 }  // namespace brainshift

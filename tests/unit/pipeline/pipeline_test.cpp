@@ -378,5 +378,23 @@ TEST(UndrainedFraction, BoundsWhatALayerThatConsolidatesIsMissing) {
   }
 }
 
+// What stands for any allocation of an update that fails.
+TEST_F(PipelineTest, AnExceptionCostsOneObservationAndItsInverter) {
+  int made = 0;
+  const MakeInverter another = [&]() -> Result<std::unique_ptr<inversion::Inverter>> {
+    if (++made == 1) return fail(ErrorCode::kInternal, "no memory yet");
+    return remembering();
+  };
+  auto broken = std::make_unique<FakeInverter>(
+      [](int, const SparseData&, const auto&, Estimate&) -> Status { throw std::bad_alloc(); });
+  auto pipeline = value_or_fail(
+      Pipeline::build(model(), config_, method_, boundary_, std::move(broken), another));
+  EXPECT_THROW((void)pipeline.run(landmarks(1, "pointer")), std::bad_alloc);
+  EXPECT_EQ(refusal_of(pipeline.run(landmarks(2, "ius")), ErrorCode::kInternal), "no memory yet");
+  ASSERT_TRUE(pipeline.run(landmarks(3, "ius")));
+  EXPECT_EQ(made, 2);
+  EXPECT_EQ(seen_->size(), 4) << "nothing of the first is left";
+}
+
 }  // namespace
 }  // namespace brainshift::pipeline

@@ -170,6 +170,19 @@ TEST(Icp, StartsFromTheInitialPose) {
   EXPECT_LT(placement_error(result.T_surface_points, T_points_surface.inverse(), points), 1e-4);
 }
 
+TEST(Icp, EndsWhenItIsTold) {
+  const TriangleSurface surface = bumpy();
+  const ClosestPointIndex index = index_of(surface);
+  std::stop_source stop;
+  stop.request_stop();
+  IcpOptions options = without_prior();
+  options.stop = stop.get_token();
+  EXPECT_EQ(refusal_of(align(geometry::sample_surface(surface, 300, 6), index,
+                             RigidTransform::Identity(), options),
+                       ErrorCode::kNotConverged),
+            "the alignment was stopped");
+}
+
 TEST(Icp, SphereShowsNoRotationAndKeepsTheTrackedOne) {
   const TriangleSurface sphere = geometry::ellipsoid_surface(kCentre, Vec3::Constant(13.8), 1.04);
   const ClosestPointIndex index = index_of(sphere);

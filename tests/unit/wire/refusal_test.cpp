@@ -218,7 +218,7 @@ TEST(Refusal, UnknownNamesAreQuoted) {
   expect_refused(decode_session_request(request.SerializeAsString()), ErrorCode::kInvalidArgument,
                  "start_session.boundary = \"\"");
   expect_refused(decode_changed_update([](auto& m) { m.set_status("done\n"); }),
-                 ErrorCode::kProtocol, "update.status: \"done \"");
+                 ErrorCode::kProtocol, "update.status: \"done?\"");
   expect_refused(decode_changed_update([](auto& m) { m.set_method("x"); }), ErrorCode::kProtocol,
                  "update.method");
   expect_refused(decode_changed_update([](auto& m) { m.set_boundary("x"); }), ErrorCode::kProtocol,

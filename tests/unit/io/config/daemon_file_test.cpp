@@ -33,6 +33,7 @@ TEST(DaemonFile, ShippedFileHasTheDefaults) {
   EXPECT_EQ(read.limits.connections, defaults.limits.connections);
   EXPECT_EQ(read.limits.observations_per_s, defaults.limits.observations_per_s);
   EXPECT_EQ(read.limits.session_starts_per_min, defaults.limits.session_starts_per_min);
+  EXPECT_EQ(read.limits.journal_gib, defaults.limits.journal_gib);
 }
 
 TEST(DaemonFile, ShippedFileDocumentsEveryKeyAsTheTableDoes) {
@@ -63,7 +64,8 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
       "endpoint: ipc:///tmp/s\nmodel: m.h5\njournal_dir: /j\nlog_level: debug\nmax_clients: 3\n"
       "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n"
       "security:\n  secret_key: k\n  allow_list: a\n"
-      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n"));
+      "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n  "
+      "journal_gib: 8\n"));
   EXPECT_EQ(config.endpoint, "ipc:///tmp/s");
   EXPECT_TRUE(config.allow_remote);
   EXPECT_EQ(config.model, folder_ / "m.h5");
@@ -77,6 +79,7 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   EXPECT_EQ(config.limits.connections, 4);
   EXPECT_EQ(config.limits.observations_per_s, 6);
   EXPECT_EQ(config.limits.session_starts_per_min, 7);
+  EXPECT_EQ(config.limits.journal_gib, 8);
 }
 
 TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {

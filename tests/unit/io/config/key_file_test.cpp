@@ -161,6 +161,9 @@ TEST_F(KeyFiles, ABadAllowListIsRefusedWithItsLine) {
 
 TEST_F(KeyFiles, AnAllowListThatEverybodyMayChangeIsRefused) {
   const fs::path list = folder_.write("list", "viewer wall " + kPublic + "\n");
+  ASSERT_EQ(chmod(list.c_str(), 0664), 0);
+  EXPECT_THAT(refusal_of(read_allow_list(list), ErrorCode::kInvalidArgument),
+              HasSubstr("mode 664: other accounts may change"));
   ASSERT_EQ(chmod(list.c_str(), 0666), 0);
   EXPECT_THAT(refusal_of(read_allow_list(list), ErrorCode::kInvalidArgument),
               HasSubstr("mode 666"));

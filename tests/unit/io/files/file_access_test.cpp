@@ -92,5 +92,23 @@ TEST(FileAccess, TwoWritersOfOneFileDoNotMeet) {
   EXPECT_EQ(content_of(folder / "f"), "second");
 }
 
+TEST(FileAccess, ANewFileIsItsOwnersAndOneThatIsReplacedKeepsItsMode) {
+  const TemporaryFolder folder;
+  const auto mode = [&] {
+    struct stat status {};
+    stat((folder / "f").c_str(), &status);
+    return status.st_mode & 0777;
+  };
+  const mode_t before = umask(0);
+  ASSERT_TRUE(write_file(folder / "f", "new"));
+  EXPECT_EQ(mode(), 0600u);
+  for (const mode_t given : {0600, 0640, 0444}) {
+    ASSERT_EQ(chmod((folder / "f").c_str(), given), 0);
+    ASSERT_TRUE(write_file(folder / "f", "replaced"));
+    EXPECT_EQ(mode(), given);
+  }
+  umask(before);
+}
+
 }  // namespace
 }  // namespace brainshift::io

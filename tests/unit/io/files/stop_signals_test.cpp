@@ -19,10 +19,22 @@ TEST(FailingWrites, DoNotEndTheProcess) {
 }
 
 TEST(StopSignals, BecomeReadableInsteadOfEndingTheProcess) {
-  const auto signals = value_or_fail(StopSignals::catch_all());
-  EXPECT_FALSE(signals.arrived());
-  std::raise(SIGTERM);
-  EXPECT_TRUE(signals.arrived());
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const auto signals = value_or_fail(StopSignals::catch_all());
+    EXPECT_FALSE(signals.arrived());
+    std::raise(signal);
+    EXPECT_TRUE(signals.arrived()) << signal;
+  }
+}
+
+TEST(StopSignals, UnderNohupATerminalThatClosesStopsNothing) {
+  std::signal(SIGHUP, SIG_IGN);
+  {
+    const auto signals = value_or_fail(StopSignals::catch_all());
+    std::raise(SIGHUP);
+    EXPECT_FALSE(signals.arrived());
+  }
+  EXPECT_EQ(std::signal(SIGHUP, SIG_DFL), SIG_IGN);
 }
 
 TEST(StopSignals, WriteToAnotherDescriptorAndRestoreWhatWasThere) {

@@ -3,6 +3,8 @@
 #include "common/io/recording/sqlite_database.hpp"
 
 #include <gmock/gmock.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -107,7 +109,7 @@ TEST_F(SurgeryOnDisk, AFileThatIsDeletedOrReplacedIsNoLongerInPlace) {
   std::ofstream(path) << "somebody else's";
   EXPECT_FALSE(file.in_place());
   EXPECT_EQ(refusal_of(file.close(), ErrorCode::kWriteFailed),
-            path.string() + ": was deleted or replaced while it was written");
+            path.string() + ": was deleted, replaced or cut while it was written");
   EXPECT_EQ(test_support::content_of(path), "somebody else's");
 }
 
@@ -143,6 +145,47 @@ TEST_F(SurgeryOnDisk, NeitherClosingNorDroppingAReplacedFileTouchesItsSuccessor)
     EXPECT_TRUE(successor.close());
     EXPECT_EQ(visit_all(*SurgeryFile::open(path)).records.size(), 4u);
   }
+}
+
+// SQLite maps the index of the log: a part that is cut off ends the process when it is used.
+TEST_F(SurgeryOnDisk, ALogOrIndexThatIsCutIsNoticedBeforeItIsUsed) {
+  for (const char* suffix : {"-wal", "-shm"}) {
+    fs::remove(path);
+    SurgeryFile file = live(2);
+    EXPECT_TRUE(file.in_place());
+    fs::resize_file(fs::path(path) += suffix, 100);
+    EXPECT_FALSE(file.in_place()) << suffix;
+    EXPECT_FALSE(file.close());
+    fs::remove(fs::path(path) += suffix);
+  }
+}
+
+TEST_F(SurgeryOnDisk, AViewInThePlaceOfATableIsRefusedAtOnce) {
+  ASSERT_TRUE(live(2).close());
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(db,
+                         "DROP TABLE record; CREATE VIEW record AS WITH RECURSIVE endless(id) AS "
+                         "(SELECT 1 UNION ALL SELECT id + 1 FROM endless) SELECT id, 'update' AS "
+                         "kind, id AS sequence, 0 AS recorded_ns, '' AS payload, 0 AS crc FROM "
+                         "endless",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(db);
+  refusal_of(SurgeryFile::open(path), ErrorCode::kUnreadable);
+  const auto damaged = SurgeryFile::open_damaged(path);
+  EXPECT_FALSE(damaged && damaged->visit([](const auto&) { return Status(); }));
+}
+
+TEST_F(SurgeryOnDisk, AJournalIsItsOwnersAlone) {
+  const mode_t before = umask(0);
+  SurgeryFile file = live(1);
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    struct stat status {};
+    ASSERT_EQ(stat((fs::path(path) += suffix).c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777, 0600u) << suffix;
+  }
+  umask(before);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include "tests/unit/server/delivery/small_updates.hpp"
@@ -194,6 +195,38 @@ TEST(Parcels, ChangesAreSharedByThoseWhoHoldTheSame) {
   EXPECT_EQ(decoded(one.bytes).update.part, (FieldPart{6, {5}, 2}));
   EXPECT_EQ(decoded(behind.bytes).update.part, (FieldPart{6, {0, 5}, 1}));
   EXPECT_EQ(behind.held->xyz_mm, one.held->xyz_mm);
+}
+
+TEST(Parcels, WhatIsKeptIsBoundedAndGoesWithItsViewer) {
+  Parcels parcels;
+  const Bytes whole = frame_of(usable(1, 6));
+  const auto one = selection({.tolerance_mm = 0.5}, kAll);
+  const Parcel parcel = made(parcels, whole, one);
+  const std::size_t each = parcels.bytes_kept();
+  EXPECT_GE(each, parcel.bytes->size());
+  for (int i = 0; i < 1000; ++i) {  // choices of a viewer that changes its mind
+    parcels.begin_turn();
+    made(parcels, whole, selection({.tolerance_mm = 0.5 + i}, kAll));
+  }
+  parcels.begin_turn();
+  EXPECT_EQ(parcels.bytes_kept(), each) << "the viewer that stayed";
+  EXPECT_EQ(made(parcels, whole, one).held, parcel.held) << "still made once";
+}
+
+TEST(Parcels, ViewersThatStayHaveABoundTogether) {
+  Parcels parcels;
+  constexpr int kMany = 50'000;
+  const Bytes whole = frame_of(usable(1, kMany));
+  std::vector<NodeIndex> all(kMany);
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<SelectionPtr> choices;
+  for (int i = 0; i < 40; ++i) {
+    parcels.begin_turn();
+    choices.push_back(selection({.tolerance_mm = 0.5 + i}, all, kMany));
+    made(parcels, whole, choices.back());
+    EXPECT_LE(parcels.bytes_kept(), Parcels::kBytesKept);
+  }
+  EXPECT_GT(parcels.bytes_kept(), Parcels::kBytesKept / 2);
 }
 
 }  // namespace

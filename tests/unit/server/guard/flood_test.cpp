@@ -183,6 +183,26 @@ TEST_F(Flood, TheFirstOfTwoPeersWithOneRoutingIdStaysAndTheSecondIsClosed) {
   EXPECT_TRUE(first.is_served());
 }
 
+// libzmq aborts the process when it has stopped reading a connection that then closes with a
+// heartbeat unread.
+TEST_F(Flood, RequestsAHeartbeatAndAHangUpAtOnceEndNothing) {
+  serve(with_model());
+  const std::string request = wire::encode_frame(MessageType::kReportRequest, 1, {});
+  const std::string ping = std::string("\4\7\4PING", 7) + std::string(2, '\0');
+  for (int i = 0; i < 200; ++i) {
+    ZmtpPeer peer(port_of(endpoint_));
+    ASSERT_TRUE(peer.shake_hands());
+    std::string all;
+    for (int k = 0; k < 40; ++k) {
+      all += '\0';
+      all += static_cast<char>(request.size());
+      all += request;
+    }
+    peer.send_bytes(all + ping);
+  }
+  served_within_two_seconds();
+}
+
 TEST_F(Flood, LargeMessagesOfAGoodClientArePassedOnWhole) {
   serve(with_model());
   RawPeer peer(endpoint_);

@@ -65,7 +65,7 @@ TEST_F(JournalOnDisk, ADeletedFileIsReportedWithinASecondAndRecordingGoesOnInANe
   ASSERT_TRUE(witness.sees_errors(1));
   EXPECT_LT(std::chrono::steady_clock::now() - deleted, std::chrono::seconds(1));
   EXPECT_THAT(witness.errors(),
-              ElementsAre(path.string() + ": was deleted or replaced while it was recorded"));
+              ElementsAre(path.string() + ": was deleted, replaced or cut while it was recorded"));
   ASSERT_TRUE(witness.sees_resumption());
   EXPECT_FALSE(holds(journal.recorded(), "ius", 1)) << "it went with its file";
   journal.append(record(2), "ius");

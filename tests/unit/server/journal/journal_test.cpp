@@ -344,6 +344,46 @@ TEST_F(JournalTest, BytesInTheQueueAreBoundedToo) {
   let_go_.set_value();
 }
 
+TEST_F(JournalTest, ASessionHasALimitOfBytesBeyondWhichItSaysSo) {
+  options.max_session_bytes = 100;
+  Begun journal(options);
+  journal.append({RecordKind::kUpdate, 1, 0, std::string(60, 'a')});
+  EXPECT_TRUE(journal.status().has_value());
+  journal.append({RecordKind::kUpdate, 2, 0, std::string(60, 'a')});
+  EXPECT_THAT(sentence_of(journal.status()), HasSubstr("its limit"));
+  ASSERT_TRUE(witness.sees_errors(1));
+  journal.append({RecordKind::kUpdate, 3, 0, "a"});
+  EXPECT_FALSE(journal.status().has_value()) << "what is small does not slip in behind";
+  journal.begin("y.surgery", {});
+  records(4, journal);
+}
+
+// What stands for any allocation of the journal's thread that fails.
+TEST_F(JournalTest, AnExceptionOnItsThreadEndsTheFileAndNotTheProcess) {
+  std::atomic<int> told = 0;
+  options.on_recorded = [&, tell = options.on_recorded](const Recorded& recorded) {
+    if (++told == 2) throw std::bad_alloc();
+    tell(recorded);
+  };
+  Begun journal(options);
+  journal.append(record(1), "ius");
+  ASSERT_TRUE(witness.sees_errors(1));
+  ASSERT_TRUE(witness.sees_resumption());
+  records(2, journal);
+}
+
+TEST(Journal, ANameThatAnotherTookInTheSameMomentCostsNoRecord) {
+  const TemporaryFolder folder;
+  folder.write("a.surgery", "another daemon's");
+  Journal journal({});
+  journal.begin(folder / "a.surgery", {});
+  journal.append(record(1), "ius");
+  journal.stop();
+  EXPECT_EQ(journal.recorded().file, folder / "a-2.surgery");
+  EXPECT_TRUE(holds(journal.recorded(), "ius", 1));
+  EXPECT_TRUE(journal.recorded().missing.empty());
+}
+
 // ---------- what a set of records holds ----------
 
 TEST(RecordRanges, SourcesAndUpdatesAreCountedApart) {
@@ -411,7 +451,7 @@ TEST(SurgeryFileSink, NoticesThatItsFileIsGone) {
   EXPECT_TRUE(sink->check());
   fs::remove(path);
   EXPECT_EQ(sentence_of(sink->check()),
-            path.string() + ": was deleted or replaced while it was recorded");
+            path.string() + ": was deleted, replaced or cut while it was recorded");
 }
 
 }  // namespace

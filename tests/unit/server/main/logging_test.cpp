@@ -117,5 +117,16 @@ TEST(Log, AReaderThatIsGoneEndsNothing) {
   SUCCEED();
 }
 
+TEST(Log, ALineOfAStrangerDrivesNoTerminal) {
+  Reader reader;
+  {
+    const Log log(into(reader));
+    spdlog::info("source \x1b[2J\u009b\u202e\nlast");
+  }
+  const auto lines = reader.lines_to("last");
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_THAT(lines[0], EndsWith(" info source ?[2J???last"));
+}
+
 }  // namespace
 }  // namespace brainshift::server

@@ -176,7 +176,8 @@ TEST(Metrics, WhatIsNotThereIsLeftOut) {
 
 // ---------- real scrapes, over loopback ----------
 
-std::string exchange(int port, const std::string& request) {
+// A socket; -1 when nobody listens.
+int connect_to(int port) {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -184,9 +185,15 @@ std::string exchange(int port, const std::string& request) {
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   timeval limit{10, 0};
   setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  close(fd);
+  return -1;
+}
+
+std::string exchange(int port, const std::string& request) {
+  const int fd = connect_to(port);
   std::string answer;
-  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
-      send(fd, request.data(), request.size(), MSG_NOSIGNAL) > 0) {
+  if (send(fd, request.data(), request.size(), MSG_NOSIGNAL) > 0) {
     std::array<char, 4096> buffer{};
     ssize_t size = 0;
     while ((size = recv(fd, buffer.data(), buffer.size(), 0)) > 0) {
@@ -276,6 +283,26 @@ TEST(MetricsExporter, MonitorsThatAskAtOnceAreAllAnswered) {
   }
   EXPECT_EQ(answered, 8);
   EXPECT_EQ(most, 1) << "one report at a time";
+}
+
+TEST(MetricsExporter, QuestionsThatNeverEndKeepNoMonitorOut) {
+  auto exporter =
+      value_or_fail(MetricsExporter::listen("127.0.0.1:0", [] { return wire::DaemonReport(); }));
+  std::vector<int> dripping;
+  for (int i = 0; i < 40; ++i) {
+    dripping.push_back(connect_to(exporter.port()));
+    ASSERT_EQ(send(dripping.back(), "GET /me", 7, MSG_NOSIGNAL), 7);
+  }
+  EXPECT_THAT(scrape(exporter.port()), StartsWith("HTTP/1.1 200"));
+  for (const int fd : dripping) close(fd);
+}
+
+TEST(Metrics, ANameOfASourceDrivesNoTerminal) {
+  wire::DaemonReport report;
+  report.sources.emplace_back().source = "a\x1b[2J\nb";
+  const std::string text = prometheus::TextSerializer().Serialize(metric_families(report));
+  EXPECT_THAT(text, HasSubstr("source=\"a?[2J?b\""));
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
 }
 
 }  // namespace

@@ -296,6 +296,20 @@ TEST_F(RunningSession, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAns
   EXPECT_EQ(state().shared.phase, SessionPhase::kTracking);
 }
 
+TEST_F(RunningSession, AFieldThatCouldNotBePublishedIsAFailure) {
+  answer(landmarks(1));
+  ASSERT_TRUE(submit(landmarks(2)));
+  const auto job = next_job();
+  ASSERT_TRUE(job);
+  ASSERT_TRUE(finish(*job, run(*job)));
+  EXPECT_EQ(state().shared.newest_usable, 2u);
+  const auto again = finish(*job, fail(ErrorCode::kInternal, "no memory"));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->error->message, "no memory");
+  EXPECT_EQ(state().shared.newest_update, 2u);
+  EXPECT_EQ(state().shared.newest_usable, 1u) << "the one that was published";
+}
+
 TEST_F(RunningSession, AnUnusableFieldIsUsedUpAndTheOneBeforeItStays) {
   answer(landmarks(1));
   EXPECT_FALSE(answer(landmarks(2, "pointer", kMaxMotion_mm + 1.0)).update.usable());

@@ -24,15 +24,36 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
   const struct {
     void (*spoil)(Observation&);
     const char* says;
-  } rows[] = {{[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
-              {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
-              {[](Observation& o) { o.source.clear(); }, "source"},
-              {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
-              {[](Observation& o) { o.session = {}; }, "session is absent"},
-              {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
-              {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
-              {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
-              {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
+  } rows[] = {
+      {[](Observation& o) { o.case_id = "x\ny"; }, "case_id = \"x?y\""},
+      {[](Observation& o) { o.frame = "lps"; }, "frame = \"lps\""},
+      {[](Observation& o) { o.source.clear(); }, "source"},
+      {[](Observation& o) { o.source.assign(1000, 'a'); }, "1 to 64 characters"},
+      {[](Observation& o) { o.source = "ius\u009b2J"; }, "\"ius?2J\": must have no control"},
+      {[](Observation& o) { o.session = {}; }, "session is absent"},
+      {[](Observation& o) { o.session.session_id = 0; }, "the running session is 1"},
+      {[](Observation& o) { o.session.model_id = "x"; }, "model_id = \"x\""},
+      {[](Observation& o) { o.session.boot_id = 1; }, "restarted"},
+      {[](Observation& o) {
+         o.body = TumourBoundary{Points::Zero(3, kMaxObservedPoints + 1), 0.5};
+       },
+       "tumour_boundary has 50001 points"},
+      {[](Observation& o) {
+         o.body = CorticalSurface{{Points::Zero(3, kMaxObservedPoints + 1), {}}, 0.5};
+       },
+       "cortical_surface has 50001 points"},
+      {[](Observation& o) {
+         CorticalSurface surface{{Points::Zero(3, 3), {}}, 0.5};
+         surface.surface.triangles.setZero(3, kMaxObservedTriangles + 1);
+         o.body = surface;
+       },
+       "cortical_surface has 100001 triangles"},
+      {[](Observation& o) {
+         const Points points = Points::Zero(3, kMaxLandmarkPairs + 1);
+         o.body = LandmarkPairs{points, points, 0.5};
+       },
+       "landmark_pairs has 1001 pairs, must be at most 1000"},
+      {[](Observation& o) { o.body = PatientPose{}; }, "patient_pose"}};
   const SessionKey running{kBootId, 1, kModelId};
   ASSERT_TRUE(check_observation(landmarks(2), kCase, running));
   for (const auto& row : rows) {
@@ -43,12 +64,6 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
         refusal_of(check_observation(observation, kCase, running), ErrorCode::kInvalidArgument),
         testing::AllOf(HasSubstr(row.says), testing::Not(HasSubstr("\n"))));
   }
-}
-
-TEST(InQuotes, IsOneShortLineWhateverItHolds) {
-  EXPECT_EQ(in_quotes("plain"), "\"plain\"");
-  EXPECT_EQ(in_quotes("a\nb\x1b"), "\"a?b?\"");
-  EXPECT_EQ(in_quotes(std::string(200, 'x')), "\"" + std::string(64, 'x') + "...\"");
 }
 
 // ---------- clocks ----------
@@ -191,6 +206,39 @@ TEST(Sources, EachHasAClockOfItsOwnAndFollowsOneThatWasSet) {
   EXPECT_EQ(sources.admit(with_stamp(landmarks(1, "camera"), 0), 9, false)->daemon_ns, 9);
   EXPECT_FALSE(sources.admit(with_stamp(landmarks(2, "camera"), kHour), 10, false));
   EXPECT_EQ(sources.admit(with_stamp(landmarks(2, "camera"), kHour + 1), 11, false)->daemon_ns, 11);
+}
+
+TEST(Sources, OneThatWasStartedAgainIsToldItsNumberAndHasANewClock) {
+  Sources sources(kMaxAge_s, false);
+  ASSERT_TRUE(sources.admit(with_stamp(landmarks(57, "ius"), kHour), kHour, false, "first run"));
+  EXPECT_THAT(refusal_of(sources.admit(with_stamp(landmarks(1, "ius"), 3), kHour + kSecond, false,
+                                       "second run"),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("a source that was started again numbers on from 58"));
+  EXPECT_FALSE(
+      sources.admit(with_stamp(landmarks(58, "ius"), 3), kHour + kSecond, false, "first run"))
+      << "a clock that runs backwards in one run";
+  const auto admitted = value_or_fail(
+      sources.admit(with_stamp(landmarks(58, "ius"), 3), kHour + kSecond, false, "second run"));
+  EXPECT_EQ(admitted.daemon_ns, kHour + kSecond);
+}
+
+TEST(Sources, InventedNamesKeepNoSourceOut) {
+  Sources sources(kMaxAge_s, false);
+  const auto admit = [&](const std::string& name, std::int64_t now_ns, const std::string& client) {
+    return sources.admit(with_stamp(landmarks(1, name), now_ns), now_ns, false, client);
+  };
+  for (int i = 0; i < Sources::kMaxSourcesOfOne; ++i) {
+    ASSERT_TRUE(admit("invented " + std::to_string(i), i, "joker"));
+  }
+  EXPECT_THAT(refusal_of(admit("one more", 9, "joker"), ErrorCode::kUnavailable),
+              HasSubstr("from this connection"));
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(admit("other " + std::to_string(i), kSecond, "bridge"));
+  }
+  EXPECT_THAT(refusal_of(admit("real", 2 * kSecond, "camera"), ErrorCode::kUnavailable),
+              HasSubstr("in the last 120 s"));
+  EXPECT_TRUE(admit("real", 121 * kSecond, "camera")) << "those that are silent make room";
 }
 
 TEST(Sources, OfARecordingShareItsClock) {

@@ -191,11 +191,26 @@ TEST_F(TransportTest, ClientsBeyondTheLimitAreRefusedUntilOneLeaves) {
   subscribe(first);
   subscribe(*second);
   RawPeer third(endpoint_);
-  const Error refused = error_of(third.ask(MessageType::kStatusRequest));
+  const Error refused = error_of(third.ask(MessageType::kModelRequest));
   EXPECT_EQ(refused.code, ErrorCode::kUnavailable);
   EXPECT_THAT(refused.message, HasSubstr("2 clients"));
+  EXPECT_TRUE(third.is_served()) << "that the daemon lives is told without a place";
+  EXPECT_EQ(third.ask(MessageType::kReportRequest).type, MessageType::kReportReply);
   second.reset();
-  EXPECT_TRUE(eventually([&] { return third.is_served(); }));
+  EXPECT_TRUE(eventually(
+      [&] { return third.ask(MessageType::kModelRequest).type == MessageType::kModelReply; }));
+}
+
+// What stands for any allocation of the transport thread that fails.
+TEST_F(TransportTest, AnExceptionOnTheTransportThreadCostsOneStep) {
+  ServiceOptions options = with_model();
+  options.on_turn = [turns = 0]() mutable {
+    if (++turns <= 3) throw std::bad_alloc();
+  };
+  serve(std::move(options));
+  RawPeer peer(endpoint_);
+  for (int i = 0; i < 5; ++i) peer.ask(MessageType::kReportRequest);
+  EXPECT_TRUE(peer.is_served());
 }
 
 // ---------- binding ----------

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "common/wire/text.hpp"
+#include "common/core/text.hpp"
 
 #include <cstddef>
+#include <cstdint>
 
-namespace brainshift::wire {
+namespace brainshift {
 namespace {
 
 bool in_range(unsigned char byte, unsigned low, unsigned high) {
@@ -28,6 +29,24 @@ std::size_t sequence_length(std::string_view text) {
   }
   return length;
 }
+
+// Of a well-formed sequence of `length` bytes.
+std::uint32_t code_point(std::string_view text, std::size_t length) {
+  static constexpr unsigned kFirstBits[] = {0, 0x7f, 0x1f, 0x0f, 0x07};
+  std::uint32_t value = static_cast<unsigned char>(text[0]) & kFirstBits[length];
+  for (std::size_t i = 1; i < length; ++i) {
+    value = value << 6 | (static_cast<unsigned char>(text[i]) & 0x3fu);
+  }
+  return value;
+}
+
+bool is_shown(std::uint32_t c) {
+  const auto within = [c](std::uint32_t low, std::uint32_t high) { return c >= low && c <= high; };
+  return c >= 0x20 && !within(0x7f, 0x9f) && c != 0x61c && !within(0x200b, 0x200f) &&
+         !within(0x2028, 0x202e) && !within(0x2060, 0x206f) && c != 0xfeff;
+}
+
+constexpr std::size_t kMaxQuoted = 64;
 
 }  // namespace
 
@@ -56,20 +75,28 @@ std::string to_utf8(std::string_view text) {
   return out;
 }
 
-std::string one_line(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7f) c = ' ';
+std::string one_line(std::string_view text, char instead) {
+  std::string out;
+  out.reserve(text.size());
+  while (!text.empty()) {
+    const std::size_t length = sequence_length(text);
+    if (length > 0 && is_shown(code_point(text, length))) {
+      out.append(text.substr(0, length));
+    } else {
+      out.push_back(instead);
+    }
+    text.remove_prefix(length > 0 ? length : 1);
   }
   return out;
 }
 
 std::string in_quotes(std::string_view text) {
-  std::string out = one_line(text);
-  out.insert(out.begin(), '"');
-  out.push_back('"');
-  return out;
+  std::size_t end = 0;
+  for (std::size_t count = 0; end < text.size() && count < kMaxQuoted; ++count) {
+    const std::size_t length = sequence_length(text.substr(end));
+    end += length > 0 ? length : 1;
+  }
+  return '"' + one_line(text.substr(0, end), '?') + (end < text.size() ? "...\"" : "\"");
 }
 
-}  // namespace brainshift::wire
+}  // namespace brainshift
