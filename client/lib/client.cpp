@@ -160,7 +160,7 @@ struct Client::Impl {
   Status renew() {
     const Deadline now = std::chrono::steady_clock::now();
     const std::uint64_t id = ++last_request_id;
-    watch.asked(id, now);
+    watch.asked(id, BootClock::now());
     renewed = now;
     acknowledged = subscription->received;
     static_cast<void>(dealer->send(
@@ -178,9 +178,10 @@ struct Client::Impl {
   // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
   // said what is newest.
   Status confirm(Deadline deadline) {
-    const Deadline asked = std::chrono::steady_clock::now();
+    const auto asked = BootClock::now();
+    const Deadline begun = std::chrono::steady_clock::now();
     while (!watch.as_of() || *watch.as_of() < asked) {
-      if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
+      if (next_renewal() <= std::chrono::steady_clock::now() || renewed < begun) {
         if (auto status = renew(); !status) return status;
       }
       auto status = receive_push(std::min(deadline, next_renewal()));
@@ -278,7 +279,7 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   self.assembly.begin(choice);
   self.acknowledged = 0;
   self.renewed = std::chrono::steady_clock::now();
-  self.watch.asked(self.last_request_id + 1, self.renewed);
+  self.watch.asked(self.last_request_id + 1, BootClock::now());
   const auto state = self.request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
                                   MessageType::kSessionState)
                          .and_then(wire::decode_session_state);
@@ -333,7 +334,7 @@ const std::optional<UpdateMessage>& Client::latest_usable() const {
 FieldStatus Client::field_status() const {
   std::optional<std::pair<SessionKey, std::uint64_t>> shown;
   if (const auto& field = latest_usable()) shown.emplace(field->key(), field->update.sequence);
-  return impl_->watch.judge(shown, impl_->dealer->endpoint(), std::chrono::steady_clock::now());
+  return impl_->watch.judge(shown, impl_->dealer->endpoint(), BootClock::now());
 }
 
 const std::optional<SessionState>& Client::session_state() const { return impl_->watch.state(); }

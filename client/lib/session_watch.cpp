@@ -8,7 +8,7 @@
 namespace brainshift::client {
 namespace {
 
-double seconds(std::chrono::steady_clock::duration duration) {
+double seconds(BootClock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
@@ -21,9 +21,9 @@ std::string one_decimal(double value) {
 }  // namespace
 
 std::string_view to_string(Currency currency) {
-  static constexpr std::string_view kNames[] = {"none", "current", "superseded", "degraded",
-                                                "stale"};
-  return enum_name<Currency::kStale>(currency, kNames);
+  static constexpr std::string_view kNames[] = {"none",  "current", "superseded", "degraded",
+                                                "stale", "aged",    "expired"};
+  return enum_name<Currency::kExpired>(currency, kNames);
 }
 
 void SessionWatch::asked(std::uint64_t request_id, TimePoint now) {
@@ -54,6 +54,14 @@ bool SessionWatch::holds(TimePoint now) const {
 
 FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
                                 const std::string& endpoint, TimePoint now) const {
+  FieldStatus status = currency_of(shown, endpoint, now);
+  status.recorded = state_ && state_->recorded;
+  return status;
+}
+
+FieldStatus SessionWatch::currency_of(
+    const std::optional<std::pair<SessionKey, std::uint64_t>>& shown, const std::string& endpoint,
+    TimePoint now) const {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   if (!state_ || !as_of_) return {Currency::kStale, "not subscribed to " + endpoint, kUnknown};
   const SessionState& state = *state_;
@@ -79,8 +87,11 @@ FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::u
   if (shown->second < state.newest_usable) {
     return {Currency::kSuperseded, "a newer field is on its way", age_s};
   }
+  const FieldAge age = state.age_of(1e3 * age_s);
+  const std::string too_old = state.age_reason(1e3 * age_s);
+  if (age == FieldAge::kExpired) return {Currency::kExpired, too_old, age_s};
   if (state.newest_update > shown->second) return {Currency::kDegraded, state.reason, age_s};
-  return {Currency::kCurrent, {}, age_s};
+  return {age == FieldAge::kAged ? Currency::kAged : Currency::kCurrent, too_old, age_s};
 }
 
 }  // namespace brainshift::client

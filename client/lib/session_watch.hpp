@@ -11,13 +11,15 @@
 #include <utility>
 
 #include "client/lib/field_status.hpp"
+#include "common/core/boot_clock.hpp"
 #include "common/values/session_state.hpp"
 
 namespace brainshift::client {
 
 class SessionWatch {
  public:
-  using TimePoint = std::chrono::steady_clock::time_point;
+  // Of a clock that runs while the computer sleeps: an answer does not hold any longer then.
+  using TimePoint = BootClock::time_point;
 
   // A request for the state goes out: what its answer says holds from here.
   void asked(std::uint64_t request_id, TimePoint now);
@@ -47,6 +49,10 @@ class SessionWatch {
                     const std::string& endpoint, TimePoint now) const;
 
  private:
+  // judge(), but for `recorded`.
+  FieldStatus currency_of(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
+                          const std::string& endpoint, TimePoint now) const;
+
   static constexpr std::size_t kMaxAsked = 64;
 
   std::string model_id_;

@@ -107,6 +107,8 @@ SessionState Service::state_now() const {
   state.session.boot_id = options_.boot_id;
   if (journal_) state.recording = recording_state(journal_->recorded());
   state.valid_ms = static_cast<std::uint32_t>(kValidity.count());
+  state.aged_after_ms = static_cast<std::uint32_t>(options_.aged_after.count());
+  state.expired_after_ms = static_cast<std::uint32_t>(options_.expired_after.count());
   return state;
 }
 

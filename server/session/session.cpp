@@ -138,7 +138,8 @@ void Session::stop() {
 
 // ---------- observations ----------
 
-Result<Admission> Session::submit(Observation observation, TimePoint now) {
+Result<Admission> Session::submit(Observation observation, TimePoint now,
+                                  std::chrono::nanoseconds asleep) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
                                                     : "no session is running: start one first");
@@ -158,7 +159,7 @@ Result<Admission> Session::submit(Observation observation, TimePoint now) {
          fmt::format("observation {} came before it was begun", observation.sequence)});
   }
   const std::string source = observation.source;
-  boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now});
+  boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now, asleep});
   return admission;
 }
 
@@ -179,7 +180,8 @@ std::optional<Job> Session::next_job(TimePoint now) {
              running_->request,
              ++running_->numbered,
              running_->model,
-             work_->stop.get_token()};
+             work_->stop.get_token(),
+             box.asleep};
 }
 
 std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> result) {
@@ -212,7 +214,11 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
   update.sequence = running_->newest_update = job.number;
   if (result && update.usable()) {
     running_->newest_usable = update.sequence;
-    running_->usable_arrived = job.arrived;
+    running_->usable_acquired =
+        job.request.recorded_clock
+            ? job.arrived
+            : TimePoint(std::chrono::nanoseconds(job.observation.acquired_ns));
+    running_->usable_asleep = job.asleep;
   } else {
     running_->reason = result ? update.estimate.quality.reason : message.error->message;
     decision.reason = running_->reason;
@@ -242,7 +248,7 @@ SessionPhase Session::phase() const {
                                                             : SessionPhase::kDegraded;
 }
 
-Session::State Session::state(TimePoint now) const {
+Session::State Session::state(TimePoint now, std::chrono::nanoseconds asleep) const {
   State state;
   state.shared.session = {boot_id_, 0, model_id_};
   state.shared.phase = phase();
@@ -257,10 +263,14 @@ Session::State Session::state(TimePoint now) const {
   state.max_age_s = running_->model->max_age_s;
   state.shared.session.session_id = running_->key.session_id;
   state.shared.preparing = coming();
+  state.shared.recorded = running_->request.recorded_clock;
+  state.shared.method = to_string(running_->request.method);
+  state.shared.boundary = to_string(running_->request.boundary);
   state.shared.newest_update = running_->newest_update;
   state.shared.newest_usable = running_->newest_usable;
   if (running_->newest_usable > 0) {
-    state.shared.age_ms = 1e3 * seconds_of(now - running_->usable_arrived);
+    const auto age = now - running_->usable_acquired + (asleep - running_->usable_asleep);
+    state.shared.age_ms = std::max(0.0, 1e3 * seconds_of(age));
   }
   if (state.shared.phase == SessionPhase::kDegraded) state.shared.reason = running_->reason;
   return state;

@@ -338,6 +338,9 @@ class Widget:
     def setValue(self, value):
         self.value = value
 
+    def setTextFormat(self, format):
+        self.format = format
+
     def setStyleSheet(self, style):
         self.style = style
 
@@ -393,6 +396,7 @@ def install(with_openigtlink=True):
     qt, ctk = types.ModuleType("qt"), types.ModuleType("ctk")
     for name in ("QLabel", "QPushButton", "QLineEdit", "QSpinBox", "QCheckBox"):
         setattr(qt, name, type(name, (Widget,), {}))
+    qt.Qt = types.SimpleNamespace(PlainText="plain")
     qt.QFormLayout = lambda parent: Widget()
     qt.QTimer = Timer
     ctk.ctkCollapsibleButton = Widget

@@ -63,6 +63,19 @@ def test_superseded_degraded_and_another_session(watch):
     assert watch.judge(update(), "e", 10.1).currency == Currency.NONE
 
 
+def test_an_old_field_is_aged_then_expired_and_never_current(watch):
+    watch.told(state(age_ms=29_500.0, aged_after_ms=30_000, expired_after_ms=30_300))
+    assert watch.judge(update(), "e", 10.4).currency == Currency.CURRENT
+    aged = watch.judge(update(), "e", 10.6)
+    assert (aged.currency, aged.reason) == (Currency.AGED, "its data are 30.1 s old: 30 s at most")
+    assert watch.judge(update(), "e", 10.9).currency == Currency.EXPIRED
+
+
+def test_a_recording_is_told_with_every_status(watch):
+    watch.told(state(recorded=True))
+    assert watch.judge(update(), "e", 10.1).recorded and watch.judge(update(), "e", 99.0).recorded
+
+
 def test_another_model_is_named(watch):
     watch.model_id = "mine"
     found = watch.judge(update(), "e", 10.1)

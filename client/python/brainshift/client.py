@@ -11,7 +11,7 @@ from typing import Callable, Deque, Iterator, Optional, TypeVar
 import zmq
 
 from . import codec, frame
-from .currency import LatestUsable, SessionWatch
+from .currency import LatestUsable, SessionWatch, boot_time
 from .errors import Error, ProtocolError, Unavailable
 from .frame import MessageType
 from .keys import Keys
@@ -159,7 +159,7 @@ class Client:
         self._subscription = _Subscription(1 if before is None else before.number + 1, window, choice)
         now = time.monotonic()
         self._subscription.renewed = now
-        self._watch.asked(self._last_request + 1, now)
+        self._watch.asked(self._last_request + 1, boot_time())
         try:
             return self._ask(MessageType.SUBSCRIBE_REQUEST, self._subscription_payload(), MessageType.SESSION_STATE,
                              codec.session_state)
@@ -213,7 +213,7 @@ class Client:
 
     def field_status(self) -> FieldStatus:
         """Whether latest_usable may be shown as current, now."""
-        return self._watch.judge(self._latest.update, self.endpoint, time.monotonic())
+        return self._watch.judge(self._latest.update, self.endpoint, boot_time())
 
     @property
     def session_state(self) -> Optional[SessionState]:
@@ -306,14 +306,14 @@ class Client:
             self._subscription.number += 1
             self._subscription.received = self._subscription.acknowledged = 0
             return
-        self._watch.asked(self._last_request, now)
+        self._watch.asked(self._last_request, boot_time())
 
     def _confirm(self, deadline: float) -> None:
         """Drops what is outdated by now, once the daemon has said what is newest."""
         assert self._subscription is not None
-        asked = time.monotonic()
+        asked, begun = boot_time(), time.monotonic()
         while self._watch.as_of is None or self._watch.as_of < asked:
-            if self._renewal_due() <= time.monotonic() or self._subscription.renewed < asked:
+            if self._renewal_due() <= time.monotonic() or self._subscription.renewed < begun:
                 self._renew()
             if not self._receive_push(min(deadline, self._renewal_due())) and time.monotonic() >= deadline:
                 raise Unavailable(f"no answer from {self.endpoint} in time")

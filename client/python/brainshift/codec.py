@@ -168,7 +168,7 @@ def session_state(payload: bytes) -> v.SessionState:
     except ValueError:
         raise ProtocolError(f"SessionState: phase {m.phase} is not known") from None
     return v.SessionState(_key(m.session), phase, m.newest_update, m.newest_usable, m.age_ms, m.valid_ms, m.reason,
-                          m.preparing)
+                          m.preparing, m.aged_after_ms, m.expired_after_ms, m.recorded, m.method, m.boundary)
 
 
 def receipt(payload: bytes) -> v.Receipt:

@@ -42,10 +42,15 @@ class SessionState:
     phase: Phase
     newest_update: int  # sequence; 0: none
     newest_usable: int  # sequence; 0: none
-    age_ms: float  # since the observation that newest_usable answers arrived
+    age_ms: float  # since the observation that newest_usable answers was acquired, on the daemon's clock
     valid_ms: int  # how long the answer holds, from the moment at which it was asked for
     reason: str  # why the session is degraded, else empty
     preparing: bool  # another session is being prepared
+    aged_after_ms: int = 0  # above it a field is aged; 0: no limit
+    expired_after_ms: int = 0  # above it a field has expired: not to be shown; 0: no limit
+    recorded: bool = False  # a recording is played: no field of it is live
+    method: str = ""  # of the session
+    boundary: str = ""  # of the session
 
 
 @dataclass(frozen=True)
@@ -341,10 +346,13 @@ class Currency(enum.Enum):
     SUPERSEDED = "superseded"  # a newer usable one is on its way
     DEGRADED = "degraded"  # the newest usable one, but a newer observation gave none
     STALE = "stale"  # nothing is known of the daemon any more: it may be older than it looks
+    AGED = "aged"  # the newest usable one, but older than the daemon's first limit: show it with that word
+    EXPIRED = "expired"  # older than the second limit: not to be shown
 
 
 @dataclass(frozen=True)
 class FieldStatus:
     currency: Currency
     reason: str  # one sentence to show; empty when current
-    age_s: Optional[float]  # since the observation that it answers reached the daemon; None: not known
+    age_s: Optional[float]  # since its data were acquired; None: not known
+    recorded: bool = False  # a recording is played: display the word RECORDED with its field

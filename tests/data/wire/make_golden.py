@@ -27,7 +27,9 @@ SCHEMA = {
     "SessionState": {
         "session": (1, "SessionKey"), "phase": (2, "int"), "newest_update": (3, "int"),
         "newest_usable": (4, "int"), "age_ms": (5, "double"), "valid_ms": (6, "int"),
-        "reason": (7, "text"), "preparing": (8, "int"), "recording": (9, "RecordingState")},
+        "reason": (7, "text"), "preparing": (8, "int"), "recording": (9, "RecordingState"),
+        "aged_after_ms": (10, "int"), "expired_after_ms": (11, "int"), "recorded": (12, "int"),
+        "method": (13, "text"), "boundary": (14, "text")},
     "RecordingState": {"recording": (1, "int"), "reason": (2, "text"), "sources": (3, "*RecordedSource")},
     "RecordedSource": {"source": (1, "text"), "until": (2, "int"), "lost_until": (3, "int")},
     "SubscribeRequest": {
@@ -174,7 +176,9 @@ MESSAGES = {
         "session": KEY, "phase": 5, "newest_update": 12, "newest_usable": 9, "age_ms": 1250.5,
         "valid_ms": 1000, "reason": "observation 12: no point is inside the brain", "preparing": 1,
         "recording": {"recording": 1, "reason": "", "sources": [
-            {"source": "ius", "until": 12, "lost_until": 3}]}}),
+            {"source": "ius", "until": 12, "lost_until": 3}]},
+        "aged_after_ms": 30000, "expired_after_ms": 2**32 - 1, "recorded": 1, "method": "condensed",
+        "boundary": "fixed"}),
     "observation_tumour": (9, 2**63 + 5, "Observation", OBSERVATION | {
         "tumour_boundary": {"points": {"xyz_mm": [12.5, -40.1, 1 / 3, -0.1, 1e-300, 55.0]},
                             "sd_mm": 0.51}}),

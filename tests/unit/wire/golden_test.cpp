@@ -203,7 +203,12 @@ SessionState session_state_from(const json& value) {
           value["valid_ms"],
           value["reason"],
           value["preparing"] == 1,
-          RecordingState{true, "", {{"ius", 12, 3}}}};
+          RecordingState{true, "", {{"ius", 12, 3}}},
+          value.value("aged_after_ms", 0u),
+          value.value("expired_after_ms", 0u),
+          value.value("recorded", 0) == 1,
+          value.value("method", ""),
+          value.value("boundary", "")};
 }
 
 Subscription subscription_from(const json& value) {

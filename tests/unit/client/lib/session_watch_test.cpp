@@ -72,6 +72,37 @@ TEST_F(SessionWatchTest, AStateThatNobodyAskedForIsNewsButNoProof) {
   EXPECT_EQ(judge(milliseconds(500), 6).currency, Currency::kCurrent);
 }
 
+// The limits are the daemon's; a field ages between its answers too.
+TEST_F(SessionWatchTest, AnOldFieldIsAgedThenExpiredAndNeverCurrent) {
+  SessionState state = tracking(5);
+  state.age_ms = 29'500.0;
+  state.aged_after_ms = 30'000;
+  state.expired_after_ms = 30'300;
+  hear(milliseconds(0), state);
+  EXPECT_EQ(judge(milliseconds(400)).currency, Currency::kCurrent);
+  const FieldStatus aged = judge(milliseconds(600));
+  EXPECT_EQ(aged.currency, Currency::kAged);
+  EXPECT_EQ(aged.reason, "its data are 30.1 s old: 30 s at most");
+  const FieldStatus expired = judge(milliseconds(900));
+  EXPECT_EQ(expired.currency, Currency::kExpired);
+  EXPECT_EQ(expired.reason, "its data are 30.4 s old: 30.3 s at most");
+  state.newest_update = 6;
+  state.reason = "no point";
+  hear(milliseconds(0), state);
+  EXPECT_EQ(judge(milliseconds(600)).currency, Currency::kDegraded);
+  EXPECT_EQ(judge(milliseconds(900)).currency, Currency::kExpired);
+}
+
+TEST_F(SessionWatchTest, ARecordingIsToldWithEveryStatus) {
+  SessionState state = tracking(5);
+  hear(milliseconds(0), state);
+  EXPECT_FALSE(judge(milliseconds(10)).recorded);
+  state.recorded = true;
+  hear(milliseconds(0), state);
+  EXPECT_TRUE(judge(milliseconds(10)).recorded);
+  EXPECT_TRUE(judge(milliseconds(5000)).recorded);
+}
+
 TEST_F(SessionWatchTest, AFailureSinceDegradesItWithItsReason) {
   SessionState state = tracking(5);
   state.newest_update = 6;

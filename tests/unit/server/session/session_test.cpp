@@ -499,6 +499,39 @@ TEST_F(RunningSession, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
 
 // ---------- what is told of it ----------
 
+// 118 s on the way, then waiting here, then the computer asleep: each is age.
+TEST_F(RunningSession, AgeCountsFromAcquisitionAndWhileTheComputerSleeps) {
+  Observation first = landmarks(1);
+  first.acquired_ns = first.sent_ns = 1'000'000'000;
+  answer(first);
+  Observation late = landmarks(2);
+  late.acquired_ns = 2'000'000'000;
+  late.sent_ns = late.acquired_ns + 100'000'000'000;
+  now_ += 101s;
+  ASSERT_TRUE(session_.submit(late, now_, 5s).has_value());
+  act();
+  answer();
+  now_ += 3s;
+  EXPECT_NEAR(session_.state(now_, 5s).shared.age_ms, 103e3, 1.0);
+  EXPECT_NEAR(session_.state(now_, 605s).shared.age_ms, 703e3, 1.0);
+}
+
+TEST_F(SessionTest, ARecordingSaysSoAndItsMethodAndBoundary) {
+  SessionRequest recorded = request(Boundary::kFixed);
+  recorded.recorded_clock = true;
+  ask(recorded);
+  prepare(*next_preparation());
+  next_job();
+  const SessionState said = state().shared;
+  EXPECT_TRUE(said.recorded);
+  EXPECT_EQ(said.kind(), "RECORDED, paper, fixed");
+  Observation old = landmarks(1);
+  old.acquired_ns = 5;
+  answer(old);
+  now_ += 2s;
+  EXPECT_NEAR(session_.state(now_).shared.age_ms, 2e3, 1.0) << "since it was played";
+}
+
 TEST_F(RunningSession, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
   EXPECT_EQ(state().working_s, 0.0);
   EXPECT_GT(state().max_age_s, 0.0);

@@ -74,7 +74,13 @@ TEST(Page, AJournalWithoutASessionHasNothingToRecord) {
 // Each stands in words: nothing depends on colour.
 TEST(Page, WhatNeedsAttentionStandsInCapitalsAndAlarms) {
   const std::pair<const char*, std::function<void(DaemonReport&)>> kFaults[] = {
-      {"STALE", [](DaemonReport& report) { report.session.age_ms = 600'001.0; }},
+      {", AGED", [](DaemonReport& report) { report.session.age_ms = 30'001.0; }},
+      {", EXPIRED", [](DaemonReport& report) { report.session.age_ms = 600'001.0; }},
+      {"ATTENTION: the field is aged: its data are 30.1 s old: 30 s at most",
+       [](DaemonReport& report) { report.session.age_ms = 30'100.0; }},
+      {"RECORDED, well", [](DaemonReport& report) { report.session.recorded = true; }},
+      {"session 3, owner 00ab12cd34, RECORDED, condensed, contact",
+       [](DaemonReport& report) { report.session.recorded = true; }},
       {"NOT RECORDING: disk full",
        [](DaemonReport& report) {
          report.journal->recording = false;
