@@ -47,6 +47,7 @@ struct Client::Impl {
   FieldAssembly assembly;
   LatestUsable latest_usable;
   SessionWatch watch;
+  int mesh_nodes = 0;  // of the model that the viewer draws with; 0: not known
   std::optional<Subscription> subscription;
   std::uint64_t acknowledged = 0;  // of subscription->received
   Deadline renewed;                // when it was last renewed
@@ -130,6 +131,9 @@ struct Client::Impl {
       return updates.push(std::move(update));
     }
     if (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id)) return;
+    if (auto fits = check_mesh(*update, mesh_nodes); !fits) {
+      return updates.push(protocol_error(fits.error().message));
+    }
     update->received_bytes = payload.size();
     update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
     const FieldAssembly::Outcome outcome = assembly.complete(*update);
@@ -210,6 +214,8 @@ struct Client::Impl {
   // The oldest queued update, on its way to the caller.
   std::optional<Result<UpdateMessage>> hand_out() {
     auto update = updates.pop();
+    // Its session may have ended while it waited.
+    while (update && *update && !latest_usable.belongs((*update)->key())) update = updates.pop();
     if (update && *update) latest_usable.take(**update);
     return update;
   }
@@ -252,6 +258,7 @@ Result<SessionInfo> Client::start_session(const SessionRequest& request) {
       .map([this](SessionInfo info) {
         impl_->latest_usable.begin(info.key());
         impl_->watch.expect_model(info.model_id);
+        impl_->mesh_nodes = info.nodes;
         return info;
       });
 }
@@ -261,6 +268,7 @@ Result<BrainModel> Client::model() {
       .and_then(wire::decode_model)
       .map([this](BrainModel model) {
         impl_->watch.expect_model(model.model_id);
+        impl_->mesh_nodes = model.mesh.num_nodes();
         return model;
       });
 }

@@ -351,7 +351,7 @@ def test_the_core_imports_nothing_of_slicer(name):
     roots = {alias.name.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     roots |= {node.module.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert not roots & {"slicer", "qt", "ctk"}
-    assert roots <= {"__future__", "dataclasses", "enum", "json", "math", "numpy", "typing", "vtk"}
+    assert roots <= {"__future__", "dataclasses", "enum", "json", "math", "numpy", "time", "typing", "vtk"}
 
 
 def test_every_name_of_the_core_is_typed(tmp_path):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any, Optional, Union
+from typing import Any, ClassVar, Optional, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +38,8 @@ class Phase(enum.IntEnum):
 
 @dataclass(frozen=True)
 class SessionState:
+    MOST_VALID_MS: ClassVar[int] = 10_000  # a daemon that says more is refused
+
     session: SessionKey
     phase: Phase
     newest_update: int  # sequence; 0: none
