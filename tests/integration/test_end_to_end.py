@@ -84,7 +84,7 @@ def test_prepare_tells_what_it_built(inputs):
 
 def test_the_simulated_surgery_of_the_paper_is_recovered(folder, daemon, paper):
     running = daemon()
-    report, _ = replay(paper, running, folder / "report.json")
+    report, _ = replay(paper, running, folder / "report.json", "--boundary", "both")
     assert len(report) == 2
     for run in report:
         assert_contract(run)

@@ -253,6 +253,19 @@ def test_a_deleted_node_removes_it(shown):
     assert not shown.logic.tick().show
 
 
+def test_a_renamed_volume_is_named(shown):
+    shown.node(FIELD).SetName("mine")
+    verdict = shown.logic.tick()
+    assert not verdict.show and "no volume brainshift_u" in verdict.reason and "renamed" in verdict.reason
+
+
+def test_a_deleted_connector_ends_the_connection(shown):
+    assert shown.logic.connecting
+    shown.scene.RemoveNode(shown.logic._connector)
+    assert shown.logic.tick().reason == "not connected"
+    assert not shown.logic.connecting and not shown.logic.verdict.show
+
+
 def test_a_deleted_transform_is_made_again(shown):
     shown.scene.RemoveNode(shown.transform)
     assert shown.logic.tick().show and shown.transform.log[-1] is not None

@@ -172,6 +172,10 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
 
     def tick(self):
         """Looks at the newest nodes, and shows or takes away. Never raises for what the bridge sends."""
+        if self._connector is not None and slicer.mrmlScene.GetNodeByID(self._connector.GetID()) is None:
+            self._connector.Stop()  # its node was deleted: nothing comes any more
+            self._connector = None
+            self._forget()
         self._watch()
         self.verdict, label = self._judge()
         if self.verdict.show:
@@ -185,6 +189,8 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         """Verdict, and the label of the field."""
         if not self.connecting:
             return Verdict(Light.RED, "not connected"), None
+        if bridge_node(FIELD) is None and self.connected:
+            return Verdict(Light.RED, f"there is no volume {FIELD}: none has come, or it was renamed or deleted"), None
         if not self.connected:
             self._heard_at = None
             return Verdict(Light.RED, "no connection to the bridge"), None

@@ -56,7 +56,11 @@ Status Follower::run(const std::stop_token& stop) {
                             status.error().code == ErrorCode::kModelNotReady;
       if (!began_ && !may_pass) return status;
       FieldStatus none{Currency::kStale, status.error().message, std::nan("")};
-      if (!shown_ || !shown_->state.blank || shown_->state.reason != none.reason) blank(none);
+      if (!shown_ || !shown_->state.blank || shown_->state.reason != none.reason) {
+        blank(none);
+      } else {
+        sign_of_life(none);
+      }
       if (std::exchange(told_, none.reason) != none.reason) calls_.tell(none.reason);
     }
     rest_for(stop, kRetry);
