@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "client/lib/field_status.hpp"
-#include "common/core/boot_clock.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/values/session_state.hpp"
 
 namespace brainshift::client {

@@ -59,8 +59,8 @@ Result<Message> decode(const Header& header, std::string_view body);
 // One whole message and nothing else: header, size and CRC are checked, too.
 Result<Message> decode(std::string_view bytes);
 
-// The whole name of the message's device. Headers hold 20 bytes; PlusServer has a longer name in the
-// metadata IGTL_DEVICE_NAME of version 2.
+// The whole name of the message's device. Headers hold 20 bytes; PlusServer has a longer name in
+// the metadata IGTL_DEVICE_NAME of version 2.
 std::string full_device(const Envelope& envelope);
 // Whether a device was meant by its whole name. Without metadata a longer one is known by its first
 // 20 bytes alone.

@@ -39,7 +39,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/boot_clock.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/core/error.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/values/decision.hpp"

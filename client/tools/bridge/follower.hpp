@@ -7,8 +7,8 @@
 //   - when nothing is heard of the daemon any more (stale), by this computer's own clock,
 //   - when its data are older than the daemon's second limit (expired),
 //   - when the session has ended, another one runs, or the daemon serves another model.
-// An aged field stays, with that word. The state goes out once a second besides, as a sign of life. It connects again by itself, and
-// makes grid and surfaces anew for another model.
+// An aged field stays, with that word. The state goes out once a second besides, as a sign of
+// life. It connects again by itself, and makes grid and surfaces anew for another model.
 //
 // Runs in a thread of its own; the callbacks are called there.
 #pragma once

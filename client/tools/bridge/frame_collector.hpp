@@ -8,8 +8,8 @@
 //
 // A transform's name is the device name of TRANSFORM, the tool's name in TDATA; a tool's name that
 // is no pair of frames ("Probe") means ProbeToTracker. Its validity stands in the metadata
-// TransformStatus, or NAMEStatus for TDATA: anything but OK is invalid. Names above 20 bytes stand in
-// the metadata as well (igtl::full_device, igtl::tool_state). Version 1 has no metadata;
+// TransformStatus, or NAMEStatus for TDATA: anything but OK is invalid. Names above 20 bytes stand
+// in the metadata as well (igtl::full_device, igtl::tool_state). Version 1 has no metadata;
 // PlusServer then sends valid transforms alone (SendValidTransformsOnly), so they count as valid.
 // Matrices are checked as those of files are. Source: vtkPlusIgtlMessageCommon.cxx of
 // PlusToolkit/PlusLib.

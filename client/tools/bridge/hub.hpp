@@ -10,9 +10,9 @@
 // Messages without a time that came while this process stood still (SIGSTOP) are of nobody knows
 // when: they are dropped with a note.
 //
-// Requests: GET_STATUS is answered with the newest STATUS and its age by now, GET_CAPABIL with the types that are
-// sent. Other messages go to the sink, in the hub's thread; types that nobody wants are read and
-// dropped.
+// Requests: GET_STATUS is answered with the newest STATUS and its age by now, GET_CAPABIL with the
+// types that are sent. Other messages go to the sink, in the hub's thread; types that nobody wants
+// are read and dropped.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "client/tools/bridge/peer.hpp"
-#include "common/core/boot_clock.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {

@@ -6,8 +6,8 @@
 // its own takes them, makes observations (Inbox), and submits them over a connection of its own, so
 // that neither tracing nor a slow daemon holds up what is sent to OpenIGTLink clients.
 //
-// What comes in is of one patient: of `case_id`, and of the first model of it that the daemon serves.
-// Nothing is submitted to another one, after a restart of the daemon for instance.
+// What comes in is of one patient: of `case_id`, and of the first model of it that the daemon
+// serves. Nothing is submitted to another one, after a restart of the daemon for instance.
 //
 // Sequence numbers begin at the milliseconds since 1970, so that they count on when the bridge is
 // started again within a session. Times are of this computer's monotonic clock.

@@ -8,10 +8,10 @@
 //                                          the code of `brainshift import`
 //
 // Models and points are in model_frame. When that is not Ras, the newest transforms and the
-// constants lead there; a frame that no chain connects is refused with a note.
-// Contours and seeds name the images of a sweep by their time (import_boundaries.hpp): a count would
-// be of what another process received. The files are read when the sweep ends, so that they may be
-// written while it goes on.
+// constants lead there; a frame that no chain connects is refused with a note. Contours and seeds
+// name the images of a sweep by their time (import_boundaries.hpp): a count would be of what
+// another process received. The files are read when the sweep ends, so that they may be written
+// while it goes on.
 //
 // Statistics: as for `brainshift import`; every point's error has standard deviation sd_mm and is
 // taken as independent of the other points' errors.

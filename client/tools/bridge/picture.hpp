@@ -50,9 +50,9 @@ struct ShownState {
 // Names of the quality's flags that are set, and "late" for an answer that was, joined by "+".
 std::string flag_names(const Update& update);
 
-// Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null when
-// not known), direction ("modeling"), recorded, method, boundary, blank, has_sd, grid_error_mm, spacing_mm, fade_mm. UTF-8;
-// bytes that are none are replaced.
+// Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null
+// when not known), direction ("modeling"), recorded, method, boundary, blank, has_sd,
+// grid_error_mm, spacing_mm, fade_mm. UTF-8; bytes that are none are replaced.
 std::string to_json(const ShownState& state);
 // The same keys; a number as JSON writes it, an unknown age as "unknown".
 igtl::Metadata to_metadata(const ShownState& state);

@@ -54,10 +54,10 @@ using ImageTimes = std::vector<std::int64_t>;
 // Two clocks are never compared: both times are the image's own, one of them rounded at most.
 inline constexpr std::int64_t kSameImage_ns = 1'000'000;
 
-// Contours of a file, with `frame` counting the recording's or the live images. A row belongs to the
-// image at its time, within kSameImage_ns and nearer than half way to the next image. Rows without
-// such an image are left out with a note. kInvalidArgument: rows that count live images, or name
-// recorded ones by time; kEmptySet: no row has an image; errors of io::read_contours.
+// Contours of a file, with `frame` counting the recording's or the live images. A row belongs to
+// the image at its time, within kSameImage_ns and nearer than half way to the next image. Rows
+// without such an image are left out with a note. kInvalidArgument: rows that count live images,
+// or name recorded ones by time; kEmptySet: no row has an image; errors of io::read_contours.
 Result<std::vector<ultrasound::Contour>> contours_of_file(const std::filesystem::path& path,
                                                           bool closed, const ImageTimes* images,
                                                           std::vector<std::string>& notes);

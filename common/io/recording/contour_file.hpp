@@ -5,8 +5,8 @@
 //   .json  {"contours": [{"frame": 12, "closed": true, "points_px": [[u, v], ...]}, ...]}
 // With time_s in the place of frame (the heading time_s,u_px,v_px; the key "time_s") the image is
 // named by its time, s since 1970 UTC, as OpenIGTLink's messages have it: for live images, which
-// nobody can count. Frames count from 0; pixels as tracking::Recording has them (orientation MF). '#' begins a
-// comment in a .csv.
+// nobody can count. Frames count from 0; pixels as tracking::Recording has them (orientation MF).
+// '#' begins a comment in a .csv.
 #pragma once
 
 #include <filesystem>
