@@ -2,6 +2,7 @@
 """The Slicer module's nodes and widgets, against a stand-in for Slicer (slicer_stub.py). No Slicer runs here."""
 import importlib
 import json
+import sys
 import types
 
 import numpy as np
@@ -481,6 +482,13 @@ def test_the_panel_tells_errors_instead_of_raising_them(panel):
     panel.widget.followers.checked = [volume]
     panel.widget.on_followers()
     assert "deformed already" in panel.slicer.errors[-1]
+
+
+def test_the_modules_own_test_finds_every_name(panel):
+    module = sys.modules[type(panel.widget).__module__]
+    own = module.BrainshiftTest()
+    own.runTest()
+    assert own.said == "Test passed"
 
 
 def test_text_from_the_bridge_is_no_markup(panel):
