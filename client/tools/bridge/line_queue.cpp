@@ -18,6 +18,27 @@ constexpr int kLookForRoom_ms = 50;
 
 }  // namespace
 
+std::string printable(std::string text) {
+  const auto at = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+  };
+  std::string out;
+  out.reserve(text.size());
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned a = at(i), b = at(i + 1), c = at(i + 2);
+    std::size_t obeyed = 0;  // bytes
+    if (a < 0x20 || a == 0x7f) obeyed = 1;
+    if (a == 0xc2 && b >= 0x80 && b <= 0x9f) obeyed = 2;  // U+0080 to U+009F
+    const bool turns = (b == 0x80 && ((c >= 0xaa && c <= 0xae) || c == 0x8e || c == 0x8f)) ||
+                       (b == 0x81 && c >= 0xa6 && c <= 0xa9);
+    if (a == 0xe2 && turns) obeyed = 3;  // U+200E, 200F, 202A to 202E, 2066 to 2069
+    if (obeyed == 0) out.push_back(text[i]);
+    if (obeyed > 0) out.push_back('?');
+    i += std::max<std::size_t>(obeyed, 1);
+  }
+  return out;
+}
+
 LineQueue::LineQueue(int descriptor) : descriptor_(descriptor), thread_([this] { run(); }) {}
 
 LineQueue::~LineQueue() {
@@ -37,7 +58,7 @@ void LineQueue::tell(std::string line) {
       ++dropped_;
       return;
     }
-    lines_.push_back(std::move(line));
+    lines_.push_back(printable(std::move(line)));
   }
   news_.notify_one();
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // LineQueue: lines for a terminal, a pipe or a file that may not be read. tell() never waits: a
 // thread of its own writes, and what finds no room is counted instead. Without a reader (EPIPE)
-// nothing is written any more.
+// nothing is written any more. What a terminal would obey in a peer's text (control characters of
+// ASCII and of Unicode's first block, marks that turn the direction of writing) becomes '?'.
 #pragma once
 
 #include <chrono>
@@ -15,6 +16,9 @@
 #include <thread>
 
 namespace brainshift::client {
+
+// The text with such characters replaced.
+std::string printable(std::string text);
 
 class LineQueue {
  public:

@@ -53,6 +53,16 @@ TEST(LineQueue, WritesLinesInTheirOrder) {
   EXPECT_EQ(pipe.rest(), "one\ntwo\n");
 }
 
+TEST(LineQueue, WhatATerminalWouldObeyIsReplaced) {
+  EXPECT_EQ(printable("a\x1b[2Jb\tc\x7f"), "a?[2Jb?c?");
+  EXPECT_EQ(printable("a\xc2\x9b"
+                      "2Jb \xe2\x80\xae"
+                      "c \xe2\x81\xa6"),
+            "a?2Jb ?c ?");
+  EXPECT_EQ(printable("K\xc3\xb6ln \xe2\x80\x93 5 \xc2\xb5m"),
+            "K\xc3\xb6ln \xe2\x80\x93 5 \xc2\xb5m");
+}
+
 // A paused pager, a full pipe: whoever tells goes on, and what is lost is counted once it is read.
 TEST(LineQueue, AReaderThatStallsDelaysNobodyAndLearnsWhatItMissed) {
   Pipe pipe;
