@@ -55,7 +55,7 @@ class SessionTest : public testing::Test {
     act();
   }
   Result<Admission> submit(Observation observation) {
-    auto admission = session_.submit(std::move(observation), now_);
+    auto admission = session_.submit(std::move(observation), now_, 0s);
     act();
     return admission;
   }
@@ -106,7 +106,7 @@ class SessionTest : public testing::Test {
     EXPECT_TRUE(submit(observation).has_value());
     return answer();
   }
-  Session::State state() const { return session_.state(now_); }
+  Session::State state() const { return session_.state(now_, 0s); }
   // A session that is asked for, made ready and begun.
   Result<SessionInfo> start(Boundary boundary = Boundary::kContact) {
     ask(request(boundary));
@@ -529,7 +529,7 @@ TEST_F(SessionTest, ARecordingSaysSoAndItsMethodAndBoundary) {
   old.acquired_ns = 5;
   answer(old);
   now_ += 2s;
-  EXPECT_NEAR(session_.state(now_).shared.age_ms, 2e3, 1.0) << "since it was played";
+  EXPECT_EQ(state().shared.age_ms, 2e3) << "since it was played";
 }
 
 TEST_F(RunningSession, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
