@@ -135,6 +135,7 @@ struct Client::Impl {
       return updates.push(protocol_error(fits.error().message));
     }
     update->received_bytes = payload.size();
+    update->received_at = BootClock::now().time_since_epoch();
     update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
     const FieldAssembly::Outcome outcome = assembly.complete(*update);
     if (outcome == FieldAssembly::Outcome::kLost && subscription) ask_anew();
@@ -341,8 +342,16 @@ const std::optional<UpdateMessage>& Client::latest_usable() const {
 
 FieldStatus Client::field_status() const {
   std::optional<std::pair<SessionKey, std::uint64_t>> shown;
-  if (const auto& field = latest_usable()) shown.emplace(field->key(), field->update.sequence);
-  return impl_->watch.judge(shown, impl_->dealer->endpoint(), BootClock::now());
+  double own_age_s = std::numeric_limits<double>::quiet_NaN();
+  if (const auto& field = latest_usable()) {
+    shown.emplace(field->key(), field->update.sequence);
+    const auto held = BootClock::now().time_since_epoch() - field->received_at;
+    const AnswerTime& answer = field->update.answer_time;
+    if (answer.ms > 0.0) {
+      own_age_s = 1e-3 * answer.age_ms + std::chrono::duration<double>(held).count();
+    }
+  }
+  return impl_->watch.judge(shown, impl_->dealer->endpoint(), BootClock::now(), own_age_s);
 }
 
 const std::optional<SessionState>& Client::session_state() const { return impl_->watch.state(); }

@@ -53,15 +53,16 @@ bool SessionWatch::holds(TimePoint now) const {
 }
 
 FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
-                                const std::string& endpoint, TimePoint now) const {
-  FieldStatus status = currency_of(shown, endpoint, now);
+                                const std::string& endpoint, TimePoint now,
+                                double own_age_s) const {
+  FieldStatus status = currency_of(shown, endpoint, now, own_age_s);
   status.recorded = state_ && state_->recorded;
   return status;
 }
 
 FieldStatus SessionWatch::currency_of(
     const std::optional<std::pair<SessionKey, std::uint64_t>>& shown, const std::string& endpoint,
-    TimePoint now) const {
+    TimePoint now, double own_age_s) const {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   if (!state_ || !as_of_) return {Currency::kStale, "not subscribed to " + endpoint, kUnknown};
   const SessionState& state = *state_;
@@ -79,7 +80,8 @@ FieldStatus SessionWatch::currency_of(
   }
   const double silent_s = seconds(now - *as_of_);
   const bool newest = shown->second == state.newest_usable;
-  const double age_s = newest ? 1e-3 * state.age_ms + silent_s : kUnknown;
+  double age_s = newest ? 1e-3 * state.age_ms + silent_s : kUnknown;
+  if (shown->second > state.newest_usable) age_s = own_age_s;
   if (!holds(now)) {
     return {Currency::kStale, "no word from " + endpoint + " for " + one_decimal(silent_s) + " s",
             age_s};

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -45,13 +46,16 @@ class SessionWatch {
   bool holds(TimePoint now) const;
   // Whether a field may be shown as current. shown: session and number of the newest usable field
   // that the viewer has; empty: it has none.
+  // own_age_s: of that field, as its update says; NaN: not known. It counts as long as the daemon
+  // has not been heard since that update.
   FieldStatus judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
-                    const std::string& endpoint, TimePoint now) const;
+                    const std::string& endpoint, TimePoint now,
+                    double own_age_s = std::numeric_limits<double>::quiet_NaN()) const;
 
  private:
   // judge(), but for `recorded`.
   FieldStatus currency_of(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
-                          const std::string& endpoint, TimePoint now) const;
+                          const std::string& endpoint, TimePoint now, double own_age_s) const;
 
   static constexpr std::size_t kMaxAsked = 64;
 

@@ -170,6 +170,7 @@ void Service::publish(UpdateMessage message, const Job& job) {
   if (update.final) {
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - job.arrived).count();
     update.answer_time = usual_time_.answer(message.session_id, ms, estimated);
+    update.answer_time.age_ms = job.age_ms(Clock::now());
   }
   wire::append_timings(update, payload);
   Bytes frame = framed(MessageType::kUpdate, 0, payload);

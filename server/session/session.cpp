@@ -19,6 +19,15 @@ double seconds_of(Session::TimePoint::duration duration) {
 
 }  // namespace
 
+Job::TimePoint Job::acquired() const {
+  if (request.recorded_clock) return arrived;
+  return TimePoint(std::chrono::nanoseconds(observation.acquired_ns));
+}
+
+double Job::age_ms(TimePoint now, std::chrono::nanoseconds asleep_now) const {
+  return std::max(0.0, 1e3 * seconds_of(now - acquired() + (asleep_now - asleep)));
+}
+
 Session::Session(std::string case_id, std::uint64_t boot_id, std::string model_id)
     : case_id_(std::move(case_id)), boot_id_(boot_id), model_id_(std::move(model_id)) {}
 
@@ -214,10 +223,7 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
   update.sequence = running_->newest_update = job.number;
   if (result && update.usable()) {
     running_->newest_usable = update.sequence;
-    running_->usable_acquired =
-        job.request.recorded_clock
-            ? job.arrived
-            : TimePoint(std::chrono::nanoseconds(job.observation.acquired_ns));
+    running_->usable_acquired = job.acquired();
     running_->usable_asleep = job.asleep;
   } else {
     running_->reason = result ? update.estimate.quality.reason : message.error->message;

@@ -39,8 +39,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/core/stopwatch.hpp"
 #include "common/core/error.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/values/decision.hpp"
 #include "common/values/observation.hpp"
@@ -86,6 +86,11 @@ struct Job {
   SessionModel* model = nullptr;
   std::stop_token stop;
   std::chrono::nanoseconds asleep{0};  // the computer so far, when the observation arrived
+
+  // When its data were acquired, on the daemon's clock; when they arrived, of a recording.
+  TimePoint acquired() const;
+  // Since then, the computer's sleep included.
+  double age_ms(TimePoint now, std::chrono::nanoseconds asleep_now = brainshift::asleep()) const;
 };
 
 // In the order in which they are to be acted on.

@@ -275,7 +275,7 @@ class Client:
                 if not self._latest.belongs(update.session) or not self._watch.model_fits(update.session.model_id):
                     return
                 codec.check_mesh(update, self._mesh_nodes)
-                self._updates.append(update)
+                self._updates.append(dataclasses.replace(update, received_s=boot_time()))
             except ProtocolError as error:
                 self._updates.append(error)  # next_update() raises it, no other call
 

@@ -308,8 +308,8 @@ def update(payload: bytes) -> v.Update:
     checked.require(m.method in _METHODS, "method", f"{m.method!r} is unknown")
     checked.require(m.boundary in _BOUNDARIES, "boundary", f"{m.boundary!r} is unknown")
     timings = v.Timings(*_times(m.timings, "register_ms", "invert_ms", "rebuild_ms", "encode_ms", "journal_ms"))
-    ms, usual_ms = _times(m.answer_time, "ms", "usual_ms")
-    answer = v.AnswerTime(ms, usual_ms, m.answer_time.late)
+    ms, usual_ms, age_ms = _times(m.answer_time, "ms", "usual_ms", "age_ms")
+    answer = v.AnswerTime(ms, usual_ms, m.answer_time.late, age_ms)
     checked.require(answer.late == (answer.usual_ms > 0.0 and answer.ms > 2.0 * answer.usual_ms), "answer_time.late",
                     "does not follow from ms and usual_ms")
     if m.HasField("t_undeformed_deformed"):

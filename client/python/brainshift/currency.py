@@ -77,6 +77,8 @@ class SessionWatch:
                 Currency.NONE, f"no usable field of the running session yet ({state.phase.name.lower()})", None)
         silent_s = now - self.as_of
         age_s = 1e-3 * state.age_ms + silent_s if shown.sequence == state.newest_usable else None
+        if shown.sequence > state.newest_usable and shown.answer_time.ms > 0.0:  # the daemon's word is older
+            age_s = 1e-3 * shown.answer_time.age_ms + now - shown.received_s
         if silent_s >= 1e-3 * state.valid_ms:
             return FieldStatus(Currency.STALE, f"no word from {endpoint} for {silent_s:.1f} s", age_s)
         if shown.sequence < state.newest_usable:

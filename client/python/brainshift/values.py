@@ -257,6 +257,7 @@ class AnswerTime:
     ms: float
     usual_ms: float  # median over the earlier answers of the session; 0: too few yet
     late: bool  # ms > 2 usual_ms: the brain may have moved since
+    age_ms: float = 0.0  # since its data were acquired, by the daemon's clock, when it was encoded
 
 
 @dataclass(frozen=True)
@@ -320,6 +321,7 @@ class Update:
     inverted_elements: int
     misfit_ratio: Optional[float]  # 1: data as far off as their errors say
     data_outside_region: int
+    received_s: float = 0.0  # when this client received it, by currency.boot_time()
 
     @property
     def failed(self) -> bool:

@@ -90,7 +90,7 @@ SCHEMA = {
         "min_volume_ratio": (27, "?double"), "inverted_elements": (28, "int"),
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
         "boot_id": (31, "fixed"), "part": (32, "FieldPart"), "answer_time": (33, "AnswerTime")},
-    "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int")},
+    "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int"), "age_ms": (4, "double")},
     "LatencyFigures": {
         "count": (1, "int"), "p50_ms": (2, "double"), "p95_ms": (3, "double"), "p99_ms": (4, "double"),
         "max_ms": (5, "double")},
@@ -226,7 +226,7 @@ MESSAGES = {
         "left_out": [], "quality": 3, "quality_flags": [1, 17],
         "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
         "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7,
-        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1}}),
+        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1, "age_ms": 118812.5}}),
     "update_changes": (12, 0, "Update", UPDATE | {
         "status": "converged", "reason": "contact holds", "quality": 1, "quality_flags": [],
         "quality_reason": "", "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]},

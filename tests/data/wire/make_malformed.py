@@ -29,7 +29,7 @@ PARTS = ("along_gravity", "across_gravity", "tumour_volume", "brain_volume", "re
 UPDATE = {key: value for key, value in golden.MESSAGES["update_changes"][3].items() if key != "part"} | {
     "contact": golden.MESSAGES["update_unusable"][3]["contact"], "sd_mm": [0.125, 2.0],
     "history": golden.MESSAGES["update"][3]["history"][:1],
-    "answer_time": {"ms": 30.5, "usual_ms": 34.25, "late": 0},
+    "answer_time": {"ms": 30.5, "usual_ms": 34.25, "late": 0, "age_ms": 35.5},
     "sources": [{"source": "ius", "observation_sequence": 2, "age_s": 0.5, "data": 9, "outliers": 1, "chi_square": 3.5,
                  "degrees_of_freedom": 4.5, "p_value": 0.5, "consistent": 1}],
     "prior_strengths": [{"part": part, "mean": 1.5, "absent": 0.25, "at_bound": 0} for part in PARTS],
@@ -157,7 +157,7 @@ def updates():
         changed("update", what, *changes)
 
     for path in ("history.0.elapsed_ms", "history.0.misfit.std_mm", "misfit.std_mm", "initial_misfit.std_mm",
-                 "timings.register_ms", "timings.journal_ms", "answer_time.ms", "answer_time.usual_ms", "misfit_ratio",
+                 "timings.register_ms", "timings.journal_ms", "answer_time.ms", "answer_time.usual_ms", "answer_time.age_ms", "misfit_ratio",
                  "contact.decrement", "sources.0.chi_square", "sources.0.degrees_of_freedom", "sources.0.p_value",
                  "prior_strengths.3.mean", "prior_strengths.3.absent", "hypotheses.0.weight", "hypotheses.0.scales.8"):
         bad(f"{path}=-1", (path, -1.0))

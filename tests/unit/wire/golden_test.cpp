@@ -163,7 +163,7 @@ UpdateMessage update_from(const json& value) {
                     timings["encode_ms"], timings["journal_ms"]};
   if (value.contains("answer_time")) {
     const json& time = value["answer_time"];
-    update.answer_time = {time["ms"], time["usual_ms"]};
+    update.answer_time = {time["ms"], time["usual_ms"], time["age_ms"]};
     EXPECT_EQ(time["late"] == 1, update.answer_time.late());
   }
   if (value["status"] == "failed") {

@@ -122,6 +122,19 @@ TEST_F(SessionWatchTest, AFieldNewerThanTheStateIsCurrentAndItsAgeIsNotKnown) {
   EXPECT_TRUE(std::isnan(newer.age_s));
 }
 
+// Data that were 118 s on their way: nobody has to wait for the daemon's next word.
+TEST_F(SessionWatchTest, AFieldNewerThanTheStateIsAsOldAsItsUpdateSays) {
+  SessionState state = tracking(5);
+  state.aged_after_ms = 30'000;
+  hear(milliseconds(0), state);
+  const auto judged = [&](double own_age_s) {
+    return watch_.judge(std::pair{kWatchedKey, std::uint64_t{6}}, "e", zero_, own_age_s);
+  };
+  EXPECT_EQ(judged(118.0).currency, Currency::kAged);
+  EXPECT_EQ(judged(118.0).age_s, 118.0);
+  EXPECT_EQ(judged(1.0).currency, Currency::kCurrent);
+}
+
 TEST_F(SessionWatchTest, AFieldOfAnotherSessionOrDaemonIsNone) {
   hear(milliseconds(0), tracking(5));
   for (const SessionKey& key : {SessionKey{7, 2, "model"}, SessionKey{8, 1, "model"}}) {
