@@ -59,10 +59,11 @@ void Hub::post(PicturePtr picture, Broadcast::Part part) {
   {
     const std::lock_guard lock(mutex_);
     if (part == Broadcast::Part::kWhole) {
-      pending_ = {std::move(picture), nullptr};
+      pending_ = {std::move(picture), nullptr, {}};
     } else {
       pending_.state = std::move(picture);
     }
+    pending_.posted = BootClock::now();
   }
   wake();
 }
@@ -76,7 +77,7 @@ void Hub::take_posts() {
     taken = std::exchange(pending_, {});
   }
   if (!taken.whole && !taken.state) return;
-  heard_ = BootClock::now();
+  heard_ = taken.posted;
   if (!taken.whole && hidden_) taken.whole = hidden_->picture_ptr();
   hidden_ = nullptr;
   if (taken.whole) offer(std::move(taken.whole), Broadcast::Part::kWhole);

@@ -72,6 +72,7 @@ class Hub {
   struct Pending {
     PicturePtr whole;
     PicturePtr state;
+    BootClock::time_point posted;  // the newest of the two
   };
   void wake();
   void take_posts();
