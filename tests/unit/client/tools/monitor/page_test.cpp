@@ -161,7 +161,8 @@ TEST(Summary, IsOneLineWithPhaseAgeRateLatencyAndJournal) {
   now.uptime_ms += 1000;
   now.usable += 30;
   EXPECT_EQ(summary({now, before}),
-            "tracking, field 0.2 s old, 30.0 updates/s, total p50 31.50 p95 40.25 p99 55.00 max "
+            "tracking, field 0.2 s old, condensed, contact, 30.0 updates/s, total p50 31.50 p95 "
+            "40.25 p99 55.00 max "
             "90.12 ms, recording");
 }
 
